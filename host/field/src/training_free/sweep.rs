@@ -109,8 +109,8 @@ pub(super) struct Views<'a, D: Device> {
     matched: Images<D>,
     /// `[view][row][column]` of the matched ones: disparity and confidence.
     disparities: D::Buffer<[f32; 2]>,
-    /// Those found the second time, and of which views.
-    settled: Option<(Vec<usize>, D::Buffer<[f32; 2]>)>,
+    /// Those found the second time.
+    settled: Option<Settled<D>>,
     /// From a plane's disparity to the next one's, of each view; 0 if it is not encoded.
     steps: Vec<f32>,
     relevance: Vec<SourceWeights>,
@@ -125,6 +125,12 @@ pub(super) struct Views<'a, D: Device> {
     unkept: Vec<(usize, Key)>,
     /// The gains estimated from some views under the current weighting, and these views.
     gains: Option<(Vec<usize>, Vec<[f32; 4]>)>,
+}
+
+/// Disparities and confidences of some views, found the second time.
+struct Settled<D: Device> {
+    views: Vec<usize>,
+    maps: D::Buffer<[f32; 2]>,
 }
 
 /// The planes of a target.

@@ -1,7 +1,7 @@
 //! The disparities of the sources: found in each one's own frustum, found a second time by what they say of one another, and
 //! kept between runs.
 
-use super::{Sweep, Views, swept};
+use super::{Settled, Sweep, Views, swept};
 use crate::FieldError;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::Device;
@@ -12,16 +12,16 @@ use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
 impl<D: Device> Views<'_, D> {
     /// The sources' disparities and confidences.
     pub(super) fn maps(&self) -> &D::Buffer<[f32; 2]> {
-        self.settled.as_ref().map_or(&self.disparities, |(_, maps)| maps)
+        self.settled.as_ref().map_or(&self.disparities, |settled| &settled.maps)
     }
 
     /// Finds the disparities of these views the second time, if the settings ask for it.
     pub(super) fn settle(&mut self, views: &[usize], progress: &dyn Progress) -> Result<(), FieldError> {
-        if self.settings.second_share <= 0.0 || self.settled.as_ref().is_some_and(|(own, _)| own == views) {
+        if self.settings.second_share <= 0.0 || self.settled.as_ref().is_some_and(|settled| settled.views == views) {
             return Ok(());
         }
         self.gains = None;
-        let mut settled = self.device.zeros(self.texels.len())?;
+        let mut maps = self.device.zeros(self.texels.len())?;
         for &view in views {
             let front_share = self.settings.second_share;
             let others: Vec<(usize, f32)> =
@@ -31,9 +31,9 @@ impl<D: Device> Views<'_, D> {
             let settings = Sweep { front_share, ..self.settings };
             let (frustum, swept) = self.source_frustum(view, settings);
             let costs = self.source_costs(&frustum, &swept, &voters, settings, progress)?;
-            self.device.pick_disparity(&frustum, &costs, &mut settled)?;
+            self.device.pick_disparity(&frustum, &costs, &mut maps)?;
         }
-        self.settled = Some((views.to_vec(), settled));
+        self.settled = Some(Settled { views: views.to_vec(), maps });
         Ok(())
     }
 
