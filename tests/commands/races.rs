@@ -109,7 +109,7 @@ fn killed_while_two_race() {
         }
         let (like, time) = &known[race];
         // By turns an empty folder and what the last race left.
-        if kill / RACES.len() % 2 == 0 {
+        if (kill / RACES.len()).is_multiple_of(2) {
             clear();
         }
         random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
