@@ -50,11 +50,6 @@ impl Answer {
         Answer { status, media_type: "text/plain; charset=utf-8", body: message.as_bytes().to_vec() }
     }
 
-    #[cfg(test)]
-    pub(crate) fn status(&self) -> u16 {
-        self.status
-    }
-
     /// Head and body as they are sent; to a request for the head alone, no body.
     pub(crate) fn to_bytes(&self, is_head_only: bool, is_last: bool) -> Vec<u8> {
         let Answer { status, media_type, body } = self;
