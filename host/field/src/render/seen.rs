@@ -37,10 +37,13 @@ pub(super) fn seen(camera: &Camera, [width, height]: [u32; 2], depths: &[f32], m
                 let shows = |map: &&DepthMap| {
                     let there = map.camera.project(point);
                     let at = || map.camera.texel_at(there.x, there.y);
+                    // A field that tells no confidence is sure.
                     let hides = |at: usize| {
-                        map.confidences[at] > MIN_CONFIDENCE
-                            && map.depths[at] > 0.0
-                            && there.depth > map.depths[at] * (1.0 + MAX_BEHIND)
+                        map.confidences.get(at).is_none_or(|confidence| *confidence > MIN_CONFIDENCE)
+                            && map
+                                .depths
+                                .get(at)
+                                .is_some_and(|surface| *surface > 0.0 && there.depth > surface * (1.0 + MAX_BEHIND))
                     };
                     there.in_image && !hides(at())
                 };
@@ -92,6 +95,7 @@ mod tests {
     #[test]
     fn a_sure_surface_hides_what_lies_behind_it() {
         assert_eq!(of(2.0, &[map(0.0, 1.5, 1.0)]), [1.0, 0.0]);
+        assert_eq!(of(2.0, &[DepthMap { confidences: Vec::new(), ..map(0.0, 1.5, 1.0) }]), [1.0, 0.0]);
         for shown in [map(0.0, 1.5, 0.25), map(0.0, 2.5, 1.0), map(0.0, 0.0, 1.0)] {
             assert_eq!(of(2.0, &[shown]), [0.0, 1.0]);
         }

@@ -129,7 +129,8 @@ pub(super) struct Views<'a, D: Device> {
 
 /// Disparities and confidences of some views, found the second time.
 struct Settled<D: Device> {
-    views: Vec<usize>,
+    /// Of each view, by which others and with which weights; none where it was not found.
+    voters: Vec<Option<Vec<(usize, f32)>>>,
     maps: D::Buffer<[f32; 2]>,
 }
 

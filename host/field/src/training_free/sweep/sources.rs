@@ -6,8 +6,8 @@ use crate::FieldError;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
-use viewfuse_kernels::plane_sweep::Planes;
 use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
+use viewfuse_kernels::plane_sweep::{MAX_MATCHED, Planes};
 
 impl<D: Device> Views<'_, D> {
     /// The sources' disparities and confidences.
@@ -15,25 +15,32 @@ impl<D: Device> Views<'_, D> {
         self.settled.as_ref().map_or(&self.disparities, |settled| &settled.maps)
     }
 
-    /// Finds the disparities of these views the second time, if the settings ask for it.
+    /// Finds the disparities of these views the second time, if the settings ask for it, where others say something of them than
+    /// the last time.
     pub(super) fn settle(&mut self, views: &[usize], progress: &dyn Progress) -> Result<(), FieldError> {
-        if self.settings.second_share <= 0.0 || self.settled.as_ref().is_some_and(|settled| settled.views == views) {
+        if self.settings.second_share <= 0.0 {
             return Ok(());
         }
-        self.gains = None;
-        let mut maps = self.device.zeros(self.texels.len())?;
+        let Settled { mut voters, mut maps } = match self.settled.take() {
+            Some(settled) => settled,
+            None => Settled { voters: vec![None; self.steps.len()], maps: self.device.zeros(self.texels.len())? },
+        };
+        let settings = Sweep { front_share: self.settings.second_share, ..self.settings };
         for &view in views {
-            let front_share = self.settings.second_share;
-            let others: Vec<(usize, f32)> =
-                self.others(view).into_iter().filter(|(other, _)| views.contains(other)).collect();
-            let cameras = &self.matched.cameras;
-            let voters = swept(cameras, cameras, &others, Some(&self.steps), None);
-            let settings = Sweep { front_share, ..self.settings };
-            let (frustum, swept) = self.source_frustum(view, settings);
-            let costs = self.source_costs(&frustum, &swept, &voters, settings, progress)?;
-            self.device.pick_disparity(&frustum, &costs, &mut maps)?;
+            let mut others = self.others(view);
+            others.retain(|(other, weight)| views.contains(other) && *weight > 0.0);
+            others.truncate(MAX_MATCHED);
+            if voters[view].as_ref() != Some(&others) {
+                let cameras = &self.matched.cameras;
+                let own = swept(cameras, cameras, &others, Some(&self.steps), None);
+                let (frustum, swept) = self.source_frustum(view, settings);
+                let costs = self.source_costs(&frustum, &swept, &own, settings, progress)?;
+                self.device.pick_disparity(&frustum, &costs, &mut maps)?;
+                voters[view] = Some(others);
+                self.gains = None;
+            }
         }
-        self.settled = Some(Settled { views: views.to_vec(), maps });
+        self.settled = Some(Settled { voters, maps });
         Ok(())
     }
 
