@@ -54,7 +54,7 @@ const NOT_RUN: [(&str, &str); 14] = [
     ("cargo install", "it would change the machine"),
     ("pip install", "it would change the machine"),
     ("host/python/test", "`python.rs` runs it where it is asked for"),
-    ("VIEWFUSE_FUZZ_SECONDS=", "`fuzz` runs a part of it; the whole takes minutes"),
+    ("VIEWFUSE_FUZZ_", "`fuzz` runs a part of it; the whole takes minutes"),
     ("seq ", "`protocols/cluster.rs` runs it where GNU parallel is"),
     ("srun ", "`protocols/cluster.rs` runs it where Slurm is"),
     ("  --shard ", "the same"),

@@ -42,6 +42,7 @@ mod undistort;
 use check::Checked;
 pub use error::SceneError;
 pub use fault::{FaultLocation, FileFault, IntrinsicsFault, NumpyFault};
+pub use frame::SRN_DISTANCE;
 use images::Turn;
 pub use images::{encode_png, picture_size, read_picture};
 use reader::Reader;

@@ -6,11 +6,9 @@
 
 use crate::Scene;
 use crate::rig::Rig;
+pub use crate::scene::SRN_DISTANCE;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::pose::Pose;
-
-/// Distance of SRN's cameras from what they look at.
-pub const SRN_DISTANCE: f32 = 1.3;
 
 /// Scenes whose cameras are so near to [`SRN_DISTANCE`], relatively, keep their numbers bit for bit.
 const MAX_DEVIATION: f32 = 1.0e-4;

@@ -4,8 +4,8 @@
 //! ```text
 //! page         the page's files, which are part of the program
 //! request      requests of the page, checked
-//! answer       a frame as the page gets it
 //! record       what belongs to a picture that is saved
+//! answer       a frame as the page gets it
 //! choice       the scheme that suits the scene, chosen beside the pictures
 //! status       what is being done
 //! mailbox      of each tab only the newest request waits
@@ -15,6 +15,7 @@
 //! coarse       a cheaper form of the field, and smaller sources
 //! render_loop  takes requests, renders, answers
 //! message      requests as HTTP writes them, within limits
+//! protocol     what the server reads of a connection's bytes, without the server
 //! connection   one connection: requests in, answers out, within limits of time
 //! connections  how many there may be, and which one makes way
 //! server       who may ask, and for what

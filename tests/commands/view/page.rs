@@ -136,7 +136,8 @@ fn schemes_and_layers(tab: &Tab<'_>) {
         keep(tab, &format!("{layer}.png"));
     }
     tab.evaluate("document.querySelector('#sources button').click()");
-    tab.wait_for(&format!("{WEIGHTS}[0] > 0.8"));
+    // From its own place it is the most relevant one.
+    tab.wait_for(&format!("{FULL} && {WEIGHTS}[0] === Math.max(...{WEIGHTS})"));
 }
 
 fn tabs_come_and_go(browser: &Browser) {

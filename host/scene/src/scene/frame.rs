@@ -6,7 +6,9 @@
 use glam::{DMat3, DVec3};
 
 use super::SceneFrame;
-use crate::unit::SRN_DISTANCE;
+
+/// Distance of SRN's cameras from what they look at.
+pub const SRN_DISTANCE: f32 = 1.3;
 
 /// Largest distance of the cameras' centroid from the origin, as a multiple of their spread.
 const FAR_FROM_ORIGIN: f64 = 16.0;
