@@ -53,6 +53,18 @@ fn picture_with(
     recorded(field, sources, weights, target, early_termination).0
 }
 
+/// Whether there is no picture, because the network's outputs are not finite.
+fn is_not_finite(
+    field: &PixelNerf,
+    sources: &SourceImages,
+    weights: &SourceWeights,
+    target: &Camera,
+    early_termination: f32,
+) -> bool {
+    let outcome = fields::picture(&Cpu, field, sources, weights, target, early_termination, &Silent);
+    matches!(outcome, Err(FieldError::NotFinite(_)))
+}
+
 /// A picture, and what the field says of it.
 fn recorded(
     field: &PixelNerf,

@@ -222,7 +222,9 @@ fn numbers_that_are_none_are_found() {
         }
     }
     let error = NotFinite { stage: "s".into(), tensor: "t".into(), index: 3, value: f32::NAN };
-    assert_eq!(error.to_string(), "s: element 3 of the t is NaN, not a finite number");
+    assert_eq!(error.to_string(), "s: element 3 of the t is not a finite number");
+    let infinite = NotFinite { value: f32::INFINITY, ..error };
+    assert_eq!(infinite.to_string(), "s: element 3 of the t is inf, not a finite number");
 }
 
 #[test]

@@ -91,7 +91,7 @@ impl Target for Shell {
         Ok(if is_plain {
             Verdict::Read
         } else {
-            Verdict::Refused(word[..word.len().min(2)].replace(char::is_alphanumeric, ""))
+            Verdict::Refused(word.chars().take(2).filter(|own| !own.is_alphanumeric()).collect())
         })
     }
 }
