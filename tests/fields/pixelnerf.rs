@@ -7,6 +7,7 @@ mod sizes;
 mod visibility;
 
 use viewfuse::device::cpu::Cpu;
+use viewfuse::field::FieldError;
 use viewfuse::field::pixelnerf::{Architecture, Omissions, PixelNerf, PixelNerfOptions, test_networks};
 use viewfuse::field::{Field, Record, Rendered, SourceSide};
 use viewfuse::job::progress::Silent;
