@@ -21,7 +21,7 @@ use viewfuse_tests::trials::{is_required, needing, trial};
 
 const REQUIRED: &str = "VIEWFUSE_REQUIRE_CLUSTER";
 /// What the recipes do, made small.
-const SMALL: &str = "--protocol random --trials 4 --targets-per-trial 1 --size 24x24 --device cpu --weights mean";
+const SMALL: &str = "--protocol random --trials 4 --targets-per-trial 1 --size 64x64 --device cpu --weights mean";
 
 pub(crate) fn trials() -> Vec<Trial> {
     let missing = |programs: &[&str]| {
