@@ -1,22 +1,19 @@
 //! What is expected of the drivers that the tests know, and that it is neither less nor more: a driver that begins to do what
 //! it did not do fails as well, so that the table stays true and what was left out for it comes back.
 //!
-//! With it: the size of subgroups that a driver reports, and dispatches that
-//! are small before a kernel's time is known. All of that holds on every device.
+//! With it: dispatches that are small before a kernel's time is known, which holds on every device.
 
 use crate::candidate::{Candidate, Test};
+use crate::forms::linear;
 use bytemuck::bytes_of;
 use libtest_mimic::Failed;
 use std::time::Duration;
 use viewfuse_core::fuse::FuseBlock;
-use viewfuse_kernels::network::linear::LinearBlock;
 use viewfuse_vulkan::kernel::{Form, Kernel};
 use viewfuse_vulkan::{Gpu, GpuOptions, VulkanError};
 
 pub(crate) const TESTS: &[Test] = &[
     Test::new("the_driver_is_as_expected", the_driver_is_as_expected),
-    Test::new("measured_forms_give_the_same_bits", measured_forms_give_the_same_bits),
-    Test::new("pipelines_have_the_subgroups_that_were_asked_for", pipelines_have_the_subgroups_that_were_asked_for),
     Test::new("an_unknown_kernel_begins_with_a_small_dispatch", an_unknown_kernel_begins_with_a_small_dispatch),
 ];
 
@@ -71,21 +68,6 @@ fn the_driver_is_as_expected(candidate: &Candidate) -> Result<(), Failed> {
     }
 }
 
-/// The product of two matrices that is large enough for every form, as bits.
-fn linear(gpu: &Gpu) -> Result<Vec<u32>, VulkanError> {
-    let [row_count, inner_count, column_count] = [300_u32, 130, 150];
-    let block = LinearBlock { row_count, inner_count, column_count, ..LinearBlock::default() };
-    let numbers = |count: u32| (0..count).map(|at| (at * 7919 % 1000) as f32 / 1000.0 - 0.5).collect::<Vec<f32>>();
-    let [inputs, weights, bias] =
-        [row_count * inner_count, inner_count * column_count, column_count].map(|count| gpu.upload(&numbers(count)));
-    let (inputs, weights, bias) = (inputs?, weights?, bias?);
-    let (residual, outputs) = (gpu.zeros::<f32>(1)?, gpu.zeros::<f32>((row_count * column_count) as usize)?);
-    let arrays = [inputs.bind(), weights.bind(), bias.bind(), residual.bind(), outputs.bind()];
-    let elements = 0..Form::Single.elements(row_count, column_count);
-    gpu.dispatch(Kernel::Linear, bytes_of(&block), elements, &arrays)?;
-    Ok(gpu.download(&outputs)?.into_iter().map(f32::to_bits).collect())
-}
-
 /// Two views with the weights 0.25 and 0.75, as bits.
 fn fused(gpu: &Gpu, count: u32) -> Result<Vec<u32>, VulkanError> {
     let latents: Vec<f32> = (0..2 * count).map(|at| (at % 1009) as f32).collect();
@@ -94,26 +76,6 @@ fn fused(gpu: &Gpu, count: u32) -> Result<Vec<u32>, VulkanError> {
     let block = FuseBlock { view_count: 2, stride: count, channel_count: count, weight_stride: 0 };
     gpu.dispatch(Kernel::FuseViews, bytes_of(&block), 0..count, &[weights.bind(), latents.bind(), fused.bind()])?;
     Ok(gpu.download(&fused)?.into_iter().map(f32::to_bits).collect())
-}
-
-fn measured_forms_give_the_same_bits(candidate: &Candidate) -> Result<(), Failed> {
-    let measured = candidate.gpu(&GpuOptions::default())?;
-    let single = candidate.gpu(&GpuOptions { form: Some(Form::Single), ..GpuOptions::default() })?;
-    let (found, expected) = (linear(&measured)?, linear(&single)?);
-    // Several forms were measured: that leaves nothing behind.
-    assert!(measured.submission_count() > single.submission_count());
-    assert!(found == expected && found.iter().any(|bits| *bits != 0));
-    assert_eq!(measured.refused_forms(), []);
-    Ok(())
-}
-
-fn pipelines_have_the_subgroups_that_were_asked_for(candidate: &Candidate) -> Result<(), Failed> {
-    let Some(size) = candidate.adapter.subgroup_size else { return Ok(()) };
-    let gpu = candidate.gpu(&GpuOptions { form: Some(Form::Subgroup), ..GpuOptions::default() })?;
-    assert_eq!(gpu.reported_subgroup_size(Kernel::Linear), None, "nothing is compiled yet");
-    linear(&gpu)?;
-    assert!(gpu.reported_subgroup_size(Kernel::Linear).is_none_or(|reported| reported == size));
-    Ok(())
 }
 
 fn an_unknown_kernel_begins_with_a_small_dispatch(candidate: &Candidate) -> Result<(), Failed> {

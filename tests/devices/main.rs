@@ -8,6 +8,7 @@ mod arguments;
 mod candidate;
 mod child;
 mod expectations;
+mod forms;
 mod genvs;
 mod layers;
 mod limits;
@@ -61,6 +62,7 @@ fn main() -> ExitCode {
         sampling::TESTS,
         limits::TESTS,
         expectations::TESTS,
+        forms::TESTS,
     ]
     .concat()
     .into_iter()

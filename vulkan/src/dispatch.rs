@@ -1,8 +1,8 @@
 //! Dispatches of kernels: arguments checked, split to fit the device, in the fastest form of their tiles.
 
-use crate::buffer::{Bound, ranges};
-use crate::error::{Missing, VulkanError};
-use crate::forms::{self, Class};
+use crate::buffer::{Array, Bound, ranges};
+use crate::error::VulkanError;
+use crate::forms::Class;
 use crate::gpu::{Gpu, State, WIDEST_PAGED, barrier};
 use crate::kernel::{Access, Form, Kernel, Layout, Piece, WORKGROUP};
 use crate::pipelines::Pipeline;
@@ -10,7 +10,7 @@ use crate::submissions::Submission;
 use ash::vk;
 use std::ops::Range;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use viewfuse_kernels::pages::MAX_PAGES;
 
 /// The time that a dispatch of an unknown kernel is expected to take.
@@ -21,7 +21,15 @@ pub(crate) struct Job<'a> {
     pub(crate) kernel: Kernel,
     parameters: &'a [u8],
     arrays: &'a [Bound<'a>],
-    page_shift: u32,
+    pub(crate) page_shift: u32,
+}
+
+impl<'a> Job<'a> {
+    /// The arrays that it writes.
+    pub(crate) fn outputs(&self) -> Vec<&'a Arc<Array>> {
+        let listed = self.kernel.arrays().iter().zip(self.arrays);
+        listed.filter(|(array, _)| array.access == Access::Write).map(|(_, bound)| bound.0).collect()
+    }
 }
 
 impl Gpu {
@@ -68,68 +76,6 @@ impl Gpu {
         })
     }
 
-    /// The form for a class of products: as was asked for, as is known, or measured now.
-    fn form(&self, state: &mut State, job: &Job<'_>, class: &Class) -> Result<Form, VulkanError> {
-        if let Some(form) = self.form {
-            return match state.pipelines.fits(job.kernel, form, job.page_shift)? {
-                true => Ok(form),
-                false => Err(VulkanError::Missing {
-                    device: self.handle.name.clone(),
-                    missing: vec![Missing::Feature("subgroups of the size that was asked for")],
-                }),
-            };
-        }
-        let candidates = class.candidates(self.is_software, self.handle.subgroup_size().is_some());
-        if candidates.len() == 1 {
-            return Ok(candidates[0]);
-        }
-        if let Some(form) = state.choices.get(class).filter(|form| candidates.contains(form)) {
-            return Ok(form);
-        }
-        let mut fastest = (Form::Single, Duration::MAX);
-        for form in candidates {
-            // A driver that compiled it for subgroups of another size would give other results.
-            if !state.pipelines.fits(job.kernel, form, job.page_shift)? {
-                state.refused.push((job.kernel, form));
-                continue;
-            }
-            let time = self.time_form(state, job, class, form)?;
-            if time < fastest.1 {
-                fastest = (form, time);
-            }
-        }
-        state.choices.set(class, fastest.0);
-        Ok(fastest.0)
-    }
-
-    /// Forms that were compiled for subgroups of another size than was asked for: they are not used. On a driver without faults there are none.
-    pub fn refused_forms(&self) -> Vec<(Kernel, Form)> {
-        self.lock().refused.clone()
-    }
-
-    /// Invocations of a subgroup that the driver reports of the kernel's pipelines that need them; `None` where it reports
-    /// nothing, or there are none yet.
-    pub fn reported_subgroup_size(&self, kernel: Kernel) -> Option<u32> {
-        self.lock().pipelines.reported(kernel)
-    }
-
-    /// The least time of a few dispatches of some tiles. They write what the dispatch that follows writes, too.
-    fn time_form(&self, state: &mut State, job: &Job<'_>, class: &Class, form: Form) -> Result<Duration, VulkanError> {
-        let elements = class.measured_elements(form, self.is_software);
-        let mut least = Duration::MAX;
-        // The first one makes what is made at the first use.
-        for round in 0..forms::ROUNDS {
-            state.wait()?;
-            let start = Instant::now();
-            self.record_job(state, job, form, 0..elements, 0)?;
-            state.wait()?;
-            if round > 0 {
-                least = least.min(start.elapsed());
-            }
-        }
-        Ok(least)
-    }
-
     /// Records a dispatch, in as many pieces as the device's limits demand, and returns how many these are. `counted`
     /// elements are counted for the time that later ones are expected to take.
     pub(crate) fn record_job(
@@ -141,6 +87,7 @@ impl Gpu {
         counted: u64,
     ) -> Result<u64, VulkanError> {
         let Job { kernel, parameters, arrays, page_shift } = *job;
+        let elements = self.faults.done(form, elements);
         let listed = kernel.arrays().iter().zip(arrays);
         let uses: Vec<_> = listed.clone().map(|(array, bound)| (bound.0, array.access)).collect();
         let pipeline = state.pipelines.get(kernel, form, page_shift)?;

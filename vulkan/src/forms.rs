@@ -1,14 +1,14 @@
 //! Forms of tiled kernels: which come into question for a product, and which was the fastest.
 //!
 //! A form is measured at the first use of a kernel for products of a class, sizes to within a factor of two. All forms give the
-//! same bits, so a choice changes nothing but the time.
+//! same bits, which is compared then, so a choice changes nothing but the time.
 
 use crate::kernel::{Form, Kernel, TILE, WORKGROUP};
 use std::collections::BTreeMap;
 use viewfuse_kernels::network::tile::Shape;
 
-/// Dispatches of a measurement, the first of which does not count.
-pub(crate) const ROUNDS: u32 = 4;
+/// Dispatches of a measurement, after one that makes what is made at the first use.
+pub(crate) const ROUNDS: u32 = 3;
 /// Multiply-adds of a product that is worth a measurement.
 const MIN_WORK: u64 = 1 << 22;
 /// Tiles that are measured: as many as keep a GPU busy, and few where a processor does their work.

@@ -6,10 +6,11 @@ use crate::error::{Missing, VulkanError};
 use crate::forms::Choices;
 use crate::handle::{Handle, Memory};
 use crate::instance::Instance;
-use crate::kernel::{Access, Form, Kernel};
+use crate::kernel::{Access, Form, Kernel, WORKGROUP};
 use crate::pipelines::Pipelines;
 use crate::submissions::{Done, Submission, Submissions};
 use ash::vk;
+use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -34,6 +35,25 @@ pub struct GpuOptions {
     /// The longest time that a piece of a dispatch may be expected to take; `None` for the device's default:
     /// [`GpuOptions::longest_piece_on`]. The results are the same bits.
     pub longest_piece: Option<Duration>,
+    /// What the driver does wrong; nothing, but in tests.
+    pub faults: Faults,
+}
+
+/// Faults that a driver has besides its own, so that tests see what is done about them on any device.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Faults {
+    /// A form of tiled kernels of which the second half of the work is not done.
+    pub half_done: Option<Form>,
+    /// The size that is reported of the subgroups of every pipeline that needs them.
+    pub reported_subgroup_size: Option<u32>,
+}
+
+impl Faults {
+    /// What is done of these elements of a form: whole workgroups.
+    pub(crate) fn done(self, form: Form, elements: Range<u32>) -> Range<u32> {
+        let half = (elements.end - elements.start) / 2 / WORKGROUP * WORKGROUP;
+        if self.half_done == Some(form) { elements.start..elements.start + half } else { elements }
+    }
 }
 
 impl Default for GpuOptions {
@@ -48,6 +68,7 @@ impl Default for GpuOptions {
             limits,
             form: None,
             longest_piece: None,
+            faults: Faults::default(),
         }
     }
 }
@@ -102,6 +123,7 @@ pub struct Gpu {
     pub(crate) form: Option<Form>,
     pub(crate) is_software: bool,
     pub(crate) longest_piece: Option<Duration>,
+    pub(crate) faults: Faults,
 }
 
 pub(crate) struct State {
@@ -109,7 +131,7 @@ pub(crate) struct State {
     pub(crate) pipelines: Pipelines,
     /// Forms of tiled kernels, as far as they are known.
     pub(crate) choices: Choices,
-    /// Forms that are not used, because their results were others.
+    /// Forms that are not used, because their results or their subgroups were others.
     pub(crate) refused: Vec<(Kernel, Form)>,
     /// How long elements took.
     pub(crate) rates: [Rate; Kernel::ALL.len()],
@@ -151,7 +173,7 @@ impl Gpu {
         let timestamps = (adapter.timestamp_bits > 0).then_some((adapter.timestamp_period, adapter.timestamp_bits));
         let time_limit = options.time_limit_on(adapter.kind);
         let submissions = Submissions::new(&handle, adapter.queue_family, timestamps, time_limit, options.closing)?;
-        let pipelines = Pipelines::new(&handle)?;
+        let pipelines = Pipelines::new(&handle, options.faults.reported_subgroup_size)?;
         // The longest page that is within the limits in every array, but long enough to start at allowed offsets.
         let page_len =
             (limits.buffer_range.min(limits.allocation) / WIDEST_PAGED).max(adapter.offset_alignment).max(64);
@@ -175,6 +197,7 @@ impl Gpu {
             form: options.form,
             is_software: adapter.kind == AdapterKind::Software,
             longest_piece: options.longest_piece_on(adapter.kind),
+            faults: options.faults,
         })
     }
 

@@ -15,6 +15,7 @@
 //! gpu                            an opened device: its state, recorded commands
 //! remembered                     pipelines and forms from one process to the next
 //! dispatch, pieces               dispatches, split to fit the device and its watchdog
+//! measure                        forms compared and timed
 //! transfers                      arrays between host and device
 //! ```
 //!
@@ -30,6 +31,7 @@ mod gpu;
 mod handle;
 mod instance;
 pub mod kernel;
+mod measure;
 mod messages;
 mod pieces;
 mod pipelines;
@@ -41,7 +43,7 @@ mod transfers;
 pub use adapter::{Adapter, AdapterKind, Limits};
 pub use buffer::{Bound, Buffer};
 pub use error::{Missing, VulkanError, version};
-pub use gpu::{Gpu, GpuOptions, Tally};
+pub use gpu::{Faults, Gpu, GpuOptions, Tally};
 pub use instance::{Instance, InstanceOptions};
 pub use messages::Messages;
 

@@ -31,17 +31,21 @@ pub(crate) struct Pipelines {
     pipelines: HashMap<(Kernel, Form, u32), vk::Pipeline>,
     /// The size of subgroups that the driver reports of a pipeline, where it reports one.
     reported: HashMap<(Kernel, Form, u32), u32>,
+    /// What takes the place of the driver's reports.
+    pretended: Option<u32>,
     handle: Arc<Handle>,
 }
 
 impl Pipelines {
-    pub(crate) fn new(handle: &Arc<Handle>) -> Result<Pipelines, VulkanError> {
+    /// `pretended` is a size of subgroups that takes the place of the driver's reports.
+    pub(crate) fn new(handle: &Arc<Handle>, pretended: Option<u32>) -> Result<Pipelines, VulkanError> {
         let mut pipelines = Pipelines {
             cache: vk::PipelineCache::null(),
             layouts: HashMap::new(),
             recalled: Vec::new(),
             pipelines: HashMap::new(),
             reported: HashMap::new(),
+            pretended,
             handle: handle.clone(),
         };
         // SAFETY: an empty cache needs nothing.
@@ -179,7 +183,7 @@ impl Pipelines {
         };
         self.pipelines.insert((kernel, form, page_shift), pipeline);
         if form.needs_subgroups()
-            && let Some(size) = self.handle.reported_subgroup_size(pipeline)
+            && let Some(size) = self.pretended.or_else(|| self.handle.reported_subgroup_size(pipeline))
         {
             self.reported.insert((kernel, form, page_shift), size);
         }

@@ -35,19 +35,31 @@ impl Gpu {
                 return gpu.update(state, array, bytes);
             }
             for_each_stretch(array, gpu.staging_bytes(), |memory, offset, range| {
-                gpu.staging(&mut state.upload, MemoryLocation::CpuToGpu)?;
-                let (from, mapped) = gpu.mapped(&mut state.upload)?;
-                mapped[..range.len()].copy_from_slice(&bytes[range.clone()]);
-                let copy = [vk::BufferCopy::default().dst_offset(offset).size(range.len() as u64)];
-                let to = memory.buffer;
-                gpu.record(state, &[(array, Access::Write)], |device, submission, _| {
-                    // SAFETY: both ranges exist; the submission is waited for before staging is written again.
-                    unsafe { device.cmd_copy_buffer(submission.commands, from, to, &copy) };
-                    Ok(())
-                })?;
-                state.wait()
+                gpu.write_piece(state, array, memory, offset, &bytes[range])
             })
         })
+    }
+
+    /// Writes bytes of one of an array's buffers, at most those of a staging buffer.
+    pub(crate) fn write_piece(
+        &self,
+        state: &mut State,
+        array: &Arc<Array>,
+        memory: &Memory,
+        offset: u64,
+        bytes: &[u8],
+    ) -> Result<(), VulkanError> {
+        self.staging(&mut state.upload, MemoryLocation::CpuToGpu)?;
+        let (from, mapped) = self.mapped(&mut state.upload)?;
+        mapped[..bytes.len()].copy_from_slice(bytes);
+        let copy = [vk::BufferCopy::default().dst_offset(offset).size(bytes.len() as u64)];
+        let to = memory.buffer;
+        self.record(state, &[(array, Access::Write)], |device, submission, _| {
+            // SAFETY: both ranges exist; the submission is waited for before staging is written again.
+            unsafe { device.cmd_copy_buffer(submission.commands, from, to, &copy) };
+            Ok(())
+        })?;
+        state.wait()
     }
 
     /// Records the bytes of a short array with the commands: nobody waits.
@@ -100,34 +112,56 @@ impl Gpu {
     fn read(&self, array: &Arc<Array>, bytes: &mut [u8]) -> Result<(), VulkanError> {
         self.with_state(|gpu, state| {
             for_each_stretch(array, gpu.staging_bytes(), |memory, offset, range| {
-                gpu.staging(&mut state.download, MemoryLocation::GpuToCpu)?;
-                let (to, _) = gpu.mapped(&mut state.download)?;
-                let copy = [vk::BufferCopy::default().src_offset(offset).size(range.len() as u64)];
-                let from = memory.buffer;
-                gpu.record(state, &[(array, Access::Read)], |device, submission, _| {
-                    let seen = [vk::MemoryBarrier::default()
-                        .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
-                        .dst_access_mask(vk::AccessFlags::HOST_READ)];
-                    // SAFETY: both ranges exist; the submission is waited for before staging is read.
-                    unsafe {
-                        device.cmd_copy_buffer(submission.commands, from, to, &copy);
-                        device.cmd_pipeline_barrier(
-                            submission.commands,
-                            vk::PipelineStageFlags::TRANSFER,
-                            vk::PipelineStageFlags::HOST,
-                            vk::DependencyFlags::empty(),
-                            &seen,
-                            &[],
-                            &[],
-                        );
-                    }
-                    Ok(())
-                })?;
-                state.wait()?;
-                let (_, mapped) = gpu.mapped(&mut state.download)?;
-                bytes[range.clone()].copy_from_slice(&mapped[..range.len()]);
-                Ok(())
+                gpu.read_piece(state, array, memory, offset, &mut bytes[range])
             })
+        })
+    }
+
+    /// Reads bytes of one of an array's buffers, at most those of a staging buffer.
+    pub(crate) fn read_piece(
+        &self,
+        state: &mut State,
+        array: &Arc<Array>,
+        memory: &Memory,
+        offset: u64,
+        bytes: &mut [u8],
+    ) -> Result<(), VulkanError> {
+        self.staging(&mut state.download, MemoryLocation::GpuToCpu)?;
+        let (to, _) = self.mapped(&mut state.download)?;
+        let copy = [vk::BufferCopy::default().src_offset(offset).size(bytes.len() as u64)];
+        let from = memory.buffer;
+        self.record(state, &[(array, Access::Read)], |device, submission, _| {
+            let seen = [vk::MemoryBarrier::default()
+                .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
+                .dst_access_mask(vk::AccessFlags::HOST_READ)];
+            let (transfer, host) = (vk::PipelineStageFlags::TRANSFER, vk::PipelineStageFlags::HOST);
+            // SAFETY: both ranges exist; the submission is waited for before staging is read.
+            unsafe {
+                device.cmd_copy_buffer(submission.commands, from, to, &copy);
+                let none = vk::DependencyFlags::empty();
+                device.cmd_pipeline_barrier(submission.commands, transfer, host, none, &seen, &[], &[]);
+            }
+            Ok(())
+        })?;
+        state.wait()?;
+        let (_, mapped) = self.mapped(&mut state.download)?;
+        bytes.copy_from_slice(&mapped[..bytes.len()]);
+        Ok(())
+    }
+
+    /// Fills the first bytes of an array, whole words within its first buffer.
+    pub(crate) fn fill_start(
+        &self,
+        state: &mut State,
+        array: &Arc<Array>,
+        bytes: usize,
+        word: u32,
+    ) -> Result<(), VulkanError> {
+        let to = array.chunks[0].buffer;
+        self.record(state, &[(array, Access::Write)], |device, submission, _| {
+            // SAFETY: the range is the buffer's, and a multiple of four bytes long.
+            unsafe { device.cmd_fill_buffer(submission.commands, to, 0, bytes as u64, word) };
+            Ok(())
         })
     }
 
@@ -184,7 +218,7 @@ impl Gpu {
         })
     }
 
-    fn staging_bytes(&self) -> usize {
+    pub(crate) fn staging_bytes(&self) -> usize {
         STAGING.min(self.handle.limits.allocation) as usize
     }
 

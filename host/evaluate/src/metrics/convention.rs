@@ -14,7 +14,6 @@
 //! which cannot be recovered from an 8-bit picture; and stretching uses integers here, where `f32` is sometimes one
 //! level lower.
 
-use super::lpips::LpipsTrunk;
 use image::RgbImage;
 use std::borrow::Cow;
 use std::fmt::{Display, Formatter};
@@ -35,14 +34,6 @@ pub enum Convention {
 impl Convention {
     /// All of them.
     pub const ALL: [Convention; 3] = [Convention::Plain, Convention::PixelNerf, Convention::ViewAttention];
-
-    /// The network of its LPIPS.
-    pub fn lpips_trunk(self) -> LpipsTrunk {
-        match self {
-            Convention::Plain | Convention::ViewAttention => LpipsTrunk::Alex,
-            Convention::PixelNerf => LpipsTrunk::Vgg,
-        }
-    }
 
     /// A picture as PSNR and SSIM compare it.
     pub fn shown(self, picture: &RgbImage) -> Cow<'_, RgbImage> {
