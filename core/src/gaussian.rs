@@ -10,6 +10,7 @@
 //! the opacity 0 and covers no pixel.
 
 use crate::camera::CameraBlock;
+use crate::composite::Compositor;
 use crate::fetch::Fetch;
 use crate::math::{clamp, exp, has_finite_bits, ln, max, min, norm3, sqrt};
 use bytemuck::{Pod, Zeroable};
@@ -21,6 +22,8 @@ pub const DILATION: f32 = 0.3;
 pub const MIN_ALPHA: f32 = 1.0 / 255.0;
 /// Greatest opacity at a pixel: something of what lies behind is always seen, and the backward pass can divide by the rest.
 pub const MAX_ALPHA: f32 = 0.99;
+/// Transmittance at which what lies behind is left out: together it has at most this weight.
+pub const MIN_TRANSMITTANCE: f32 = 1.0e-4;
 /// Share of half the image by which the expansion may lie outside of it: further out the pinhole is not nearly linear.
 pub const MARGIN: f32 = 0.3;
 /// The spherical harmonic of degree 0, `1 / (2 sqrt(pi))`: the colour is `0.5 + SH_0 * f_dc`.
@@ -196,6 +199,50 @@ impl ProjectedGaussian {
         let edge = |coordinate: f32, end: u32| clamp(coordinate + 0.5, 0.0, end as f32) as u32;
         [edge(x - right, width), edge(x + right, width), edge(y - down, height), edge(y + down, height)]
     }
+}
+
+/// The indices of projected Gaussians, nearest first, those of equal depth in their own order. Those that are not drawn come
+/// first and cover nothing. `order` has the length of `projected`; what is beyond the shorter of both is left alone.
+///
+/// Rust's own sort of slices: at most a multiple of `N log N` comparisons, and it recurses at most `2 log N` deep. On a GPU
+/// the host sorts.
+pub fn nearest_first(projected: &[ProjectedGaussian], order: &mut [u32]) {
+    let count = if order.len() < projected.len() { order.len() } else { projected.len() };
+    let order = &mut order[..count];
+    for (index, own) in order.iter_mut().enumerate() {
+        *own = index as u32;
+    }
+    // Depths are positive or 0: their bits have their order.
+    order.sort_unstable_by_key(|index| (projected[*index as usize].depth.to_bits(), *index));
+}
+
+/// A row of an image of `W` columns: pixel by pixel what is in front of what. `order` are `count` indices, nearest first
+/// ([`nearest_first`]). A pixel whose transmittance is at most [`MIN_TRANSMITTANCE`] takes nothing more. Channels are summed
+/// in the order of the depths.
+#[inline]
+pub fn composite_row<const W: usize>(
+    projected: &(impl Fetch<ProjectedGaussian> + ?Sized),
+    order: &(impl Fetch<u32> + ?Sized),
+    count: u32,
+    row: u32,
+) -> [Compositor<3>; W] {
+    let mut pixels = [Compositor::<3>::START; W];
+    let y = row as f32 + 0.5;
+    let mut index = 0;
+    while index < count as usize {
+        let gaussian = projected.fetch(order.fetch(index) as usize);
+        let [first, end, top, bottom] = gaussian.pixels(W as u32, row + 1);
+        let mut column = if top <= row && row < bottom { first } else { end };
+        while column < end {
+            let pixel = &mut pixels[column as usize];
+            if !pixel.is_terminated(MIN_TRANSMITTANCE) {
+                pixel.add_alpha(&gaussian.colour, gaussian.alpha(column as f32 + 0.5, y), gaussian.depth);
+            }
+            column += 1;
+        }
+        index += 1;
+    }
+    pixels
 }
 
 /// Numbers of a channel's coefficients beyond degree 0, for degrees 0 to 3.
