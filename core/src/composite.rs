@@ -95,6 +95,17 @@ impl<const C: usize> Compositor<C> {
         self.pass(channels, max(1.0 - occupancy, 0.0), depth)
     }
 
+    /// Adds the next surface, front to back, that covers the share `alpha` in `[0, 1]` of what lies behind it (NaN counts as
+    /// 0): the transmittance is multiplied by `1 - alpha`. Returns the surface's weight. For one ray use either this, or
+    /// [`Compositor::add`], or [`Compositor::add_solid`].
+    #[inline]
+    pub fn add_alpha(&mut self, channels: &[f32; C], alpha: f32, depth: f32) -> f32 {
+        if !(alpha > 0.0) {
+            return 0.0;
+        }
+        self.pass(channels, self.transmittance * max(1.0 - alpha, 0.0), depth)
+    }
+
     /// Adds a sample behind which the transmittance is `behind`.
     #[inline]
     fn pass(&mut self, channels: &[f32; C], behind: f32, depth: f32) -> f32 {

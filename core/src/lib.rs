@@ -19,6 +19,7 @@
 //! lookup            interpolation in grids                         bilinear, trilinear
 //! fuse              weighted sums of the views' latents            fuse_views, fuse_visible, fuse_readings
 //! composite         compositing of the samples along a ray         Compositor<C>
+//! gaussian          Gaussians in the world, and projected          GaussianBlock, ProjectedGaussian, project, composite_row
 //! schedule          noise levels of the diffusion denoiser         NoiseSchedule, Preconditioning, HeunStep
 //! sampler           samplers with few calls of the denoiser        Sampler, Mix, History, Churn, verdict
 //! metrics           picture quality                                psnr, ssim
@@ -35,6 +36,7 @@ pub mod composite;
 pub mod depths;
 pub mod fetch;
 pub mod fuse;
+pub mod gaussian;
 pub mod half_precision;
 pub mod lens;
 pub mod lookup;

@@ -7,6 +7,7 @@
 //!   (25 operations): about 100 operations and 80 bytes a view. The maps of 15 views at 160x120 are 5.8 MB, so the
 //!   look-ups hit the second-level cache: it is the chain of dependent operations that bounds a sample, not memory.
 //! - `prepare`, `encode`, `render`: the stages of the sample scene at its own size, on all cores.
+//! - `40 thousand Gaussians`: opening a file of them, from the system's cache.
 //! - with `VIEWFUSE_BENCH_SCENE=FOLDER` (a full path): the first view of that scene from all others at 160 pixels across, from the
 //!   photographs in memory to the picture, on the CPU and on each Vulkan device.
 
@@ -20,12 +21,14 @@ use viewfuse::field::On;
 use viewfuse::field::render::{Frame, RenderOptions, Stage};
 use viewfuse::field::training_free::TrainingFree;
 use viewfuse::job::progress::Silent;
-use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::{Target, target_of};
+use viewfuse::scene::gaussians::{Gaussian, GaussianScene};
 use viewfuse::scene::photographs::Album;
 use viewfuse::scene::photographs::object_box::find_object;
+use viewfuse::scene::{Scene, SceneFrame};
 use viewfuse::weighting::Weighting;
 use viewfuse_core::Vec3;
+use viewfuse_core::gaussian::REST_COUNTS;
 use viewfuse_core::pose::Pose;
 use viewfuse_core::random::uniform;
 use viewfuse_core::sources::Sources;
@@ -175,5 +178,28 @@ impl Views<'_> {
     }
 }
 
-criterion_group!(benches, weights, stages, own_scene);
+/// Opening a file of 40 thousand Gaussians, of degree 0 and of degree 3.
+fn gaussian_files(criterion: &mut Criterion) {
+    const COUNT: usize = 40_000;
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut group = criterion.benchmark_group("40 thousand Gaussians");
+    for degree in [0, 3] {
+        let gaussian = Gaussian {
+            position: [0.5, -0.25, 2.0],
+            log_scales: [-4.0, -5.0, -6.0],
+            rotation: [1.0, 0.0, 0.25, 0.0],
+            opacity: 1.0,
+            f_dc: [0.25, 0.5, 0.75],
+        };
+        let f_rest = vec![0.125; COUNT * 3 * REST_COUNTS[degree] as usize];
+        let scene = GaussianScene { gaussians: vec![gaussian; COUNT], degree: degree as u32, f_rest };
+        let path = folder.path().join(format!("{degree}.ply"));
+        scene.write(&path, &SceneFrame::FILE).expect("a file");
+        let open = || GaussianScene::read(&path, &SceneFrame::FILE).expect("the file");
+        group.bench_function(format!("opened, degree {degree}"), |bencher| bencher.iter(open));
+    }
+    group.finish();
+}
+
+criterion_group!(benches, weights, stages, gaussian_files, own_scene);
 criterion_main!(benches);

@@ -6,6 +6,7 @@
 //! requests   the server, by requests alone
 //! page       the page: what a person does and sees
 //! moves      pictures while dragging, and that memory does not grow
+//! one_file   a scene of Gaussians as one page
 //! ```
 //!
 //! The browser is that of `report.rs`: without one its tests are ignored and say why; with `VIEWFUSE_REQUIRE_BROWSER=1` they
@@ -15,6 +16,7 @@
 mod attacks;
 mod devtools;
 mod moves;
+mod one_file;
 mod page;
 mod requests;
 
@@ -28,7 +30,8 @@ use viewfuse_tests::places::repository;
 use viewfuse_tests::viewer::Program;
 
 pub(crate) fn trials() -> Vec<Trial> {
-    requests::trials().into_iter().chain(attacks::trials()).chain(page::trials()).chain(moves::trials()).collect()
+    let pages = page::trials().into_iter().chain(moves::trials()).chain(one_file::trials());
+    requests::trials().into_iter().chain(attacks::trials()).chain(pages).collect()
 }
 
 /// The viewer on the CPU.

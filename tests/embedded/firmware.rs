@@ -13,6 +13,7 @@ use viewfuse_list::attended::attention;
 use viewfuse_list::formulas::formulas;
 use viewfuse_list::quantised::quantised;
 use viewfuse_list::sampled::sampling;
+use viewfuse_list::splatted::splatting;
 use viewfuse_tests::emulator::Emulator;
 use viewfuse_tests::emulator::board::{BOARDS, Board, Registers};
 use viewfuse_tests::emulator::image::Image;
@@ -26,7 +27,7 @@ const REQUIRED: &str = "VIEWFUSE_REQUIRE_FIRMWARE";
 
 /// For size, and for speed.
 const PROFILES: [&str; 2] = ["release", "fast"];
-const PROGRAMS: [&str; 4] = ["formulas", "attention", "samplers", "quantised"];
+const PROGRAMS: [&str; 5] = ["formulas", "attention", "samplers", "quantised", "gaussians"];
 /// Of so many different numbers a list consists at least.
 const MIN_DIFFERENT: usize = 200;
 
@@ -35,6 +36,7 @@ fn host_list(program: &str, inputs: Inputs) -> Vec<Line> {
         "formulas" => gathered(|emit| formulas(inputs, emit)),
         "samplers" => gathered(|emit| sampling(inputs, emit)),
         "quantised" => gathered(|emit| quantised(inputs, emit)),
+        "gaussians" => gathered(|emit| splatting(inputs, emit)),
         _ => gathered(|emit| attention(inputs, emit)),
     }
 }

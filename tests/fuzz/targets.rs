@@ -3,6 +3,7 @@
 mod capi;
 mod checkpoints;
 mod fall;
+mod gaussians;
 mod guarded;
 mod images;
 mod journals;
@@ -53,7 +54,7 @@ pub(crate) trait Target {
 type Row = (&'static str, fn() -> Box<dyn Target>);
 
 /// All targets.
-pub(crate) const ALL: [Row; 25] = [
+pub(crate) const ALL: [Row; 26] = [
     ("images", || Box::new(images::Images::new())),
     ("transforms", || Box::new(scenes::transforms())),
     ("srn", || Box::new(scenes::srn())),
@@ -75,6 +76,7 @@ pub(crate) const ALL: [Row; 25] = [
     ("journals", || Box::new(journals::Journals::new())),
     ("path-tables", || Box::new(paths::Paths::tables())),
     ("path-json", || Box::new(paths::Paths::json())),
+    ("gaussians", || Box::new(gaussians::Gaussians::new())),
     ("shell", || Box::new(shell::Shell)),
     ("specs", || Box::new(parsers::Specs)),
     ("views", || Box::new(parsers::Views::new())),

@@ -54,7 +54,7 @@ const HEAVY: [(&str, &[&str]); 12] = [
     ("ndarray", &["viewfuse-train"]),
     ("faer", &["viewfuse-evaluate?", "viewfuse-research"]),
     ("maud", &["viewfuse-evaluate?"]),
-    ("base64", &["viewfuse-evaluate?"]),
+    ("base64", &["viewfuse-evaluate?", "viewfuse-output"]),
     ("plotters", &["viewfuse-evaluate?", "viewfuse-research", "viewfuse-train"]),
     ("httparse", &["viewfuse-view"]),
     ("exr", &["viewfuse-output?"]),

@@ -17,6 +17,8 @@ trait OnAnyDevice: Any + Send + Sync {
     fn on<'a>(&'a self, device: &'a AnyDevice) -> Box<dyn Renderer + 'a>;
 
     fn preview(&self) -> Option<AnyField>;
+
+    fn is_live(&self) -> bool;
 }
 
 impl<F: Field + Send + Sync + 'static> OnAnyDevice for F {
@@ -33,6 +35,10 @@ impl<F: Field + Send + Sync + 'static> OnAnyDevice for F {
 
     fn preview(&self) -> Option<AnyField> {
         Field::preview(self).map(AnyField::new)
+    }
+
+    fn is_live(&self) -> bool {
+        Field::is_live(self)
     }
 }
 
@@ -55,6 +61,11 @@ impl AnyField {
     /// Its cheaper form for a moving camera, if there is one.
     pub fn preview(&self) -> Option<AnyField> {
         self.0.preview()
+    }
+
+    /// Whether a picture takes milliseconds ([`Field::is_live`]).
+    pub fn is_live(&self) -> bool {
+        self.0.is_live()
     }
 
     /// The field, if it is of this type.

@@ -44,6 +44,12 @@ pub trait Field {
     {
         None
     }
+
+    /// Whether a picture takes milliseconds once the sources are prepared, because the scene is there and is only drawn: a
+    /// moving camera then gets larger pictures, and more of them.
+    fn is_live(&self) -> bool {
+        false
+    }
 }
 
 /// Source views on a device, with their encodings so far. What not every field can do is a capability: a value that is

@@ -11,6 +11,8 @@
 //! exr      depth maps as OpenEXR (feature `exr`)
 //! depth    depth maps as files of any format
 //! ply      point clouds as PLY
+//! scripts  scripts that pages share
+//! gaussian_page  a scene of Gaussians as one page
 //! rate     frames per second
 //! webp     animated pictures
 //! gif      the same for who takes no WebP (feature `gif`)
@@ -32,6 +34,7 @@ mod earlier;
 #[cfg(feature = "exr")]
 pub mod exr;
 pub mod folder;
+pub mod gaussian_page;
 #[cfg(feature = "gif")]
 mod gif;
 pub mod journal;
@@ -40,6 +43,7 @@ pub mod png;
 pub mod rate;
 pub mod record;
 pub mod run;
+pub mod scripts;
 pub mod selected;
 pub mod sheet;
 pub mod video;

@@ -4,6 +4,7 @@ use std::path::Path;
 use viewfuse_field::point_cloud::CloudPoint;
 use viewfuse_job::files::{WriteError, write_whole};
 use viewfuse_scene::SceneFrame;
+use viewfuse_scene::ply::header;
 
 /// Writes a cloud, completely or not at all. Coordinates are `float`, or `double` where the scene was moved or scaled when
 /// it was opened: `float` would not hold them.
@@ -14,14 +15,11 @@ pub fn write_ply(path: &Path, points: &[CloudPoint], frame: &SceneFrame) -> Resu
     let is_double = *frame != SceneFrame::FILE;
     let coordinate = if is_double { "double" } else { "float" };
     let properties = ["x", "y", "z"]
-        .map(|name| format!("property {coordinate} {name}\n"))
+        .map(|name| (coordinate, name.to_owned()))
         .into_iter()
-        .chain(["nx", "ny", "nz"].map(|name| format!("property float {name}\n")))
-        .chain(["red", "green", "blue"].map(|name| format!("property uchar {name}\n")));
-    let mut bytes = b"ply\nformat binary_little_endian 1.0\ncomment viewfuse\n".to_vec();
-    bytes.extend(format!("element vertex {}\n", points.len()).into_bytes());
-    properties.for_each(|property| bytes.extend(property.into_bytes()));
-    bytes.extend(b"end_header\n");
+        .chain(["nx", "ny", "nz"].map(|name| ("float", name.to_owned())))
+        .chain(["red", "green", "blue"].map(|name| ("uchar", name.to_owned())));
+    let mut bytes = header("vertex", points.len(), properties);
     for CloudPoint { position, normal, colour, .. } in points {
         for value in frame.file(position.as_dvec3()).to_array() {
             match is_double {

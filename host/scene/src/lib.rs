@@ -6,6 +6,8 @@
 //! numpy         arrays as NumPy's files
 //! scene         a folder of posed photographs, in any layout: Scene, View, Photograph, ScenePoint
 //!               reader: what a layout's reader is, and READERS, all of them
+//! ply           headers of PLY files: PlyElement, PlyProperty
+//! gaussians     scenes of Gaussians and their files: GaussianScene
 //! dataset       folders of many scenes: Dataset, Split
 //! rig           the cameras as a whole: focus, up
 //! unit          the unit of length of weightings and networks: RigUnit
@@ -22,18 +24,20 @@
 pub mod coverage;
 pub mod dataset;
 pub mod few_shot;
+pub mod gaussians;
 pub mod inspect;
 pub mod listing;
 pub mod numpy;
 pub mod path;
 pub mod photographs;
+pub mod ply;
 pub mod rig;
 mod scene;
 pub mod unit;
 pub mod write;
 
 pub use scene::{
-    FaultLocation, FileFault, IntrinsicsFault, MAX_SIDE, NumpyFault, Photograph, READERS, Scene, SceneError,
+    FaultLocation, FileFault, IntrinsicsFault, MAX_SIDE, NumpyFault, Photograph, PlyFault, READERS, Scene, SceneError,
     SceneFrame, ScenePoint, Split, View, encode_png, looked_for, picture_size, read_picture, reader,
 };
 

@@ -41,7 +41,7 @@ mod undistort;
 
 use check::Checked;
 pub use error::SceneError;
-pub use fault::{FaultLocation, FileFault, IntrinsicsFault, NumpyFault};
+pub use fault::{FaultLocation, FileFault, IntrinsicsFault, NumpyFault, PlyFault};
 pub use frame::SRN_DISTANCE;
 use images::Turn;
 pub use images::{encode_png, picture_size, read_picture};

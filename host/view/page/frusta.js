@@ -1,45 +1,11 @@
 // Cameras as frusta, in the picture and in the map.
 
 import { css } from './colours.js';
+import { drawFrustum, frustum } from './outlines.js';
 import { inCamera } from './poses.js';
 import { state } from './state.js';
-import { add, sub, times } from './vectors.js';
 
-// The centre and the corners of a camera's image, at a depth.
-export function frustum({ pose: own, lens }, depth) {
-  const corners = [[0, 0], [1, 0], [1, 1], [0, 1]].map(([x, y]) => {
-    const across = (x * lens.size[0] - lens.principal[0]) / lens.focal[0];
-    const below = (y * lens.size[1] - lens.principal[1]) / lens.focal[1];
-    const towards = add(add(own.forward, times(own.right, across)), times(own.down, below));
-    return add(own.centre, times(towards, depth));
-  });
-  return [own.centre, ...corners];
-}
-
-const EDGES = [[0, 1], [0, 2], [0, 3], [0, 4], [1, 2], [2, 3], [3, 4], [4, 1]];
-const NEAR = 1e-3;
-
-// A frustum as lines, cut where it is behind the eye.
-export function drawFrustum(context, eye, project, points, colour, width) {
-  const seen = points.map((point) => inCamera(eye, point));
-  const near = NEAR * state.scene.distance;
-  context.strokeStyle = colour;
-  context.lineWidth = width;
-  context.beginPath();
-  for (const [from, to] of EDGES) {
-    let [a, b] = [seen[from], seen[to]];
-    if (a[2] < near && b[2] < near) continue;
-    if (a[2] < near || b[2] < near) {
-      const share = (near - a[2]) / (b[2] - a[2]);
-      const cut = add(a, times(sub(b, a), share));
-      if (a[2] < near) a = cut; else b = cut;
-    }
-    context.moveTo(...project(a));
-    context.lineTo(...project(b));
-  }
-  context.stroke();
-  return seen;
-}
+export const NEAR = 1e-3;           // of the cameras' distance
 
 // The source cameras, the greatest weights last. `own` are their weights.
 export function drawSources(context, eye, project, ratio, own, isMap) {
@@ -50,7 +16,8 @@ export function drawSources(context, eye, project, ratio, own, isMap) {
     const source = state.scene.sources[i];
     // In the picture, cameras beside the eye would cover everything and show nothing.
     if (!isMap && inCamera(eye, source.pose.centre)[2] < 0.1 * state.scene.distance) return null;
-    return drawFrustum(context, eye, project, frustum(source, state.scene.frustum), css(share), (1 + 2 * share) * ratio)[0];
+    const points = frustum(source, state.scene.frustum);
+    return drawFrustum(context, eye, project, points, css(share), (1 + 2 * share) * ratio, NEAR * state.scene.distance)[0];
   });
   if (!isMap) return;
   // Names, of the greatest weights first, where they do not cover one another.

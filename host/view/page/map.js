@@ -1,7 +1,8 @@
 // The map: the cameras and the subject, seen from outside.
 
 import { fitted } from './canvas.js';
-import { drawFrustum, drawSources, frustum } from './frusta.js';
+import { NEAR, drawSources } from './frusta.js';
+import { drawFrustum, frustum } from './outlines.js';
 import { MIN_SEEN } from './picture.js';
 import { inCamera, lookAt } from './poses.js';
 import { element, state } from './state.js';
@@ -106,7 +107,8 @@ export function drawMap() {
 
   drawSources(context, eye, project, ratio, state.weights.length > 0 ? state.weights : state.scene.sources.map(() => 0), true);
   const accent = style.getPropertyValue('--accent');
-  drawFrustum(context, eye, project, frustum({ pose: state.pose, lens: state.scene.lens }, 1.5 * state.scene.frustum), accent, 2.5 * ratio);
+  const own = frustum({ pose: state.pose, lens: state.scene.lens }, 1.5 * state.scene.frustum);
+  drawFrustum(context, eye, project, own, accent, 2.5 * ratio, NEAR * state.scene.distance);
   const line = [state.pose.centre, state.focus].map((point) => inCamera(eye, point));
   if (line.every((point) => point[2] > 0)) {
     context.setLineDash([4 * ratio, 4 * ratio]);

@@ -10,7 +10,6 @@ import { tellWeights } from './sources.js';
 import { element, state, tab } from './state.js';
 
 const REST = 200;            // milliseconds without a change after which the hand rests
-const COARSE_SIDE = 160;     // pixels
 
 async function post(path, body) {
   const response = await fetch(path, {
@@ -43,7 +42,7 @@ async function askPicture(moving, arrived) {
   const at = state.pose;
   const { scheme } = state;
   const body = { tab, pose: matrixOf(at), scheme, layer: state.layer, moving };
-  if (moving) body.side = COARSE_SIDE;
+  if (moving) body.side = state.scene.moving_side;
   try {
     const response = await post('picture', body);
     if (response === null) return;

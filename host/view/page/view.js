@@ -15,7 +15,7 @@
 
 import { drawScale } from './colours.js';
 import { copy, savePicture, savePose } from './elsewhere.js';
-import { back, goTo, listenToKeys, listenToMap, listenToPicture } from './hand.js';
+import { back, goTo, listenToKeyboard, listenToMap, listenToPicture } from './hand.js';
 import { listenToKeyframes, stop } from './keyframes.js';
 import { drawMap, firstObserver } from './map.js';
 import { drawPicture } from './picture.js';
@@ -64,7 +64,7 @@ function frustumDepth(sources, distance) {
 async function begin() {
   listenToPicture(element('picture'));
   listenToMap(element('map'));
-  listenToKeys();
+  listenToKeyboard();
   drawScale(element('scale'));
   drawScale(element('layer-scale'));
   if (matchMedia('(pointer: coarse)').matches) {

@@ -1,9 +1,12 @@
 //! How coarse a picture has to be to come in time, from the times of the pictures before.
 
+use crate::request::{COARSE_SIDE, LIVE_SIDE};
 use std::time::Duration;
 
 /// Time of a coarse picture that is aimed at: with encoding and the way to the page it makes ten pictures a second.
 pub(crate) const TIME_OF_A_PICTURE: Duration = Duration::from_millis(80);
+/// The same for a live field: thirty a second.
+const TIME_OF_A_LIVE_PICTURE: Duration = Duration::from_millis(20);
 
 /// Longest sides of coarse pictures as shares of the largest one, in 16ths.
 const SIXTEENTHS: [u32; 6] = [16, 13, 10, 8, 6, 4];
@@ -12,8 +15,12 @@ const SIXTEENTHS: [u32; 6] = [16, 13, 10, 8, 6, 4];
 const MEMORY: usize = 3;
 
 /// The choice of the coarse pictures' size.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct Pace {
+    /// Time of a picture that is aimed at.
+    aim: Duration,
+    /// Longest side of the largest pictures.
+    largest: u32,
     /// Index into [`SIXTEENTHS`].
     step: usize,
     /// Times of the last pictures of that size.
@@ -21,9 +28,27 @@ pub(crate) struct Pace {
 }
 
 impl Pace {
+    /// The largest pictures at first; those of a live field ([`viewfuse_field::AnyField::is_live`]) are larger, and more.
+    pub(crate) fn of(is_live: bool) -> Pace {
+        let (aim, largest) =
+            if is_live { (TIME_OF_A_LIVE_PICTURE, LIVE_SIDE) } else { (TIME_OF_A_PICTURE, COARSE_SIDE) };
+        Pace { aim, largest, step: 0, times: Vec::new() }
+    }
+
+    /// Whether pictures come thirty a second. Then they are never full ones, whose record and encoding take longer than
+    /// the picture.
+    pub(crate) fn is_live(&self) -> bool {
+        self.aim == TIME_OF_A_LIVE_PICTURE
+    }
+
+    /// Longest side of the largest pictures.
+    pub(crate) fn largest(&self) -> u32 {
+        self.largest
+    }
+
     /// Longest side for the next picture, of at most `most` pixels; at least 1.
     pub(crate) fn side(&self, most: u32) -> u32 {
-        (most * SIXTEENTHS[self.step] / 16).max(1)
+        (most.min(self.largest) * SIXTEENTHS[self.step] / 16).max(1)
     }
 
     /// The last picture took so long: coarser pictures follow if it was too long, finer ones if those should be in time
@@ -41,10 +66,10 @@ impl Pace {
             let [side, finer] = [self.step, finer].map(|step| f64::from(SIXTEENTHS[step]));
             median.mul_f64((finer / side).powi(2))
         });
-        if median > TIME_OF_A_PICTURE && self.step + 1 < SIXTEENTHS.len() {
+        if median > self.aim && self.step + 1 < SIXTEENTHS.len() {
             self.step += 1;
             self.times.clear();
-        } else if finer.is_some_and(|time| time < TIME_OF_A_PICTURE.mul_f64(0.9)) {
+        } else if finer.is_some_and(|time| time < self.aim.mul_f64(0.9)) {
             self.step -= 1;
             self.times.clear();
         }
@@ -67,7 +92,7 @@ mod tests {
 
     #[test]
     fn pictures_are_as_fine_as_time_allows() {
-        let mut pace = Pace::default();
+        let mut pace = Pace::of(false);
         assert_eq!(settle(&mut pace, 0.02), 160);
         assert_eq!(settle(&mut pace, 0.15), 100);
         assert_eq!(settle(&mut pace, 100.0), 40, "the coarsest");
@@ -75,8 +100,18 @@ mod tests {
     }
 
     #[test]
+    fn a_live_field_has_larger_pictures_in_less_time() {
+        let mut live = Pace::of(true);
+        assert_eq!((live.is_live(), live.side(1000), live.side(100)), (true, 320, 100));
+        assert_eq!((Pace::of(false).is_live(), Pace::of(false).side(1000)), (false, 160));
+        // What is in time otherwise is too late.
+        assert!(settle(&mut live, 0.06) < 160);
+        assert_eq!(settle(&mut Pace::of(false), 0.06), 160);
+    }
+
+    #[test]
     fn one_slow_picture_changes_nothing() {
-        let mut pace = Pace::default();
+        let mut pace = Pace::of(false);
         for index in 0..10 * MEMORY {
             pace.took(if index % MEMORY == 1 { 50 * TIME_OF_A_PICTURE } else { TIME_OF_A_PICTURE / 2 });
         }

@@ -1,5 +1,7 @@
 //! The page's files, which are part of the program.
 
+use viewfuse_output::scripts::{COLOURS, HANDS, ORBITS, OUTLINES, POSES, Script, VECTORS};
+
 /// A file that the page consists of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct PageFile {
@@ -15,13 +17,21 @@ const fn script(name: &'static str, text: &'static str) -> PageFile {
     PageFile { name, media_type: "text/javascript; charset=utf-8", text }
 }
 
+/// A script that pages share.
+const fn shared(own: Script) -> PageFile {
+    script(own.name, own.text)
+}
+
 /// All of them. Scripts are modules in the order of their imports.
-pub(crate) const FILES: [PageFile; 22] = [
+pub(crate) const FILES: [PageFile; 25] = [
     PageFile { name: "", media_type: "text/html; charset=utf-8", text: include_str!("../page/index.html") },
     PageFile { name: "view.css", media_type: "text/css; charset=utf-8", text: include_str!("../page/view.css") },
-    script("vectors.js", include_str!("../page/vectors.js")),
-    script("poses.js", include_str!("../page/poses.js")),
-    script("colours.js", include_str!("../page/colours.js")),
+    shared(VECTORS),
+    shared(POSES),
+    shared(COLOURS),
+    shared(OUTLINES),
+    shared(ORBITS),
+    shared(HANDS),
     script("canvas.js", include_str!("../page/canvas.js")),
     script("state.js", include_str!("../page/state.js")),
     script("frusta.js", include_str!("../page/frusta.js")),
@@ -43,7 +53,7 @@ pub(crate) const FILES: [PageFile; 22] = [
 
 #[cfg(test)]
 mod tests {
-    use super::FILES;
+    use super::{COLOURS, FILES, HANDS, ORBITS, OUTLINES, POSES, VECTORS};
     use std::collections::BTreeSet;
 
     /// Most lines of a file of the page.
@@ -66,7 +76,10 @@ mod tests {
     fn every_file_of_the_folder_is_part_of_the_page_and_short() {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/page");
         let entries = std::fs::read_dir(folder).expect("the folder").map(|entry| entry.expect("a file").file_name());
-        let there: BTreeSet<String> = entries.map(|name| name.to_string_lossy().into_owned()).collect();
+        let mut there: BTreeSet<String> = entries.map(|name| name.to_string_lossy().into_owned()).collect();
+        for script in [VECTORS, POSES, COLOURS, OUTLINES, ORBITS, HANDS] {
+            assert!(there.insert(script.name.to_owned()), "{} is shared and there", script.name);
+        }
         let served = FILES.iter().map(|file| if file.name.is_empty() { "index.html" } else { file.name });
         assert_eq!(there, served.map(str::to_owned).collect());
         for file in FILES {

@@ -212,7 +212,7 @@ pub(crate) fn run(viewer: &Viewer<'_>, shared: &Shared, outer: &dyn Progress) ->
             renderer: renderer.as_ref(),
             coarse: None,
             full: None,
-            pace: Pace::default(),
+            pace: Pace::of(field.is_live()),
             full_time: None,
             choice: Choice::of(&viewer.viewed),
         };
@@ -313,7 +313,7 @@ impl<'a> RenderLoop<'a> {
     /// A picture at once: as fine as time allows. And whether it is a full one.
     fn soon(&mut self, request: &Request) -> Result<(Frame, bool), RenderError> {
         let watch = Watch { shared: self.shared, outer: self.outer, makes_way: MakesWay::Never };
-        let is_fast = self.full_time.is_some_and(|time| time < TIME_OF_A_PICTURE);
+        let is_fast = !self.pace.is_live() && self.full_time.is_some_and(|time| time < TIME_OF_A_PICTURE);
         let scheme = request.weighting.to_string();
         let settings = self.choice.settings(&scheme, &self.viewer.viewed);
         let is_ready = self.full.as_ref().is_some_and(|full| full.is_under(&scheme, settings));

@@ -6,6 +6,8 @@ use viewfuse_weighting::{Weighting, WeightingError, WeightingSpec};
 
 /// Longest side of coarse pictures, in pixels.
 pub const COARSE_SIDE: u32 = 160;
+/// Longest side of pictures of a live field while the camera moves, in pixels.
+pub const LIVE_SIDE: u32 = 320;
 
 /// Most characters of a tab's name.
 const LONGEST_TAB: usize = 40;
@@ -99,14 +101,14 @@ impl Request {
             weighting,
             layer,
             is_moving: moving,
-            most_side: side.unwrap_or(COARSE_SIDE).clamp(1, COARSE_SIDE),
+            most_side: side.unwrap_or(COARSE_SIDE).clamp(1, LIVE_SIDE),
         })
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{COARSE_SIDE, Layer, Request};
+    use super::{COARSE_SIDE, LIVE_SIDE, Layer, Request};
     use viewfuse_core::pose::Pose;
     use viewfuse_weighting::Weighting;
 
@@ -140,6 +142,6 @@ mod tests {
             let error = read(|request| request[key] = value.clone()).expect_err(key);
             assert!(error.contains(part), "{key}: {error}");
         }
-        assert_eq!(read(|request| request["side"] = 100_000.into()).expect("a request").most_side, COARSE_SIDE);
+        assert_eq!(read(|request| request["side"] = 100_000.into()).expect("a request").most_side, LIVE_SIDE);
     }
 }

@@ -1,6 +1,7 @@
 //! What the page has to know of the scene before the first picture: cameras, their arrangement, schemes.
 
 use crate::Viewed;
+use crate::pace::Pace;
 use serde::Serialize;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
@@ -28,6 +29,8 @@ pub(crate) struct Subject {
     device: String,
     /// Width and height of full pictures.
     size: [u32; 2],
+    /// Longest side of pictures while the camera moves.
+    moving_side: u32,
     /// Intrinsics of full pictures.
     lens: Intrinsics,
     start: [[f32; 4]; 4],
@@ -126,6 +129,7 @@ impl Subject {
             field: about.name,
             device,
             size: [full.pinhole.width(), full.pinhole.height()],
+            moving_side: Pace::of(viewed.field.is_live()).largest(),
             lens: Intrinsics::of(full),
             start: start(&cameras, &rig).to_opencv(),
             focus: rig.focus.to_array(),

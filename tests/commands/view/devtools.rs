@@ -14,6 +14,7 @@ use viewfuse_tests::patience::PATIENCE;
 
 /// What the page shows becomes `shows`, beside two of its functions.
 const NAMES_FOR_TESTS: &str = "addEventListener('load', async () => {
+    if (!location.protocol.startsWith('http')) return;
     const [{ state }, { matrixOf }, { goTo }] =
         await Promise.all(['state', 'poses', 'hand'].map((own) => import(`${document.baseURI}${own}.js`)));
     Object.assign(window, { matrixOf, goTo, shows: state });
@@ -46,6 +47,8 @@ impl Chromium {
             .arg(browser.program())
             .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run"])
             .args(["--disable-component-update", "--disable-sync", "--hide-scrollbars", "--remote-debugging-pipe"])
+            // WebGL without a GPU.
+            .args(["--use-angle=swiftshader", "--enable-unsafe-swiftshader"])
             // Nothing behind this address answers; it is not used for this machine.
             .arg("--proxy-server=127.0.0.1:9")
             .arg(format!("--user-data-dir={}", profile.path().join("profile").display()))

@@ -20,6 +20,20 @@ const MAX_PARAMETERS: usize = 20_000;
 /// What the firmware without attention may have there of code and constants.
 const MAX_BYTES: u64 = 32 * 1024;
 
+/// Programs that are measured on the first board alone, and their calls with what they are in the tables: they take an FPU, and
+/// memory.
+const WITH_AN_FPU: [(&str, &[(&str, &str)]); 2] = [
+    ("embeddings", &[("attend", "attention weights of 8 sources, 32 bits"), ("embed", "one pose embedded, 32 bits")]),
+    (
+        "splats",
+        &[
+            ("project", "one Gaussian projected"),
+            ("sort", "1000 projected Gaussians sorted by depth"),
+            ("row", "one row of 64 pixels of 1000 projected Gaussians"),
+        ],
+    ),
+];
+
 /// A row of a table: what it is about, and its numbers; what is not measured has none.
 type Row = (String, Vec<Option<u64>>);
 
@@ -74,17 +88,15 @@ pub(super) fn what_the_calls_take(boards: &[Arc<Firmware>]) -> Result<(), Failed
     }
     assert_eq!(weighed.next(), None, "every scheme was measured");
 
-    // Parameters of 32 bits, where there is an FPU.
-    let floats = PROFILES.map(|profile| measured(&boards[0], profile, "embeddings"));
-    let [small_floats, fast_floats] = floats;
-    let (small_floats, fast_floats) = (small_floats?, fast_floats?);
-    for (name, title) in
-        [("attend", "attention weights of 8 sources, 32 bits"), ("embed", "one pose embedded, 32 bits")]
-    {
-        let nothing = [None; 3].repeat(boards.len() - 1);
-        let row = numbers(named(&small_floats, name)?).into_iter().chain(nothing).collect();
-        three.push((title.to_owned(), row));
-        speed.push((title.to_owned(), numbers(named(&fast_floats, name)?)[..2].to_vec()));
+    for (program, named_calls) in WITH_AN_FPU {
+        let [small_floats, fast_floats] = PROFILES.map(|profile| measured(&boards[0], profile, program));
+        let (small_floats, fast_floats) = (small_floats?, fast_floats?);
+        for (name, title) in named_calls {
+            let nothing = [None; 3].repeat(boards.len() - 1);
+            let row = numbers(named(&small_floats, name)?).into_iter().chain(nothing).collect();
+            three.push(((*title).to_owned(), row));
+            speed.push(((*title).to_owned(), numbers(named(&fast_floats, name)?)[..2].to_vec()));
+        }
     }
 
     let mut whole = Vec::new();

@@ -11,7 +11,7 @@ use viewfuse_job::panics::Panicked;
 use viewfuse_job::text::in_line;
 
 use super::MAX_SIDE;
-use super::fault::{FaultLocation, FileFault, IntrinsicsFault, NumpyFault, Short};
+use super::fault::{FaultLocation, FileFault, IntrinsicsFault, NumpyFault, PlyFault, Short};
 
 /// Why a scene could not be read.
 #[derive(Debug, Error)]
@@ -351,6 +351,16 @@ pub enum SceneError {
         entry: String,
         /// What is wrong.
         fault: NumpyFault,
+    },
+    /// Not a PLY file that can be read.
+    #[error("{path}{place}: not a readable PLY file: {fault}")]
+    Ply {
+        /// The file.
+        path: PathBuf,
+        /// The line of its header.
+        place: FaultLocation,
+        /// What is wrong.
+        fault: PlyFault,
     },
     /// Not a zip archive.
     #[error("{path}: not a readable zip archive: {cause}")]

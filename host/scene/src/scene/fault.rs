@@ -1,4 +1,4 @@
-//! Parts of [`super::SceneError`]: the place in a file, and faults of intrinsics, files and arrays.
+//! Parts of [`super::SceneError`]: the place in a file, and faults of intrinsics, files, arrays and PLY headers.
 
 use std::fmt;
 
@@ -191,4 +191,39 @@ pub enum NumpyFault {
     /// Two arrays of one name.
     #[error("the archive holds it twice")]
     Twice,
+}
+
+/// Why bytes are not a PLY file that can be read.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum PlyFault {
+    /// The first line is another one.
+    #[error("the first line is not ply")]
+    Magic,
+    /// The header has no end.
+    #[error("the header does not end")]
+    NoEnd,
+    /// Text, or big-endian numbers.
+    #[error("the format is {0:?}; binary_little_endian 1.0 is read")]
+    Format(String),
+    /// A line that a header does not have there.
+    #[error("{0:?} is no line of a header")]
+    Line(String),
+    /// A property before the first element.
+    #[error("a property before the first element")]
+    NoElement,
+    /// An unknown type.
+    #[error("there is no type {0:?}")]
+    Type(String),
+    /// Two properties of one name.
+    #[error("property {0} is there twice")]
+    Twice(String),
+    /// A list, where rows must have one length.
+    #[error("element {0} has a list; rows of one length are read")]
+    List(String),
+    /// The element that is needed is missing.
+    #[error("there is no element {0}")]
+    NoSuchElement(&'static str),
+    /// Coefficients of no degree of spherical harmonics.
+    #[error("there are {0} properties f_rest_; degrees 0 to 3 have 0, 9, 24 or 45")]
+    RestCount(usize),
 }

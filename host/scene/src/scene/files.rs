@@ -27,7 +27,7 @@ const MAX_TEXT: u64 = 256 << 20;
 const LONGEST_EXCERPT: usize = 40;
 
 /// The error for a file or folder that the operating system could not open.
-pub(super) fn unreadable(path: &Path, cause: io::Error) -> SceneError {
+pub(crate) fn unreadable(path: &Path, cause: io::Error) -> SceneError {
     let path = path.to_path_buf();
     if cause.kind() == io::ErrorKind::NotFound {
         SceneError::Missing { path }

@@ -11,6 +11,7 @@ pub mod formulas;
 pub mod quantised;
 pub mod rig;
 pub mod sampled;
+pub mod splatted;
 
 /// Where the named numbers go. One function on purpose: a firmware has no room for a copy per caller.
 pub type Emit<'a> = &'a mut dyn FnMut(&str, f32);

@@ -1,0 +1,217 @@
+//! A scene of Gaussians as one page: a file that any browser with WebGL 2 shows, on a phone too, without a server and without
+//! the network.
+//!
+//! It has the Gaussians (means as `f32`, scales and rotations in 16 bits, colours and opacities in 8; of the spherical
+//! harmonics degree 0), the source cameras, gsplat.js (`vendor/gsplat.md`), which draws, and the scripts of `page/`. The weights
+//! that it shows are those of `distance:power=2`, which a script computes for the view on the screen: pages have no server
+//! to ask for another scheme.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use serde::Serialize;
+use viewfuse_core::Vec3;
+use viewfuse_core::camera::Camera;
+use viewfuse_core::gaussian::{SH_0, opacity};
+use viewfuse_job::files::{WriteError, write_whole};
+use viewfuse_scene::gaussians::{Gaussian, GaussianScene};
+use viewfuse_scene::rig::Rig;
+
+use crate::scripts::{COLOURS, HANDS, ORBITS, OUTLINES, POSES, Script, VECTORS, joined};
+
+/// Scripts in the order of their imports.
+const SCRIPTS: [Script; 10] = [
+    VECTORS,
+    POSES,
+    COLOURS,
+    OUTLINES,
+    ORBITS,
+    HANDS,
+    Script { name: "weights.js", text: include_str!("../page/weights.js") },
+    Script { name: "gaussians.js", text: include_str!("../page/gaussians.js") },
+    Script { name: "stage.js", text: include_str!("../page/stage.js") },
+    Script { name: "page.js", text: include_str!("../page/page.js") },
+];
+const TEMPLATE: &str = include_str!("../page/index.html");
+const STYLE: &str = include_str!("../page/page.css");
+const VIEWER: &str = include_str!("../vendor/gsplat.js");
+const LICENCE: &str = include_str!("../vendor/gsplat.LICENSE");
+
+/// What a page shows.
+#[derive(Clone, Copy, Debug)]
+pub struct GaussianPage<'a> {
+    /// Its title, usually the scene's name.
+    pub title: &'a str,
+    /// The Gaussians, in world coordinates.
+    pub scene: &'a GaussianScene,
+    /// The source cameras with their names: at least one, in world coordinates.
+    pub cameras: &'a [(String, Camera)],
+    /// What lies behind the Gaussians: red, green, blue in `[0, 1]`.
+    pub background: [f32; 3],
+}
+
+/// Writes the page, completely or not at all. Of 40 thousand Gaussians it has 1.8 MB.
+///
+/// # Errors
+/// [`WriteError`].
+pub fn write_html(path: &Path, page: &GaussianPage<'_>) -> Result<(), WriteError> {
+    let told = serde_json::to_string(&Told::of(page))
+        .map_err(|cause| WriteError::Encode { path: path.to_path_buf(), cause: Box::new(cause) })?;
+    // The first picture is that of the camera in the middle, and the frame has its shape.
+    let shape = page.cameras.get(start(page.cameras)).map_or([1; 2], |(_, camera)| sides(camera));
+    let [red, green, blue] = page.background.map(level);
+    let values = HashMap::from([
+        ("title", escaped(page.title)),
+        ("style", STYLE.to_owned()),
+        ("count", page.scene.gaussians.len().to_string()),
+        ("source_count", page.cameras.len().to_string()),
+        ("background", format!("rgb({red} {green} {blue})")),
+        ("aspect", format!("{} / {}", shape[0], shape[1])),
+        ("licence", LICENCE.trim().replace("--", "- -")),
+        ("viewer", VIEWER.to_owned()),
+        ("script", joined(&SCRIPTS)),
+        // No text of a file ends the element that it is in.
+        ("scene", told.replace('<', "\\u003c")),
+    ]);
+    write_whole(path, filled(TEMPLATE, &values).as_bytes())
+}
+
+/// The template with its values, each put in once: what is in them is not looked at.
+fn filled(template: &str, values: &HashMap<&str, String>) -> String {
+    let mut parts = template.split("{{");
+    let mut page = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let (name, rest) = part.split_once("}}").unwrap_or((part, ""));
+        page.push_str(values.get(name).map_or("", String::as_str));
+        page.push_str(rest);
+    }
+    page
+}
+
+/// A text as it stands in HTML.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+/// What the page's scripts know.
+#[derive(Serialize)]
+struct Told<'a> {
+    gaussians: Stored,
+    cameras: Vec<Row<'a>>,
+    /// The camera that the page begins with.
+    start: usize,
+    focus: [f32; 3],
+    up: [f32; 3],
+    /// Mean distance of the cameras from the focus.
+    distance: f32,
+    /// The viewer's unit: the median standard deviation, because it keeps variances in half precision.
+    unit: f32,
+}
+
+/// A source camera: world from camera, row-major, OpenCV axes; intrinsics in pixels of `size`.
+#[derive(Serialize)]
+struct Row<'a> {
+    name: &'a str,
+    pose: [[f32; 4]; 4],
+    lens: Lens,
+}
+
+#[derive(Serialize)]
+struct Lens {
+    focal: [f32; 2],
+    size: [u32; 2],
+    principal: [f32; 2],
+}
+
+/// The Gaussians as base64 of little-endian numbers, an array after the other.
+#[derive(Serialize)]
+struct Stored {
+    count: usize,
+    /// What 0 and 65535 of `scales` stand for, as natural logarithms.
+    limits: [f32; 2],
+    means: String,
+    scales: String,
+    rotations: String,
+    colours: String,
+}
+
+impl<'a> Told<'a> {
+    fn of(page: &GaussianPage<'a>) -> Told<'a> {
+        let cameras: Vec<Camera> = page.cameras.iter().map(|(_, camera)| *camera).collect();
+        let rig = Rig::of(&cameras);
+        let mut deviations: Vec<f32> = log_scales(page.scene).map(f32::exp).filter(|own| *own > 0.0).collect();
+        deviations.sort_unstable_by(f32::total_cmp);
+        let row = |(name, camera): &'a (String, Camera)| Row {
+            name,
+            pose: camera.pose.to_opencv(),
+            lens: Lens { focal: camera.pinhole.focal(), size: sides(camera), principal: camera.pinhole.principal() },
+        };
+        Told {
+            gaussians: Stored::of(page.scene),
+            cameras: page.cameras.iter().map(row).collect(),
+            start: start(page.cameras),
+            focus: rig.focus.to_array(),
+            up: rig.up.to_array(),
+            distance: rig.distance,
+            unit: deviations.get(deviations.len() / 2).copied().unwrap_or(1.0),
+        }
+    }
+}
+
+impl Stored {
+    fn of(scene: &GaussianScene) -> Stored {
+        let all = &scene.gaussians;
+        let limits = log_scales(scene).fold([f32::MAX, f32::MIN], |[low, high], own| [low.min(own), high.max(own)]);
+        let limits = if all.is_empty() { [0.0; 2] } else { limits };
+        let span = (limits[1] - limits[0]).max(f32::MIN_POSITIVE);
+        let scale = |own: f32| ((own - limits[0]) / span * 65_535.0).round() as u16;
+        Stored {
+            count: all.len(),
+            limits,
+            means: text(all.iter().flat_map(|own| own.position).flat_map(f32::to_le_bytes)),
+            scales: text(log_scales(scene).flat_map(|own| scale(own).to_le_bytes())),
+            rotations: text(all.iter().flat_map(|own| turn(own.rotation)).flat_map(i16::to_le_bytes)),
+            colours: text(all.iter().flat_map(colour)),
+        }
+    }
+}
+
+fn log_scales(scene: &GaussianScene) -> impl Iterator<Item = f32> + '_ {
+    scene.gaussians.iter().flat_map(|own| own.log_scales)
+}
+
+/// The index of the camera nearest to the middle of all.
+fn start(cameras: &[(String, Camera)]) -> usize {
+    let centre = |(_, camera): &(String, Camera)| camera.pose.centre_world();
+    let middle = cameras.iter().map(centre).sum::<Vec3>() / cameras.len().max(1) as f32;
+    let distance = |index: &usize| centre(&cameras[*index]).distance(middle);
+    (0..cameras.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or_default()
+}
+
+fn sides(camera: &Camera) -> [u32; 2] {
+    [camera.pinhole.width(), camera.pinhole.height()]
+}
+
+/// A quaternion of length 1, in units of 1 / 32767; no rotation for one that is none.
+fn turn(rotation: [f32; 4]) -> [i16; 4] {
+    let length = rotation.iter().map(|own| f64::from(*own).powi(2)).sum::<f64>().sqrt();
+    if !(length > 0.0 && length.is_finite()) {
+        return [i16::MAX, 0, 0, 0];
+    }
+    rotation.map(|own| (f64::from(own) / length * 32_767.0).round() as i16)
+}
+
+fn colour(gaussian: &Gaussian) -> [u8; 4] {
+    let [red, green, blue] = gaussian.f_dc.map(|own| level(0.5 + SH_0 * own));
+    [red, green, blue, level(opacity(gaussian.opacity))]
+}
+
+fn level(share: f32) -> u8 {
+    (share.clamp(0.0, 1.0) * 255.0).round() as u8
+}
+
+fn text(bytes: impl Iterator<Item = u8>) -> String {
+    STANDARD.encode(bytes.collect::<Vec<u8>>())
+}

@@ -1,0 +1,89 @@
+//! Scenes of Gaussians, and their files in the layout of "3D Gaussian Splatting" (Kerbl et al. 2023).
+//!
+//! A file is a binary little-endian PLY file with an element `vertex` and the properties `x y z` (mean), `f_dc_0..2` and
+//! `f_rest_*` (spherical harmonics of the colour), `opacity` (logit), `scale_0..2` (natural logarithms of the standard
+//! deviations) and `rot_0..3` (quaternion `w, x, y, z`), in any order and with others between them, which are ignored. Its
+//! coordinates are those of the photographs' cameras, that is of the scene's files ([`SceneFrame`]).
+
+mod read;
+mod write;
+
+use std::path::Path;
+
+use viewfuse_core::Vec3;
+use viewfuse_core::gaussian::{GaussianBlock, REST_COUNTS, colour_along};
+use viewfuse_job::files::WriteError;
+
+use crate::{SceneError, SceneFrame};
+
+/// Greatest degree of spherical harmonics.
+pub const MAX_DEGREE: u32 = 3;
+/// Greatest magnitude of a logit and of a logarithm: files say "opaque" and "flat" with infinities, which are limited to it.
+pub const MAX_LOGARITHM: f32 = 80.0;
+
+/// A Gaussian of a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gaussian {
+    /// The mean in world coordinates.
+    pub position: [f32; 3],
+    /// Natural logarithms of the standard deviations along its own axes, in world units.
+    pub log_scales: [f32; 3],
+    /// Rotation from its own axes to the world's: a quaternion `w, x, y, z` of any length; zero counts as none.
+    pub rotation: [f32; 4],
+    /// Logit of the opacity.
+    pub opacity: f32,
+    /// Coefficients of the spherical harmonic of degree 0, red, green, blue: the colour is `0.5 + 0.2821 f_dc`.
+    pub f_dc: [f32; 3],
+}
+
+/// The Gaussians of a scene.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GaussianScene {
+    /// The Gaussians.
+    pub gaussians: Vec<Gaussian>,
+    /// Degree of the spherical harmonics, 0 to [`MAX_DEGREE`].
+    pub degree: u32,
+    /// Coefficients of the degrees above 0: `[gaussian][channel][coefficient]`, with
+    /// [`REST_COUNTS`]`[degree]` coefficients a channel.
+    pub f_rest: Vec<f32>,
+}
+
+impl GaussianScene {
+    /// Reads a file in the coordinates of the scene's files: `frame` is the scene's.
+    ///
+    /// # Errors
+    /// [`SceneError`] with the path and the line of the header or the property: no such file, another format, a property that is
+    /// missing, twice or no `float` or `double`, rows that the file has no room for, NaN, coordinates beyond
+    /// [`viewfuse_core::pose::MAX_COORDINATE`]. Infinite opacities, and scales of zero, are limited to [`MAX_LOGARITHM`].
+    pub fn read(path: &Path, frame: &SceneFrame) -> Result<GaussianScene, SceneError> {
+        read::read(path, frame)
+    }
+
+    /// Writes a file in the coordinates of the scene's files, completely or not at all. Coordinates are `float`, or `double` where the scene was moved
+    /// or scaled when it was opened: `float` would not hold them. Normals are 0, as in the published code.
+    ///
+    /// # Errors
+    /// [`WriteError`].
+    pub fn write(&self, path: &Path, frame: &SceneFrame) -> Result<(), WriteError> {
+        write::write(self, path, frame)
+    }
+
+    /// The Gaussians as a kernel reads them, with their colours from a camera at `centre_world`.
+    pub fn blocks(&self, centre_world: Vec3) -> Vec<GaussianBlock> {
+        let rest_count = 3 * REST_COUNTS[self.degree.min(MAX_DEGREE) as usize] as usize;
+        let block = |(index, gaussian): (usize, &Gaussian)| {
+            let rest = self.f_rest.get(index * rest_count..(index + 1) * rest_count);
+            let towards = Vec3::from(gaussian.position) - centre_world;
+            let (rest, degree) = rest.map_or((&[][..], 0), |rest| (rest, self.degree));
+            GaussianBlock {
+                position: gaussian.position,
+                opacity: gaussian.opacity,
+                log_scales: gaussian.log_scales,
+                rotation: gaussian.rotation,
+                colour: colour_along(gaussian.f_dc, rest, degree, towards),
+                ..GaussianBlock::default()
+            }
+        };
+        self.gaussians.iter().enumerate().map(block).collect()
+    }
+}

@@ -1,0 +1,260 @@
+//! Gaussians: the projection against differences of the pinhole in `f64`, the opacity of a pixel, spherical harmonics, and what
+//! cannot be drawn.
+
+use viewfuse::check::poses::Random;
+use viewfuse_core::Vec3;
+use viewfuse_core::camera::{Camera, CameraBlock, Pinhole};
+use viewfuse_core::composite::Compositor;
+use viewfuse_core::gaussian::{
+    DILATION, GaussianBlock, MAX_ALPHA, MIN_ALPHA, ProjectedGaussian, axes, colour_along, opacity, project,
+};
+use viewfuse_core::pose::Pose;
+
+const NEAR: f32 = 0.1;
+
+fn camera(pose: Pose) -> CameraBlock {
+    let pinhole = Pinhole::new([131.25, 97.5], [70.3, 41.8], 160, 90).expect("a usable camera");
+    Camera { pose, pinhole }.block(0)
+}
+
+/// A Gaussian in front of the camera, within the image.
+fn in_sight(random: &mut Random, camera: &CameraBlock) -> GaussianBlock {
+    let (x, y) = (random.range(0.0, 160.0) as f32, random.range(0.0, 90.0) as f32);
+    let depth = random.log_range(0.5, 20.0) as f32;
+    let place = camera.centre_world() + camera.towards(x, y) * depth;
+    let mut number = || random.normal() as f32;
+    GaussianBlock {
+        position: place.to_array(),
+        opacity: 2.0 * number(),
+        log_scales: [number() - 3.0, number() - 3.0, number() - 3.0],
+        rotation: [number(), number(), number(), number()],
+        colour: [0.25, 0.5, 0.75],
+        ..GaussianBlock::default()
+    }
+}
+
+/// The image coordinates of a world point in `f64`.
+fn seen(camera: &CameraBlock, point: [f64; 3]) -> [f64; 2] {
+    let centre = camera.centre_world().to_array().map(f64::from);
+    let offset = [point[0] - centre[0], point[1] - centre[1], point[2] - centre[2]];
+    let along = |row: [f32; 4]| (0..3).map(|axis| f64::from(row[axis]) * offset[axis]).sum::<f64>();
+    let [right, down, forward] = [along(camera.pose.right), along(camera.pose.down), along(camera.pose.forward)];
+    let [focal_x, focal_y, principal_x, principal_y] = camera.intrinsics.map(f64::from);
+    [focal_x * right / forward + principal_x, focal_y * down / forward + principal_y]
+}
+
+/// The covariance in the image by central differences of the projection along the Gaussian's axes: `xx, xy, yy`.
+fn covariance(gaussian: &GaussianBlock, camera: &CameraBlock) -> [f64; 3] {
+    let [w, x, y, z] = gaussian.rotation.map(f64::from);
+    let norm = (w * w + x * x + y * y + z * z).sqrt();
+    let (w, v) = (w / norm, [x / norm, y / norm, z / norm]);
+    let cross =
+        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let mean = gaussian.position.map(f64::from);
+    let mut sum = [f64::from(DILATION), 0.0, f64::from(DILATION)];
+    for axis in 0..3 {
+        // The rotation of a unit vector e by a quaternion: e + 2 v x (v x e + w e).
+        let unit: [f64; 3] = std::array::from_fn(|own| f64::from(u8::from(own == axis)));
+        let inner = cross(v, unit);
+        let turned = cross(v, std::array::from_fn(|own| inner[own] + w * unit[own]));
+        let deviation = f64::from(gaussian.log_scales[axis]).exp();
+        let step = 1.0e-5;
+        let at = |sign: f64| {
+            seen(camera, std::array::from_fn(|own| mean[own] + sign * step * (unit[own] + 2.0 * turned[own])))
+        };
+        let (ahead, behind) = (at(1.0), at(-1.0));
+        let [u, v] = [0, 1].map(|own| (ahead[own] - behind[own]) / (2.0 * step) * deviation);
+        sum = [sum[0] + u * u, sum[1] + u * v, sum[2] + v * v];
+    }
+    sum
+}
+
+#[test]
+fn the_projection_is_that_of_the_pinhole_to_first_order() {
+    let mut random = Random::new(71);
+    let (mut worst, mut drawn) = ([0.0_f64; 3], 0);
+    for _ in 0..5_000 {
+        let camera = camera(random.pose(1.0));
+        let gaussian = in_sight(&mut random, &camera);
+        let projected = project(&gaussian, &camera, NEAR);
+        if opacity(gaussian.opacity) < MIN_ALPHA {
+            assert_eq!(projected, ProjectedGaussian::default());
+            continue;
+        }
+        drawn += 1;
+        let mean = seen(&camera, gaussian.position.map(f64::from));
+        let [xx, xy, yy] = covariance(&gaussian, &camera);
+        let determinant = xx * yy - xy * xy;
+        let size = (xx + yy) / determinant;
+        let expected = [yy / determinant, -xy / determinant, xx / determinant];
+        for axis in 0..2 {
+            worst[0] = worst[0].max((f64::from(projected.mean[axis]) - mean[axis]).abs());
+            let reach = 2.0 * (255.0 / (1.0 + (-f64::from(gaussian.opacity)).exp())).ln().max(0.0);
+            let extent = (reach * [xx, yy][axis]).sqrt();
+            worst[2] = worst[2].max((f64::from(projected.extent[axis]) - extent).abs() / (1.0 + extent));
+        }
+        for (own, expected) in projected.conic.iter().zip(expected) {
+            worst[1] = worst[1].max((f64::from(*own) - expected).abs() / size);
+        }
+    }
+    println!(
+        "{drawn} Gaussians: mean {:e} pixels, inverse covariance {:e} and extent {:e} relative",
+        worst[0], worst[1], worst[2]
+    );
+    assert!(drawn > 4_000, "{drawn}");
+    // The mean is rounded at the size of the world, seen from half a unit away at a focal length of 131 pixels. Its covariance
+    // is as far off as its depth, whose relative error is that of the mean; the bounds are ten times what was seen.
+    assert!(worst[0] < 1.0e-3 && worst[1] < 3.0e-4 && worst[2] < 3.0e-4, "{worst:?}");
+}
+
+/// A needle across the diagonal of the image: the difference of products of variances would be off by a tenth or negative.
+#[test]
+fn a_needle_keeps_its_width() {
+    let camera = camera(Pose::IDENTITY);
+    let quarter = std::f32::consts::FRAC_PI_8;
+    let gaussian = GaussianBlock {
+        position: [0.0, 0.0, 1.0],
+        opacity: 3.0,
+        log_scales: [2.5, -20.0, -20.0],
+        rotation: [quarter.cos(), 0.0, 0.0, quarter.sin()],
+        ..GaussianBlock::default()
+    };
+    let projected = project(&gaussian, &camera, NEAR);
+    let [xx, xy, yy] = covariance(&gaussian, &camera);
+    // Across the needle the covariance is the dilation alone.
+    let across = [f64::from(projected.conic[0]), f64::from(projected.conic[1]), f64::from(projected.conic[2])];
+    let (u, v) = (xx.sqrt(), yy.sqrt());
+    let (x, y) = (v / (u * u + v * v).sqrt(), -u / (u * u + v * v).sqrt());
+    let inverse = across[0] * x * x + 2.0 * across[1] * x * y + across[2] * y * y;
+    assert!((inverse * f64::from(DILATION) - 1.0).abs() < 1.0e-4, "{inverse} for {xx} {xy} {yy}");
+}
+
+#[test]
+fn the_opacity_of_a_pixel_is_that_of_the_form() {
+    let mut random = Random::new(72);
+    let (mut compared, mut outside) = (0, 0);
+    for _ in 0..2_000 {
+        let camera = camera(random.pose(1.0));
+        let gaussian = in_sight(&mut random, &camera);
+        let projected = project(&gaussian, &camera, NEAR);
+        let [left, right, top, bottom] = projected.pixels(160, 90);
+        for _ in 0..20 {
+            let (column, row) = (random.below(160) as u32, random.below(90) as u32);
+            let (x, y) = (column as f32 + 0.5, row as f32 + 0.5);
+            let (dx, dy) = (f64::from(x - projected.mean[0]), f64::from(y - projected.mean[1]));
+            let [xx, xy, yy] = projected.conic.map(f64::from);
+            let power = -0.5 * (xx * dx * dx + yy * dy * dy) - xy * dx * dy;
+            let expected = (f64::from(projected.opacity) * power.exp()).min(f64::from(MAX_ALPHA));
+            let alpha = f64::from(projected.alpha(x, y));
+            let is_inside = left <= column && column < right && top <= row && row < bottom;
+            assert!(is_inside || expected < f64::from(MIN_ALPHA) * 1.001, "{expected} outside of the box");
+            outside += usize::from(!is_inside);
+            if expected > f64::from(MIN_ALPHA) * 1.001 {
+                compared += 1;
+                // Rounded terms of the form, each at most the largest of them.
+                let size = 1.0 + 0.5 * (xx * dx * dx + yy * dy * dy) + (xy * dx * dy).abs();
+                assert!((alpha - expected).abs() <= expected * size * 4.0e-7, "{alpha} instead of {expected}");
+            } else if expected < f64::from(MIN_ALPHA) * 0.999 {
+                assert_eq!(alpha, 0.0);
+            }
+        }
+    }
+    assert!(compared > 1_000 && outside > 1_000, "{compared} {outside}");
+}
+
+#[test]
+fn what_can_not_be_drawn_covers_nothing() {
+    let camera = camera(Pose::IDENTITY);
+    let good =
+        GaussianBlock { position: [0.0, 0.0, 2.0], opacity: 2.0, log_scales: [-2.0; 3], ..GaussianBlock::default() };
+    assert!(project(&good, &camera, NEAR).opacity > 0.8);
+    // A quaternion that is none is no rotation: the Gaussian is round, and drawn.
+    for rotation in [[0.0; 4], [f32::NAN, 0.0, 0.0, 1.0], [f32::INFINITY; 4]] {
+        assert_eq!(axes(rotation), [Vec3::X, Vec3::Y, Vec3::Z]);
+        assert_eq!(project(&GaussianBlock { rotation, ..good }, &camera, NEAR), project(&good, &camera, NEAR));
+    }
+    let broken = [
+        GaussianBlock { position: [0.0, 0.0, -2.0], ..good },
+        GaussianBlock { position: [0.0, 0.0, 0.05], ..good },
+        GaussianBlock { position: [f32::NAN, 0.0, 2.0], ..good },
+        GaussianBlock { position: [0.0, 0.0, f32::NAN], ..good },
+        GaussianBlock { opacity: -6.0, ..good },
+        GaussianBlock { opacity: f32::NAN, ..good },
+        GaussianBlock { opacity: f32::NEG_INFINITY, ..good },
+        GaussianBlock { log_scales: [80.0; 3], ..good },
+        GaussianBlock { log_scales: [f32::INFINITY, 0.0, 0.0], ..good },
+    ];
+    for gaussian in broken {
+        let projected = project(&gaussian, &camera, NEAR);
+        assert_eq!((projected, projected.pixels(160, 90)), (ProjectedGaussian::default(), [0; 4]), "{gaussian:?}");
+        assert_eq!(projected.alpha(70.0, 40.0), 0.0);
+    }
+    // Scales that are NaN count as 0, as every exponential of NaN does: one pixel wide.
+    let flat = project(&GaussianBlock { log_scales: [f32::NAN; 3], ..good }, &camera, NEAR);
+    assert_eq!(flat.conic, [1.0 / DILATION, 0.0, 1.0 / DILATION].map(|value: f32| value));
+    assert_eq!(project(&good, &camera, NEAR).alpha(f32::NAN, 1.0), 0.0);
+    assert_eq!(
+        [opacity(f32::NAN), opacity(f32::NEG_INFINITY), opacity(f32::INFINITY), opacity(0.0)],
+        [0.0, 0.0, 1.0, 0.5]
+    );
+    // Behind the left edge nothing is covered, however the image coordinates are rounded.
+    let aside = GaussianBlock { position: [-40.0, 0.0, 2.0], ..good };
+    let [left, right, _, _] = project(&aside, &camera, NEAR).pixels(160, 90);
+    assert_eq!((left, right), (0, 0));
+}
+
+#[test]
+fn surfaces_are_composited_front_to_back() {
+    let surfaces = [([1.0, 0.0, 0.0], 0.5_f32, 1.0), ([0.0, 1.0, 0.0], 0.25, 2.0), ([0.0, 0.0, 1.0], 0.8, 4.0)];
+    let mut ray = Compositor::<3>::START;
+    let weights = surfaces.map(|(colour, alpha, depth)| ray.add_alpha(&colour, alpha, depth));
+    assert_eq!([ray.add_alpha(&[9.0; 3], f32::NAN, 1.0), ray.add_alpha(&[9.0; 3], -1.0, 1.0)], [0.0; 2]);
+    let expected = [0.5, 0.5 * 0.25, 0.5 * 0.75 * 0.8];
+    weights.iter().zip(expected).for_each(|(own, expected)| assert!((own - expected).abs() < 1.0e-7));
+    let pixel = ray.finish(&[1.0; 3], 0.0);
+    assert!((pixel.opacity - (1.0 - 0.5 * 0.75 * 0.2)).abs() < 1.0e-7);
+    assert!((pixel.channels[1] - (0.125 + 0.075)).abs() < 1.0e-7, "{pixel:?}");
+    ray.add_alpha(&[0.0; 3], 2.0, 1.0);
+    assert_eq!(ray.transmittance(), 0.0);
+}
+
+/// The harmonics are orthonormal on the sphere: by a product rule that is exact for polynomials of the degree.
+#[test]
+fn spherical_harmonics_are_orthonormal() {
+    let value = |index: usize, direction: Vec3| {
+        if index == 0 {
+            return 0.282_094_79;
+        }
+        let rest: Vec<f32> = (0..45).map(|own| f32::from(u8::from(own == index - 1))).collect();
+        // Around a level that keeps the colour above 0.
+        f64::from(colour_along([16.0 / 0.282_094_8, 0.0, 0.0], &rest[..], 3, direction)[0]) - 16.5
+    };
+    let (points, circle) = ([-0.861_136_311_6_f64, -0.339_981_043_6, 0.339_981_043_6, 0.861_136_311_6], 12);
+    let shares = [0.347_854_845_1, 0.652_145_154_9, 0.652_145_154_9, 0.347_854_845_1];
+    let mut products = [[0.0_f64; 16]; 16];
+    for (height, share) in points.iter().zip(shares) {
+        for step in 0..circle {
+            let angle = std::f64::consts::TAU * (f64::from(step) + 0.25) / f64::from(circle);
+            let radius = (1.0 - height * height).sqrt();
+            let direction = Vec3::new((radius * angle.cos()) as f32, (radius * angle.sin()) as f32, *height as f32);
+            let values: [f64; 16] = std::array::from_fn(|index| value(index, 3.0 * direction));
+            for row in 0..16 {
+                for column in 0..16 {
+                    products[row][column] +=
+                        share * std::f64::consts::TAU / f64::from(circle) * values[row] * values[column];
+                }
+            }
+        }
+    }
+    for row in 0..16 {
+        for column in 0..16 {
+            let expected = f64::from(u8::from(row == column));
+            assert!((products[row][column] - expected).abs() < 2.0e-5, "{row} {column}: {}", products[row][column]);
+        }
+    }
+    // The published signs: y and x are negative, z is positive; and a place on top of the mean has degree 0 alone.
+    let one = |index: usize, direction: Vec3| value(index, direction).signum();
+    assert_eq!([one(1, Vec3::Y), one(2, Vec3::Z), one(3, Vec3::X)], [-1.0, 1.0, -1.0]);
+    assert_eq!(colour_along([0.0; 3], &[9.0; 45], 3, Vec3::ZERO), [0.5; 3]);
+    assert_eq!(colour_along([-9.0, 0.0, 9.0], &[0.0; 0], 0, Vec3::X)[0], 0.0);
+}
