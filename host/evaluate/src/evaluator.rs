@@ -104,6 +104,9 @@ pub struct Evaluator<'a> {
     pub progress: &'a dyn Progress,
 }
 
+/// The time of a set of sources, in times of reading the photographs: for the progress that is shown.
+const READINGS_A_GROUP: usize = 20;
+
 /// The masks of targets, by the index of the view.
 type Masks = HashMap<usize, Option<MaskedTruth>>;
 
@@ -247,13 +250,15 @@ impl Evaluator<'_> {
     pub fn score_all(&self, scene: &Scene, selection: &Selection) -> Result<Vec<Score>, EvaluateError> {
         let groups = source_groups(scene, selection, self.renderer.about().least_sources)?;
         let used = groups.iter().flat_map(|(sources, targets)| sources.iter().chain(targets).copied());
-        let of = 1 + groups.len();
+        // Reading takes far less than what follows.
+        let of = 1 + READINGS_A_GROUP * groups.len();
         self.progress.stage("reading photographs", 0..1, of);
         let album = open_album(scene, used, self.renderer, self.options, self.progress)?;
         let mut scores = Vec::new();
         for (index, (sources, targets)) in groups.iter().enumerate() {
             let subject = Subject { scene, album: &album, masked: None };
-            let progress = &Part::begin(self.progress, "", 1 + index..2 + index, of);
+            let place = 1 + READINGS_A_GROUP * index;
+            let progress = &Part::begin(self.progress, "", place..place + READINGS_A_GROUP, of);
             let own = Evaluator { progress, ..*self };
             scores.extend(own.score(subject, sources, targets, |_, _, _, _| {})?);
         }

@@ -1,8 +1,9 @@
 //! How far the work is: a share that never falls, and the time that is left, which is told while it falls.
 //!
 //! Rates are measured over pieces of the work of about a hundredth. What is left of the stage goes at the median of its own
-//! rates, what follows at the median of all: a stage that is slower than the others, or a machine that is busy for a moment,
-//! moves neither far. Time that would rise is worse than none: nothing is told until it is below what was told again.
+//! rates, what follows at the median of all or at the mean of all so far, whichever is slower: a machine that is busy for a moment
+//! moves neither far, and stages that do nothing do not hide those that take the time. Time that would rise is worse than none:
+//! nothing is told until it is below what was told again, in the first seconds, and while a piece takes longer than was expected.
 
 use std::ops::Range;
 use std::time::{Duration, Instant};
@@ -13,7 +14,10 @@ const TELLING: f64 = 0.02;
 /// Least share over which a rate is measured.
 const MIN_MEASURED: f64 = 0.01;
 
-/// So much more than was told is taken for the same.
+/// Nothing is told before so much time has passed: what comes first is seldom like the rest.
+const MIN_PASSED: Duration = Duration::from_secs(2);
+
+/// So much more than was told, or than a piece was expected to take, is taken for the same.
 const MAX_RISE: Duration = Duration::from_secs(1);
 
 /// The course of some work.
@@ -25,6 +29,8 @@ pub(super) struct Course {
     pieces: (usize, usize),
     /// The greatest share so far.
     share: f64,
+    /// When the work began.
+    start: Instant,
     /// Where the measurement of the next rate began.
     mark: (Instant, f64),
     /// Shares a second, of all stages; those of this stage come last.
@@ -46,6 +52,7 @@ impl Course {
             place: 0.0..1.0,
             pieces: (0, 0),
             share: 0.0,
+            start,
             mark: (start, 0.0),
             rates: Vec::new(),
             earlier: 0,
@@ -107,7 +114,9 @@ impl Course {
 
     /// `gain` is that of the piece that was done last, and is expected of the next one.
     fn estimate(&mut self, gain: f64, now: Instant) {
-        let Some(all) = median(&self.rates) else { return };
+        let Some(median_rate) = median(&self.rates) else { return };
+        let mean_rate = self.share / now.duration_since(self.start).as_secs_f64();
+        let all = if mean_rate > 0.0 { median_rate.min(mean_rate) } else { median_rate };
         let own = median(&self.rates[self.earlier..]).unwrap_or(all);
         let stage_end = self.place.end.max(self.share);
         let left = (stage_end - self.share) / own + (1.0 - stage_end).max(0.0) / all;
@@ -120,7 +129,11 @@ impl Course {
         let Some((left, since)) = self.left.filter(|_| self.share >= TELLING && self.share < 1.0) else {
             return self.stage.clone();
         };
-        let left = left.saturating_sub(now.duration_since(since)).max(self.next);
+        let (passed, expected) = (now.duration_since(since), left.saturating_sub(self.next));
+        if now.duration_since(self.start) < MIN_PASSED || passed > expected + MAX_RISE {
+            return self.stage.clone();
+        }
+        let left = left.saturating_sub(passed).max(self.next);
         if left > self.told.saturating_add(MAX_RISE) {
             return self.stage.clone();
         }
@@ -278,6 +291,23 @@ mod tests {
         let after = &faked.told[before..];
         assert!(after.iter().any(Option::is_none), "{after:?}");
         assert!(after.iter().rev().skip(2).take(20).any(Option::is_some), "near the end it is told again: {after:?}");
+    }
+
+    /// As an evaluation: reading takes no time, and of two stages one does nothing, because the other does its work.
+    #[test]
+    fn stages_without_work_do_not_hide_the_others() {
+        let mut faked = Faked::new();
+        for stage in 0..20 {
+            faked.stage(stage, 20, 1, |_| if stage < 2 || stage % 2 == 0 { 0.05 } else { 4.0 });
+        }
+        faked.never_rises();
+        // 36 s in all. Of what is left at least a third is told: a second of 36, as the fast stages alone would have it, is none.
+        let beats = faked.told.len();
+        for (beat, told) in faked.told.iter().enumerate() {
+            let left = 36.0 * (beats - beat) as f64 / beats as f64;
+            assert!(told.is_none_or(|told| 3.0 * (told as f64 + 1.0) > left), "{told:?} of {left} s: {:?}", faked.told);
+        }
+        assert!(faked.told_share() > 0.3, "{}", faked.told_share());
     }
 
     #[test]
