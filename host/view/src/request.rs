@@ -7,7 +7,7 @@ use viewfuse_weighting::{Weighting, WeightingError, WeightingSpec};
 /// Longest side of coarse pictures, in pixels.
 pub const COARSE_SIDE: u32 = 160;
 /// Longest side of pictures of a live field while the camera moves, in pixels.
-pub const LIVE_SIDE: u32 = 320;
+pub(crate) const LIVE_SIDE: u32 = 320;
 
 /// Most characters of a tab's name.
 const LONGEST_TAB: usize = 40;
