@@ -12,6 +12,8 @@ pub use viewfuse_job as job;
 pub use viewfuse_nn as nn;
 #[cfg(feature = "output")]
 pub use viewfuse_output as output;
+#[cfg(feature = "pose")]
+pub use viewfuse_pose as pose;
 pub use viewfuse_scene as scene;
 #[cfg(feature = "synthetic")]
 pub use viewfuse_synthetic as synthetic;

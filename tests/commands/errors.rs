@@ -62,7 +62,7 @@ fn with_pose(change: impl Fn(&mut [f64; 16])) -> Folder {
 
 fn no_scene() {
     assert_refused("render nowhere --orbit 3 -o out", &["nowhere: no such file or folder"]);
-    assert_refused("inspect toy/rgb -o map.png", &["toy/rgb: no scene here"]);
+    assert_refused("inspect toy/rgb -o map.png", &["toy/rgb: 24 photographs, and nothing that gives their poses"]);
 }
 
 fn poses_missing_or_extra() {

@@ -23,6 +23,7 @@ mod memory;
 mod moving;
 mod outputs;
 mod pareto;
+mod pose;
 mod progress;
 mod protocols;
 mod python;
@@ -74,6 +75,7 @@ fn main() -> ExitCode {
         moving::trials(),
         outputs::trials(),
         pareto::trials(),
+        pose::trials(),
         progress::trials(),
         protocols::trials(),
         python::trials(),
@@ -119,6 +121,7 @@ fn help_fits_and_gives_examples() {
     assert_eq!(version.split_whitespace().next(), Some("viewfuse"), "{version}");
     let commands = [
         "",
+        "pose",
         "render",
         "view",
         "weights",

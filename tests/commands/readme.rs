@@ -43,7 +43,7 @@ fn commands() -> Vec<String> {
 }
 
 /// Lines of `sh` blocks that are not run here: how they begin, and why.
-const NOT_RUN: [(&str, &str); 14] = [
+const NOT_RUN: [(&str, &str); 16] = [
     ("#", "a comment"),
     ("git clone", "the network"),
     ("tests/run", "it runs this test"),
@@ -51,6 +51,8 @@ const NOT_RUN: [(&str, &str); 14] = [
     ("cargo build --profile firmware -p viewfuse-capi", "`embedded/capi.rs` runs it"),
     ("cc ", "`embedded/capi.rs` compiles the program"),
     ("cargo run --release -p viewfuse-research ", "experiments, up to hours"),
+    ("cargo openmvg", "`tests/run` builds it, which takes minutes"),
+    ("cargo run --release --features pose ", "`pose.rs` runs it where `viewfuse-openmvg` is"),
     ("cargo install", "it would change the machine"),
     ("pip install", "it would change the machine"),
     ("host/python/test", "`python.rs` runs it where it is asked for"),

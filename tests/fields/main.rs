@@ -5,6 +5,7 @@ mod budget;
 mod genvs;
 mod pixelnerf;
 mod plane_sweep;
+mod posed;
 mod rows;
 mod sampling;
 mod scales;

@@ -11,7 +11,7 @@ use viewfuse_tests::places::repository;
 use viewfuse_tests::source::{Source, files};
 
 /// Crates whose modules have an order.
-const CRATES: [&str; 15] = [
+const CRATES: [&str; 16] = [
     "core",
     "vulkan",
     "host/job",
@@ -25,6 +25,7 @@ const CRATES: [&str; 15] = [
     "host/synthetic",
     "host/check",
     "host/train",
+    "host/pose",
     "host/view",
     "host/python",
 ];

@@ -26,6 +26,8 @@ mod pareto;
 mod parse;
 mod path;
 mod points;
+#[cfg(feature = "pose")]
+mod pose;
 mod printing;
 mod render;
 #[cfg(feature = "report")]
@@ -49,6 +51,8 @@ mod weights;
 use left_out::completions;
 #[cfg(not(feature = "pareto"))]
 use left_out::pareto;
+#[cfg(not(feature = "pose"))]
+use left_out::pose;
 #[cfg(not(feature = "report"))]
 use left_out::report;
 #[cfg(not(feature = "scenes"))]
@@ -82,6 +86,8 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Find the camera poses of bare photographs, and write them as a scene.
+    Pose(pose::Arguments),
     /// Render novel views: pictures, depth maps, contact sheets and a run record.
     Render(render::Arguments),
     /// Look around in a scene, in the browser: drag the camera and see the picture and the weights change.
@@ -147,6 +153,7 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
     terminal::silence_caught_panics();
     terminal::listen()?;
     match arguments.command {
+        Command::Pose(arguments) => pose::run(&arguments),
         Command::Render(arguments) => render::run(&arguments, &options::values(&command, &matches)),
         #[cfg(feature = "view")]
         Command::View(arguments) => view::run(&arguments, &options::given(&command, &matches)),

@@ -3,7 +3,8 @@
 //! ```text
 //! planes                                      a target's planes, for two of them
 //! efforts, headroom, mixture, paper_question,
-//! refinement, self_knowledge, sweep_time      the experiments
+//! poses, refinement, self_knowledge,
+//! sweep_time                                  the experiments
 //! ```
 
 mod efforts;
@@ -11,6 +12,7 @@ mod headroom;
 mod mixture;
 mod paper_question;
 mod planes;
+mod poses;
 mod refinement;
 mod self_knowledge;
 mod sweep_time;
@@ -20,11 +22,12 @@ use anyhow::Context;
 /// Takes what stands behind the experiment's name.
 type Experiment = fn(&[String]) -> anyhow::Result<()>;
 
-const EXPERIMENTS: [(&str, Experiment); 7] = [
+const EXPERIMENTS: [(&str, Experiment); 8] = [
     ("efforts", efforts::run),
     ("headroom", headroom::run),
     ("mixture", mixture::run),
     ("paper_question", paper_question::run),
+    ("poses", poses::run),
     ("refinement", refinement::run),
     ("self_knowledge", self_knowledge::run),
     ("sweep_time", sweep_time::run),

@@ -206,7 +206,11 @@ impl Scene {
             let Checked { views, points, warnings, frame } = checked;
             return Ok(Scene { path: path.to_path_buf(), layout: reader.name(), views, points, warnings, frame });
         }
-        Err(SceneError::UnknownLayout { path: path.to_path_buf(), looked_for: looked_for(readers) })
+        let (path, looked_for) = (path.to_path_buf(), looked_for(readers));
+        Err(match files::photograph_count(&path) {
+            0 => SceneError::UnknownLayout { path, looked_for },
+            count => SceneError::BarePhotographs { path, count },
+        })
     }
 
     /// Its name: that of its folder, for any spelling of the path.

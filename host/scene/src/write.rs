@@ -161,6 +161,20 @@ pub fn write(
     folder: &Path,
     progress: &dyn Progress,
 ) -> Result<Written, WriteSceneError> {
+    write_with(scene, layout, folder, &[], progress)
+}
+
+/// As [`write`], with more files in the folder, each a name and its bytes: they appear with the scene or not at all.
+///
+/// # Errors
+/// [`WriteSceneError`]; no files remain then.
+pub fn write_with(
+    scene: &Scene,
+    layout: Layout,
+    folder: &Path,
+    beside: &[(&str, Vec<u8>)],
+    progress: &dyn Progress,
+) -> Result<Written, WriteSceneError> {
     let failed = |cause| WriteSceneError::Io { path: folder.to_path_buf(), cause };
     let is_empty = || fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none());
     if folder.exists() && !is_empty() {
@@ -189,6 +203,7 @@ pub fn write(
         Layout::Llff => llff::write(&mut out)?,
         Layout::Neus => neus::write(&mut out)?,
     };
+    beside.iter().try_for_each(|(name, bytes)| out.put(name, bytes))?;
     unfinished.finish().map_err(failed)?;
     Ok(Written { folder: folder.to_path_buf(), photograph_count, left_out: left_out(scene, layout) })
 }

@@ -29,6 +29,15 @@ pub(crate) fn device_options(gpu: GpuOptions) -> DeviceOptions {
     DeviceOptions { instance: instance_options(), gpu, memory: cache_folder() }
 }
 
+/// The program that finds poses: `VIEWFUSE_OPENMVG`, or the one that lies beside this command; where neither is, one of this
+/// name that the system finds.
+#[cfg(feature = "pose")]
+pub(crate) fn openmvg() -> PathBuf {
+    let name = format!("viewfuse-openmvg{}", env::consts::EXE_SUFFIX);
+    let beside = || env::current_exe().ok().map(|own| own.with_file_name(&name)).filter(|path| path.is_file());
+    env::var_os("VIEWFUSE_OPENMVG").map(PathBuf::from).or_else(beside).unwrap_or_else(|| name.into())
+}
+
 /// Where devices remember what they compiled and measured: `VIEWFUSE_CACHE`, or the folder for such files that the system
 /// has for the user. Nowhere if the variable is empty.
 fn cache_folder() -> Option<PathBuf> {

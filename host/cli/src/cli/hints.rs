@@ -21,7 +21,10 @@ pub(crate) fn hint(error: &anyhow::Error) -> Option<&'static str> {
         let render = cause.downcast_ref::<RenderError>().and_then(of_render);
         let evaluation = cause.downcast_ref::<EvaluateError>().and_then(of_evaluation);
         let output = cause.downcast_ref::<OutputError>().and_then(of_output);
-        let others = || of_training(cause).or_else(|| of_viewer(cause)).or_else(|| of_tiff(cause));
+        let others = || {
+            let of_scenes = of_tiff(cause).or_else(|| of_bare(cause));
+            of_training(cause).or_else(|| of_viewer(cause)).or(of_scenes).or_else(|| of_pose(cause))
+        };
         few_shot.or(photographs).or(output).or(folder).or(render).or(evaluation).or_else(others)
     })
 }
@@ -111,6 +114,35 @@ fn of_tiff(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
         }
         _ => None,
     }
+}
+
+/// A folder of photographs without poses.
+fn of_bare(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
+    match cause.downcast_ref::<SceneError>() {
+        Some(SceneError::BarePhotographs { .. }) => Some(
+            "`viewfuse pose FOLDER -o posed` finds poses and writes a scene; `viewfuse --help` lists the layouts of posed \
+                 photographs",
+        ),
+        _ => None,
+    }
+}
+
+#[cfg(feature = "pose")]
+fn of_pose(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
+    use viewfuse_pose::{IntakeError, SolverError};
+    match (cause.downcast_ref::<SolverError>(), cause.downcast_ref::<IntakeError>()) {
+        (Some(SolverError::Missing { .. }), _) => Some(
+            "in the repository `cargo openmvg` builds it, and `cargo install --path host/pose/openmvg --ignore-rust-version` \
+             installs it; VIEWFUSE_OPENMVG names it where it lies elsewhere",
+        ),
+        (_, Some(IntakeError::Many { .. })) => Some("--every N takes every Nth"),
+        _ => None,
+    }
+}
+
+#[cfg(not(feature = "pose"))]
+fn of_pose(_: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
+    None
 }
 
 #[cfg(feature = "train")]

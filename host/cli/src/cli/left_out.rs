@@ -77,7 +77,7 @@ macro_rules! commands {
 }
 
 commands!(
-    bench "check", check "check", completions "completions", pareto "pareto", report "report", scenes "scenes", train "train", verify "check",
+    bench "check", check "check", completions "completions", pareto "pareto", pose "pose", report "report", scenes "scenes", train "train", verify "check",
     view "view"
 );
 

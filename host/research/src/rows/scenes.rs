@@ -47,7 +47,23 @@ pub(super) fn of_scenes() -> Vec<Row> {
             vec![print("viewfuse evaluate {DATA}/torcs_cars/* --sources all/3")],
         )
         .needs(&[MESH]),
+        row(
+            "poses",
+            "poses of bare photographs beside the known ones",
+            &["poses.txt"],
+            Hours::Estimated(0.4),
+            vec![print(format!("viewfuse-research poses viewfuse-openmvg{}", of_posed()))],
+        )
+        .needs(&[FERN, DINO, CUP, CAPE, KANGAROO, DTU, HERZ, FOX, Need::Program("viewfuse-openmvg")])
+        .also(&["host/pose/src", "host/pose/openmvg/src", "tests/data/room", "tests/data/toy"]),
     ]
+}
+
+/// The scenes whose poses are removed.
+fn of_posed() -> String {
+    let given = ["fern", "dino", "cup", "gold_cape", "kangaroo"].map(|scene| format!(" {{DATA}}/{scene}"));
+    let large = ["dtu_scan65", "herz_jesus_p8", "fox"].map(|scene| format!(" {{DATA}}/{scene}"));
+    [given.concat(), " tests/data/room tests/data/toy".to_owned(), large.concat()].concat()
 }
 
 /// A table of a network on the twelve cars.

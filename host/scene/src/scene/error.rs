@@ -38,6 +38,14 @@ pub enum SceneError {
         /// The layouts that the readers recognise.
         looked_for: String,
     },
+    /// Photographs, and no layout that gives their poses.
+    #[error("{path}: {count} photographs, and nothing that gives their poses")]
+    BarePhotographs {
+        /// The folder.
+        path: PathBuf,
+        /// How many photographs.
+        count: usize,
+    },
     /// A file that is no camera path.
     #[error("{path}: no camera path; looked for {looked_for}")]
     UnknownCameraPath {

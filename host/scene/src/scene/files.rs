@@ -83,6 +83,16 @@ pub fn list(folder: &Path, wanted: impl Fn(&Path) -> bool) -> Result<Vec<PathBuf
     Ok(paths)
 }
 
+/// How many photographs lie in a folder, or in `images` in it; 0 for what cannot be listed.
+pub(super) fn photograph_count(folder: &Path) -> usize {
+    let count =
+        |folder: &Path| list(folder, |path| has_extension(path, &IMAGE_EXTENSIONS)).map_or(0, |paths| paths.len());
+    match count(folder) {
+        0 => count(&folder.join("images")),
+        count => count,
+    }
+}
+
 /// The existing ones of `images` and, by increasing N, `images_N`: photographs at full size and N times smaller.
 pub(super) fn image_folders(root: &Path) -> Result<Vec<PathBuf>, SceneError> {
     let failed = |cause| unreadable(root, cause);

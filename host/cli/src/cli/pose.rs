@@ -1,0 +1,154 @@
+//! `viewfuse pose`.
+
+use super::environment::openmvg;
+use super::outputs::keep_folder_apart;
+use super::terminal::Terminal;
+use super::{on_threads, say};
+use anyhow::bail;
+use clap::Args;
+use image::DynamicImage;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use viewfuse_job::progress::Progress;
+use viewfuse_job::shell::quoted;
+use viewfuse_output::camera_map::camera_map;
+use viewfuse_pose::{FocalSource, Found, OpenMvg, Options, Record, Refusal, Solver, Verdict, find, write};
+use viewfuse_scene::encode_png;
+use viewfuse_scene::inspect::inspect;
+use viewfuse_scene::photographs::BackgroundChoice;
+use viewfuse_scene::write::Layout;
+
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    viewfuse pose photos/ -o posed\n      posed/sparse/0 and posed/images (COLMAP's layout), pose.json, cameras.png; then: viewfuse render posed --orbit 24 -o out\n  \
+    viewfuse pose photos/ --focal 1375 -o posed\n      photographs that do not state their focal length\n\n\
+    Poses are found several times, with other features and, where the focal length is unknown, other guesses of it. What is\n\
+    written is what two attempts agree on, and what passes this: each photograph, left out and rendered from the others, is met\n\
+    at its pose, better than by copies of its neighbours, and not two degrees beside it. If nothing passes, nothing is written.")]
+pub(crate) struct Arguments {
+    /// The folder of the photographs: JPEG, PNG, WebP
+    photographs: PathBuf,
+    /// Focal length in pixels of the first photograph [default: as the photographs state it (EXIF), otherwise found]
+    #[arg(long, value_name = "PIXELS", value_parser = parse_focal)]
+    focal: Option<f64>,
+    /// Take every Nth photograph, in the order of the names
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    every: u16,
+    /// How to lay the scene out: colmap, colmap-binary or transforms
+    #[arg(long, default_value = "colmap", value_parser = parse_layout)]
+    layout: Layout,
+    /// Seed of every random draw
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Work on this many threads [default: all cores]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: Option<u16>,
+    /// Folder to write; must not be there yet, or be empty
+    #[arg(short, long, value_name = "FOLDER")]
+    output: PathBuf,
+}
+
+fn parse_focal(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|focal| (1.0..=1.0e6).contains(focal))
+        .ok_or_else(|| "a number of pixels from 1".to_owned())
+}
+
+/// The layouts that hold lenses.
+fn parse_layout(text: &str) -> Result<Layout, String> {
+    let layouts = [Layout::Colmap, Layout::ColmapBinary, Layout::Transforms];
+    let layout = layouts.into_iter().find(|layout| layout.to_string() == text);
+    layout.ok_or_else(|| "the layout must be colmap, colmap-binary or transforms".to_owned())
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    let Arguments { photographs, output, .. } = arguments;
+    if output.exists() && !std::fs::read_dir(output).is_ok_and(|mut entries| entries.next().is_none()) {
+        bail!("{}: exists already and is not an empty folder; give another name", output.display());
+    }
+    let options = Options { focal: arguments.focal, seed: arguments.seed, every: arguments.every.into() };
+    let openmvg = OpenMvg { program: openmvg() };
+    let solvers: [&dyn Solver; 1] = [&openmvg];
+    let progress = Terminal::new("reading the photographs");
+    let found = on_threads(arguments.threads, || find(photographs, &solvers, &options, &progress))??;
+    let verdict = match &found.verdict {
+        Ok(verdict) => verdict,
+        Err(refusal) => {
+            told(&found, refusal, &progress);
+            drop(progress);
+            bail!(
+                "{}: no poses that can be trusted ({}); photograph with textured surfaces in view, neighbouring views not more \
+                 than 15 degrees apart and the camera moved, not only turned{}",
+                photographs.display(),
+                refusal.main(),
+                if found.cameras.are_known() { "" } else { ", or give the focal length with --focal" }
+            );
+        }
+    };
+    keep_folder_apart([&verdict.scene], output)?;
+    let picture = camera_map(&verdict.scene, &inspect(&verdict.scene, BackgroundChoice::None, &progress)?);
+    let files = [("cameras.png", encode_png(&DynamicImage::ImageRgb8(picture))?)];
+    progress.stage("writing the scene", 9..10, 10);
+    write(&found, verdict, &options, (arguments.layout, output), &files, &progress)?;
+    drop(progress);
+    print(&found, verdict, &found.record(verdict, &options))?;
+    say(format_args!("written    {} ({}): {} photographs", output.display(), arguments.layout, verdict.photos.len()))?;
+    let word = quoted(output.as_os_str());
+    say(format_args!("next       viewfuse render {word} --orbit 24 -o out"))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Why each attempt was refused, and which photographs cannot be used.
+fn told(found: &Found, refusal: &Refusal, progress: &Terminal) {
+    for (name, reason) in found.left_out(None) {
+        progress.warn(&format!("{name}: {reason}"));
+    }
+    for (attempt, reason) in found.attempts.iter().zip(&refusal.reasons) {
+        let tried = &attempt.tried;
+        let guess =
+            tried.focal_guess.map_or(String::new(), |guess| format!(", focal length from {guess} longest sides"));
+        progress.warn(&format!("{} ({:?}{guess}): {reason}", tried.solver, tried.features));
+    }
+}
+
+fn print(found: &Found, verdict: &Verdict, record: &Record<'_>) -> std::io::Result<()> {
+    let all = found.intake.photos.len() + found.intake.unusable.len();
+    say(format_args!("registered {} of {all} photographs", verdict.photos.len()))?;
+    record.left_out.iter().try_for_each(|(name, reason)| say(format_args!("left out   {name}: {reason}")))?;
+    for camera in &record.cameras {
+        let [width, height] = camera.size;
+        let from = match camera.focal_from {
+            FocalSource::Given => "given",
+            FocalSource::Exif => "from EXIF",
+            FocalSource::Unknown => "found with the poses",
+        };
+        let (focal, widths) = (camera.focal, camera.focal / f64::from(width));
+        say(format_args!(
+            "focal      {focal:.0} pixels ({widths:.2} widths), {from}; {width}x{height}, k1 {:.4}",
+            camera.k1
+        ))?;
+    }
+    let tried = record.attempts[record.attempt];
+    let (solver, points, error) = (&tried.solver, tried.points, record.reprojection_error);
+    let features = format!("{:?}", tried.features).to_lowercase();
+    say(format_args!("points     {points} by {solver} ({features}), reprojection error {error:.2} pixels"))?;
+    for own in record.accepted {
+        let scores = &own.left_out;
+        say(format_args!(
+            "left-out   {} rendered from the others {:.1} dB; copies {:.1} dB, two degrees beside {:.1} dB; attempts differ by {:.2} degrees",
+            scores.photograph,
+            scores.score,
+            scores.copy.max(scores.warp),
+            scores.disturbed,
+            own.rotation_difference
+        ))?;
+    }
+    let neighbours = &record.neighbours;
+    let (median, greatest) = (neighbours.median, neighbours.greatest);
+    say(format_args!("neighbours {median:.0} degrees apart (median), at most {greatest:.0}"))?;
+    let gap = |(a, b, gap): &(String, String, f32)| {
+        say(format_args!("gap        {gap:.0} degrees: take photographs between {a} and {b}"))
+    };
+    neighbours.gaps.iter().try_for_each(gap)
+}

@@ -1,0 +1,166 @@
+//! OpenMVG's front end and its incremental engine.
+
+use crate::answer::{Camera, Line, Pair, Photograph, Point, Solution};
+use crate::job::{Features, Job};
+use crate::say;
+use openmvg_core::camera::{RadialDistortion, TangentialDistortion};
+use openmvg_sfm::model::{ImageMeta, IntrinsicPrior, PairGeometry};
+use openmvg_sfm::progress::{SfmProgressSink, SfmProgressStage};
+use openmvg_sfm::reports::ViewVerdictStatus;
+use openmvg_sfm::{
+    Camera as Model, Dataset, ExtractionMethod, Frontend, Incremental, IntrinsicId, Reconstruction, Result, SfmOutput,
+    ViewGraph, ViewId,
+};
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// The library whose answer it is.
+pub(crate) const SOLVER: &str = "openmvg-sfm 0.1.0";
+
+/// Pixels between the library's image coordinates, whose pixel centres are integers, and ours.
+const CENTRE: f64 = 0.5;
+
+/// Poses for a job's photographs.
+pub(crate) fn solve(job: &Job) -> Result<Solution> {
+    let told = Told::default();
+    let frontend =
+        Frontend::default().with_max_dimension(Some(job.max_side)).with_extraction_method(match job.features {
+            Features::Alp => ExtractionMethod::Alp,
+            Features::Sift => ExtractionMethod::Sift,
+        });
+    let (graph, _) = frontend.build_with_report(&dataset(job)?, &told)?;
+    let output = Incremental::default().runner().progress(&told).run_prepared(&graph)?;
+    let found = output.reconstruction();
+    Ok(Solution {
+        solver: SOLVER,
+        cameras: found.camera_models().iter().map(camera).collect(),
+        photographs: photographs(&output),
+        points: points(found),
+        pairs: pairs(&graph),
+    })
+}
+
+/// The photographs with one camera for each group, its principal point in the middle.
+fn dataset(job: &Job) -> Result<Dataset> {
+    let mut models = Vec::new();
+    for (index, guess) in job.cameras.iter().enumerate() {
+        let size = job.photographs.iter().find(|photograph| photograph.camera == index).map_or([2, 2], |own| own.size);
+        let [x, y] = size.map(|side| f64::from(side) / 2.0 - CENTRE);
+        let (radial, tangential) = (RadialDistortion::K1(0.0), TangentialDistortion::None);
+        models.push(Model::try_brown_conrady(guess.focal, guess.focal, x, y, radial, tangential)?);
+    }
+    let meta = |own: &crate::job::Photograph| ImageMeta::path(&own.path, own.size[0], own.size[1]);
+    let prior = |is_guess: bool| if is_guess { IntrinsicPrior::Guess } else { IntrinsicPrior::Trusted };
+    Dataset::builder()
+        .root_seed(job.seed)
+        .image_meta(job.photographs.iter().map(meta))
+        .camera_models(models)
+        .intrinsic_priors(job.cameras.iter().map(|guess| prior(guess.is_guess)))
+        .view_intrinsics(job.photographs.iter().map(|own| IntrinsicId::new(own.camera)))
+        .one_pose_per_view()
+        .build()
+}
+
+fn camera(model: &Model) -> Camera {
+    match model {
+        Model::BrownConrady(own) => Camera {
+            focal: 0.5 * (own.focal_x() + own.focal_y()),
+            principal: [own.principal_x() + CENTRE, own.principal_y() + CENTRE],
+            k1: own.radial_distortion().k1(),
+        },
+        // No other model was given.
+        _ => Camera { focal: 0.0, principal: [0.0; 2], k1: 0.0 },
+    }
+}
+
+fn photographs(output: &SfmOutput) -> Vec<Photograph> {
+    let found = output.reconstruction();
+    let mut all = Vec::new();
+    for index in 0..found.view_count() {
+        let view = ViewId::new(index);
+        let camera_from_world = found.pose(view).map(|record| {
+            let (rotation, translation) = (record.pose.rotation_matrix(), record.pose.translation());
+            [0, 1, 2].map(|row| [rotation[(row, 0)], rotation[(row, 1)], rotation[(row, 2)], translation[row]])
+        });
+        let verdict = output.report().view_verdicts().get(index).map(|verdict| verdict.status());
+        let reason = match verdict {
+            Some(ViewVerdictStatus::Unregistered { reason }) => Some(reason.to_string()),
+            _ => None,
+        };
+        all.push(Photograph { camera_from_world, reason });
+    }
+    all
+}
+
+fn points(found: &Reconstruction) -> Vec<Point> {
+    let mut seen: BTreeMap<usize, Vec<(usize, [f64; 2])>> = BTreeMap::new();
+    for observation in found.observations() {
+        let place = [observation.pixel.x + CENTRE, observation.pixel.y + CENTRE];
+        seen.entry(observation.landmark.index()).or_default().push((observation.view.index(), place));
+    }
+    let mut of = |landmark: &openmvg_sfm::model::Landmark| {
+        let seen = seen.remove(&landmark.id.index())?;
+        Some(Point { position: landmark.point.coords.into(), error: landmark.reprojection_error.value(), seen })
+    };
+    found.landmarks().iter_active().filter_map(&mut of).collect()
+}
+
+fn pairs(graph: &ViewGraph) -> Vec<Pair> {
+    let pair = |pair: openmvg_sfm::model::GraphPair<'_>| {
+        let (geometry, is_inlier) = pair.verified()?;
+        let is_general = matches!(geometry, PairGeometry::Essential { .. } | PairGeometry::Fundamental { .. });
+        let inliers = is_inlier.iter().filter(|is_inlier| **is_inlier).count();
+        Some(Pair { photographs: [pair.views().first().index(), pair.views().second().index()], inliers, is_general })
+    };
+    graph.pairs().filter_map(pair).collect()
+}
+
+/// Says how far the work is; stops it when nobody reads that any more.
+#[derive(Default)]
+struct Told {
+    now: Mutex<(usize, usize)>,
+    is_alone: AtomicBool,
+}
+
+impl Told {
+    fn say(&self, stage: SfmProgressStage, of: usize, done: usize) {
+        if !say(&Line::Progress { stage: name(stage), of, done }) {
+            self.is_alone.store(true, Ordering::Relaxed);
+        }
+    }
+}
+
+impl SfmProgressSink for Told {
+    fn begin(&self, stage: SfmProgressStage, total: usize) {
+        if let Ok(mut now) = self.now.lock() {
+            *now = (total, 0);
+        }
+        self.say(stage, total, 0);
+    }
+
+    fn advance(&self, stage: SfmProgressStage, completed: usize) {
+        let Ok(mut now) = self.now.lock() else { return };
+        now.1 += completed;
+        let (of, done) = *now;
+        drop(now);
+        self.say(stage, of, done);
+    }
+
+    fn is_canceled(&self) -> bool {
+        self.is_alone.load(Ordering::Relaxed)
+    }
+}
+
+/// What a person reads.
+fn name(stage: SfmProgressStage) -> &'static str {
+    match stage {
+        SfmProgressStage::FeatureExtraction => "finding features",
+        SfmProgressStage::MatcherPreparation | SfmProgressStage::Matching => "matching features",
+        SfmProgressStage::Verification => "verifying pairs",
+        SfmProgressStage::RadialCalibration => "estimating the lens",
+        SfmProgressStage::TrackBuilding => "building tracks",
+        SfmProgressStage::InitialPair | SfmProgressStage::Registration => "registering photographs",
+        _ => "bundle adjustment",
+    }
+}

@@ -1,0 +1,145 @@
+//! The attempts: with other features, other draws, and where focal lengths are unknown other guesses of them.
+
+use crate::focal::Cameras;
+use crate::intake::{Intake, Photo, WORKING_SIDE};
+use crate::solution::{Features, Job, JobPhotograph, Solution, Solver, SolverError};
+use crate::support::Support;
+use serde::Serialize;
+use std::time::Instant;
+use viewfuse_job::progress::{Part, Progress};
+
+/// Guesses of an unknown focal length, in longest sides: a phone, a compact camera, a small telephoto lens.
+const GUESSES: [f64; 3] = [0.75, 1.1, 1.6];
+
+/// An attempt at the poses.
+#[derive(Clone, Debug)]
+pub struct Attempt {
+    /// What was tried.
+    pub tried: Tried,
+    /// What was found.
+    pub solution: Option<Solution>,
+}
+
+/// An attempt, as the record tells it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Tried {
+    /// The solver, with its version where it answered.
+    pub solver: String,
+    /// The kind of features.
+    pub features: Features,
+    /// The seed.
+    pub seed: u64,
+    /// The guess of unknown focal lengths, in longest sides.
+    pub focal_guess: Option<f64>,
+    /// Photographs with a pose.
+    pub registered: usize,
+    /// Focal length of each camera in pixels of its photographs.
+    pub focal: Vec<f64>,
+    /// Mean reprojection error in pixels at working size.
+    pub reprojection_error: f64,
+    /// Number of points.
+    pub points: usize,
+    /// What the points tell.
+    pub support: Option<Support>,
+    /// Seconds that it took.
+    pub seconds: f64,
+    /// Why it is not a candidate; `None` if it is.
+    pub refused: Option<String>,
+}
+
+/// A plan of an attempt.
+struct Plan {
+    features: Features,
+    seed: u64,
+    guess: Option<f64>,
+}
+
+/// What is tried with a solver.
+fn plans(solver: &dyn Solver, are_known: bool, seed: u64) -> Vec<Plan> {
+    let guesses: Vec<Option<f64>> = if are_known { vec![None] } else { GUESSES.map(Some).to_vec() };
+    let of = |guess| {
+        let plan = move |features: &Features| Plan { features: *features, seed, guess };
+        solver.features().iter().map(plan)
+    };
+    guesses.into_iter().flat_map(of).collect()
+}
+
+/// Makes the attempts with every solver.
+///
+/// # Errors
+/// [`SolverError`] if a solver is missing or broken, or the work is stopped; that it finds nothing is no error.
+pub(crate) fn attempts(
+    solvers: &[&dyn Solver],
+    intake: &Intake,
+    cameras: &Cameras,
+    seed: u64,
+    progress: &dyn Progress,
+) -> Result<Vec<Attempt>, SolverError> {
+    let all: Vec<(&dyn Solver, Plan)> = solvers
+        .iter()
+        .flat_map(|solver| plans(*solver, cameras.are_known(), seed).into_iter().map(|plan| (*solver, plan)))
+        .collect();
+    let mut made = Vec::with_capacity(all.len());
+    for (index, (solver, plan)) in all.iter().enumerate() {
+        let name = format!("attempt {} of {}", index + 1, all.len());
+        let part = Part::begin(progress, name, index..index + 1, all.len());
+        let start = Instant::now();
+        let job = job(intake, cameras, plan);
+        let mut tried = Tried {
+            solver: solver.name().to_owned(),
+            features: plan.features,
+            seed: plan.seed,
+            focal_guess: plan.guess,
+            registered: 0,
+            focal: Vec::new(),
+            reprojection_error: 0.0,
+            points: 0,
+            support: None,
+            seconds: 0.0,
+            refused: None,
+        };
+        let solution = match solver.solve(&job, &part) {
+            Ok(solution) => {
+                tried.solver.clone_from(&solution.solver);
+                tried.registered = solution.registered().len();
+                tried.focal = focal(&solution, cameras, &intake.photos);
+                tried.reprojection_error = solution.reprojection_error();
+                tried.points = solution.points.len();
+                tried.support = Some(Support::of(&solution));
+                Some(solution)
+            }
+            Err(SolverError::Nothing(reason)) => {
+                tried.refused = Some(reason);
+                None
+            }
+            Err(error) => return Err(error),
+        };
+        tried.seconds = start.elapsed().as_secs_f64();
+        made.push(Attempt { tried, solution });
+    }
+    Ok(made)
+}
+
+fn job(intake: &Intake, cameras: &Cameras, plan: &Plan) -> Job {
+    let photograph = |(photo, camera): (&Photo, &usize)| JobPhotograph {
+        path: photo.working.clone(),
+        size: photo.working_size,
+        camera: *camera,
+    };
+    Job {
+        seed: plan.seed,
+        features: plan.features,
+        max_side: WORKING_SIDE,
+        cameras: cameras.guesses(&intake.photos, plan.guess.unwrap_or(1.0)),
+        photographs: intake.photos.iter().zip(&cameras.of_photo).map(photograph).collect(),
+    }
+}
+
+/// The cameras' focal lengths in pixels of their photographs.
+fn focal(solution: &Solution, cameras: &Cameras, photos: &[Photo]) -> Vec<f64> {
+    let of = |(camera, group): (&crate::solution::SolvedCamera, &crate::focal::CameraGroup)| {
+        let working = group.photos.first().map_or(group.size, |photo| photos[*photo].working_size);
+        camera.focal * f64::from(group.size[0]) / f64::from(working[0])
+    };
+    solution.cameras.iter().zip(&cameras.groups).map(of).collect()
+}

@@ -1,0 +1,109 @@
+//! What a photograph states of its camera (EXIF): the focal length in pixels, and which camera it was.
+//!
+//! Of the sources of a focal length the first that is plausible counts:
+//!
+//! ```text
+//! focal plane   FocalLength in millimetres by FocalPlaneXResolution, for a photograph that still has its size
+//! 35 mm         FocalLengthIn35mmFilm by the diagonal: 43.27 mm for the picture's diagonal in pixels (CIPA DCG-001)
+//! ```
+
+use exif::{In, Reader, Tag, Value};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+/// Diagonal of 36 mm by 24 mm, in millimetres.
+const FULL_FRAME_DIAGONAL: f64 = 43.266_615_305_567_87;
+
+/// Plausible focal lengths, in diagonals of the picture.
+const PLAUSIBLE: std::ops::RangeInclusive<f64> = 0.15..=20.0;
+
+/// Most that the focal plane's value may differ from the 35 mm equivalent, as a share of it: past rounding, its resolution is
+/// that of another size of the picture.
+const MAX_DIFFERENCE: f64 = 0.1;
+
+/// What a photograph states of its camera.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Exif {
+    /// Focal length in pixels of the photograph as it is stored.
+    pub focal: Option<f64>,
+    /// Make, model and lens, as far as they are stated: photographs of one text are of one camera.
+    pub camera: Option<String>,
+    /// Focal length in millimetres: a zoom lens has several.
+    pub millimetres: Option<f64>,
+}
+
+impl Exif {
+    /// Reads what a file of this size in pixels states; nothing where it has no readable EXIF.
+    pub fn read(path: &Path, size: [u32; 2]) -> Exif {
+        let Ok(file) = File::open(path) else { return Exif::default() };
+        let Ok(fields) = Reader::new().read_from_container(&mut BufReader::new(file)) else { return Exif::default() };
+        let number = |tag| number(&fields.get_field(tag, In::PRIMARY)?.value);
+        let text = |tag| Some(fields.get_field(tag, In::PRIMARY)?.display_value().to_string().replace('"', ""));
+        let names: Vec<String> = [Tag::Make, Tag::Model, Tag::LensModel].into_iter().filter_map(text).collect();
+        let millimetres = number(Tag::FocalLength).filter(|length| *length > 0.0);
+        let stored = [Tag::PixelXDimension, Tag::PixelYDimension].map(number);
+        let has_its_size = stored == size.map(|side| Some(f64::from(side)));
+        let plane = Plane {
+            millimetres,
+            // 3 stands for centimetres, 2 and nothing for inches.
+            unit: if number(Tag::FocalPlaneResolutionUnit) == Some(3.0) { 10.0 } else { 25.4 },
+            resolution: number(Tag::FocalPlaneXResolution).filter(|_| has_its_size),
+        };
+        Exif {
+            focal: focal(&plane, number(Tag::FocalLengthIn35mmFilm), size),
+            camera: (!names.is_empty()).then(|| names.join(" ")),
+            millimetres,
+        }
+    }
+}
+
+/// What is stated of the focal plane.
+struct Plane {
+    millimetres: Option<f64>,
+    /// Millimetres of the resolution's unit.
+    unit: f64,
+    /// Pixels of the photograph for each unit.
+    resolution: Option<f64>,
+}
+
+/// The focal length in pixels.
+fn focal(plane: &Plane, equivalent: Option<f64>, size: [u32; 2]) -> Option<f64> {
+    let diagonal = size.map(f64::from)[0].hypot(f64::from(size[1]));
+    let is_plausible = |focal: &f64| PLAUSIBLE.contains(&(focal / diagonal));
+    let of_plane = plane.millimetres.zip(plane.resolution).map(|(length, density)| length * density / plane.unit);
+    let of_film = equivalent.map(|length| length / FULL_FRAME_DIAGONAL * diagonal).filter(is_plausible);
+    let agrees = |focal: &f64| of_film.is_none_or(|film| (focal / film - 1.0).abs() <= MAX_DIFFERENCE);
+    of_plane.filter(is_plausible).filter(agrees).or(of_film)
+}
+
+fn number(value: &Value) -> Option<f64> {
+    let number = match value {
+        Value::Rational(all) => all.first()?.to_f64(),
+        Value::Short(all) => f64::from(*all.first()?),
+        Value::Long(all) => f64::from(*all.first()?),
+        _ => return None,
+    };
+    number.is_finite().then_some(number).filter(|number| *number > 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_focal_plane_counts_where_it_agrees() {
+        let plane = |resolution| Plane { millimetres: Some(50.0), unit: 25.4, resolution };
+        let size = [3000, 2000];
+        let near = |value: Option<f64>, expected: f64| (value.unwrap_or_default() - expected).abs() < 0.5;
+        // 36 mm for 3000 pixels: 2116.7 pixels an inch.
+        let density = 3000.0 / 36.0 * 25.4;
+        assert!(near(focal(&plane(Some(density)), Some(50.0), size), 4166.7));
+        assert!(near(focal(&plane(Some(density)), None, size), 4166.7));
+        let of_film = 50.0 / FULL_FRAME_DIAGONAL * 3000.0_f64.hypot(2000.0);
+        assert!(near(focal(&plane(Some(2.0 * density)), Some(50.0), size), of_film), "it is of another size");
+        assert!(near(focal(&plane(None), Some(50.0), size), of_film));
+        assert_eq!(focal(&plane(None), None, size), None);
+        assert_eq!(focal(&plane(Some(1.0)), None, size), None, "a focal length of two pixels");
+    }
+}

@@ -1,0 +1,102 @@
+//! From a folder of photographs to a verdict.
+
+use crate::attempt::{Attempt, attempts};
+use crate::focal::Cameras;
+use crate::intake::{Intake, IntakeError};
+use crate::solution::{Solver, SolverError};
+use crate::verdict::{Refusal, Verdict, VerdictError, verdict};
+use std::path::Path;
+use viewfuse_field::render::RenderError;
+use viewfuse_job::progress::{Part, Progress};
+use viewfuse_scene::SceneError;
+
+/// What a person may choose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// Focal length in pixels of the first photograph; `None` takes what the photographs state, or finds it.
+    pub focal: Option<f64>,
+    /// Seed of every random draw.
+    pub seed: u64,
+    /// Every so many photographs are taken.
+    pub every: usize,
+}
+
+impl Default for Options {
+    fn default() -> Options {
+        Options { focal: None, seed: 0, every: 1 }
+    }
+}
+
+/// What was found.
+#[derive(Debug)]
+pub struct Found {
+    /// The photographs.
+    pub intake: Intake,
+    /// Their cameras before the work.
+    pub cameras: Cameras,
+    /// The attempts.
+    pub attempts: Vec<Attempt>,
+    /// The verdict.
+    pub verdict: Result<Verdict, Refusal>,
+}
+
+/// Why poses could not be looked for.
+#[derive(Debug, thiserror::Error)]
+pub enum PoseError {
+    /// The photographs.
+    #[error(transparent)]
+    Intake(#[from] IntakeError),
+    /// A solver.
+    #[error(transparent)]
+    Solver(#[from] SolverError),
+    /// Too few photographs.
+    #[error("{folder}: {count} photographs can be used, three are needed{unusable}")]
+    Few {
+        /// The folder.
+        folder: String,
+        /// How many can be used.
+        count: usize,
+        /// Those that cannot, with reasons.
+        unusable: String,
+    },
+    /// A photograph changed while the work went on, or a pose is none.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A photograph that was left out could not be rendered.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+}
+
+impl From<VerdictError> for PoseError {
+    fn from(error: VerdictError) -> PoseError {
+        match error {
+            VerdictError::Scene(error) => PoseError::Scene(error),
+            VerdictError::Render(error) => PoseError::Render(error),
+        }
+    }
+}
+
+/// Looks for the poses of a folder's photographs with these solvers.
+///
+/// # Errors
+/// [`PoseError`]; that nothing can be trusted is no error but a verdict.
+pub fn find(
+    folder: &Path,
+    solvers: &[&dyn Solver],
+    options: &Options,
+    progress: &dyn Progress,
+) -> Result<Found, PoseError> {
+    let part = Part::begin(progress, "reading the photographs", 0..1, 10);
+    let intake = Intake::read(folder, options.every, &part)?;
+    if intake.photos.len() < 3 {
+        let unusable = intake.unusable.iter().map(|own| format!("; {}: {}", own.name, own.reason)).collect();
+        let (folder, count) = (folder.display().to_string(), intake.photos.len());
+        return Err(PoseError::Few { folder, count, unusable });
+    }
+    let cameras = Cameras::of(&intake.photos, options.focal);
+    let part = Part::begin(progress, "", 1..7, 10);
+    let mut attempts = attempts(solvers, &intake, &cameras, options.seed, &part)?;
+    let part = Part::begin(progress, "", 7..9, 10);
+    let verdict = verdict(folder, &intake.photos, &cameras, &mut attempts, &part)?;
+    Ok(Found { intake, cameras, attempts, verdict })
+}

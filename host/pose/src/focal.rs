@@ -1,0 +1,85 @@
+//! The cameras of photographs before the work: which photographs share one, and its focal length with where it comes from.
+
+use crate::intake::Photo;
+use crate::solution::CameraGuess;
+
+/// Where a focal length comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FocalSource {
+    /// The person gave it.
+    Given,
+    /// The photographs state it.
+    Exif,
+    /// It is found with the poses.
+    Unknown,
+}
+
+/// Photographs of one camera.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraGroup {
+    /// Focal length in pixels of the upright photograph; `None` if it is unknown.
+    pub focal: Option<f64>,
+    /// Where it comes from.
+    pub source: FocalSource,
+    /// Width and height of its photographs.
+    pub size: [u32; 2],
+    /// The photographs, as indices.
+    pub photos: Vec<usize>,
+}
+
+/// The cameras of all photographs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cameras {
+    /// In the order of their first photographs.
+    pub groups: Vec<CameraGroup>,
+    /// The camera of each photograph.
+    pub of_photo: Vec<usize>,
+}
+
+impl Cameras {
+    /// Photographs of one size are of one camera; with focal lengths by EXIF, of one size, camera and zoom. `given` is a focal
+    /// length in pixels of photographs as large as the first: of others it is scaled with the longest side.
+    pub fn of(photos: &[Photo], given: Option<f64>) -> Cameras {
+        let longest = |size: [u32; 2]| f64::from(size[0].max(size[1]));
+        let mut groups: Vec<(String, CameraGroup)> = Vec::new();
+        let mut of_photo = Vec::with_capacity(photos.len());
+        for (index, photo) in photos.iter().enumerate() {
+            let (focal, source, key) = match (given, photo.exif.focal) {
+                (Some(given), _) => {
+                    let focal = given * longest(photo.size) / longest(photos[0].size);
+                    (Some(focal), FocalSource::Given, String::new())
+                }
+                (None, Some(focal)) => {
+                    let own = format!("{:?} {:?}", photo.exif.camera, photo.exif.millimetres);
+                    (Some(focal), FocalSource::Exif, own)
+                }
+                (None, None) => (None, FocalSource::Unknown, "unknown".to_owned()),
+            };
+            let key = format!("{:?} {key}", photo.size);
+            let place = groups.iter().position(|(own, _)| *own == key).unwrap_or(groups.len());
+            if place == groups.len() {
+                groups.push((key, CameraGroup { focal, source, size: photo.size, photos: Vec::new() }));
+            }
+            groups[place].1.photos.push(index);
+            of_photo.push(place);
+        }
+        Cameras { groups: groups.into_iter().map(|(_, group)| group).collect(), of_photo }
+    }
+
+    /// Whether every focal length is known.
+    pub fn are_known(&self) -> bool {
+        self.groups.iter().all(|group| group.focal.is_some())
+    }
+
+    /// The cameras of a job whose photographs are at working size; unknown focal lengths are `guess` longest sides.
+    pub(crate) fn guesses(&self, photos: &[Photo], guess: f64) -> Vec<CameraGuess> {
+        let of = |group: &CameraGroup| {
+            let own = group.photos.first().map_or([1, 1], |photo| photos[*photo].working_size);
+            let scale = f64::from(own[0]) / f64::from(group.size[0]);
+            let longest = f64::from(group.size[0].max(group.size[1]));
+            CameraGuess { focal: scale * group.focal.unwrap_or(guess * longest), is_guess: group.focal.is_none() }
+        };
+        self.groups.iter().map(of).collect()
+    }
+}

@@ -1,0 +1,62 @@
+//! Camera poses of bare photographs: structure from motion by libraries that others keep, and a verdict on what they found.
+//!
+//! Solvers of structure from motion can be wrong by tens of degrees without a sign of it in their own figures: the number of
+//! points, the reprojection error, what they accept. Two things tell. Attempts with other features, seeds and focal lengths
+//! disagree where poses are wrong. And photographs, left out one at a time and rendered from the others, are met only at their
+//! true poses.
+//!
+//! The modules are listed in the order of the data; a module uses only modules listed above it:
+//!
+//! ```text
+//! exif          what a photograph states of its camera: Exif
+//! intake        the photographs of a folder, and those that cannot be used: Intake
+//! focal         cameras before the work, with where their focal lengths come from: Cameras
+//! solution      a job for a solver and its answer: Job, Solution, Solver
+//! openmvg       OpenMVG's crates, as a process: OpenMvg
+//! posed         a solution as a scene
+//! agreement     rotations of two solutions between the same photographs
+//! support       parallax and the shape of the points: what two views can tell
+//! left_out      photographs rendered from the others: LeftOut
+//! verdict       the solution that is accepted, with the photographs that are: Verdict
+//! attempt       the attempts that are made: Attempt
+//! advice        where more photographs help: Neighbours
+//! find          from a folder to a verdict: find
+//! write         the scene with its record, whole or not at all
+//! ```
+#![forbid(unsafe_code)]
+
+mod advice;
+mod agreement;
+mod attempt;
+mod exif;
+mod find;
+mod focal;
+mod intake;
+mod left_out;
+mod openmvg;
+mod posed;
+mod solution;
+mod support;
+mod verdict;
+mod write;
+
+pub use advice::Neighbours;
+pub use attempt::{Attempt, Tried};
+pub use exif::Exif;
+pub use find::{Found, Options, PoseError, find};
+pub use focal::{CameraGroup, Cameras, FocalSource};
+pub use intake::{Intake, IntakeError, MAX_PHOTOGRAPHS, Photo, Unusable, is_photograph};
+pub use left_out::LeftOut;
+pub use openmvg::OpenMvg;
+pub use solution::{
+    CameraGuess, Features, Job, JobPhotograph, Solution, SolvedCamera, SolvedPair, SolvedPhotograph, SolvedPoint,
+    Solver, SolverError,
+};
+pub use support::Support;
+pub use verdict::{Refusal, Verdict, Verified};
+pub use write::{CameraRecord, Record, write};
+
+/// The examples of the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,0 +1,203 @@
+//! A job for a solver of structure from motion, and its answer.
+
+use glam::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+use viewfuse_job::progress::{Interrupted, Progress};
+
+/// A kind of features.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Features {
+    /// Extrema of an analytic Laplacian (ALP), described as SIFT's.
+    Alp,
+    /// SIFT.
+    Sift,
+}
+
+/// What a solver is asked.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Job {
+    /// Seed of every random draw.
+    pub seed: u64,
+    /// The kind of features; a solver that has one kind ignores it.
+    pub features: Features,
+    /// Longest side in pixels at which features are looked for.
+    pub max_side: u32,
+    /// The cameras: photographs of one camera share its focal length and its lens.
+    pub cameras: Vec<CameraGuess>,
+    /// The photographs.
+    pub photographs: Vec<JobPhotograph>,
+}
+
+/// A camera before the work.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct CameraGuess {
+    /// Focal length in pixels of the job's photographs.
+    pub focal: f64,
+    /// Whether that is no more than a guess.
+    pub is_guess: bool,
+}
+
+/// A photograph of a job: grey, upright, at working size.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct JobPhotograph {
+    /// Its file.
+    pub path: PathBuf,
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Its camera, as an index.
+    pub camera: usize,
+}
+
+/// What a solver found. Image coordinates are of the job's photographs: the top left pixel's centre is at (0.5, 0.5).
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+pub struct Solution {
+    /// The solver and its version.
+    pub solver: String,
+    /// The cameras, in the order of the job.
+    pub cameras: Vec<SolvedCamera>,
+    /// The photographs, in the order of the job.
+    pub photographs: Vec<SolvedPhotograph>,
+    /// Surface points.
+    pub points: Vec<SolvedPoint>,
+    /// Pairs of photographs with matches that one geometry explains.
+    #[serde(default)]
+    pub pairs: Vec<SolvedPair>,
+}
+
+/// A camera as it was refined.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+pub struct SolvedCamera {
+    /// Focal length in pixels.
+    pub focal: f64,
+    /// Principal point in pixels.
+    pub principal: [f64; 2],
+    /// Radial distortion `k1`, OpenCV's.
+    pub k1: f64,
+}
+
+/// A photograph with or without a pose.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct SolvedPhotograph {
+    /// World to camera, rows of `[R|t]`, axes x right, y down, z forward; `None` without a pose.
+    pub camera_from_world: Option<[[f64; 4]; 3]>,
+    /// Why it has none, in the solver's words.
+    pub reason: Option<String>,
+}
+
+impl SolvedPhotograph {
+    /// The rotation from world to camera.
+    pub fn rotation(&self) -> Option<DMat3> {
+        let rows = self.camera_from_world?.map(|row| DVec3::new(row[0], row[1], row[2]));
+        Some(DMat3::from_cols(rows[0], rows[1], rows[2]).transpose())
+    }
+
+    /// The camera's centre in world coordinates.
+    pub fn centre(&self) -> Option<DVec3> {
+        let rows = self.camera_from_world?;
+        Some(-(self.rotation()?.transpose() * DVec3::new(rows[0][3], rows[1][3], rows[2][3])))
+    }
+}
+
+/// A surface point.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct SolvedPoint {
+    /// World coordinates.
+    pub position: [f64; 3],
+    /// Mean reprojection error in pixels.
+    pub error: f64,
+    /// The photographs that saw it, each with the place in it.
+    pub seen: Vec<(usize, [f64; 2])>,
+}
+
+/// A pair of photographs.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+pub struct SolvedPair {
+    /// Their indices.
+    pub photographs: [usize; 2],
+    /// Number of matches that agree with the geometry.
+    pub inliers: usize,
+    /// Whether the geometry is that of a moved camera, and not a homography or a rotation alone.
+    pub is_general: bool,
+}
+
+impl Solution {
+    /// The photographs with a pose, ascending.
+    pub fn registered(&self) -> Vec<usize> {
+        let all = self.photographs.iter().enumerate();
+        all.filter(|(_, photograph)| photograph.camera_from_world.is_some()).map(|(index, _)| index).collect()
+    }
+
+    /// Mean reprojection error over the points in pixels; 0 without points.
+    pub fn reprojection_error(&self) -> f64 {
+        self.points.iter().map(|point| point.error).sum::<f64>() / self.points.len().max(1) as f64
+    }
+
+    /// Whether every number is finite, every index is that of a photograph or camera of the job, and focal lengths are
+    /// positive: a process answered.
+    pub(crate) fn fits(&self, job: &Job) -> bool {
+        let count = job.photographs.len();
+        let poses = self.photographs.iter().filter_map(|photograph| photograph.camera_from_world);
+        let finite = |numbers: &[f64]| numbers.iter().all(|number| number.is_finite());
+        let is_rotation = |photograph: &SolvedPhotograph| {
+            photograph.rotation().is_none_or(|own| (own.determinant() - 1.0).abs() < 1.0e-3)
+        };
+        self.photographs.len() == count
+            && self.cameras.len() == job.cameras.len()
+            && poses.flatten().all(|row| finite(&row))
+            && self.photographs.iter().all(is_rotation)
+            && self
+                .cameras
+                .iter()
+                .all(|own| own.focal > 0.0 && finite(&[own.focal, own.k1, own.principal[0], own.principal[1]]))
+            && self.points.iter().all(|point| {
+                finite(&point.position)
+                    && point.error.is_finite()
+                    && point.seen.iter().all(|(photograph, place)| *photograph < count && finite(place))
+            })
+            && self.pairs.iter().all(|pair| pair.photographs.iter().all(|own| *own < count))
+    }
+}
+
+/// Why a solver has no answer.
+#[derive(Debug, thiserror::Error)]
+pub enum SolverError {
+    /// The program is not there.
+    #[error("{}: the program is not there or cannot be started: {cause}", program.display())]
+    Missing {
+        /// The program.
+        program: PathBuf,
+        /// What the system said.
+        cause: std::io::Error,
+    },
+    /// The program broke.
+    #[error("{}: {problem}", program.display())]
+    Broken {
+        /// The program.
+        program: PathBuf,
+        /// What happened.
+        problem: String,
+    },
+    /// It found nothing; the words are the solver's.
+    #[error("{0}")]
+    Nothing(String),
+    /// The person stopped the work.
+    #[error("interrupted")]
+    Interrupted(#[from] Interrupted),
+}
+
+/// A solver of structure from motion.
+pub trait Solver: Sync {
+    /// Its name, for records and messages.
+    fn name(&self) -> &'static str;
+
+    /// The kinds of features that it has.
+    fn features(&self) -> &'static [Features];
+
+    /// Works on a job. The same job has the same answer, byte for byte, on one machine.
+    ///
+    /// # Errors
+    /// [`SolverError`].
+    fn solve(&self, job: &Job, progress: &dyn Progress) -> Result<Solution, SolverError>;
+}

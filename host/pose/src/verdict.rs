@@ -1,0 +1,286 @@
+//! Which attempt is accepted, and which of its photographs.
+//!
+//! ```text
+//! candidates   at least three photographs; a plausible focal length; parallax
+//! agreement    an attempt with other features, or another guess of the focal length, has the same rotations
+//! left out     each photograph, rendered from the others, is met at its pose and nowhere else
+//! ```
+//!
+//! Photographs that fail are taken out and the rest is looked at again, until none fails. The first candidate that keeps at
+//! least three is accepted. The limits were set on scenes with known poses (`host/research/results/poses.md`).
+
+use crate::agreement::{differences, median};
+use crate::attempt::Attempt;
+use crate::focal::Cameras;
+use crate::intake::Photo;
+use crate::left_out::{LeftOut, left_out};
+use crate::posed;
+use crate::solution::Solution;
+use std::path::Path;
+use viewfuse_field::render::RenderError;
+use viewfuse_job::progress::{Part, Progress};
+use viewfuse_scene::{Scene, SceneError};
+
+/// Fewest photographs: each must be seen again by two others.
+const MIN_PHOTOGRAPHS: usize = 3;
+/// Plausible focal lengths, in widths of the photograph.
+const PLAUSIBLE_WIDTHS: std::ops::RangeInclusive<f64> = 0.5..=3.0;
+/// Most that a known focal length may change, as a share of it.
+const MAX_KNOWN_CHANGE: f64 = 0.15;
+/// Most that unknown focal lengths of two attempts may differ, as a share.
+const MAX_FOCAL_DIFFERENCE: f64 = 0.1;
+/// Least median parallax in degrees.
+const MIN_PARALLAX: f64 = 1.0;
+/// Least thickness of the points where the focal length is unknown: points in a plane leave it open.
+const MIN_THICKNESS: f64 = 0.03;
+/// Most degrees between the relative rotations of two attempts.
+const MAX_ROTATION_DIFFERENCE: f64 = 1.5;
+/// Least decibels by which a left-out photograph is met better at its pose than at disturbed ones.
+const MIN_SHARPNESS: f64 = 0.5;
+/// Least decibels by which left-out photographs are met better than their copies: each, and the median.
+const MIN_GAIN: f64 = 0.5;
+const MIN_MEDIAN_GAIN: f64 = 1.0;
+
+/// Of so many photographs that fail, one is taken out at once.
+const WORST: usize = 4;
+
+/// What was accepted.
+#[derive(Clone, Debug)]
+pub struct Verdict {
+    /// The attempt, as an index.
+    pub attempt: usize,
+    /// Its scene of the accepted photographs.
+    pub scene: Scene,
+    /// The accepted photographs, as indices, ascending.
+    pub photos: Vec<usize>,
+    /// What each accepted photograph passed.
+    pub verified: Vec<Verified>,
+    /// Photographs that were taken out, as indices, with the reason.
+    pub taken_out: Vec<(usize, String)>,
+}
+
+/// What a photograph passed.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Verified {
+    /// Degrees between its relative rotations and those of the attempt that agrees best.
+    pub rotation_difference: f64,
+    /// The scores when it was left out.
+    #[serde(flatten)]
+    pub left_out: LeftOut,
+}
+
+/// Why nothing was accepted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refusal {
+    /// For each attempt, in one line.
+    pub reasons: Vec<String>,
+}
+
+impl Refusal {
+    /// The reason of the attempt that came furthest: the longest way through the checks has the most to tell.
+    pub fn main(&self) -> &str {
+        let all = || self.reasons.iter().map(String::as_str);
+        let stage = |reason: &&str| {
+            let later = ["left out", "no other attempt", "lie in a plane", "hardly moved", "focal length"];
+            later.iter().position(|words| reason.contains(words)).map_or(0, |place| later.len() - place)
+        };
+        all().max_by_key(stage).unwrap_or("no attempt was made")
+    }
+}
+
+/// Why there is no verdict.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum VerdictError {
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    #[error(transparent)]
+    Render(#[from] RenderError),
+}
+
+/// The verdict on attempts; each that is no candidate is told why.
+pub(crate) fn verdict(
+    folder: &Path,
+    photos: &[Photo],
+    cameras: &Cameras,
+    attempts: &mut [Attempt],
+    progress: &dyn Progress,
+) -> Result<Result<Verdict, Refusal>, VerdictError> {
+    let candidates = candidates(cameras, attempts);
+    let count = candidates.len();
+    for (index, (attempt, confirmed)) in candidates.into_iter().enumerate() {
+        let part = Part::begin(progress, "leaving photographs out", index..index + 1, count);
+        let Some(solution) = &attempts[attempt].solution else { continue };
+        let mut trial = Trial { folder, photos, cameras, solution, taken_out: Vec::new() };
+        trial.taken_out.extend(trial.unconfirmed(&confirmed));
+        match trial.run(confirmed, &part)? {
+            Ok((scene, kept)) => {
+                let taken_out = trial.taken_out;
+                let (photos, verified) = kept.into_iter().unzip();
+                return Ok(Ok(Verdict { attempt, scene, photos, verified, taken_out }));
+            }
+            Err(reason) => attempts[attempt].tried.refused = Some(reason),
+        }
+    }
+    let reason = |attempt: &Attempt| {
+        attempt.tried.refused.clone().unwrap_or_else(|| "no other attempt agrees with it".to_owned())
+    };
+    Ok(Err(Refusal { reasons: attempts.iter().map(reason).collect() }))
+}
+
+/// Attempts that may be accepted, the most promising first, each with the photographs that another one confirms and by how much.
+fn candidates(cameras: &Cameras, attempts: &mut [Attempt]) -> Vec<(usize, Vec<(usize, f64)>)> {
+    for attempt in attempts.iter_mut().filter(|attempt| attempt.tried.refused.is_none()) {
+        attempt.tried.refused = implausible(cameras, attempt);
+    }
+    let mut found: Vec<(usize, Vec<(usize, f64)>)> = Vec::new();
+    for own in 0..attempts.len() {
+        if attempts[own].tried.refused.is_some() {
+            continue;
+        }
+        let confirmed = confirmed(cameras, attempts, own);
+        if confirmed.len() < MIN_PHOTOGRAPHS {
+            attempts[own].tried.refused = Some(format!(
+                "no other attempt has the same rotations, to {MAX_ROTATION_DIFFERENCE} degrees, for {MIN_PHOTOGRAPHS} photographs"
+            ));
+        } else {
+            found.push((own, confirmed));
+        }
+    }
+    found.sort_by_key(|(own, confirmed)| {
+        (std::cmp::Reverse(confirmed.len()), std::cmp::Reverse(attempts[*own].tried.points))
+    });
+    found
+}
+
+/// What rules an attempt out by itself.
+fn implausible(cameras: &Cameras, attempt: &Attempt) -> Option<String> {
+    let tried = &attempt.tried;
+    if tried.registered < MIN_PHOTOGRAPHS {
+        return Some(format!("{} photographs have a pose, {MIN_PHOTOGRAPHS} are needed", tried.registered));
+    }
+    for (focal, group) in tried.focal.iter().zip(&cameras.groups) {
+        let width = f64::from(group.size[0]);
+        if !PLAUSIBLE_WIDTHS.contains(&(focal / width)) && group.focal.is_none() {
+            return Some(format!("a focal length of {:.2} widths is not plausible", focal / width));
+        }
+        if let Some(known) = group.focal.filter(|known| (focal / known - 1.0).abs() > MAX_KNOWN_CHANGE) {
+            return Some(format!("the focal length became {focal:.0} pixels where {known:.0} are known"));
+        }
+    }
+    let support = tried.support?;
+    if support.parallax < MIN_PARALLAX {
+        let parallax = support.parallax;
+        return Some(format!("the camera hardly moved: {parallax:.1} degrees of parallax, {MIN_PARALLAX} are needed"));
+    }
+    if !cameras.are_known() && support.thickness < MIN_THICKNESS {
+        return Some("all points lie in a plane, which leaves the focal length open".to_owned());
+    }
+    None
+}
+
+/// The photographs of an attempt whose relative rotations another one confirms, each with the least difference in degrees.
+fn confirmed(cameras: &Cameras, attempts: &[Attempt], own: usize) -> Vec<(usize, f64)> {
+    let Some(solution) = &attempts[own].solution else { return Vec::new() };
+    let mut least = vec![f64::INFINITY; solution.photographs.len()];
+    for (index, other) in attempts.iter().enumerate() {
+        let (a, b) = (&attempts[own].tried, &other.tried);
+        let Some(others) = other.solution.as_ref().filter(|_| index != own && is_independent(a, b)) else { continue };
+        let near = a.focal.iter().zip(&b.focal).all(|(a, b)| (a / b - 1.0).abs() <= MAX_FOCAL_DIFFERENCE);
+        let common: Vec<usize> = solution
+            .registered()
+            .into_iter()
+            .filter(|own| others.photographs[*own].camera_from_world.is_some())
+            .collect();
+        if common.len() < MIN_PHOTOGRAPHS || !near && !cameras.are_known() {
+            continue;
+        }
+        for (photo, difference) in common.iter().zip(differences(solution, others, &common)) {
+            least[*photo] = least[*photo].min(difference);
+        }
+    }
+    let all = least.into_iter().enumerate();
+    all.filter(|(_, difference)| *difference <= MAX_ROTATION_DIFFERENCE).collect()
+}
+
+/// Whether two attempts could be wrong in different ways.
+fn is_independent(a: &crate::attempt::Tried, b: &crate::attempt::Tried) -> bool {
+    a.features != b.features || a.solver.split(' ').next() != b.solver.split(' ').next()
+}
+
+/// A candidate that is looked at.
+struct Trial<'a> {
+    folder: &'a Path,
+    photos: &'a [Photo],
+    cameras: &'a Cameras,
+    solution: &'a Solution,
+    taken_out: Vec<(usize, String)>,
+}
+
+impl Trial<'_> {
+    fn unconfirmed(&self, confirmed: &[(usize, f64)]) -> Vec<(usize, String)> {
+        let is_confirmed = |photo: &usize| confirmed.iter().any(|(own, _)| own == photo);
+        let reason = format!("no other attempt has its rotation to {MAX_ROTATION_DIFFERENCE} degrees");
+        let all = self.solution.registered().into_iter().filter(|photo| !is_confirmed(photo));
+        all.map(|photo| (photo, reason.clone())).collect()
+    }
+
+    /// Leaves photographs out until none fails: the scene and the photographs that stay, or why they do not.
+    #[allow(clippy::type_complexity)]
+    fn run(
+        &mut self,
+        mut kept: Vec<(usize, f64)>,
+        progress: &dyn Progress,
+    ) -> Result<Result<(Scene, Vec<(usize, Verified)>), String>, VerdictError> {
+        loop {
+            if kept.len() < MIN_PHOTOGRAPHS {
+                let said: Vec<String> =
+                    self.taken_out.iter().map(|(photo, why)| format!("{}: {why}", self.photos[*photo].name)).collect();
+                return Ok(Err(format!("fewer than {MIN_PHOTOGRAPHS} photographs stay ({})", said.join("; "))));
+            }
+            let taken: Vec<usize> = kept.iter().map(|(photo, _)| *photo).collect();
+            let scene = posed::scene(self.folder, self.photos, self.cameras, self.solution, &taken)?;
+            let scores = left_out(&scene, progress)?;
+            let mut failed: Vec<(f64, usize, String)> = taken
+                .iter()
+                .zip(&scores)
+                .filter_map(|(photo, scores)| Some((scores.sharpness().min(scores.gain()), *photo, failure(scores)?)))
+                .collect();
+            if failed.is_empty() {
+                let gain = median(scores.iter().map(LeftOut::gain).collect());
+                if gain < MIN_MEDIAN_GAIN {
+                    return Ok(Err(format!(
+                        "photographs that were left out are met {gain:.1} dB better than by copies of their neighbours, {MIN_MEDIAN_GAIN} are needed"
+                    )));
+                }
+                let verified = kept.into_iter().zip(scores);
+                let verified = verified.map(|((photo, rotation_difference), left_out)| {
+                    (photo, Verified { rotation_difference, left_out })
+                });
+                return Ok(Ok((scene, verified.collect())));
+            }
+            // The worst first: what is wrong with it may be what is wrong with its neighbours.
+            failed.sort_by(|a, b| a.0.total_cmp(&b.0));
+            failed.truncate(failed.len().div_ceil(WORST));
+            kept.retain(|(photo, _)| failed.iter().all(|(_, own, _)| own != photo));
+            self.taken_out.extend(failed.into_iter().map(|(_, photo, reason)| (photo, reason)));
+        }
+    }
+}
+
+/// Why a photograph fails.
+fn failure(scores: &LeftOut) -> Option<String> {
+    if scores.sharpness() < MIN_SHARPNESS {
+        return Some(format!(
+            "left out and rendered from the others, it is met no better at its pose ({:.1} dB) than two degrees beside it ({:.1} dB)",
+            scores.score, scores.disturbed
+        ));
+    }
+    if scores.gain() < MIN_GAIN {
+        return Some(format!(
+            "left out and rendered from the others, it is met hardly better ({:.1} dB) than by a copy of its neighbour ({:.1} dB)",
+            scores.score,
+            scores.copy.max(scores.warp)
+        ));
+    }
+    None
+}

@@ -1,0 +1,124 @@
+//! The scene with its record, whole or not at all.
+
+use crate::advice::Neighbours;
+use crate::attempt::Tried;
+use crate::find::{Found, Options};
+use crate::focal::FocalSource;
+use crate::intake::file_name;
+use crate::verdict::{Verdict, Verified};
+use serde::Serialize;
+use std::path::Path;
+use viewfuse_job::progress::Progress;
+use viewfuse_scene::write::{Layout, WriteSceneError, Written, write_with};
+
+/// The record's file.
+const RECORD: &str = "pose.json";
+
+/// The record of how a scene's poses were found.
+#[derive(Debug, Serialize)]
+pub struct Record<'a> {
+    /// This crate's version.
+    pub viewfuse: &'static str,
+    /// The folder of the photographs.
+    pub photographs: String,
+    /// The seed.
+    pub seed: u64,
+    /// Every so many photographs were taken.
+    pub every: usize,
+    /// The cameras of the accepted attempt.
+    pub cameras: Vec<CameraRecord>,
+    /// Mean reprojection error of its points in pixels at working size.
+    pub reprojection_error: f64,
+    /// Its place among the attempts.
+    pub attempt: usize,
+    /// Every attempt.
+    pub attempts: Vec<&'a Tried>,
+    /// The accepted photographs with what they passed.
+    pub accepted: &'a [Verified],
+    /// Photographs that were left out, each with the reason.
+    pub left_out: Vec<(String, String)>,
+    /// The accepted ones as neighbours.
+    pub neighbours: Neighbours,
+}
+
+/// A camera of the record.
+#[derive(Debug, Serialize)]
+pub struct CameraRecord {
+    /// Width and height of its photographs.
+    pub size: [u32; 2],
+    /// How many photographs it took.
+    pub photographs: usize,
+    /// Focal length in pixels.
+    pub focal: f64,
+    /// Where the focal length comes from; it is refined with the poses.
+    pub focal_from: FocalSource,
+    /// Radial distortion `k1`.
+    pub k1: f64,
+}
+
+impl Found {
+    /// The photographs of the folder that a verdict does not accept, by file, each with the reason.
+    pub fn left_out(&self, verdict: Option<&Verdict>) -> Vec<(String, String)> {
+        let mut all: Vec<(String, String)> =
+            self.intake.unusable.iter().map(|own| (own.name.clone(), own.reason.clone())).collect();
+        let Some(verdict) = verdict else { return all };
+        for (index, photo) in self.intake.photos.iter().enumerate() {
+            if verdict.photos.contains(&index) {
+                continue;
+            }
+            let taken_out = verdict.taken_out.iter().find(|(own, _)| *own == index).map(|(_, reason)| reason.clone());
+            let reason = taken_out.unwrap_or_else(|| "matches too little of the other photographs".to_owned());
+            all.push((file_name(&photo.path), reason));
+        }
+        all.sort();
+        all
+    }
+
+    /// The record of an accepted verdict.
+    pub fn record<'a>(&'a self, verdict: &'a Verdict, options: &Options) -> Record<'a> {
+        let attempt = &self.attempts[verdict.attempt];
+        let k1 =
+            |index: usize| attempt.solution.as_ref().and_then(|own| own.cameras.get(index)).map_or(0.0, |own| own.k1);
+        let cameras = self.cameras.groups.iter().enumerate().map(|(index, group)| CameraRecord {
+            size: group.size,
+            photographs: group.photos.iter().filter(|photo| verdict.photos.contains(photo)).count(),
+            focal: attempt.tried.focal.get(index).copied().unwrap_or_default(),
+            focal_from: group.source,
+            k1: k1(index),
+        });
+        Record {
+            viewfuse: env!("CARGO_PKG_VERSION"),
+            photographs: self.intake.folder.display().to_string(),
+            seed: options.seed,
+            every: options.every,
+            cameras: cameras.filter(|camera| camera.photographs > 0).collect(),
+            reprojection_error: attempt.tried.reprojection_error,
+            attempt: verdict.attempt,
+            attempts: self.attempts.iter().map(|attempt| &attempt.tried).collect(),
+            accepted: &verdict.verified,
+            left_out: self.left_out(Some(verdict)),
+            neighbours: Neighbours::of(&verdict.scene),
+        }
+    }
+}
+
+/// Writes the accepted scene in a layout to a folder that does not exist or is empty, with the record `pose.json` and more
+/// files. The same photographs and options give the same bytes, but for the seconds in the record.
+///
+/// # Errors
+/// [`WriteSceneError`]; no files remain then.
+pub fn write(
+    found: &Found,
+    verdict: &Verdict,
+    options: &Options,
+    (layout, folder): (Layout, &Path),
+    beside: &[(&str, Vec<u8>)],
+    progress: &dyn Progress,
+) -> Result<Written, WriteSceneError> {
+    let failed = |cause: serde_json::Error| WriteSceneError::Io { path: folder.join(RECORD), cause: cause.into() };
+    let mut record = serde_json::to_vec_pretty(&found.record(verdict, options)).map_err(failed)?;
+    record.push(b'\n');
+    let mut files = vec![(RECORD, record)];
+    files.extend(beside.iter().cloned());
+    write_with(&verdict.scene, layout, folder, &files, progress)
+}

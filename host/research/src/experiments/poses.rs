@@ -1,0 +1,145 @@
+//! Poses of bare photographs, on scenes whose poses are known: they are removed, found again, and compared.
+//!
+//! `cargo run --release -p viewfuse-research -- poses PROGRAM SCENE...`
+//!
+//! `PROGRAM` is `viewfuse-openmvg`, a scene is a folder. A row is a set of photographs of one scene, about 12 degrees apart. Errors are
+//! of the poses that were accepted:
+//!
+//! ```text
+//! focal      known: the scene's own is given; unknown: nothing is said, and the files' EXIF is taken out
+//! accepted   photographs with an accepted pose, of those in the set
+//! rotation   median over pairs of photographs of the angle between relative rotations found and known, degrees
+//! worst      the greatest of these angles
+//! centres    root mean square distance of the camera centres, aligned by a similarity, in percent of their spread
+//! attempts   the greatest median rotation error of an attempt that was not accepted: what the verdict had to tell apart
+//! ```
+
+mod sets;
+mod truth;
+
+use anyhow::{Context, bail};
+use sets::{SETS, Set, neighbours};
+use std::path::{Path, PathBuf};
+use truth::{Errors, errors};
+use viewfuse_job::progress::Silent;
+use viewfuse_pose::{OpenMvg, Options, PoseError, find};
+use viewfuse_scene::{Scene, read_picture};
+
+pub(crate) fn run(arguments: &[String]) -> anyhow::Result<()> {
+    let [program, scenes @ ..] = arguments else { bail!("usage: poses PROGRAM SCENE...") };
+    let solver = OpenMvg { program: PathBuf::from(program) };
+    println!("scene           photographs  seed  focal    accepted  rotation   worst  centres  attempts");
+    let mut totals = Totals::default();
+    for folder in scenes {
+        let scene = Scene::open(folder)?;
+        for set in SETS.iter().filter(|set| set.count <= scene.views.len()) {
+            let row = one(&scene, set, &solver).with_context(|| format!("{folder}: {set:?}"))?;
+            println!("{}", line(&scene.name(), set, &row));
+            totals.add(&row);
+        }
+    }
+    println!("{totals}");
+    Ok(())
+}
+
+/// What became of a set.
+struct Row {
+    /// Photographs in it.
+    asked: usize,
+    /// Of the accepted poses; `None` if nothing was accepted.
+    accepted: Option<Errors>,
+    /// The greatest median rotation error of the other attempts.
+    attempts: f64,
+}
+
+/// Removes the poses of a set and finds them again.
+fn one(scene: &Scene, set: &Set, solver: &OpenMvg) -> anyhow::Result<Row> {
+    let views = neighbours(scene, set);
+    let folder = tempfile::tempdir()?;
+    for (place, view) in views.iter().enumerate() {
+        let file = scene.views[*view].image.as_deref().context("a photograph")?;
+        put(file, &folder.path().join(format!("{place:03}")), set.is_known)?;
+    }
+    let pinhole = &scene.views[views[0]].camera.pinhole;
+    let focal = set.is_known.then(|| f64::from(pinhole.focal()[0]));
+    let options = Options { focal, seed: set.seed, every: 1 };
+    let found = match find(folder.path(), &[solver], &options, &Silent) {
+        // Too few photographs that can be used.
+        Err(PoseError::Few { .. }) => return Ok(Row { asked: views.len(), accepted: None, attempts: 0.0 }),
+        found => found?,
+    };
+    let view_of = |photo: usize| views[found.intake.photos[photo].name.parse::<usize>().unwrap_or_default()];
+    let accepted_attempt = found.verdict.as_ref().ok().map(|verdict| verdict.attempt);
+    let mut attempts = 0.0_f64;
+    for (index, attempt) in found.attempts.iter().enumerate().filter(|(index, _)| Some(*index) != accepted_attempt) {
+        if let Some(solution) = &attempt.solution {
+            let own = errors(scene, solution, &solution.registered(), view_of);
+            attempts = attempts.max(if found.attempts[index].tried.registered > 1 { own.rotation } else { 0.0 });
+        }
+    }
+    let accepted = found.verdict.as_ref().ok().and_then(|verdict| {
+        Some(errors(scene, found.attempts[verdict.attempt].solution.as_ref()?, &verdict.photos, view_of))
+    });
+    Ok(Row { asked: views.len(), accepted, attempts })
+}
+
+/// Copies a photograph; a JPEG without what it states, where its focal length is to be unknown. `to` has no extension.
+fn put(file: &Path, to: &Path, with_exif: bool) -> anyhow::Result<()> {
+    let extension = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    if with_exif || extension == "png" {
+        std::fs::copy(file, to.with_extension(extension))?;
+    } else {
+        read_picture(file)?.save(to.with_extension("png"))?;
+    }
+    Ok(())
+}
+
+fn line(scene: &str, set: &Set, row: &Row) -> String {
+    let focal = if set.is_known { "known" } else { "unknown" };
+    let head = format!("{scene:<18} {:>9} {:>5}  {focal:<7}", row.asked, set.seed);
+    match &row.accepted {
+        None => format!("{head}   refused                            {:>8.2}", row.attempts),
+        Some(own) => format!(
+            "{head}  {:>8}  {:>8.2}  {:>6.2}  {:>7.1}  {:>8.2}",
+            own.count, own.rotation, own.worst, own.centres, row.attempts
+        ),
+    }
+}
+
+/// Most degrees of a median rotation error that is not called wrong.
+const WRONG: f64 = 3.0;
+
+#[derive(Default)]
+struct Totals {
+    sets: usize,
+    accepted_sets: usize,
+    asked: usize,
+    accepted: usize,
+    wrong: usize,
+    with_wrong_attempts: usize,
+}
+
+impl Totals {
+    fn add(&mut self, row: &Row) {
+        self.sets += 1;
+        self.asked += row.asked;
+        self.with_wrong_attempts += usize::from(row.attempts > WRONG);
+        if let Some(own) = &row.accepted {
+            self.accepted_sets += 1;
+            self.accepted += own.count;
+            self.wrong += usize::from(own.rotation > WRONG);
+        }
+    }
+}
+
+impl std::fmt::Display for Totals {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Totals { sets, accepted_sets, asked, accepted, wrong, with_wrong_attempts } = self;
+        write!(
+            f,
+            "\n{sets} sets: {accepted_sets} accepted, {} refused; {accepted} of {asked} photographs; accepted and wrong by more than \
+             {WRONG} degrees: {wrong}; sets with an attempt that wrong: {with_wrong_attempts}",
+            sets - accepted_sets
+        )
+    }
+}

@@ -1,0 +1,309 @@
+//! `viewfuse pose`: photographs without poses, to a scene; and what keeps photographs, or all of them, out of it.
+//!
+//! Most tests need the program `viewfuse-openmvg` beside the command or named by `VIEWFUSE_OPENMVG`; `tests/run` builds it.
+
+use super::BINARY;
+use image::{DynamicImage, ImageFormat, RgbImage, imageops};
+use libtest_mimic::Trial;
+use serde_json::Value;
+use std::fs;
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use viewfuse::core::pose::Pose;
+use viewfuse::scene::Scene;
+use viewfuse_tests::command::{
+    Outcome, assert_command_refused, assert_refused, assert_wrong_arguments, command, files_below, interrupt, spawn,
+};
+use viewfuse_tests::patience::wait_while_running;
+use viewfuse_tests::places::data;
+use viewfuse_tests::scenes::Folder;
+use viewfuse_tests::trials::{is_required, needing, trial};
+
+/// What lets tests fail that lack the program.
+const REQUIRE: &str = "VIEWFUSE_REQUIRE_POSE";
+
+/// Focal length of the sample room in millimetres of a 35 mm camera: 294.4 pixels of 320 x 240, rounded as cameras do.
+const ROOM_FILM: u16 = 32;
+
+/// EXIF tags, both short numbers.
+const ORIENTATION: u16 = 0x0112;
+const FILM: u16 = 0xa405;
+
+pub(crate) fn trials() -> Vec<Trial> {
+    let missing = program().is_none().then(|| "no viewfuse-openmvg: `cargo openmvg` builds it".to_owned());
+    let needs = |name: &str, test: fn()| {
+        needing(missing.clone(), is_required(REQUIRE), trial(&format!("commands::pose::{name}"), test))
+    };
+    vec![
+        needs("eight_photographs_to_a_picture", eight_photographs_to_a_picture),
+        needs("what_does_not_belong_is_left_out_by_name", what_does_not_belong_is_left_out_by_name),
+        needs("sizes_and_orientations_may_differ", sizes_and_orientations_may_differ),
+        needs("photographs_of_nothing_in_common", photographs_of_nothing_in_common),
+        #[cfg(unix)]
+        needs("ctrl_c_leaves_nothing", ctrl_c_leaves_nothing),
+        trial("commands::pose::formats_that_are_not_read", formats_that_are_not_read),
+        trial("commands::pose::too_many_and_too_few", too_many_and_too_few),
+        trial("commands::pose::without_the_program", without_the_program),
+        trial("commands::pose::bare_photographs_say_how", bare_photographs_say_how),
+    ]
+}
+
+/// The program, if there is one.
+fn program() -> Option<PathBuf> {
+    let beside = Path::new(BINARY).with_file_name(format!("viewfuse-openmvg{}", std::env::consts::EXE_SUFFIX));
+    std::env::var_os("VIEWFUSE_OPENMVG").map(PathBuf::from).or(Some(beside)).filter(|path| path.is_file())
+}
+
+/// A JPEG file with short numbers as EXIF.
+fn with_exif(jpeg: &[u8], tags: &[(u16, u16)]) -> Vec<u8> {
+    let mut tiff = b"MM\0*\0\0\0\x08".to_vec();
+    let entry = |out: &mut Vec<u8>, tag: u16, kind: u16, value: [u8; 4]| {
+        out.extend([tag.to_be_bytes(), kind.to_be_bytes()].concat());
+        out.extend([0, 0, 0, 1]);
+        out.extend(value);
+    };
+    let short = |value: u16| [value.to_be_bytes(), [0, 0]].concat().try_into().expect("four bytes");
+    let (of_exif, of_image): (Vec<_>, Vec<_>) = tags.iter().partition(|(tag, _)| *tag == FILM);
+    // The first directory: its own tags, then where the second begins.
+    tiff.extend((of_image.len() as u16 + 1).to_be_bytes());
+    of_image.iter().for_each(|(tag, value)| entry(&mut tiff, *tag, 3, short(*value)));
+    let behind = (tiff.len() + 12 + 4) as u32;
+    entry(&mut tiff, 0x8769, 4, behind.to_be_bytes());
+    tiff.extend([0; 4]);
+    tiff.extend((of_exif.len() as u16).to_be_bytes());
+    of_exif.iter().for_each(|(tag, value)| entry(&mut tiff, *tag, 3, short(*value)));
+    tiff.extend([0; 4]);
+    let length = (2 + 6 + tiff.len()) as u16;
+    [&jpeg[..2], &[0xff, 0xe1], &length.to_be_bytes(), b"Exif\0\0", &tiff, &jpeg[2..]].concat()
+}
+
+/// The bytes of a photograph of the room.
+fn room(view: usize) -> Vec<u8> {
+    fs::read(data("room").join(format!("images/{view:03}.jpg"))).expect("a photograph")
+}
+
+fn decoded(view: usize) -> RgbImage {
+    image::load_from_memory(&room(view)).expect("a picture").into_rgb8()
+}
+
+fn jpeg(picture: RgbImage) -> Vec<u8> {
+    let mut bytes = Cursor::new(Vec::new());
+    DynamicImage::ImageRgb8(picture).write_to(&mut bytes, ImageFormat::Jpeg).expect("a JPEG");
+    bytes.into_inner()
+}
+
+/// A folder with these photographs of the room in `bare`, which state their focal length.
+fn bare(views: impl IntoIterator<Item = usize>) -> Folder {
+    let folder = Folder::new();
+    for view in views {
+        folder.write(&format!("bare/{view:03}.jpg"), with_exif(&room(view), &[(FILM, ROOM_FILM)]));
+    }
+    folder
+}
+
+/// What the command prints; warnings and progress aside, it succeeds.
+#[track_caller]
+fn posed(folder: &Folder, arguments: &str) -> String {
+    let outcome = Outcome::of(command(BINARY, folder.path(), arguments));
+    assert_eq!(outcome.code, Some(0), "viewfuse {arguments}\n{}{}", outcome.stdout, outcome.stderr);
+    outcome.stdout
+}
+
+/// The greatest angle in degrees between relative rotations of the scene and of the room, over the views that have these names.
+fn worst_rotation(scene: &Scene) -> f32 {
+    let known = Scene::open(data("room")).expect("the room");
+    let pose = |scene: &Scene, name: &str| scene.views[scene.view_named(name).expect("a view")].camera.pose;
+    let relative = |scene: &Scene, a: &str, b: &str| {
+        let (a, b): (Pose, Pose) = (pose(scene, a), pose(scene, b));
+        [a.right_world(), a.down_world(), a.forward_world()].map(|axis| {
+            glam::Vec3::new(axis.dot(b.right_world()), axis.dot(b.down_world()), axis.dot(b.forward_world()))
+        })
+    };
+    let mut worst = 0.0_f32;
+    for a in &scene.views {
+        for b in &scene.views {
+            let (own, true_one) = (relative(scene, &a.name, &b.name), relative(&known, &a.name, &b.name));
+            // trace(A B^T) = 1 + 2 cos
+            let trace: f32 = own.iter().zip(&true_one).map(|(own, true_one)| own.dot(*true_one)).sum();
+            worst = worst.max((0.5 * (trace - 1.0)).clamp(-1.0, 1.0).acos().to_degrees());
+        }
+    }
+    worst
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_slice(&fs::read(path).expect("a file")).expect("JSON")
+}
+
+fn eight_photographs_to_a_picture() {
+    let folder = bare(0..8);
+    let said = posed(&folder, "pose bare -o posed --seed 3");
+    assert!(said.starts_with("registered 8 of 8 photographs\n") && said.contains("from EXIF; 320x240"), "{said}");
+    let scene = Scene::open(folder.path().join("posed")).expect("a scene");
+    assert_eq!((scene.layout, scene.views.len()), ("colmap", 8));
+    assert!(scene.points.len() > 100, "{} points", scene.points.len());
+    let worst = worst_rotation(&scene);
+    assert!(worst < 1.5, "{worst} degrees");
+    let record = json(&folder.path().join("posed/pose.json"));
+    assert_eq!(record["accepted"].as_array().expect("a list").len(), 8);
+    assert!(record["attempts"][0]["solver"].as_str().is_some_and(|name| name.starts_with("openmvg-sfm ")), "{record}");
+    assert!(image::open(folder.path().join("posed/cameras.png")).is_ok());
+    // From nothing to a picture.
+    posed(&folder, "render posed --targets 3 -o out --size 160x120 --weights distance:power=2 --device cpu");
+    let psnr = json(&folder.path().join("out/run.json"))["frames"][0]["psnr"].as_f64().expect("a score");
+    assert!(psnr > 21.0, "{psnr} dB");
+    // Once more: the same bytes, but for the times.
+    posed(&folder, "pose bare -o again --seed 3");
+    for (path, _) in files_below(&folder.path().join("posed")).into_iter().filter(|(path, _)| path.is_file()) {
+        let again = folder.path().join("again").join(path.strip_prefix(folder.path().join("posed")).expect("inside"));
+        if !path.ends_with("pose.json") {
+            assert_eq!(fs::read(&path).expect("a file"), fs::read(&again).expect("a file"), "{}", path.display());
+        }
+    }
+}
+
+fn what_does_not_belong_is_left_out_by_name() {
+    let folder = bare(0..5);
+    let cut = room(5);
+    folder.write("bare/cut.jpg", &cut[..cut.len() / 2]);
+    folder.write("bare/twice.jpg", with_exif(&room(2), &[(FILM, ROOM_FILM)]));
+    folder.write("bare/blurred.jpg", with_exif(&jpeg(imageops::blur(&decoded(6), 6.0)), &[(FILM, ROOM_FILM)]));
+    let other = image::open(data("toy/rgb/000003.png")).expect("another scene").to_rgb8();
+    let other = imageops::resize(&other, 320, 240, imageops::FilterType::Triangle);
+    folder.write("bare/other.jpg", with_exif(&jpeg(other), &[(FILM, ROOM_FILM)]));
+    let said = posed(&folder, "pose bare -o posed");
+    assert!(said.starts_with("registered 5 of 9 photographs\n"), "{said}");
+    for (name, reason) in [
+        ("cut.jpg", "the file ends before the picture does"),
+        ("twice.jpg", "the same picture as 002.jpg"),
+        ("blurred.jpg", "blurred"),
+        ("other.jpg", ""),
+    ] {
+        assert!(said.contains(&format!("left out   {name}: {reason}")), "{name}: {said}");
+    }
+    let scene = Scene::open(folder.path().join("posed")).expect("a scene");
+    assert_eq!(scene.views.len(), 5);
+    assert!(worst_rotation(&scene) < 1.5);
+}
+
+fn sizes_and_orientations_may_differ() {
+    let folder = bare(0..4);
+    // Half as large, and stored on its side.
+    let small = imageops::resize(&decoded(4), 160, 120, imageops::FilterType::Triangle);
+    folder.write("bare/004.jpg", with_exif(&jpeg(small), &[(FILM, ROOM_FILM)]));
+    let lying = with_exif(&jpeg(imageops::rotate270(&decoded(5))), &[(ORIENTATION, 6), (FILM, ROOM_FILM)]);
+    folder.write("bare/005.jpg", lying);
+    let said = posed(&folder, "pose bare -o posed --layout transforms");
+    assert!(said.contains("320x240"), "{said}");
+    let scene = Scene::open(folder.path().join("posed")).expect("a scene");
+    let turned = scene.view_named("005").map(|view| &scene.views[view].camera.pinhole).expect("the lying one");
+    assert_eq!((turned.width(), turned.height()), (320, 240), "upright");
+    assert!(scene.views.len() >= 5, "{said}");
+    assert!(worst_rotation(&scene) < 2.0, "{said}");
+}
+
+fn photographs_of_nothing_in_common() {
+    let folder = Folder::new();
+    folder.write("bare/a.jpg", room(0));
+    for (name, file) in [("b", "toy/rgb/000003.png"), ("c", "car/rgb/000016.png")] {
+        let picture = image::open(data(file)).unwrap_or_else(|error| panic!("{file}: {error}")).to_rgb8();
+        folder.write(
+            &format!("bare/{name}.jpg"),
+            jpeg(imageops::resize(&picture, 320, 240, imageops::FilterType::Triangle)),
+        );
+    }
+    let before = files_below(folder.path());
+    let outcome = Outcome::of(command(BINARY, folder.path(), "pose bare -o posed"));
+    assert_eq!((outcome.code, outcome.stdout.as_str()), (Some(1), ""), "{}", outcome.stderr);
+    let last = outcome.stderr.lines().last().unwrap_or_default();
+    for part in ["viewfuse: bare: no poses that can be trusted", "15 degrees", "--focal"] {
+        assert!(last.contains(part), "{part}: {}", outcome.stderr);
+    }
+    assert_eq!(files_below(folder.path()), before);
+}
+
+#[cfg(unix)]
+fn ctrl_c_leaves_nothing() {
+    let folder = bare(0..8);
+    let before = files_below(folder.path());
+    let mut child = spawn(command(BINARY, folder.path(), "pose bare -o posed"));
+    let process = child.id();
+    // The program has begun.
+    let has_child = || {
+        let tasks = fs::read_to_string(format!("/proc/{process}/task/{process}/children")).unwrap_or_default();
+        !cfg!(target_os = "linux") || !tasks.is_empty()
+    };
+    let threads_have = || {
+        let tasks = fs::read_dir(format!("/proc/{process}/task")).into_iter().flatten().flatten();
+        tasks.into_iter().any(|task| fs::read_to_string(task.path().join("children")).is_ok_and(|own| !own.is_empty()))
+    };
+    wait_while_running(&mut child, || has_child() || threads_have());
+    interrupt(child, "-INT");
+    assert_eq!(files_below(folder.path()), before);
+}
+
+fn formats_that_are_not_read() {
+    let folder = bare(0..3);
+    folder.write("bare/IMG_7.HEIC", "ftypheic");
+    assert_refused(
+        BINARY,
+        folder.path(),
+        "pose bare -o posed",
+        &["bare/IMG_7.HEIC: HEIC is not read", "heif-convert IMG_7.HEIC"],
+    );
+    folder.remove("bare/IMG_7.HEIC").write("bare/DSC_1.NEF", "raw");
+    assert_refused(BINARY, folder.path(), "pose bare -o posed", &["bare/DSC_1.NEF: a camera's raw format is not read"]);
+}
+
+fn too_many_and_too_few() {
+    let folder = Folder::new();
+    assert_refused(BINARY, folder.path(), "pose nowhere -o posed", &["nowhere: no such file or folder"]);
+    folder.write("empty/notes.txt", "nothing");
+    assert_refused(BINARY, folder.path(), "pose empty -o posed", &["empty: no photographs here"]);
+    for number in 0..300 {
+        folder.write(&format!("many/{number}.jpg"), room(0));
+    }
+    assert_refused(
+        BINARY,
+        folder.path(),
+        "pose many -o posed",
+        &["many: 300 photographs", "--every N takes every Nth"],
+    );
+    let two = bare(0..2);
+    two.write("bare/cut.jpg", &room(5)[..4000]);
+    assert_refused(
+        BINARY,
+        two.path(),
+        "pose bare -o posed",
+        &["bare: 2 photographs can be used", "cut.jpg: the file ends"],
+    );
+    assert_refused(BINARY, two.path(), "pose bare -o bare", &["bare: exists already"]);
+    assert_wrong_arguments(BINARY, two.path(), "pose bare -o posed --focal 0", &["--focal"]);
+    assert_wrong_arguments(BINARY, two.path(), "pose bare -o posed --layout srn", &["--layout"]);
+}
+
+fn without_the_program() {
+    let folder = bare(0..3);
+    let mut named: Command = command(BINARY, folder.path(), "pose bare -o posed");
+    named.env("VIEWFUSE_OPENMVG", folder.path().join("nothing"));
+    assert_command_refused(named, folder.path(), &["nothing: the program is not there", "`cargo openmvg` builds it"]);
+    // A program that says something else.
+    let mut named: Command = command(BINARY, folder.path(), "pose bare -o posed");
+    named.env("VIEWFUSE_OPENMVG", "/bin/echo");
+    if Path::new("/bin/echo").exists() {
+        assert_command_refused(named, folder.path(), &["/bin/echo: its answer cannot be read"]);
+    }
+}
+
+fn bare_photographs_say_how() {
+    let folder = bare(0..3);
+    for arguments in ["inspect bare", "render bare --orbit 3 -o out", "view bare --no-browser"] {
+        assert_refused(
+            BINARY,
+            folder.path(),
+            arguments,
+            &["bare: 3 photographs, and nothing that gives their poses", "`viewfuse pose FOLDER -o posed`"],
+        );
+    }
+}

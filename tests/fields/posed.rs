@@ -1,0 +1,129 @@
+//! The verdict on poses that a solver gives for bare photographs: true ones pass, and wrong ones do not, also where every
+//! attempt agrees on them.
+
+use glam::{DMat3, DVec3};
+use std::f64::consts::PI;
+use std::path::Path;
+use viewfuse::job::progress::{Progress, Silent};
+use viewfuse::pose::{
+    Features, Found, Job, Options, Solution, SolvedCamera, SolvedPhotograph, SolvedPoint, Solver, SolverError, find,
+};
+use viewfuse::scene::Scene;
+use viewfuse::scene::rig::Rig;
+use viewfuse_tests::places::data;
+
+/// Photographs of a set.
+const COUNT: usize = 5;
+
+/// Says the true poses of the sample room's first photographs, changed.
+struct Oracle<F> {
+    /// Of the features and a photograph: the turn of its camera about its down axis, degrees.
+    turn: F,
+    /// What all distances between cameras are multiplied with.
+    baseline: f64,
+}
+
+impl<F: Fn(Features, usize) -> f64 + Sync> Solver for Oracle<F> {
+    fn name(&self) -> &'static str {
+        "oracle"
+    }
+
+    fn features(&self) -> &'static [Features] {
+        &[Features::Alp, Features::Sift]
+    }
+
+    fn solve(&self, job: &Job, _progress: &dyn Progress) -> Result<Solution, SolverError> {
+        let scene = Scene::open(data("room")).expect("the room");
+        let cameras: Vec<_> = scene.views.iter().map(|view| view.camera).collect();
+        let focus = Rig::of(&cameras).focus.as_dvec3();
+        let first = cameras[0].pose.centre_world().as_dvec3();
+        let photograph = |index: usize| {
+            let pose = &cameras[index].pose;
+            let axes = [pose.right_world(), pose.down_world(), pose.forward_world()].map(|axis| axis.as_dvec3());
+            let world_from_camera = DMat3::from_cols(axes[0], axes[1], axes[2]);
+            let turned = DMat3::from_rotation_y((self.turn)(job.features, index).to_radians());
+            let rotation = (world_from_camera * turned).transpose();
+            let centre = first + self.baseline * (pose.centre_world().as_dvec3() - first);
+            let translation = -(rotation * centre);
+            let row = |row: usize| [rotation.x_axis[row], rotation.y_axis[row], rotation.z_axis[row], translation[row]];
+            SolvedPhotograph { camera_from_world: Some([row(0), row(1), row(2)]), reason: None }
+        };
+        // Around what the cameras look at: they bound the depths, and have parallax.
+        let away = focus.distance(first);
+        let point = |number: usize| {
+            let angle = 2.0 * PI * number as f64 / 40.0;
+            let offset = DVec3::new(angle.cos(), (3.0 * angle).sin(), angle.sin());
+            let seen = (0..COUNT).map(|photo| (photo, [160.0, 120.0])).collect();
+            SolvedPoint { position: (focus + 0.4 * away * offset).to_array(), error: 0.3, seen }
+        };
+        let camera = |_| SolvedCamera { focal: 294.4, principal: [160.0, 120.0], k1: 0.0 };
+        Ok(Solution {
+            solver: "oracle 1".to_owned(),
+            cameras: job.cameras.iter().map(camera).collect(),
+            photographs: (0..COUNT).map(photograph).collect(),
+            points: (0..40).map(point).collect(),
+            pairs: Vec::new(),
+        })
+    }
+}
+
+fn bare(folder: &Path) {
+    for view in 0..COUNT {
+        let name = format!("{view:03}.jpg");
+        std::fs::copy(data("room").join("images").join(&name), folder.join(&name)).expect("a photograph");
+    }
+}
+
+fn found(baseline: f64, turn: impl Fn(Features, usize) -> f64 + Sync) -> Found {
+    let folder = tempfile::tempdir().expect("a folder");
+    bare(folder.path());
+    let options = Options { focal: Some(294.4), ..Options::default() };
+    find(folder.path(), &[&Oracle { turn, baseline }], &options, &Silent).expect("a verdict")
+}
+
+#[track_caller]
+fn assert_refused(found: &Found, words: &str) {
+    let refusal = found.verdict.as_ref().expect_err("wrong poses");
+    assert!(refusal.main().contains(words), "{refusal:?}");
+}
+
+#[test]
+fn true_poses_pass() {
+    let found = found(1.0, |_, _| 0.0);
+    let verdict = found.verdict.as_ref().expect("true poses");
+    assert_eq!(verdict.photos, (0..COUNT).collect::<Vec<_>>());
+    for own in &verdict.verified {
+        assert!(
+            own.rotation_difference < 1.0e-6 && own.left_out.gain() > 1.0 && own.left_out.sharpness() > 1.0,
+            "{own:?}"
+        );
+    }
+}
+
+#[test]
+fn one_wrong_pose_is_left_out_by_name() {
+    let found = found(1.0, |_, photo| if photo == 2 { 5.0 } else { 0.0 });
+    let verdict = found.verdict.as_ref().expect("the others are true");
+    assert!(!verdict.photos.contains(&2) && verdict.photos.len() >= 3, "{:?}", verdict.photos);
+    let left_out = found.left_out(Some(verdict));
+    assert!(
+        left_out.iter().any(|(name, why)| name == "002.jpg" && why.contains("left out and rendered")),
+        "{left_out:?}"
+    );
+}
+
+#[test]
+fn wrong_poses_that_all_attempts_agree_on_are_refused() {
+    assert_refused(&found(1.0, |_, photo| 6.0 * photo as f64), "photographs stay");
+}
+
+#[test]
+fn attempts_that_disagree_are_refused() {
+    let turn = |features, photo: usize| if features == Features::Sift { 4.0 * photo as f64 } else { 0.0 };
+    assert_refused(&found(1.0, turn), "no other attempt has the same rotations");
+}
+
+#[test]
+fn a_camera_that_only_turned_is_refused() {
+    assert_refused(&found(0.001, |_, _| 0.0), "the camera hardly moved");
+}
