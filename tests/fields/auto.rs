@@ -67,7 +67,8 @@ fn what_is_chosen_is_what_is_rendered() -> Result<(), Box<dyn Error>> {
     let (frames, chosen) = automatic(&scene)?;
     let field = TrainingFree::default();
     let renderer = On { device: &Cpu, field: &field };
-    let given = RenderOptions { settings: chosen.settings.clone(), ..options() };
+    let (settings, mixture) = (chosen.settings.clone(), chosen.mixture.clone());
+    let given = RenderOptions { settings, mixture, ..options() };
     let mut same = Vec::new();
     render(&scene, &middle(&scene), &chosen.weighting, &renderer, &given, &Silent, |_, frame| {
         same.push(frame);
@@ -76,6 +77,7 @@ fn what_is_chosen_is_what_is_rendered() -> Result<(), Box<dyn Error>> {
     assert_eq!((frames.len(), same.len()), (1, 1));
     assert_eq!(frames[0].colours, same[0].colours);
     assert_eq!(frames[0].confidences, same[0].confidences);
+    assert_eq!(frames[0].shares, same[0].shares);
     assert_eq!(frames[0].confidences.len(), frames[0].colours.len());
     assert!(frames[0].confidences.iter().all(|confidence| (0.0..=1.0).contains(confidence)));
     Ok(())
@@ -103,10 +105,53 @@ fn the_choice_is_the_best_that_was_tried_or_the_default() -> Result<(), Box<dyn 
 }
 
 #[test]
+fn pictures_are_mixed_where_that_is_not_worse() -> Result<(), Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    let scene = room(folder.path(), 6);
+    let (frames, chosen) = automatic(&scene)?;
+    let mixed = chosen.candidates.last().ok_or("candidates")?;
+    assert_eq!(mixed.settings.last().map(|setting| setting.name), Some("mixed pictures"), "a mixture is tried last");
+    let best = |candidates: &[auto::Candidate]| candidates.iter().map(|one| one.psnr).fold(f64::MIN, f64::max);
+    let single = best(&chosen.candidates[..chosen.candidates.len() - 1]);
+    println!("mixed {:.2} dB, one picture {single:.2} dB, shares {:?}", mixed.psnr, frames[0].shares);
+    match &chosen.mixture {
+        // The best of all that was tried is not always what was chosen before: gains within the noise do not count.
+        None => assert!(mixed.psnr < single, "{} against {single}", mixed.psnr),
+        Some(mixture) => {
+            assert_eq!((mixture.parts.len(), mixture.constants.len(), frames[0].shares.len()), (3, 2, 3));
+            assert!(mixed.psnr > single - 0.2, "{} against {single}", mixed.psnr);
+            assert!((frames[0].shares.iter().sum::<f32>() - 1.0).abs() < 1.0e-4, "{:?}", frames[0].shares);
+            // What is mixed is the pictures under the settings of the parts.
+            let field = TrainingFree::default();
+            let renderer = On { device: &Cpu, field: &field };
+            let mut levels = [Vec::new(), Vec::new(), Vec::new()];
+            for (settings, levels) in mixture.parts.iter().zip(&mut levels) {
+                let given = RenderOptions { settings: settings.clone(), ..options() };
+                render(&scene, &middle(&scene), &chosen.weighting, &renderer, &given, &Silent, |_, frame| {
+                    levels.extend(frame.colours.iter().map(|colour| colour[1]));
+                    Ok::<(), RenderError>(())
+                })?;
+            }
+            for (pixel, colour) in frames[0].colours.iter().enumerate() {
+                let (low, high) = levels
+                    .iter()
+                    .fold((f32::MAX, f32::MIN), |(low, high), part| (low.min(part[pixel]), high.max(part[pixel])));
+                assert!(
+                    colour[1] > low - 1.0e-5 && colour[1] < high + 1.0e-5,
+                    "{pixel}: {colour:?} in {low} to {high}"
+                );
+            }
+        }
+    }
+    Ok(())
+}
+
+#[test]
 fn two_sources_give_the_default_and_no_expectation() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     let scene = room(folder.path(), 3);
     let (frames, chosen) = automatic(&scene)?;
+    assert!(chosen.mixture.is_none() && frames[0].shares.is_empty());
     assert!(chosen.candidates.is_empty() && chosen.settings.is_empty() && chosen.left_out.is_empty());
     assert_eq!(chosen.expected(&frames[0]), None);
     Ok(())

@@ -148,7 +148,7 @@ impl Evaluator<'_> {
                 OpenedChoice::Given(weighting) => weighting.clone(),
                 OpenedChoice::Auto => {
                     let chosen = choose(&stage, renderer, options, progress)?;
-                    stage.tune(&chosen.settings);
+                    stage.tune(&chosen.settings, chosen.mixture.as_ref());
                     chosen.weighting
                 }
             };
@@ -171,7 +171,7 @@ impl Evaluator<'_> {
                 }
             }
             kept_in_words(&bounded).iter().for_each(|words| progress.note(&format!("{name}: {words}")));
-            stage.tune(&options.settings);
+            stage.tune(&options.settings, options.mixture.as_ref());
         }
         let share = shared / (scores.len() - first).max(1) as u32;
         scores[first..].iter_mut().for_each(|score: &mut Score| score.time += share);

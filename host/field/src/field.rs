@@ -163,6 +163,11 @@ pub trait Tuned {
     /// Sets scalars for the views and targets that follow; those that are not named take their defaults. Encoded views stay
     /// as they are. Names that are none of [`Tuned::tunables`] are ignored.
     fn tune(&mut self, settings: &[Setting]);
+
+    /// Settings whose pictures are worth mixing where these were chosen; none by default.
+    fn parts(&self, _chosen: &[Setting]) -> Vec<Vec<Setting>> {
+        Vec::new()
+    }
 }
 
 /// Where the surfaces are.

@@ -7,6 +7,7 @@
 //! field             the traits of a field: it prepares, encodes and renders
 //! renderer          a field on a device, with types erased
 //! any               a field of any kind
+//! mixture           pictures under several settings, mixed by region
 //! session           when views are encoded
 //! scores            PSNR and SSIM of what a photograph shows
 //! budget            how much of a field's work a bound on the error or on the time needs
@@ -34,6 +35,7 @@ pub mod field;
 pub mod finite;
 pub mod genvs;
 pub mod learned;
+pub mod mixture;
 pub mod options;
 pub mod pixelnerf;
 pub mod point_cloud;
@@ -52,6 +54,7 @@ pub use field::{
     About, Check, DepthMap, Effort, Efforts, Encoding, Encodings, ExactPixels, Field, Geometry, LONGEST_DEFAULT_SIDE,
     Prepared, Rendered, Request, Setting, SourceSide, Surfaces, Tunable, Tuned, Weighted,
 };
+pub use mixture::Mixture;
 pub use record::{Denoising, LeftOut, Omission, Record, VIEWS};
 pub use renderer::{On, Renderer};
 

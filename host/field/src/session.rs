@@ -1,7 +1,8 @@
 //! The life cycle of source views, the same for all fields: prepared, encoded when needed, used for rendering.
 
 use super::error::FieldError;
-use super::field::{Check, Effort, Encoding, Encodings, Prepared, Rendered, Request, Tunable};
+use super::field::{Check, Effort, Encoding, Encodings, Prepared, Rendered, Request, Setting, Tunable};
+use super::mixture::Mixture;
 use super::record::{Record, VIEWS};
 use super::renderer::Renderer;
 use viewfuse_core::camera::Camera;
@@ -36,6 +37,10 @@ pub(crate) struct Session<'a> {
     pub(crate) judge: Judge,
     pub(crate) tunables: &'static [Tunable],
     effort: Option<usize>,
+    settings: Vec<Setting>,
+    mixture: Option<Mixture>,
+    /// The mean share of each part in the last picture; empty without a mixture.
+    pub(crate) shares: Vec<f32>,
 }
 
 impl<'a> Session<'a> {
@@ -64,7 +69,29 @@ impl<'a> Session<'a> {
             judge,
             tunables,
             effort: None,
+            settings: Vec::new(),
+            mixture: None,
+            shares: Vec::new(),
         })
+    }
+
+    /// Sets the field's scalars for what follows, and a mixture of pictures under settings of its own, if there is one.
+    pub(crate) fn tune(&mut self, settings: &[Setting], mixture: Option<&Mixture>) {
+        self.settings = settings.to_vec();
+        self.mixture = mixture.filter(|mixture| !mixture.parts.is_empty()).cloned();
+        self.shares = Vec::new();
+        self.set(settings);
+    }
+
+    /// The settings whose pictures are worth mixing where these were chosen.
+    pub(crate) fn parts(&mut self, chosen: &[Setting]) -> Vec<Vec<Setting>> {
+        self.prepared.tuned().map_or_else(Vec::new, |tuned| tuned.parts(chosen))
+    }
+
+    fn set(&mut self, settings: &[Setting]) {
+        if let Some(tuned) = self.prepared.tuned() {
+            tuned.tune(settings);
+        }
     }
 
     /// Begins a weighting: encodes all views, if all of them contribute to each picture. `relevance[view]` are the weights of
@@ -120,7 +147,17 @@ impl<'a> Session<'a> {
     ) -> Result<Rendered, FieldError> {
         self.encode(weights, progress)?;
         let views = &self.views(weights);
-        self.prepared.render(&Request { camera, weights, views, early_termination }, progress)
+        let request = Request { camera, weights, views, early_termination };
+        let Some(mixture) = self.mixture.clone() else { return self.prepared.render(&request, progress) };
+        let mut parts = Vec::with_capacity(mixture.parts.len());
+        for settings in &mixture.parts {
+            self.set(settings);
+            parts.push(self.prepared.render(&request, progress)?);
+        }
+        self.set(&self.settings.clone());
+        let (mixed, shares) = mixture.mixed(&parts);
+        self.shares = shares;
+        Ok(mixed)
     }
 
     /// Renders what follows with one of the efforts. Views that this effort needs otherwise are encoded again.

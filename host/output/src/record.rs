@@ -6,7 +6,7 @@ use viewfuse_device::{KernelTime, Transfers};
 use viewfuse_field::auto::{Candidate, Chosen, Expected, LeftOutSource};
 use viewfuse_field::budget::Kept;
 use viewfuse_field::render::{Frame, RenderOptions, Seen, StageCosts};
-use viewfuse_field::{Denoising, LeftOut, Setting};
+use viewfuse_field::{Denoising, LeftOut, Mixture, Setting};
 use viewfuse_scene::coverage::Coverage;
 use viewfuse_scene::few_shot::FewShot;
 use viewfuse_scene::{Scene, SceneFrame};
@@ -99,6 +99,9 @@ impl DepthUnits {
 pub struct ChosenRecord {
     /// The field's scalars that are not at their defaults.
     pub settings: Vec<Setting>,
+    /// Pictures under other settings that are mixed in place of one under these, with the constants of their shares (the module
+    /// `mixture` of `viewfuse-field`); null where one picture is not worse.
+    pub mixture: Option<Mixture>,
     /// All schemes and settings that were tried, with the mean score of the sources that were left out.
     pub candidates: Vec<Candidate>,
     /// The sources that were left out, each rendered coarsely from the others with what was chosen.
@@ -107,8 +110,8 @@ pub struct ChosenRecord {
 
 impl From<Chosen> for ChosenRecord {
     fn from(chosen: Chosen) -> ChosenRecord {
-        let Chosen { settings, candidates, left_out, .. } = chosen;
-        ChosenRecord { settings, candidates, left_out }
+        let Chosen { settings, mixture, candidates, left_out, .. } = chosen;
+        ChosenRecord { settings, mixture, candidates, left_out }
     }
 }
 
@@ -204,6 +207,9 @@ pub struct FrameRecord {
     /// What share of its surfaces few photographs show, by the depths that the field found; null for fields without depths.
     #[serde(default)]
     pub seen_by: Option<Seen>,
+    /// Mean share of each part of the mixture in the picture; empty without one.
+    #[serde(default)]
+    pub shares: Vec<f32>,
     /// Sum of their weights: a bound on the change of a fusion of all views by leaving them out, as a share of the range
     /// of its inputs.
     pub left_out_weight: f32,
@@ -244,6 +250,7 @@ impl FrameRecord {
                 .collect(),
             seen: coverage.seen_in(&frame.target.camera, frame.picture.dimensions().into(), &frame.depths),
             seen_by: frame.seen,
+            shares: frame.shares.clone(),
             left_out_weight: frame.omission.omitted_weight,
             psnr: frame.truth.as_ref().map(|truth| truth.psnr).filter(|psnr| psnr.is_finite()),
             expected: None,

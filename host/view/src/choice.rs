@@ -1,8 +1,8 @@
 //! The scheme and the field's scalars that suit the scene, chosen beside the pictures: while no request waits.
 
 use crate::Viewed;
-use viewfuse_field::Setting;
 use viewfuse_field::auto::Chosen;
+use viewfuse_field::{Mixture, Setting};
 
 /// What is known of the choice.
 #[derive(Debug, Default)]
@@ -32,5 +32,10 @@ impl Choice {
     /// The field's scalars under a scheme: those that were chosen along with it, or those of the options.
     pub(crate) fn settings<'a>(&'a self, scheme: &str, viewed: &Viewed<'a>) -> &'a [Setting] {
         self.made(scheme).map_or(&viewed.options.settings, |chosen| &chosen.settings)
+    }
+
+    /// The pictures that are mixed under a scheme, if that was chosen along with it. Coarse pictures are not mixed.
+    pub(crate) fn mixture(&self, scheme: &str) -> Option<&Mixture> {
+        self.made(scheme).and_then(|chosen| chosen.mixture.as_ref())
     }
 }

@@ -22,7 +22,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::Camera;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, open_album, working_side};
-use viewfuse_field::{FieldError, Renderer, Setting, auto};
+use viewfuse_field::{FieldError, Mixture, Renderer, Setting, auto};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
 use viewfuse_scene::coverage::Coverage;
@@ -109,10 +109,10 @@ impl Progress for Watch<'_> {
     }
 }
 
-/// A stage, and the scheme and scalars that its sources are encoded under; none before the first.
+/// A stage, and the scheme, scalars and mixture that its sources are encoded under; none before the first.
 struct Weighed<'a> {
     stage: Stage<'a>,
-    under: Option<(String, Vec<Setting>)>,
+    under: Option<(String, Vec<Setting>, Option<Mixture>)>,
 }
 
 impl<'a> Weighed<'a> {
@@ -121,8 +121,9 @@ impl<'a> Weighed<'a> {
     }
 
     /// Whether this weighting has begun.
-    fn is_under(&self, scheme: &str, settings: &[Setting]) -> bool {
-        self.under.as_ref().is_some_and(|(own, scalars)| own == scheme && scalars == settings)
+    fn is_under(&self, scheme: &str, settings: &[Setting], mixture: Option<&Mixture>) -> bool {
+        let under = self.under.as_ref();
+        under.is_some_and(|(own, scalars, mixed)| own == scheme && scalars == settings && mixed.as_ref() == mixture)
     }
 
     /// Begins a weighting, unless it has begun. Sources that it does not encode are encoded by the frames that use them.
@@ -130,12 +131,13 @@ impl<'a> Weighed<'a> {
         &mut self,
         weighting: &Weighting,
         settings: &[Setting],
+        mixture: Option<&Mixture>,
         progress: &dyn Progress,
     ) -> Result<(), RenderError> {
         let scheme = weighting.to_string();
-        if !self.is_under(&scheme, settings) {
-            self.stage.tune(settings);
-            self.under = Some((scheme, settings.to_vec()));
+        if !self.is_under(&scheme, settings, mixture) {
+            self.stage.tune(settings, mixture);
+            self.under = Some((scheme, settings.to_vec(), mixture.cloned()));
             self.stage.weigh(weighting, progress)?;
         }
         Ok(())
@@ -221,7 +223,7 @@ pub(crate) fn run(viewer: &Viewer<'_>, shared: &Shared, outer: &dyn Progress) ->
                 shared.status.begin("preparing coarse pictures");
                 let stage = coarse::stage(scene, &album, sources, small, renderer.as_ref(), &coarse_options, &watch)?;
                 let mut coarse = Weighed::new(stage);
-                coarse.weigh(weighting, &options.settings, &watch)?;
+                coarse.weigh(weighting, &options.settings, None, &watch)?;
                 pictures.coarse = Some(coarse);
             }
             None => pictures.prepare(&watch)?,
@@ -316,7 +318,8 @@ impl<'a> RenderLoop<'a> {
         let is_fast = !self.pace.is_live() && self.full_time.is_some_and(|time| time < TIME_OF_A_PICTURE);
         let scheme = request.weighting.to_string();
         let settings = self.choice.settings(&scheme, &self.viewer.viewed);
-        let is_ready = self.full.as_ref().is_some_and(|full| full.is_under(&scheme, settings));
+        let mixture = self.choice.mixture(&scheme);
+        let is_ready = self.full.as_ref().is_some_and(|full| full.is_under(&scheme, settings, mixture));
         if is_fast && is_ready {
             return Ok((self.full_frame(request, &watch)?, true));
         }
@@ -339,7 +342,7 @@ impl<'a> RenderLoop<'a> {
         if let Some(coarse) = &mut self.coarse {
             self.shared.status.begin("encoding sources for coarse pictures");
             let settings = self.choice.settings(&request.weighting.to_string(), &self.viewer.viewed);
-            coarse.weigh(&request.weighting, settings, &watch)?;
+            coarse.weigh(&request.weighting, settings, None, &watch)?;
             // A frame that has to encode sources first would come late.
             coarse.stage.encode_all(&watch)?;
         }
@@ -366,8 +369,9 @@ impl<'a> RenderLoop<'a> {
             return self.full_frame(request, watch);
         };
         self.shared.status.begin("encoding sources");
-        let settings = self.choice.settings(&request.weighting.to_string(), &self.viewer.viewed);
-        full.weigh(&request.weighting, settings, watch)?;
+        let scheme = request.weighting.to_string();
+        let settings = self.choice.settings(&scheme, &self.viewer.viewed);
+        full.weigh(&request.weighting, settings, self.choice.mixture(&scheme), watch)?;
         self.shared.status.begin("rendering");
         let start = Instant::now();
         let frame = full.stage.frame(&request.weighting, &target, watch)?;

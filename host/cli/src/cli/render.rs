@@ -254,14 +254,23 @@ fn print(record: &RunRecord, folder: &Path) -> std::io::Result<()> {
 
 /// What was chosen for the scene, and what it gained.
 fn choice(chosen: &ChosenRecord, weighting: &str) -> String {
-    let ChosenRecord { settings, candidates, left_out } = chosen;
+    let ChosenRecord { settings, mixture, candidates, left_out } = chosen;
     if left_out.is_empty() {
         return format!("chosen: {weighting}, the default: too few sources to leave one out");
     }
     let of = |candidate: &Candidate| candidate.weighting == weighting && candidate.settings == *settings;
-    let own = candidates.iter().find(|candidate| of(candidate)).map_or(0.0, |candidate| candidate.psnr);
+    // A mixture is tried last.
+    let own = match mixture {
+        Some(_) => candidates.last(),
+        None => candidates.iter().find(|candidate| of(candidate)),
+    };
+    let own = own.map_or(0.0, |candidate| candidate.psnr);
     let gain = own - candidates.first().map_or(own, |first| first.psnr);
-    let with = if settings.is_empty() { "" } else { " with settings for these photographs" };
+    let with = match mixture {
+        Some(mixture) => format!(", {} pictures under different settings mixed by region", mixture.parts.len()),
+        None if settings.is_empty() => String::new(),
+        None => " with settings for these photographs".to_owned(),
+    };
     let more = if gain > 0.0 { format!(", {gain:.2} dB more than by default") } else { String::new() };
     let count = left_out.len();
     format!(

@@ -3,7 +3,7 @@
 use super::geometry::{Measure, Standing};
 use crate::Setting;
 use crate::budget::Bound;
-use crate::render::{RenderError, RenderOptions, SceneSources, Stage};
+use crate::render::{Frame, RenderError, RenderOptions, SceneSources, Stage};
 use crate::renderer::Renderer;
 use crate::scores::psnr_of_seen;
 use crate::session::Judge;
@@ -69,7 +69,7 @@ pub(super) fn coarse(options: &RenderOptions, stage: &Stage<'_>) -> RenderOption
     let camera = stage.scene().and_then(|of| of.scene.views.first()).map(|view| view.camera);
     let size = camera.map(|camera| scaled_size(&camera, SIDE.min(stage.side())).into());
     let bound = (stage.session.judge == Judge::Pixels).then_some(Bound::Error(MAX_ERROR));
-    RenderOptions { size, settings: Vec::new(), bound, ..options.clone() }
+    RenderOptions { size, settings: Vec::new(), mixture: None, bound, ..options.clone() }
 }
 
 impl<'a> Trials<'a> {
@@ -168,20 +168,43 @@ impl<'a> Trials<'a> {
         settings: &[Setting],
         progress: &dyn Progress,
     ) -> Result<Vec<Outcome>, RenderError> {
-        let mut outcomes = Vec::with_capacity(self.trials.len());
-        for Trial { stage, target, truth, seen, standing, copy } in &mut self.trials {
+        let frames = self.frames(weighting, settings, progress)?;
+        let outcome = |(index, frame): (usize, &Frame)| self.outcome(index, &frame.picture, mean(&frame.confidences));
+        Ok(frames.iter().enumerate().map(outcome).collect())
+    }
+
+    /// The settings whose pictures are worth mixing where these were chosen.
+    pub(super) fn parts(&mut self, chosen: &[Setting]) -> Vec<Vec<Setting>> {
+        self.trials.first_mut().map_or_else(Vec::new, |trial| trial.stage.parts(chosen))
+    }
+
+    /// The pictures of the sources that are left out.
+    pub(super) fn frames(
+        &mut self,
+        weighting: &Weighting,
+        settings: &[Setting],
+        progress: &dyn Progress,
+    ) -> Result<Vec<Frame>, RenderError> {
+        let mut frames = Vec::with_capacity(self.trials.len());
+        for Trial { stage, target, .. } in &mut self.trials {
             progress.check().map_err(stopped)?;
-            stage.tune(settings);
-            let frame = stage.frame(weighting, target, &Quiet(progress))?;
-            outcomes.push(Outcome {
-                psnr: psnr_of_seen(&frame.picture, truth, seen.as_ref()).min(MAX_PSNR),
-                confidence: mean(&frame.confidences),
-                standing: *standing,
-                copy: *copy,
-            });
+            stage.tune(settings, None);
+            frames.push(stage.frame(weighting, target, &Quiet(progress))?);
             progress.step();
         }
-        Ok(outcomes)
+        Ok(frames)
+    }
+
+    /// What the sources that are left out show, and where they show something, if not everywhere.
+    pub(super) fn truths(&self) -> impl Iterator<Item = (&RgbImage, Option<&GrayImage>)> {
+        self.trials.iter().map(|trial| (&trial.truth, trial.seen.as_ref()))
+    }
+
+    /// The result of a picture of a source that is left out, with the mean confidence of its pixels.
+    pub(super) fn outcome(&self, index: usize, picture: &RgbImage, confidence: Option<f64>) -> Outcome {
+        let Trial { truth, seen, standing, copy, .. } = &self.trials[index];
+        let psnr = psnr_of_seen(picture, truth, seen.as_ref()).min(MAX_PSNR);
+        Outcome { psnr, confidence, standing: *standing, copy: *copy }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::RenderError;
 use crate::budget::Bound;
-use crate::{Renderer, Setting};
+use crate::{Mixture, Renderer, Setting};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::{Album, BackgroundChoice, longest_side};
 use viewfuse_scene::{Scene, View};
@@ -21,6 +21,8 @@ pub struct RenderOptions {
     pub early_termination: f32,
     /// Values of the field's scalars ([`Tunable`](crate::Tunable)); those that are not named take their defaults.
     pub settings: Vec<Setting>,
+    /// Pictures under several settings that are mixed in place of one under [`RenderOptions::settings`].
+    pub mixture: Option<Mixture>,
     /// A bound on each picture's error or time, which chooses the effort.
     pub bound: Option<Bound>,
 }
@@ -41,6 +43,7 @@ impl Default for RenderOptions {
             leave_out: DEFAULT_LEAVE_OUT,
             early_termination: DEFAULT_EARLY_TERMINATION,
             settings: Vec::new(),
+            mixture: None,
             bound: None,
         }
     }

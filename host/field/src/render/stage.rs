@@ -4,7 +4,7 @@ use super::seen::seen;
 use super::{Frame, RenderError, RenderOptions, Truth, working_side};
 use crate::budget::{Controller, View};
 use crate::session::Session;
-use crate::{DepthMap, Effort, FieldError, Geometry, Record, Rendered, Renderer, Setting, Surfaces, Tunable};
+use crate::{DepthMap, Effort, FieldError, Geometry, Mixture, Record, Rendered, Renderer, Setting, Surfaces, Tunable};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::Camera;
@@ -137,7 +137,7 @@ impl<'a> Stage<'a> {
         let largest = images.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
         let side = options.size.map_or(largest, |[width, height]| width.max(height));
         let mut stage = Stage { scene: None, options, side, first, unit, sources, images, session, controller, costs };
-        stage.tune(&options.settings);
+        stage.tune(&options.settings, options.mixture.as_ref());
         Ok(stage)
     }
 
@@ -215,11 +215,15 @@ impl<'a> Stage<'a> {
         self.session.tunables
     }
 
-    /// Sets the field's scalars for what follows; views that are encoded stay as they are.
-    pub fn tune(&mut self, settings: &[Setting]) {
-        if let Some(tuned) = self.session.prepared.tuned() {
-            tuned.tune(settings);
-        }
+    /// Sets the field's scalars for what follows, and the mixture of pictures under other settings, if there is one; views that
+    /// are encoded stay as they are.
+    pub fn tune(&mut self, settings: &[Setting], mixture: Option<&Mixture>) {
+        self.session.tune(settings, mixture);
+    }
+
+    /// The settings whose pictures are worth mixing where these were chosen.
+    pub(crate) fn parts(&mut self, chosen: &[Setting]) -> Vec<Vec<Setting>> {
+        self.session.parts(chosen)
     }
 
     /// What the field knows of where the surfaces are.
@@ -344,6 +348,7 @@ impl<'a> Stage<'a> {
             depths,
             confidences,
             seen: None,
+            shares: self.session.shares.clone(),
             truth,
             time,
             encode,

@@ -7,12 +7,14 @@
 //! search      surface points of a scene whose files do not tell its depths
 //! kept        what was found of the sources, in a folder between runs
 //! unseen      parts of a picture that its photograph does not show
+//! scalars     the scalars that are chosen for a scene, and the pictures that are mixed
 //! efforts     coarser comparisons, from the cheapest to the exact one
 //! ```
 
 mod efforts;
 mod kept;
 mod matching;
+mod scalars;
 mod search;
 mod sources;
 mod unseen;
@@ -21,8 +23,8 @@ use super::exposure;
 use super::space::Space;
 use crate::row::{Origin, Row};
 use crate::{
-    About, AnyField, DepthMap, Efforts, Field, FieldError, Geometry, Prepared, Rendered, Request, Setting, Surfaces,
-    Tunable, Tuned, Weighted,
+    About, AnyField, DepthMap, Efforts, Field, FieldError, Geometry, Prepared, Rendered, Request, Surfaces, Tuned,
+    Weighted,
 };
 pub use kept::Cache;
 use kept::{Kept, Key};
@@ -36,21 +38,6 @@ use viewfuse_kernels::plane_sweep::disparity::TEMPERATURE;
 use viewfuse_kernels::plane_sweep::frustum::SweptView;
 use viewfuse_scene::photographs::{SourceImage, SourceImages, reduced_size};
 use viewfuse_weighting::sources::SourceWeights;
-
-const NEAR_COST: &str = "near cost";
-const FRONT_SHARE: &str = "front share";
-const DISSENT_SHARE: &str = "dissent share";
-const TEMPERATURE_NAME: &str = "temperature";
-const SECOND_SHARE: &str = "second share";
-
-/// The scalars that differ most from scene to scene, the most effective ones first.
-const TUNABLES: &[Tunable] = &[
-    Tunable { name: FRONT_SHARE, default: DEFAULT.front_share, others: &[0.0, 0.2] },
-    Tunable { name: NEAR_COST, default: DEFAULT.near_cost, others: &[0.002, 0.02] },
-    Tunable { name: DISSENT_SHARE, default: DEFAULT.dissent_share, others: &[0.0, 0.125] },
-    Tunable { name: SECOND_SHARE, default: DEFAULT.second_share, others: &[0.03] },
-    Tunable { name: TEMPERATURE_NAME, default: DEFAULT.temperature, others: &[0.005, 0.013] },
-];
 
 /// The settings that serve most scenes.
 const DEFAULT: Sweep = Sweep {
@@ -123,12 +110,14 @@ pub(super) struct Views<'a, D: Device> {
     found: Vec<(usize, Vec<[f32; 2]>)>,
     /// ... and those on the device that are to be kept.
     unkept: Vec<(usize, Key)>,
-    /// The gains estimated from some views under the current weighting, and these views.
-    gains: Option<(Vec<usize>, Vec<[f32; 4]>)>,
+    /// The gains estimated from some views under the current weighting, these views, and whether by the second disparities.
+    gains: Option<(Vec<usize>, bool, Vec<[f32; 4]>)>,
 }
 
 /// Disparities and confidences of some views, found the second time.
 struct Settled<D: Device> {
+    /// The settings under which they were found.
+    settings: Sweep,
     /// Of each view, by which others and with which weights; none where it was not found.
     voters: Vec<Option<Vec<(usize, f32)>>>,
     maps: D::Buffer<[f32; 2]>,
@@ -144,17 +133,6 @@ struct Volume<D: Device> {
 }
 
 impl Sweep {
-    /// The scalars that can be chosen for a scene, by the names in [`TUNABLES`].
-    fn scalars(&mut self) -> [(&'static str, &mut f32); 5] {
-        [
-            (FRONT_SHARE, &mut self.front_share),
-            (SECOND_SHARE, &mut self.second_share),
-            (NEAR_COST, &mut self.near_cost),
-            (DISSENT_SHARE, &mut self.dissent_share),
-            (TEMPERATURE_NAME, &mut self.temperature),
-        ]
-    }
-
     fn matching<'d, D: Device>(&self, device: &'d D, has_silhouettes: bool) -> Matching<'d, D> {
         let &Sweep { near_cost, dissent_share, front_share, .. } = self;
         Matching { device, has_silhouettes, near_cost, dissent_share, front_share }
@@ -304,12 +282,13 @@ impl<D: Device> Views<'_, D> {
 
     /// Estimates the gains from these views alone: a picture does not depend on sources that its weights leave out.
     fn estimate_gains(&mut self, views: &[usize]) -> Result<(), FieldError> {
-        if self.gains.as_ref().is_none_or(|(own, _)| own != views) {
+        let by_second = self.settings.second_share > 0.0;
+        if self.gains.as_ref().is_none_or(|(own, second, _)| own != views || *second != by_second) {
             let maps = self.device.download(self.maps())?;
             let step = |view: usize| if views.contains(&view) { self.steps[view] } else { 0.0 };
             let steps: Vec<f32> = (0..self.steps.len()).map(step).collect();
             let gains = exposure::gains(&self.matched.cameras, &self.texels, &maps, &steps);
-            self.gains = Some((views.to_vec(), gains));
+            self.gains = Some((views.to_vec(), by_second, gains));
         }
         Ok(())
     }
@@ -325,7 +304,7 @@ impl<D: Device> Views<'_, D> {
         let camera = Camera { pinhole, ..*target }.block(0);
         let weights: Vec<(usize, f32)> = views.iter().copied().zip(request.view_weights()).collect();
         let range = self.range(&camera);
-        let (maps, gains) = (&self.matched.cameras, self.gains.as_ref().map(|(_, gains)| &gains[..]));
+        let (maps, gains) = (&self.matched.cameras, self.gains.as_ref().map(|(_, _, gains)| &gains[..]));
         let matched = swept(maps, maps, &weights, Some(&self.steps), gains);
         let matching = self.settings.matching(self.device, self.has_silhouettes);
         let frustum = matching.frustum(camera, range, &matched);
@@ -406,23 +385,6 @@ impl<D: Device> Weighted for Views<'_, D> {
         self.unkept.clear();
         self.gains = None;
         Ok(())
-    }
-}
-
-impl<D: Device> Tuned for Views<'_, D> {
-    fn tunables(&self) -> &'static [Tunable] {
-        TUNABLES
-    }
-
-    fn tune(&mut self, settings: &[Setting]) {
-        let Sweep { plane_count, match_side, neighbours, .. } = self.settings;
-        self.settings = Sweep { plane_count, match_side, neighbours, ..self.defaults };
-        self.settled = None;
-        for Setting { name, value } in settings {
-            if let Some((_, scalar)) = self.settings.scalars().into_iter().find(|(own, _)| own == name) {
-                *scalar = *value;
-            }
-        }
     }
 }
 

@@ -114,7 +114,7 @@ fn measure(
         let mut true_scores = Vec::new();
         if grid {
             for candidate in &chosen.candidates {
-                stage.tune(&candidate.settings);
+                stage.tune(&candidate.settings, None);
                 let weighting = Weighting::open(&candidate.weighting)?;
                 stage.weigh(&weighting, &Silent)?;
                 let mut scores = Vec::new();
@@ -154,7 +154,7 @@ fn rendered(
     targets: &[usize],
     summary: &mut Summary,
 ) -> anyhow::Result<Vec<serde_json::Value>> {
-    stage.tune(&chosen.settings);
+    stage.tune(&chosen.settings, chosen.mixture.as_ref());
     stage.weigh(&chosen.weighting, &Silent)?;
     let mut views = Vec::new();
     for &target in targets {

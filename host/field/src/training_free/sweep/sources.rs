@@ -12,7 +12,9 @@ use viewfuse_kernels::plane_sweep::{MAX_MATCHED, Planes};
 impl<D: Device> Views<'_, D> {
     /// The sources' disparities and confidences.
     pub(super) fn maps(&self) -> &D::Buffer<[f32; 2]> {
-        self.settled.as_ref().map_or(&self.disparities, |settled| &settled.maps)
+        let is_settled = self.settings.second_share > 0.0;
+        let settled = self.settled.as_ref().filter(|_| is_settled);
+        settled.map_or(&self.disparities, |settled| &settled.maps)
     }
 
     /// Finds the disparities of these views the second time, if the settings ask for it, where others say something of them than
@@ -21,11 +23,14 @@ impl<D: Device> Views<'_, D> {
         if self.settings.second_share <= 0.0 {
             return Ok(());
         }
-        let Settled { mut voters, mut maps } = match self.settled.take() {
-            Some(settled) => settled,
-            None => Settled { voters: vec![None; self.steps.len()], maps: self.device.zeros(self.texels.len())? },
-        };
         let settings = Sweep { front_share: self.settings.second_share, ..self.settings };
+        let Settled { mut voters, mut maps, .. } = match self.settled.take().filter(|own| own.settings == settings) {
+            Some(settled) => settled,
+            None => {
+                let voters = vec![None; self.steps.len()];
+                Settled { settings, voters, maps: self.device.zeros(self.texels.len())? }
+            }
+        };
         for &view in views {
             let mut others = self.others(view);
             others.retain(|(other, weight)| views.contains(other) && *weight > 0.0);
@@ -40,7 +45,7 @@ impl<D: Device> Views<'_, D> {
                 self.gains = None;
             }
         }
-        self.settled = Some(Settled { voters, maps });
+        self.settled = Some(Settled { settings, voters, maps });
         Ok(())
     }
 

@@ -1,0 +1,212 @@
+//! Pictures of one target under several settings, mixed by region.
+//!
+//! ```text
+//! share_i = 1 / n + c_i . x   for i > 0, and share_0 the rest; negative ones are 0, and all are divided by their sum
+//! x       = 1, k_0 - K, ..., k_(n-1) - K, |d_1|, ..., |d_(n-1)|
+//! ```
+//!
+//! `k_i` is the confidence of picture `i`, `d_i` its disparity less that of picture 0, both averaged over the pixels around. With
+//! constants `c` of 0 the mixture is the plain mean. Errors of pictures under different settings are partly independent, so the
+//! mean is nearly always nearer to the truth than each of them.
+
+use crate::{Rendered, Setting};
+use serde::Serialize;
+
+/// Confidences count from here (`K`).
+const USUAL_CONFIDENCE: f32 = 0.3;
+/// Reach of the mean over pixels, as a share of the longer side; it is taken twice.
+const REACH: f32 = 0.01;
+/// A difference of disparities counts as a share of this part of the median disparity...
+const DISPARITY_SHARE: f32 = 0.1;
+/// ... and at most so many times.
+const MAX_DIFFERENCE: f32 = 2.0;
+
+/// Settings under which a target is rendered, and how the pictures are mixed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Mixture {
+    /// The settings of each picture.
+    pub parts: Vec<Vec<Setting>>,
+    /// The constants `c_i` of each picture but the first.
+    pub constants: Vec<Vec<f32>>,
+}
+
+/// How many terms a share has, for so many pictures.
+pub(crate) fn term_count(parts: usize) -> usize {
+    2 * parts
+}
+
+impl Mixture {
+    /// The plain mean.
+    pub fn mean(parts: Vec<Vec<Setting>>) -> Mixture {
+        let constants = vec![vec![0.0; term_count(parts.len())]; parts.len().saturating_sub(1)];
+        Mixture { parts, constants }
+    }
+
+    /// Mixes pictures of one size, in the order of the parts; returns the mean share of each, too. Colours and confidences are
+    /// mixed; a pixel's depth is that of the picture with the greatest share, so that no surface stands between two others.
+    pub(crate) fn mixed(&self, parts: &[Rendered]) -> (Rendered, Vec<f32>) {
+        let Some(first) = parts.first() else {
+            let nothing =
+                Rendered { colours: Vec::new(), depths: Vec::new(), confidences: Vec::new(), width: 0, height: 0 };
+            return (nothing, Vec::new());
+        };
+        let terms = terms(parts);
+        let mut mixed = first.clone();
+        let mut sums = vec![0.0_f64; parts.len()];
+        let mut shares = vec![0.0; parts.len()];
+        for (pixel, terms) in terms.chunks_exact(term_count(parts.len())).enumerate() {
+            self.shares(terms, &mut shares);
+            let of = |values: &dyn Fn(&Rendered) -> f32| -> f32 {
+                parts.iter().zip(&shares).map(|(part, share)| share * values(part)).sum()
+            };
+            mixed.colours[pixel] = [0, 1, 2, 3].map(|channel| of(&|part| part.colours[pixel][channel]));
+            if let Some(confidence) = mixed.confidences.get_mut(pixel) {
+                *confidence = of(&|part| part.confidences.get(pixel).copied().unwrap_or(0.0));
+            }
+            let greatest = (1..parts.len()).fold(0, |best, own| if shares[own] > shares[best] { own } else { best });
+            if let (Some(depth), Some(own)) = (mixed.depths.get_mut(pixel), parts[greatest].depths.get(pixel)) {
+                *depth = *own;
+            }
+            sums.iter_mut().zip(&shares).for_each(|(sum, share)| *sum += f64::from(*share));
+        }
+        let count = mixed.colours.len().max(1) as f64;
+        (mixed, sums.into_iter().map(|sum| (sum / count) as f32).collect())
+    }
+
+    /// The share of each picture at a pixel with these terms.
+    fn shares(&self, terms: &[f32], shares: &mut [f32]) {
+        let equal = 1.0 / shares.len() as f32;
+        let mut rest = 1.0;
+        for (share, constants) in shares[1..].iter_mut().zip(&self.constants) {
+            *share = equal + constants.iter().zip(terms).map(|(constant, term)| constant * term).sum::<f32>();
+            rest -= *share;
+        }
+        shares[0] = rest;
+        shares.iter_mut().for_each(|share| *share = share.max(0.0));
+        // The shares sum to 1 before negative ones are taken away, so that this sum is at least 1.
+        let sum: f32 = shares.iter().sum();
+        shares.iter_mut().for_each(|share| *share /= sum);
+    }
+}
+
+/// The terms `x` of all pixels, `[pixel][term]`.
+pub(crate) fn terms(parts: &[Rendered]) -> Vec<f32> {
+    let Some(Rendered { width, height, colours, .. }) = parts.first() else { return Vec::new() };
+    let (size, count) = ([*width as usize, *height as usize], term_count(parts.len()));
+    let mut terms = vec![0.0; colours.len() * count];
+    let mut set = |term: usize, values: &dyn Fn(usize) -> f32| {
+        terms.chunks_exact_mut(count).enumerate().for_each(|(pixel, terms)| terms[term] = values(pixel));
+    };
+    set(0, &|_| 1.0);
+    for (index, part) in parts.iter().enumerate() {
+        if part.confidences.len() == colours.len() {
+            let smooth = smooth(&part.confidences, size);
+            set(1 + index, &|pixel| smooth[pixel] - USUAL_CONFIDENCE);
+        }
+    }
+    let disparity = |depth: f32| if depth > 0.0 { depth.recip() } else { 0.0 };
+    let mut own: Vec<f32> = parts[0].depths.iter().copied().map(disparity).collect();
+    let usual = DISPARITY_SHARE * median(&mut own.clone());
+    for (index, part) in parts.iter().enumerate().skip(1) {
+        if usual > 0.0 && part.depths.len() == own.len() {
+            let difference =
+                |(depth, own): (&f32, &f32)| ((disparity(*depth) - own) / usual).clamp(-MAX_DIFFERENCE, MAX_DIFFERENCE);
+            let differences: Vec<f32> = part.depths.iter().zip(&own).map(difference).collect();
+            let smooth = smooth(&differences, size);
+            set(parts.len() + index, &|pixel| smooth[pixel].abs());
+        }
+    }
+    own.clear();
+    terms
+}
+
+/// The median; 0 of nothing.
+fn median(values: &mut [f32]) -> f32 {
+    let middle = values.len() / 2;
+    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f32::total_cmp).1 }
+}
+
+/// Means over square windows, taken twice; at the border over the pixels in the picture.
+fn smooth(values: &[f32], [width, height]: [usize; 2]) -> Vec<f32> {
+    let reach = ((REACH * width.max(height) as f32).round() as usize).max(1);
+    let once = along(&along(values, height, width, 1, reach), width, height, width, reach);
+    along(&along(&once, height, width, 1, reach), width, height, width, reach)
+}
+
+/// Means over `2 reach + 1` elements of each of `lines` lines of `length` elements that are `stride` apart.
+fn along(values: &[f32], lines: usize, length: usize, stride: usize, reach: usize) -> Vec<f32> {
+    let mut means = vec![0.0; values.len()];
+    let next_line = if stride == 1 { length } else { 1 };
+    let mut sums = vec![0.0_f64; length + 1];
+    for line in 0..lines {
+        let at = |index: usize| line * next_line + index * stride;
+        for index in 0..length {
+            sums[index + 1] = sums[index] + f64::from(values[at(index)]);
+        }
+        for index in 0..length {
+            let (first, end) = (index.saturating_sub(reach), (index + reach + 1).min(length));
+            means[at(index)] = ((sums[end] - sums[first]) / (end - first) as f64) as f32;
+        }
+    }
+    means
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A picture of one colour, confidence and depth.
+    fn flat(level: f32, confidence: f32, depth: f32) -> Rendered {
+        let (width, height, count) = (6, 4, 24);
+        Rendered {
+            colours: vec![[level, level, level, 1.0]; count],
+            depths: vec![depth; count],
+            confidences: vec![confidence; count],
+            width,
+            height,
+        }
+    }
+
+    fn near(own: f32, expected: f32) -> bool {
+        (own - expected).abs() < 1.0e-6
+    }
+
+    #[test]
+    fn without_constants_it_is_the_plain_mean() {
+        let parts = [flat(0.2, 0.1, 1.0), flat(0.5, 0.3, 2.0), flat(0.8, 0.8, 4.0)];
+        let (mixed, shares) = Mixture::mean(vec![Vec::new(); 3]).mixed(&parts);
+        assert!(mixed.colours.iter().all(|colour| near(colour[0], 0.5) && near(colour[3], 1.0)));
+        assert!(mixed.confidences.iter().all(|confidence| near(*confidence, 0.4)));
+        assert!(shares.iter().all(|share| near(*share, 1.0 / 3.0)), "{shares:?}");
+    }
+
+    #[test]
+    fn the_surer_picture_gets_the_greater_share() {
+        let mut mixture = Mixture::mean(vec![Vec::new(); 2]);
+        mixture.constants[0] = vec![0.0, 0.0, 1.0, 0.0];
+        let (mixed, shares) = mixture.mixed(&[flat(0.0, 0.3, 1.0), flat(1.0, 0.5, 2.0)]);
+        assert!(near(shares[1], 0.7) && near(shares[0], 0.3), "{shares:?}");
+        assert!(mixed.colours.iter().all(|colour| near(colour[0], 0.7)));
+        assert_eq!(mixed.depths, [2.0; 24], "the depth of the picture with the greater share");
+        // No share is negative, and they sum to 1.
+        mixture.constants[0][0] = 9.0;
+        assert_eq!(mixture.mixed(&[flat(0.0, 0.3, 1.0), flat(1.0, 0.5, 2.0)]).1, [0.0, 1.0]);
+    }
+
+    #[test]
+    fn pictures_that_differ_in_depth_are_told() {
+        let parts = [flat(0.0, 0.3, 1.0), flat(1.0, 0.3, 1.0 / 1.05)];
+        let terms = terms(&parts);
+        assert!(terms.chunks_exact(4).all(|terms| terms[0] == 1.0 && near(terms[1], 0.0)));
+        assert!(terms.chunks_exact(4).all(|terms| (terms[3] - 0.5).abs() < 1.0e-4), "{terms:?}");
+    }
+
+    #[test]
+    fn a_mean_over_pixels_keeps_what_is_the_same_everywhere() {
+        let values: Vec<f32> = (0..35).map(|index| (index % 7) as f32).collect();
+        assert!(smooth(&[2.5; 35], [7, 5]).iter().all(|mean| near(*mean, 2.5)));
+        let smooth = smooth(&values, [7, 5]);
+        assert!((0..5).all(|row| near(smooth[row * 7 + 3], 3.0)), "a slope stays in the middle: {smooth:?}");
+        assert!(smooth[0] > 0.4, "the border is averaged with what lies beside it");
+    }
+}
