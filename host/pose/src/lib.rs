@@ -10,15 +10,15 @@
 //! ```text
 //! exif          what a photograph states of its camera: Exif
 //! intake        the photographs of a folder, and those that cannot be used: Intake
-//! focal         cameras before the work, with where their focal lengths come from: Cameras
 //! solution      a job for a solver and its answer: Job, Solution, Solver
+//! focal         cameras before the work, with where their focal lengths come from: Cameras
 //! openmvg       OpenMVG's crates, as a process: OpenMvg
 //! posed         a solution as a scene
 //! agreement     rotations of two solutions between the same photographs
-//! support       parallax and the shape of the points: what two views can tell
+//! support       parallax and the shape of the points: Support
 //! left_out      photographs rendered from the others: LeftOut
-//! verdict       the solution that is accepted, with the photographs that are: Verdict
 //! attempt       the attempts that are made: Attempt
+//! verdict       the attempt that is accepted, with the photographs that are: Verdict
 //! advice        where more photographs help: Neighbours
 //! find          from a folder to a verdict: find
 //! write         the scene with its record, whole or not at all

@@ -233,9 +233,11 @@ impl Trial<'_> {
     ) -> Result<Result<(Scene, Vec<(usize, Verified)>), String>, VerdictError> {
         loop {
             if kept.len() < MIN_PHOTOGRAPHS {
-                let said: Vec<String> =
-                    self.taken_out.iter().map(|(photo, why)| format!("{}: {why}", self.photos[*photo].name)).collect();
-                return Ok(Err(format!("fewer than {MIN_PHOTOGRAPHS} photographs stay ({})", said.join("; "))));
+                let first = self
+                    .taken_out
+                    .first()
+                    .map_or(String::new(), |(photo, why)| format!("; {}: {why}", self.photos[*photo].name));
+                return Ok(Err(format!("fewer than {MIN_PHOTOGRAPHS} photographs stay{first}")));
             }
             let taken: Vec<usize> = kept.iter().map(|(photo, _)| *photo).collect();
             let scene = posed::scene(self.folder, self.photos, self.cameras, self.solution, &taken)?;

@@ -127,15 +127,16 @@ fn of_bare(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
     }
 }
 
+/// A transparent error replaces its cause, which is then not part of the chain.
 #[cfg(feature = "pose")]
 fn of_pose(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
-    use viewfuse_pose::{IntakeError, SolverError};
-    match (cause.downcast_ref::<SolverError>(), cause.downcast_ref::<IntakeError>()) {
-        (Some(SolverError::Missing { .. }), _) => Some(
+    use viewfuse_pose::{IntakeError, PoseError, SolverError};
+    match cause.downcast_ref::<PoseError>() {
+        Some(PoseError::Solver(SolverError::Missing { .. })) => Some(
             "in the repository `cargo openmvg` builds it, and `cargo install --path host/pose/openmvg --ignore-rust-version` \
              installs it; VIEWFUSE_OPENMVG names it where it lies elsewhere",
         ),
-        (_, Some(IntakeError::Many { .. })) => Some("--every N takes every Nth"),
+        Some(PoseError::Intake(IntakeError::Many { .. })) => Some("--every N takes every Nth"),
         _ => None,
     }
 }
