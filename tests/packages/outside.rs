@@ -138,9 +138,9 @@ fn a_layout_of_ones_own_is_opened_and_rendered() {
     }
     let frame = training_free(&scene, &Weighting::default_scheme());
     assert!(frame.truth.is_some_and(|truth| truth.psnr > 15.0));
-    // The readers of the crate know nothing of it, and say what they look for.
+    // The readers of the crate know nothing of it, and see photographs alone.
     let error = Scene::open(folder.path()).expect_err("an unknown layout").to_string();
-    assert!(error.contains("no scene here; looked for a folder with transforms.json"), "{error}");
+    assert!(error.contains("8 photographs, and nothing that gives their poses"), "{error}");
 }
 
 #[test]

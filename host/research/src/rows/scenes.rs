@@ -54,7 +54,7 @@ pub(super) fn of_scenes() -> Vec<Row> {
             Hours::Estimated(0.4),
             vec![print(format!("viewfuse-research poses viewfuse-openmvg{}", of_posed()))],
         )
-        .needs(&[FERN, DINO, CUP, CAPE, KANGAROO, DTU, HERZ, FOX, Need::Program("viewfuse-openmvg")])
+        .needs(&[FERN, DINO, CUP, CAPE, KANGAROO, DTU, HERZ, FOX, MESH, Need::Program("viewfuse-openmvg")])
         .also(&["host/pose/src", "host/pose/openmvg/src", "tests/data/room", "tests/data/toy"]),
     ]
 }
@@ -62,7 +62,8 @@ pub(super) fn of_scenes() -> Vec<Row> {
 /// The scenes whose poses are removed.
 fn of_posed() -> String {
     let given = ["fern", "dino", "cup", "gold_cape", "kangaroo"].map(|scene| format!(" {{DATA}}/{scene}"));
-    let large = ["dtu_scan65", "herz_jesus_p8", "fox"].map(|scene| format!(" {{DATA}}/{scene}"));
+    let large = ["dtu_scan65", "herz_jesus_p8", "fox", "torcs_cars/baja-bug", "torcs_cars/p406"]
+        .map(|scene| format!(" {{DATA}}/{scene}"));
     [given.concat(), " tests/data/room tests/data/toy".to_owned(), large.concat()].concat()
 }
 
