@@ -105,7 +105,7 @@ pub(crate) fn terms(parts: &[Rendered]) -> Vec<f32> {
         }
     }
     let disparity = |depth: f32| if depth > 0.0 { depth.recip() } else { 0.0 };
-    let mut own: Vec<f32> = parts[0].depths.iter().copied().map(disparity).collect();
+    let own: Vec<f32> = parts[0].depths.iter().copied().map(disparity).collect();
     let usual = DISPARITY_SHARE * median(&mut own.clone());
     for (index, part) in parts.iter().enumerate().skip(1) {
         if usual > 0.0 && part.depths.len() == own.len() {
@@ -116,7 +116,6 @@ pub(crate) fn terms(parts: &[Rendered]) -> Vec<f32> {
             set(parts.len() + index, &|pixel| smooth[pixel].abs());
         }
     }
-    own.clear();
     terms
 }
 
