@@ -6,6 +6,7 @@ mod camera;
 mod compare;
 mod compositing;
 mod front;
+mod gaussians;
 mod group_norm;
 mod half_precision;
 mod layers;
