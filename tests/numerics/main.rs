@@ -7,6 +7,7 @@ mod compare;
 mod compositing;
 mod front;
 mod gaussian;
+mod gaussians;
 mod group_norm;
 mod half_precision;
 mod layers;

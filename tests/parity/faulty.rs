@@ -52,6 +52,24 @@ impl Perturb for RayPoint {
     }
 }
 
+impl Perturb for ProjectedGaussian {
+    fn perturb(values: &mut [ProjectedGaussian]) {
+        values.iter_mut().for_each(|splat| f32::perturb(&mut splat.colour));
+    }
+}
+
+impl Perturb for SplatGradient {
+    fn perturb(values: &mut [SplatGradient]) {
+        values.iter_mut().for_each(|sums| f32::perturb(&mut sums.colour));
+    }
+}
+
+impl Perturb for GaussianBlock {
+    fn perturb(values: &mut [GaussianBlock]) {
+        values.iter_mut().for_each(|gaussian| f32::perturb(&mut gaussian.colour));
+    }
+}
+
 impl Memory for Faulty {
     type Buffer<T: Element> = Vec<T>;
 

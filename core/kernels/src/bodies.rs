@@ -6,6 +6,7 @@
 //! a loop ([`for_each_kernel`](crate::for_each_kernel) makes both), a GPU for each invocation. That of a tiled kernel
 //! hands the two matrices and what happens to a sum to the device's tiles.
 
+mod gaussians;
 mod layers;
 mod lists;
 mod pictures;
@@ -17,6 +18,7 @@ mod visual_hull;
 mod volumes;
 mod weighting;
 
+pub use gaussians::*;
 pub use layers::*;
 pub use lists::*;
 pub use pictures::*;

@@ -15,6 +15,7 @@
 //! genvs             volumes of features become a feature image     VolumePlace, weigh_features, denoiser_input
 //! visual_hull       the training-free field inside silhouettes     matched depth, signed distance, density and colour
 //! plane_sweep       the training-free field for any scene          evidence, census, paths, disparity, blend
+//! gaussians         Gaussians of a scene: pictures and derivatives    blend_row, TileGradient, project_gradient
 //! limits            what a device can do at most                   chained, copied, looked_up
 //! bodies            the kernels: a function of one element each
 //! rows              the list of kernels, one row each              Kernel, for_each_kernel
@@ -27,6 +28,7 @@
 pub mod bodies;
 pub mod compact;
 pub mod finite;
+pub mod gaussians;
 pub mod genvs;
 pub mod limits;
 pub mod network;

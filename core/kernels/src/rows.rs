@@ -61,6 +61,8 @@ pub use kernel::{Access, Array, Form, Kernel, Layout, Piece, SHARED_BYTES, WORKG
 // What the rows name.
 pub use crate::compact::RUN;
 pub use crate::finite::FINITE_RUN;
+pub use crate::gaussians::blend_gradient::SplatGradient;
+pub use crate::gaussians::{SplatBlock, TileBlock};
 pub use crate::genvs::{DenoiserInputBlock, FeatureBlock, VolumeBlock};
 pub use crate::limits::{ChainBlock, LookUpBlock};
 pub use crate::network::attend::MatrixBlock;
@@ -87,6 +89,7 @@ pub use viewfuse_core::camera::CameraBlock;
 pub use viewfuse_core::composite::CompositeBlock;
 pub use viewfuse_core::depths::{CoarseBlock, FineBlock};
 pub use viewfuse_core::fuse::FuseBlock;
+pub use viewfuse_core::gaussian::{GaussianBlock, ProjectedGaussian};
 pub use viewfuse_core::half_precision::word_count;
 pub use viewfuse_core::pose::PoseBlock;
 pub use viewfuse_core::rays::{CastBlock, PlaceBlock, RayPoint, TargetRay};

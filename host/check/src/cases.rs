@@ -14,6 +14,7 @@ mod fine_depths;
 mod front;
 mod fuse_views;
 mod gather_latents;
+mod gaussians;
 mod group_norm;
 mod half_precision;
 mod hull_entry;

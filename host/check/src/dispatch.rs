@@ -125,6 +125,39 @@ impl Floats for RayPoint {
     }
 }
 
+impl Floats for GaussianBlock {
+    fn floats(values: Vec<GaussianBlock>) -> Vec<f32> {
+        let all = |own: GaussianBlock| {
+            let ([x, y, z], [a, b, c], [red, green, blue]) = (own.position, own.log_scales, own.colour);
+            let [w, i, j, k] = own.rotation;
+            [x, y, z, own.opacity, a, b, c, own.padding, w, i, j, k, red, green, blue, own.padding_end]
+        };
+        values.into_iter().flat_map(all).collect()
+    }
+}
+
+impl Floats for ProjectedGaussian {
+    fn floats(values: Vec<ProjectedGaussian>) -> Vec<f32> {
+        let all = |own: ProjectedGaussian| {
+            let ([x, y], [xx, xy, yy], [red, green, blue]) = (own.mean, own.conic, own.colour);
+            let ([right, down], [first, second]) = (own.extent, own.padding_end);
+            let rest = [red, green, blue, own.padding_colour, right, down, first, second];
+            [[x, y, own.depth, own.opacity, xx, xy, yy, own.padding], rest].concat()
+        };
+        values.into_iter().flat_map(all).collect()
+    }
+}
+
+impl Floats for SplatGradient {
+    fn floats(values: Vec<SplatGradient>) -> Vec<f32> {
+        let all = |own: SplatGradient| {
+            let ([x, y], [xx, xy, yy], [red, green, blue]) = (own.along, own.squares, own.colour);
+            [own.opacity, x, y, own.padding, xx, xy, yy, own.unused, red, green, blue, own.behind]
+        };
+        values.into_iter().flat_map(all).collect()
+    }
+}
+
 /// A dispatch of a kernel. The arrays of several dispatches in a device's memory are `(array of the row, ...)`, each
 /// `[dispatch]`.
 pub trait Dispatch: Clone + Send + Sync + 'static {

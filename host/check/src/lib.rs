@@ -14,7 +14,7 @@
 //!   network_oracle, point_oracle,
 //!   group_norm_oracle,
 //!   matrix_oracle, volume_oracle,
-//!   sweep_oracle
+//!   sweep_oracle, gaussian_oracle
 //! poses, ray_inputs, world,     inputs for a seed
 //!   swept
 //! dispatch                      each kernel's parameters and arrays, from its row: upload, run, download
@@ -35,6 +35,7 @@ pub mod cases;
 pub mod compare;
 pub mod compositing_oracle;
 pub mod dispatch;
+pub mod gaussian_oracle;
 pub mod group_norm_oracle;
 pub mod hull_oracle;
 pub mod matrix_oracle;

@@ -19,6 +19,7 @@ mod inspect;
 mod left_out;
 mod metrics_options;
 mod model;
+mod optimise;
 mod options;
 mod outputs;
 #[cfg(feature = "pareto")]
@@ -98,6 +99,8 @@ enum Command {
     Select(select::Arguments),
     /// Write the surfaces that the sources show as a coloured point cloud (PLY).
     Points(points::Arguments),
+    /// Optimise a scene of Gaussians from the sources, for pictures at once and for other viewers (PLY).
+    Optimise(optimise::Arguments),
     /// Show a scene: its cameras from above, the point that they look at, and warnings.
     Inspect(inspect::Arguments),
     /// Compare weighting schemes on held-out views.
@@ -161,6 +164,7 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
         Command::View(arguments) => view::run(&arguments),
         Command::Weights(arguments) => weights::run(&arguments),
         Command::Select(arguments) => select::run(&arguments),
+        Command::Optimise(arguments) => optimise::run(&arguments),
         Command::Points(arguments) => points::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments, options::values(&command, &matches)),

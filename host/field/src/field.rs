@@ -165,7 +165,7 @@ pub trait Tuned {
     fn tune(&mut self, settings: &[Setting]);
 
     /// Settings whose pictures are worth mixing where these were chosen; none by default.
-    fn parts(&self, _chosen: &[Setting]) -> Vec<Vec<Setting>> {
+    fn parts(&mut self, _chosen: &[Setting]) -> Vec<Vec<Setting>> {
         Vec::new()
     }
 }

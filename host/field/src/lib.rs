@@ -13,6 +13,7 @@
 //! budget            how much of a field's work a bound on the error or on the time needs
 //! render            the render loop, from a scene to pictures
 //! point_cloud       the sources' depths as one cloud of points
+//! gaussians         Gaussians optimised for the sources
 //! auto              the scheme and the field's scalars for a scene, and the score to expect
 //! enlarged          previews: small pictures, enlarged
 //! options           a person's options of a field, and the flags that take them
@@ -33,6 +34,7 @@ pub mod enlarged;
 pub mod error;
 pub mod field;
 pub mod finite;
+pub mod gaussians;
 pub mod genvs;
 pub mod learned;
 pub mod mixture;

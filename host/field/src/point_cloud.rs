@@ -10,7 +10,7 @@ use crate::render::{RenderError, Stage};
 use viewfuse_core::Vec3;
 use viewfuse_core::lookup::bilinear;
 use viewfuse_job::progress::{Interrupted, Progress};
-use viewfuse_scene::photographs::SourceImage;
+use viewfuse_scene::photographs::{SourceImage, SourceImages};
 use viewfuse_weighting::Weighting;
 use viewfuse_weighting::sources::SourceWeights;
 
@@ -69,9 +69,20 @@ pub fn point_cloud(
     progress.stage("fusing the depths", 3..4, 4);
     let maps = stage.source_depths()?;
     let relevance = stage.relevance(weighting);
-    let (images, has_silhouettes) = (&stage.images.images[..], stage.images.has_silhouettes);
-    let fusion = Fusion { maps: &maps, images, has_silhouettes, relevance: &relevance, options };
-    fusion.points(progress).map_err(|interrupted| RenderError::Field(interrupted.into()))
+    cloud_of(&maps, &stage.images, &relevance, options, progress)
+        .map_err(|interrupted| RenderError::Field(interrupted.into()))
+}
+
+/// The cloud of these depth maps, one a source; `relevance[view]` are the weights of the others for source `view`.
+pub(crate) fn cloud_of(
+    maps: &[DepthMap],
+    images: &SourceImages,
+    relevance: &[SourceWeights],
+    options: CloudOptions,
+    progress: &dyn Progress,
+) -> Result<Vec<CloudPoint>, Interrupted> {
+    let has_silhouettes = images.has_silhouettes;
+    Fusion { maps, images: &images.images, has_silhouettes, relevance, options }.points(progress)
 }
 
 /// The maps of all views, with what else is fused.

@@ -7,7 +7,8 @@ use super::{genvs, pixelnerf, training_free};
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
 
 /// All of them; the first is the default.
-pub const ROWS: [&Row; 4] = [&training_free::ROW, &training_free::SWEEP, &pixelnerf::ROW, &genvs::ROW];
+pub const ROWS: [&Row; 5] =
+    [&training_free::ROW, &training_free::SWEEP, &training_free::GAUSSIANS, &pixelnerf::ROW, &genvs::ROW];
 
 /// The row of a field of this name.
 pub fn named(name: &str) -> Option<&'static Row> {

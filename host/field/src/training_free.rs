@@ -5,15 +5,21 @@
 //! sweep    any sources: planes through the frusta of sources and target
 //! space    near and far bounds, for the planes
 //! exposure gains that equalise the sources' exposure
+//! with_gaussians  the sweep's pictures with those of Gaussians
+//! gaussians  the field of Gaussians alone
 //! presets  settings to compare
 //! ```
 
 mod exposure;
+mod gaussians;
 pub mod hull;
 mod presets;
 mod space;
 mod sweep;
+mod with_gaussians;
 
+use self::with_gaussians::WithGaussians;
+use super::gaussians::Recipe;
 use super::options::{FieldOptions, Flag, FlagAbout, OpenError, flags};
 use super::row::{Origin, Row};
 use super::{About, AnyField, Field, FieldError, Prepared, SourceSide};
@@ -22,6 +28,8 @@ use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
 
+pub use gaussians::Gaussians;
+pub(crate) use gaussians::ROW as GAUSSIANS;
 pub use hull::NoObject;
 pub(crate) use sweep::ROW as SWEEP;
 pub use sweep::{Cache, Sweep};
@@ -33,6 +41,8 @@ pub struct TrainingFree {
     pub hull: hull::Hull,
     /// Settings for other sources.
     pub sweep: Sweep,
+    /// The optimisation of the Gaussians that pictures of other sources may be mixed with.
+    pub recipe: Recipe,
     /// Side of the sources as a share of the pictures', above 0: smaller sources take less time to match.
     pub source_share: f32,
     /// Where what is found of sources without silhouettes is kept.
@@ -42,7 +52,13 @@ pub struct TrainingFree {
 impl Default for TrainingFree {
     /// Sources at the size of the pictures.
     fn default() -> TrainingFree {
-        TrainingFree { hull: hull::Hull::default(), sweep: Sweep::default(), source_share: 1.0, cache: None }
+        TrainingFree {
+            hull: hull::Hull::default(),
+            sweep: Sweep::default(),
+            recipe: Recipe::default(),
+            source_share: 1.0,
+            cache: None,
+        }
     }
 }
 
@@ -91,7 +107,8 @@ impl Field for TrainingFree {
         if sources.has_silhouettes {
             Ok(Box::new(self.hull.views(device, sources, progress)?))
         } else {
-            self.sweep.prepare_kept(device, sources, self.cache.as_ref(), progress)
+            let sweep = self.sweep.prepare_kept(device, sources, self.cache.as_ref(), progress)?;
+            Ok(Box::new(WithGaussians::new(device, sweep, sources, self.recipe, 0.0)))
         }
     }
 

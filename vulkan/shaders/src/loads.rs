@@ -6,8 +6,10 @@
 use spirv_std::glam::{UVec4, Vec2, Vec4};
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::fetch::Fetch;
+use viewfuse_core::gaussian::{GaussianBlock, ProjectedGaussian};
 use viewfuse_core::pose::PoseBlock;
 use viewfuse_core::rays::RayPoint;
+use viewfuse_kernels::gaussians::blend_gradient::SplatGradient;
 use viewfuse_kernels::plane_sweep::Planes;
 use viewfuse_kernels::plane_sweep::frustum::SweptView;
 use viewfuse_kernels::store::Store;
@@ -127,9 +129,104 @@ impl InVectors for RayPoint {
     }
 }
 
+impl InVectors for GaussianBlock {
+    type Vectors = [Vec4; 4];
+
+    #[inline(always)]
+    fn from_vectors([place, scales, rotation, colour]: [Vec4; 4]) -> GaussianBlock {
+        GaussianBlock {
+            position: [place.x, place.y, place.z],
+            opacity: place.w,
+            log_scales: [scales.x, scales.y, scales.z],
+            padding: 0.0,
+            rotation: rotation.to_array(),
+            colour: [colour.x, colour.y, colour.z],
+            padding_end: 0.0,
+        }
+    }
+}
+
+impl IntoVectors for GaussianBlock {
+    #[inline(always)]
+    fn into_vectors(self) -> [Vec4; 4] {
+        let ([x, y, z], [a, b, c], [red, green, blue]) = (self.position, self.log_scales, self.colour);
+        [
+            Vec4::new(x, y, z, self.opacity),
+            Vec4::new(a, b, c, 0.0),
+            Vec4::from_array(self.rotation),
+            Vec4::new(red, green, blue, 0.0),
+        ]
+    }
+}
+
+impl InVectors for ProjectedGaussian {
+    type Vectors = [Vec4; 4];
+
+    #[inline(always)]
+    fn from_vectors([mean, conic, colour, extent]: [Vec4; 4]) -> ProjectedGaussian {
+        ProjectedGaussian {
+            mean: [mean.x, mean.y],
+            depth: mean.z,
+            opacity: mean.w,
+            conic: [conic.x, conic.y, conic.z],
+            padding: 0.0,
+            colour: [colour.x, colour.y, colour.z],
+            padding_colour: 0.0,
+            extent: [extent.x, extent.y],
+            padding_end: [0.0; 2],
+        }
+    }
+}
+
+impl IntoVectors for ProjectedGaussian {
+    #[inline(always)]
+    fn into_vectors(self) -> [Vec4; 4] {
+        let ([x, y], [xx, xy, yy], [red, green, blue], [right, down]) =
+            (self.mean, self.conic, self.colour, self.extent);
+        [
+            Vec4::new(x, y, self.depth, self.opacity),
+            Vec4::new(xx, xy, yy, 0.0),
+            Vec4::new(red, green, blue, 0.0),
+            Vec4::new(right, down, 0.0, 0.0),
+        ]
+    }
+}
+
+impl InVectors for SplatGradient {
+    type Vectors = [Vec4; 3];
+
+    #[inline(always)]
+    fn from_vectors([first, squares, colour]: [Vec4; 3]) -> SplatGradient {
+        SplatGradient {
+            opacity: first.x,
+            along: [first.y, first.z],
+            padding: 0.0,
+            squares: [squares.x, squares.y, squares.z],
+            unused: 0.0,
+            colour: [colour.x, colour.y, colour.z],
+            behind: 0.0,
+        }
+    }
+}
+
+impl IntoVectors for SplatGradient {
+    #[inline(always)]
+    fn into_vectors(self) -> [Vec4; 3] {
+        let ([xx, xy, yy], [red, green, blue]) = (self.squares, self.colour);
+        [
+            Vec4::new(self.opacity, self.along[0], self.along[1], 0.0),
+            Vec4::new(xx, xy, yy, 0.0),
+            Vec4::new(red, green, blue, 0.0),
+        ]
+    }
+}
+
 const _: () = assert!(size_of::<<CameraBlock as InVectors>::Vectors>() == size_of::<CameraBlock>());
 const _: () = assert!(size_of::<<SweptView as InVectors>::Vectors>() == size_of::<SweptView>());
 const _: () = assert!(size_of::<<RayPoint as InVectors>::Vectors>() == size_of::<RayPoint>());
+const _: () = assert!(size_of::<<GaussianBlock as InVectors>::Vectors>() == size_of::<GaussianBlock>());
+const _: () = assert!(size_of::<<ProjectedGaussian as InVectors>::Vectors>() == size_of::<ProjectedGaussian>());
+const _: () = assert!(size_of::<<SplatGradient as InVectors>::Vectors>() == size_of::<SplatGradient>());
 const _: () = assert!(size_of::<<Planes as InVectors>::Vectors>() == size_of::<Planes>());
 
 #[inline(always)]

@@ -437,6 +437,42 @@ macro_rules! for_each_kernel {
                 write pixel_depths: f32,
                 write confidences: f32,
             }
+            /// Gaussians as a camera sees them. An element is a Gaussian.
+            ProjectGaussians project_gaussians(block: SplatBlock) for gaussian in [0..block.gaussian_count; 128 a core] {
+                read gaussians: GaussianBlock as vectors,
+                write splats: ProjectedGaussian as vectors,
+            }
+            /// Pixels from the splats of their tile, which the list `entries[starts[tile]..starts[tile + 1]]` numbers front to
+            /// back: `colours[row][column]` (red, green, blue over the background, opacity) and `depths[row][column]`,
+            /// weighted sums. An element is a tile's part of a row of pixels.
+            BlendSplats blend_splats(block: TileBlock) for part in [0..block.part_count(); 16 a core], wide {
+                read starts: u32,
+                read entries: u32,
+                read splats: ProjectedGaussian as vectors,
+                write colours[block.first_pixel(part)]: [f32; 4] as vectors,
+                write depths[block.first_pixel(part)]: f32,
+            }
+            /// What the pixels of a tile say of each splat of its list: `sums[entry]`, from the derivatives of a loss by the
+            /// pixels, `gradients[row][column]` (by red, green, blue and opacity). An element is a tile.
+            BlendGradient blend_gradient(block: TileBlock) for tile in [0..block.tile_count(); 1 a core], wide {
+                read starts: u32,
+                read entries: u32,
+                read splats: ProjectedGaussian as vectors,
+                read colours: [f32; 4] as vectors,
+                read gradients: [f32; 4] as vectors,
+                write sums[starts[tile as usize]]: SplatGradient as vectors,
+            }
+            /// Derivatives by the Gaussians' parameters, in the places of these: `gradients[gaussian]`, from the entries of the
+            /// tiles' lists that are the Gaussian's, `uses[use_starts[gaussian]..use_starts[gaussian + 1]]`. An element is a
+            /// Gaussian.
+            ProjectGradients project_gradients(block: SplatBlock) for gaussian in [0..block.gaussian_count; 128 a core] {
+                read gaussians: GaussianBlock as vectors,
+                read splats: ProjectedGaussian as vectors,
+                read use_starts: u32,
+                read uses: u32,
+                read sums: SplatGradient as vectors,
+                write gradients: GaussianBlock as vectors,
+            }
             /// Linear combinations of pictures: `mixed[element]` of `state[element]` and four results, the newest first.
             /// What has coefficient 0 is not read and may be any buffer. An element is a channel of a pixel.
             MixPictures mix_pictures(block: Mix; element_count) for channel in [0..element_count; 4096 a core] {

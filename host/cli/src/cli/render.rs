@@ -19,8 +19,10 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 use viewfuse_device::choice::Chosen;
+use viewfuse_field::AnyField;
 use viewfuse_field::auto::{self, Candidate, Expected};
 use viewfuse_field::budget::{Estimate, Kept};
+use viewfuse_field::gaussians::GivenGaussians;
 use viewfuse_field::render::{Frame, Seen, render};
 use viewfuse_job::files::check_writable;
 use viewfuse_job::progress::{Part, Progress};
@@ -31,6 +33,7 @@ use viewfuse_output::run::{Circumstances, RECORD, RunWriter};
 use viewfuse_output::video::VideoFormat;
 use viewfuse_scene::coverage::Coverage;
 use viewfuse_scene::few_shot::{FewShot, Target};
+use viewfuse_scene::gaussians::GaussianScene;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_scene::{READERS, Scene, looked_for};
 use viewfuse_weighting::{Weighting, WeightingChoice};
@@ -44,7 +47,8 @@ const MIN_FEW: f32 = 0.2;
     viewfuse render dino/ --targets 1,4,7 --size 160x120 -o out\n      views 1, 4 and 7 from the other thirteen, with scores\n  \
     viewfuse render car/ --targets 5 --sources all/3 --weights mean -o out\n      view 5 from every third view, averaged instead of weighted\n  \
     viewfuse render photos/ --between 3 7 --frames 120 --video webp,mp4 -o out\n      the way from view 3 to view 7 as a video\n  \
-    viewfuse render photos/ --camera-path camera_path.json -o - | ffplay -\n      a path from nerfstudio's viewer, played as it comes\n\n\
+    viewfuse render photos/ --camera-path camera_path.json -o - | ffplay -\n      a path from nerfstudio's viewer, played as it comes\n  \
+    viewfuse render photos/ --gaussians photos.ply --orbit 24 -o out\n      the Gaussians that `optimise` wrote\n\n\
     Writes NAME.png, NAME_depth.png (16 bit; scale in run.json; none with a GeNVS), NAME_confidence.png (8 bit; where the field \
     tells), NAME_sheet.png for each target, and run.json. A run that was interrupted continues where it was when it is started \
     again. With `-o -` the pictures go to standard output as y4m, and nothing is written.")]
@@ -68,6 +72,9 @@ pub(crate) struct Arguments {
     model: ModelOptions,
     #[command(flatten)]
     sequence: Flags<SEQUENCE>,
+    /// Render the Gaussians of this file, of `optimise` or of another program, in the coordinates of the scene's files
+    #[arg(long, value_name = "FILE", conflicts_with = "model")]
+    gaussians: Option<PathBuf>,
     #[command(flatten)]
     device: DeviceOptions,
     /// Seed of every random draw (the training-free field makes none)
@@ -89,8 +96,8 @@ impl Arguments {
     fn weighting(&self) -> anyhow::Result<Option<Weighting>> {
         Ok(match &self.weights {
             Some(WeightingChoice::Given(spec)) => Some(spec.open()?),
-            // A network's pictures take too long to try out schemes unasked.
-            None if self.model.label().is_some() => Some(Weighting::default_scheme()),
+            // A network's pictures take too long to try out schemes unasked; Gaussians show the same under all of them.
+            None if self.model.label().is_some() || self.gaussians.is_some() => Some(Weighting::default_scheme()),
             Some(WeightingChoice::Auto) | None => None,
         })
     }
@@ -106,7 +113,10 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
         keep_folder_apart([&scene], &arguments.output)?;
     }
     let open_time = start.elapsed();
-    let field = arguments.model.open(arguments.seed, Some(&arguments.sequence))?;
+    let field = match &arguments.gaussians {
+        Some(path) => AnyField::new(GivenGaussians { scene: GaussianScene::read(path, &scene.frame)? }),
+        None => arguments.model.open(arguments.seed, Some(&arguments.sequence))?,
+    };
     let about = field.about();
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), arguments.path.choice());
     let job = selection.resolve(&scene, about.least_sources)?;
@@ -132,7 +142,8 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
     writer.lock()?;
     writer.set_outputs(arguments.outputs.outputs());
     leaving.into_iter().for_each(|warning| writer.warn(warning));
-    let files: Vec<&Path> = arguments.model.file().into_iter().chain(before.file()).collect();
+    let given = arguments.gaussians.as_deref();
+    let files: Vec<&Path> = arguments.model.file().into_iter().chain(before.file()).chain(given).collect();
     // Frames that follow from one another are not continued.
     let job = if arguments.sequence.is_empty() {
         let run = run_identity(values, &device.name(), &scene, &job, &files)?;

@@ -29,6 +29,7 @@ use crate::{
 pub use kept::Cache;
 use kept::{Kept, Key};
 use matching::{Images, Matching, Range};
+pub(super) use scalars::TUNABLES;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;

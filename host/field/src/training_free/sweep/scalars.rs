@@ -11,7 +11,7 @@ const TEMPERATURE_NAME: &str = "temperature";
 const SECOND_SHARE: &str = "second share";
 
 /// The scalars that differ most from scene to scene, the most effective ones first.
-const TUNABLES: &[Tunable] = &[
+pub(in crate::training_free) const TUNABLES: &[Tunable] = &[
     Tunable { name: FRONT_SHARE, default: DEFAULT.front_share, others: &[0.0, 0.2] },
     Tunable { name: NEAR_COST, default: DEFAULT.near_cost, others: &[0.002, 0.02] },
     Tunable { name: DISSENT_SHARE, default: DEFAULT.dissent_share, others: &[0.0, 0.125] },
@@ -53,7 +53,7 @@ impl<D: Device> Tuned for Views<'_, D> {
 
     /// Where the scene is as most sources see it, as the sources' own disparities say, and as the disparities say that are found
     /// the second time: each is right where the others are not.
-    fn parts(&self, chosen: &[Setting]) -> Vec<Vec<Setting>> {
+    fn parts(&mut self, chosen: &[Setting]) -> Vec<Vec<Setting>> {
         if self.has_silhouettes {
             return Vec::new();
         }

@@ -1,0 +1,99 @@
+//! Gaussians of a scene: projected to a camera, composited front to back, and the derivatives by their parameters.
+//!
+//! A picture is made of tiles of [`SPLAT_TILE`] by [`SPLAT_TILE`] pixels. Each tile has a list of the splats that cover pixels of it, the
+//! nearest first; the host sorts and lists them between the two dispatches. Stages, each a data-parallel kernel:
+//!
+//! ```text
+//! lanes               eight pixels of a row, and a splat's opacity there  Lanes, SplatLanes
+//! blend               pixels from the splats of their tile                blend_row
+//! blend_gradient      derivatives of a tile's pixels by its splats        TileGradient
+//! footprint           a Gaussian's ellipse, with what its derivatives need   Footprint
+//! project_gradient    ... and of the splats by their Gaussians            project_gradient
+//! adam                a step against the derivative                       adam_step
+//! ```
+//!
+//! Forward: [`viewfuse_core::gaussian`]. Backward: the chain rule by hand, as in "3D Gaussian Splatting" (Kerbl et al. 2023). All sums
+//! run in one order, so that results do not depend on the number of threads.
+
+pub mod adam;
+pub mod blend;
+pub mod blend_gradient;
+pub mod footprint;
+pub mod lanes;
+pub mod project_gradient;
+
+use bytemuck::{Pod, Zeroable};
+use viewfuse_core::camera::CameraBlock;
+
+/// Early termination: what lies behind this transmittance does not count.
+pub const MIN_TRANSMITTANCE: f32 = 1.0e-3;
+/// Pixels of a tile's side.
+pub const SPLAT_TILE: usize = 8;
+
+/// A camera and the number of Gaussians that it sees, as plain data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct SplatBlock {
+    /// The camera.
+    pub camera: CameraBlock,
+    /// Depth along the principal axis from which on Gaussians are seen, world units, above 0.
+    pub near: f32,
+    /// Number of Gaussians.
+    pub gaussian_count: u32,
+    /// Zero.
+    pub padding: [u32; 2],
+}
+
+const _: () = assert!(size_of::<SplatBlock>() == 96);
+
+/// A picture in tiles, as plain data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct TileBlock {
+    /// Columns of pixels.
+    pub width: u32,
+    /// Rows of pixels.
+    pub height: u32,
+    /// Columns of tiles.
+    pub tile_columns: u32,
+    /// Zero.
+    pub padding: u32,
+    /// What is seen where nothing is: red, green, blue; the fourth number is unused.
+    pub background: [f32; 4],
+}
+
+const _: () = assert!(size_of::<TileBlock>() == 32);
+
+impl TileBlock {
+    /// A picture of this size, over a background.
+    #[inline]
+    pub fn new(width: u32, height: u32, [red, green, blue]: [f32; 3]) -> TileBlock {
+        let tile_columns = width.div_ceil(SPLAT_TILE as u32);
+        TileBlock { width, height, tile_columns, padding: 0, background: [red, green, blue, 0.0] }
+    }
+
+    /// How many tiles it has, row by row.
+    #[inline]
+    pub fn tile_count(&self) -> u32 {
+        self.tile_columns * self.height.div_ceil(SPLAT_TILE as u32)
+    }
+
+    /// How many parts of rows: each is a tile's part of a row of pixels.
+    #[inline]
+    pub fn part_count(&self) -> u32 {
+        self.tile_columns * self.height
+    }
+
+    /// The first pixel of a part; behind the last part, that behind the last pixel.
+    #[inline]
+    pub fn first_pixel(&self, part: u32) -> u32 {
+        part / self.tile_columns * self.width + part % self.tile_columns * SPLAT_TILE as u32
+    }
+
+    /// How many columns of a column of tiles are in the picture.
+    #[inline]
+    pub fn columns_in(&self, tile_column: u32) -> u32 {
+        let first = tile_column * SPLAT_TILE as u32;
+        if self.width - first < SPLAT_TILE as u32 { self.width - first } else { SPLAT_TILE as u32 }
+    }
+}

@@ -1,0 +1,36 @@
+//! Gaussians optimised for a scene: some ten seconds of gradient descent on the source views, then every picture at once.
+//!
+//! ```text
+//! tiles      a picture's tiles, and which splats each shows
+//! picture    pictures and derivatives on a device
+//! recipe     the settings, chosen by measurement
+//! level      the source views at the sizes of the pyramid
+//! loss       how far a picture is from a photograph, and its derivative
+//! start      the Gaussians to begin with: the sources' surfaces, and faint ones at random
+//! particles  Gaussians with the state of their optimisation: steps, pruning, splitting
+//! optimise   the loop
+//! given      a scene of Gaussians that is there already, as a field
+//! ```
+//!
+//! No network and no data but the scene's own photographs. The start is the cloud of the sources' depths ([`crate::point_cloud`]):
+//! gradient descent does not repair wrong surfaces. The kernels run on the device; sorting, lists of tiles, the loss and the steps
+//! on the host, in one order, so that the same seed gives the same scene for any number of threads.
+//!
+//! Source: "3D Gaussian Splatting for Real-Time Radiance Field Rendering" (Kerbl et al. 2023); the pyramid, the faint Gaussians at
+//! random and the penalty on opacity are for few views.
+
+mod given;
+mod level;
+mod loss;
+mod optimise;
+mod particles;
+mod picture;
+mod recipe;
+mod start;
+mod tiles;
+
+pub use given::{GivenGaussians, scene_of};
+pub use optimise::{Optimised, Optimiser};
+pub use picture::{Splatted, Splatter};
+pub use recipe::Recipe;
+pub use tiles::Tiles;

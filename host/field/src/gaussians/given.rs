@@ -1,0 +1,115 @@
+//! A scene of Gaussians that is there already, as a field: optimised before, or by another program.
+
+use super::picture::Splatter;
+use crate::{About, Encoding, Field, FieldError, Prepared, Rendered, Request};
+use viewfuse_core::Vec3;
+use viewfuse_core::gaussian::SH_0;
+use viewfuse_core::random::uniform;
+use viewfuse_device::Device;
+use viewfuse_job::progress::Progress;
+use viewfuse_kernels::rows::GaussianBlock;
+use viewfuse_scene::gaussians::{Gaussian, GaussianScene};
+use viewfuse_scene::photographs::SourceImages;
+
+/// Depth from which on Gaussians are seen, relative to their median depth in the sources.
+const NEAR: f32 = 0.1;
+/// Most Gaussians whose depths are looked at.
+const MAX_LOOKED_AT: usize = 4096;
+/// Opacity below which a pixel has no depth.
+const MIN_OPACITY: f32 = 0.5;
+
+/// Pictures of a scene of Gaussians. The sources give their weights, the near bound and the colour behind.
+#[derive(Clone, Debug)]
+pub struct GivenGaussians {
+    /// The Gaussians.
+    pub scene: GaussianScene,
+}
+
+/// The same for a scene's sources.
+struct Prepare<'a, D: Device> {
+    device: &'a D,
+    scene: &'a GaussianScene,
+    near: f32,
+    background: [f32; 3],
+}
+
+impl Field for GivenGaussians {
+    fn about(&self) -> About {
+        About::new("gaussians")
+    }
+
+    fn prepare<'a, D: Device>(
+        &'a self,
+        device: &'a D,
+        sources: &SourceImages,
+        _progress: &dyn Progress,
+    ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
+        let background = if sources.has_silhouettes { sources.background } else { mean_colour(sources) };
+        Ok(Box::new(Prepare { device, scene: &self.scene, near: NEAR * self.median_depth(sources), background }))
+    }
+}
+
+impl GivenGaussians {
+    /// The median depth of the Gaussians that the sources see; 1 if they see none.
+    fn median_depth(&self, sources: &SourceImages) -> f32 {
+        let count = self.scene.gaussians.len();
+        let looked_at = (0..MAX_LOOKED_AT.min(count)).filter_map(|draw| {
+            let drawn = if count > MAX_LOOKED_AT { (uniform(0, draw as u32, 0) * count as f32) as usize } else { draw };
+            self.scene.gaussians.get(drawn).map(|own| Vec3::from_array(own.position))
+        });
+        let positions: Vec<Vec3> = looked_at.collect();
+        let seen = sources.images.iter().flat_map(|image| {
+            let camera = image.camera.block(0);
+            positions.iter().map(move |position| camera.project(*position))
+        });
+        let mut depths: Vec<f32> = seen.filter(|seen| seen.in_image).map(|seen| seen.depth).collect();
+        depths.sort_by(f32::total_cmp);
+        depths.get(depths.len() / 2).copied().unwrap_or(1.0)
+    }
+}
+
+impl<D: Device> Prepared for Prepare<'_, D> {
+    fn encoding(&self) -> Encoding {
+        Encoding::Used
+    }
+
+    fn encode(&mut self, _view: usize, _progress: &dyn Progress) -> Result<(), FieldError> {
+        Ok(())
+    }
+
+    fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
+        progress.check()?;
+        let camera = request.camera.block(0);
+        // Colours of higher degrees are those from this camera.
+        let blocks = self.scene.blocks(camera.centre_world());
+        let blocks =
+            if blocks.is_empty() { vec![GaussianBlock { opacity: -80.0, ..GaussianBlock::default() }] } else { blocks };
+        let gaussians = self.device.upload(&blocks)?;
+        let splatter = Splatter { device: self.device, near: self.near, background: self.background };
+        Ok(splatter.rendered(&gaussians, blocks.len(), &camera, MIN_OPACITY)?)
+    }
+}
+
+/// Gaussians of one colour in all directions, as a scene that can be written.
+pub fn scene_of(gaussians: &[GaussianBlock]) -> GaussianScene {
+    let own = |block: &GaussianBlock| Gaussian {
+        position: block.position,
+        log_scales: block.log_scales,
+        rotation: block.rotation,
+        opacity: block.opacity,
+        f_dc: block.colour.map(|value| (value - 0.5) / SH_0),
+    };
+    GaussianScene { gaussians: gaussians.iter().map(own).collect(), ..GaussianScene::default() }
+}
+
+/// The mean of all photographs.
+pub(super) fn mean_colour(sources: &SourceImages) -> [f32; 3] {
+    [0, 1, 2].map(|channel| {
+        let (mut sum, mut count) = (0.0_f64, 0);
+        for image in &sources.images {
+            sum += image.texels.iter().map(|texel| f64::from(texel[channel])).sum::<f64>();
+            count += image.texels.len();
+        }
+        (sum / count.max(1) as f64) as f32
+    })
+}

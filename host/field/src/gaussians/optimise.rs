@@ -1,0 +1,279 @@
+//! The loop: a source at a time is drawn, compared with its photograph, and what made it is stepped.
+
+use super::given::mean_colour;
+use super::level::{LevelView, level};
+use super::loss::{Pair, gradient};
+use super::particles::{Particle, Step, refined, step_all};
+use super::picture::Splatter;
+use super::recipe::Recipe;
+use super::start::{Extent, start};
+use crate::FieldError;
+use crate::point_cloud::CloudPoint;
+use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::random::uniform;
+use viewfuse_device::Device;
+use viewfuse_device::parallel::map;
+use viewfuse_job::progress::Progress;
+use viewfuse_kernels::gaussians::adam::adam_step;
+use viewfuse_kernels::rows::GaussianBlock;
+use viewfuse_scene::photographs::{SourceImages, longest_side};
+
+/// Levels of the pyramid.
+const LEVELS: usize = 4;
+/// Share of a gain's difference from 1 in its derivative.
+const GAIN_PULL: f32 = 0.02;
+
+/// Gaussians of a scene, optimised so far.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Optimised {
+    /// The Gaussians.
+    pub gaussians: Vec<GaussianBlock>,
+    /// Depth along the principal axis from which on they are seen, world units.
+    pub near: f32,
+    /// What is seen where nothing is: red, green, blue.
+    pub background: [f32; 3],
+    /// How much brighter each source is than the Gaussians: red, green, blue.
+    pub gains: Vec<[f32; 3]>,
+}
+
+/// A source's gain and the moments of its derivative.
+#[derive(Clone, Copy, Debug)]
+struct Gain {
+    value: [f32; 3],
+    moments: [[f32; 2]; 3],
+    step_count: i32,
+}
+
+/// Optimises Gaussians for source views, an iteration at a time.
+#[derive(Debug)]
+pub struct Optimiser<'d, D> {
+    splatter: Splatter<'d, D>,
+    recipe: Recipe,
+    extent: Extent,
+    /// `[level][source]`, the finest level first.
+    levels: Vec<Vec<LevelView>>,
+    particles: Vec<Particle>,
+    gains: Vec<Gain>,
+    /// How much each source counts, 1 in the mean.
+    weights: Vec<f32>,
+    /// The sources that are still to be drawn in this round.
+    round: Vec<usize>,
+    iteration: u32,
+    level: Option<usize>,
+}
+
+impl<'d, D: Device> Optimiser<'d, D> {
+    /// Begins with the sources' surface points; `None` if there are too few of them.
+    ///
+    /// # Errors
+    /// [`FieldError`] if a source cannot be reduced.
+    pub fn new(
+        device: &'d D,
+        images: &SourceImages,
+        points: &[CloudPoint],
+        recipe: Recipe,
+    ) -> Result<Option<Optimiser<'d, D>>, FieldError> {
+        let own_side = images.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
+        let side = own_side.min(recipe.side);
+        let levels = map(LEVELS, 1, |own| level(images, side, own as u32));
+        let levels: Vec<Vec<LevelView>> =
+            levels.into_iter().collect::<Result<_, _>>().map_err(FieldError::unsuitable)?;
+        let finest = levels.first().and_then(|views| views.first()).map_or(1.0, |view| view.camera.intrinsics[0]);
+        let Some(extent) = Extent::of(points, images, finest) else { return Ok(None) };
+        let background = match images.has_silhouettes {
+            true => images.background,
+            false => mean_colour(images),
+        };
+        let particles = start(points, images, &extent, &recipe).into_iter().map(Particle::new).collect();
+        let gain = Gain { value: [1.0; 3], moments: [[0.0; 2]; 3], step_count: 0 };
+        let source_count = images.images.len();
+        Ok(Some(Optimiser {
+            splatter: Splatter { device, near: recipe.near * extent.depth, background },
+            recipe,
+            extent,
+            levels,
+            particles,
+            gains: vec![gain; source_count],
+            weights: vec![1.0; source_count],
+            round: Vec::new(),
+            iteration: 0,
+            level: None,
+        }))
+    }
+
+    /// Counts each source's differences by its weight from now on; the weights are scaled to 1 in the mean.
+    pub fn weigh(&mut self, weights: &[f32]) {
+        let mean = weights.iter().sum::<f32>() / weights.len().max(1) as f32;
+        if mean > 0.0 && weights.len() == self.weights.len() {
+            self.weights = weights.iter().map(|weight| weight / mean).collect();
+        }
+    }
+
+    /// Goes on from Gaussians that were optimised before, with the finest level's iterations.
+    pub fn resume(&mut self, gaussians: &[GaussianBlock]) {
+        self.particles = gaussians.iter().copied().map(Particle::new).collect();
+        let [.., finest] = self.recipe.iterations;
+        self.iteration = self.iteration_count() - finest;
+        self.level = Some(self.level_of(self.iteration).0);
+    }
+
+    /// How many iterations are done.
+    pub fn done(&self) -> u32 {
+        self.iteration
+    }
+
+    /// All iterations of the recipe.
+    pub fn iteration_count(&self) -> u32 {
+        self.recipe.iterations.iter().sum()
+    }
+
+    /// The Gaussians so far.
+    pub fn optimised(&self) -> Optimised {
+        Optimised {
+            gaussians: self.particles.iter().map(|particle| particle.gaussian).collect(),
+            near: self.splatter.near,
+            background: self.splatter.background,
+            gains: self.gains.iter().map(|gain| gain.value).collect(),
+        }
+    }
+
+    /// All iterations that are left.
+    ///
+    /// # Errors
+    /// [`FieldError`]; after one the Gaussians so far are still there.
+    pub fn run(&mut self, progress: &dyn Progress) -> Result<(), FieldError> {
+        progress.expect((self.iteration_count() - self.iteration) as usize);
+        while self.iteration < self.iteration_count() {
+            progress.check()?;
+            self.iterate()?;
+            progress.step();
+        }
+        Ok(())
+    }
+
+    /// One iteration; nothing once all are done.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn advance(&mut self) -> Result<(), FieldError> {
+        if self.iteration < self.iteration_count() { self.iterate() } else { Ok(()) }
+    }
+
+    /// The level of an iteration, and how far through it is.
+    fn level_of(&self, iteration: u32) -> (usize, f32) {
+        let mut first = 0;
+        for (coarse, count) in self.recipe.iterations.iter().enumerate() {
+            if iteration < first + count {
+                return (LEVELS - 1 - coarse, (iteration - first) as f32 / *count as f32);
+            }
+            first += count;
+        }
+        (0, 1.0)
+    }
+
+    /// The next source: each once a round, in an order drawn for the round.
+    fn next_source(&mut self) -> usize {
+        if self.round.is_empty() {
+            self.round = (0..self.gains.len()).collect();
+            for last in (1..self.round.len()).rev() {
+                let drawn = uniform(self.recipe.seed, self.iteration, last as u32) * (last + 1) as f32;
+                self.round.swap(last, (drawn as usize).min(last));
+            }
+        }
+        self.round.pop().unwrap_or_default()
+    }
+
+    /// Keeps the mean of the gains at 1: the Gaussians have the sources' mean exposure.
+    fn level_gains(&mut self) {
+        for channel in 0..3 {
+            let sum: f32 = self.gains.iter().map(|gain| gain.value[channel]).sum();
+            let mean = sum / self.gains.len().max(1) as f32;
+            self.gains.iter_mut().for_each(|gain| gain.value[channel] /= mean);
+        }
+    }
+
+    fn iterate(&mut self) -> Result<(), FieldError> {
+        let (level, share) = self.level_of(self.iteration);
+        let footprint = self.extent.footprint * (1 << level) as f32;
+        if self.level != Some(level) {
+            if self.level.is_some() {
+                let cameras: Vec<CameraBlock> = self.levels[0].iter().map(|view| view.camera).collect();
+                self.particles = refined(&self.particles, &cameras, &self.extent, footprint, &self.recipe);
+            }
+            self.level = Some(level);
+        }
+        let source = self.next_source();
+        let view = &self.levels[level][source];
+        let device = self.splatter.device;
+        let gaussians: Vec<GaussianBlock> = self.particles.iter().map(|particle| particle.gaussian).collect();
+        let uploaded = device.upload(&gaussians)?;
+        let picture = self.splatter.picture(&uploaded, gaussians.len(), &view.camera)?;
+        let colours = device.download(&picture.colours)?;
+        let (by_pixels, by_gain) =
+            by_pixels(&colours, view, self.gains[source].value, self.weights[source], &self.recipe);
+        let (gradients, tile_counts) = self.splatter.gradients(&uploaded, &picture, &by_pixels)?;
+        let done = self.iteration as f32 / self.iteration_count() as f32;
+        let [place, scale, turn, opaque, colour, gain_rate] = self.recipe.rates;
+        let rates = [
+            place * footprint * 0.3_f32.powf(share),
+            scale * 0.2_f32.powf(done),
+            turn,
+            opaque * 0.2_f32.powf(done),
+            colour * 0.1_f32.powf(done),
+        ];
+        let opacity_penalty = self.recipe.opacity_penalty / (view.camera.width * view.camera.height) as f32;
+        let camera = view.camera;
+        let depth = self.extent.depth;
+        let step =
+            Step { gradients: &gradients, tile_counts: &tile_counts, camera, rates, opacity_penalty, footprint, depth };
+        step_all(&mut self.particles, &step);
+        self.gains[source].step(by_gain, gain_rate);
+        self.level_gains();
+        self.iteration += 1;
+        Ok(())
+    }
+}
+
+impl Gain {
+    fn step(&mut self, by_gain: [f32; 3], rate: f32) {
+        self.step_count += 1;
+        let corrections = [1.0 - 0.9_f32.powi(self.step_count), 1.0 - 0.99_f32.powi(self.step_count)];
+        for channel in 0..3 {
+            let pulled = by_gain[channel] + GAIN_PULL * (self.value[channel] - 1.0);
+            adam_step(&mut self.value[channel], &mut self.moments[channel], pulled, rate, corrections);
+        }
+    }
+}
+
+/// Derivatives of the loss by the picture's pixels and by the source's gain.
+fn by_pixels(
+    colours: &[[f32; 4]],
+    view: &LevelView,
+    gain: [f32; 3],
+    weight: f32,
+    recipe: &Recipe,
+) -> (Vec<[f32; 4]>, [f32; 3]) {
+    let (width, height) = (view.camera.width as usize, view.camera.height as usize);
+    let factor = weight / (3 * width * height) as f32;
+    let channels = map(3, 1, |channel| {
+        let picture: Vec<f32> = colours.iter().map(|colour| colour[channel] * gain[channel]).collect();
+        let (photograph, structure, seen) = (&view.channels[channel], &view.structure[channel], &view.seen[..]);
+        gradient(&Pair { picture: &picture, photograph, structure, seen, width, height }, recipe.structure_share)
+    });
+    let mut by_gain = [0.0; 3];
+    let mut by_pixels = vec![[0.0; 4]; colours.len()];
+    for (channel, values) in channels.iter().enumerate() {
+        let mut sum = 0.0_f64;
+        for ((by, value), colour) in by_pixels.iter_mut().zip(values).zip(colours) {
+            by[channel] = factor * gain[channel] * value;
+            sum += f64::from(value * colour[channel]);
+        }
+        by_gain[channel] = factor * sum as f32;
+    }
+    if view.seen.is_empty() && recipe.silhouette_share > 0.0 && view.has_silhouette {
+        for ((by, colour), alpha) in by_pixels.iter_mut().zip(colours).zip(&view.channels[3]) {
+            by[3] = 3.0 * factor * recipe.silhouette_share * ((colour[3] - alpha) / 0.01).clamp(-1.0, 1.0);
+        }
+    }
+    (by_pixels, by_gain)
+}

@@ -1,0 +1,140 @@
+//! Gaussians with the state of their optimisation: steps of Adam, pruning, splitting.
+
+use super::recipe::Recipe;
+use super::start::Extent;
+use viewfuse_core::Vec3;
+use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::gaussian::{axes, opacity};
+use viewfuse_device::parallel::for_each;
+use viewfuse_kernels::gaussians::adam::{FIRST_DECAY, SECOND_DECAY, adam_step};
+use viewfuse_kernels::rows::GaussianBlock;
+
+/// Most times that a Gaussian is split in a row.
+const MAX_SPLITS: u32 = 3;
+/// Logarithm of the greatest quotient of a Gaussian's scales: ten.
+const MAX_ELONGATION: f32 = 2.3;
+/// Greatest magnitude of an opacity's logit.
+const MAX_LOGIT: f32 = 6.0;
+/// Greatest standard deviation, in footprints of the level.
+const MAX_SCALE: f32 = 8.0;
+
+/// A Gaussian and the moments of its derivatives.
+#[derive(Clone, Debug)]
+pub(super) struct Particle {
+    pub(super) gaussian: GaussianBlock,
+    moments: [[f32; 2]; 14],
+    step_count: i32,
+}
+
+/// What an iteration does to the particles.
+pub(super) struct Step<'a> {
+    /// Derivatives by the Gaussians' parameters.
+    pub(super) gradients: &'a [GaussianBlock],
+    /// In how many tiles each Gaussian is seen: others stay as they are.
+    pub(super) tile_counts: &'a [u32],
+    pub(super) camera: CameraBlock,
+    /// Of position, log scale, rotation, opacity, colour.
+    pub(super) rates: [f32; 5],
+    /// What the opacity's derivative grows by, a unit of it.
+    pub(super) opacity_penalty: f32,
+    /// Size of the level's pixel at the median depth, world units.
+    pub(super) footprint: f32,
+    /// Median depth, world units.
+    pub(super) depth: f32,
+}
+
+impl Particle {
+    pub(super) fn new(gaussian: GaussianBlock) -> Particle {
+        Particle { gaussian, moments: [[0.0; 2]; 14], step_count: 0 }
+    }
+
+    fn step(&mut self, gradient: &GaussianBlock, step: &Step<'_>) {
+        self.step_count += 1;
+        let corrections = [1.0 - FIRST_DECAY.powi(self.step_count), 1.0 - SECOND_DECAY.powi(self.step_count)];
+        let own = &mut self.gaussian;
+        let solid = opacity(own.opacity);
+        let penalty = step.opacity_penalty * solid * (1.0 - solid);
+        let [place, scale, turn, opaque, colour] = step.rates;
+        let mut moments = self.moments.iter_mut();
+        let mut all = |values: &mut [f32], gradients: &[f32], rate: f32| {
+            for ((value, gradient), moments) in values.iter_mut().zip(gradients).zip(&mut moments) {
+                if gradient.is_finite() {
+                    adam_step(value, moments, *gradient, rate, corrections);
+                }
+            }
+        };
+        all(&mut own.position, &gradient.position, place);
+        all(&mut own.log_scales, &gradient.log_scales, scale);
+        all(&mut own.rotation, &gradient.rotation, turn);
+        all(std::slice::from_mut(&mut own.opacity), &[gradient.opacity + penalty], opaque);
+        all(&mut own.colour, &gradient.colour, colour);
+        let [x, y, z] = own.position;
+        let depth = step.camera.pose.rotate_to_camera(Vec3::new(x, y, z) - step.camera.centre_world()).z;
+        let most = (MAX_SCALE * step.footprint * (depth / step.depth).max(1.0)).ln();
+        let scales = &mut own.log_scales;
+        scales.iter_mut().for_each(|scale| *scale = scale.min(most));
+        let least = scales.iter().copied().fold(f32::NEG_INFINITY, f32::max) - MAX_ELONGATION;
+        scales.iter_mut().for_each(|scale| *scale = scale.max(least));
+        own.opacity = own.opacity.clamp(-MAX_LOGIT, MAX_LOGIT);
+    }
+}
+
+/// Steps all Gaussians that are seen.
+pub(super) fn step_all(particles: &mut [Particle], step: &Step<'_>) {
+    for_each(particles, 128, |index, particle| {
+        if step.tile_counts[index] > 0 {
+            particle.step(&step.gradients[index], step);
+        }
+    });
+}
+
+/// Prunes the faintest and splits the largest for a level whose pixel has this size at the median depth.
+pub(super) fn refined(
+    particles: &[Particle],
+    cameras: &[CameraBlock],
+    extent: &Extent,
+    footprint: f32,
+    recipe: &Recipe,
+) -> Vec<Particle> {
+    let mut kept: Vec<(GaussianBlock, u32)> = particles
+        .iter()
+        .filter(|particle| opacity(particle.gaussian.opacity) >= recipe.prune_opacity)
+        .map(|particle| (particle.gaussian, 0))
+        .collect();
+    let mut refined = Vec::with_capacity(2 * kept.len());
+    kept.reverse();
+    while let Some((own, splits)) = kept.pop() {
+        let axis = (0..3).fold(0, |most, axis| if own.log_scales[axis] > own.log_scales[most] { axis } else { most });
+        let has_room = refined.len() + kept.len() + 1 < recipe.max_count;
+        let limit = recipe.split_scale * footprint * nearest(&own, cameras, extent).max(0.3);
+        if splits < MAX_SPLITS && has_room && own.log_scales[axis].exp() > limit {
+            kept.extend(halves(&own, axis).map(|half| (half, splits + 1)));
+        } else {
+            refined.push(Particle::new(own));
+        }
+    }
+    refined
+}
+
+/// The least depth at which a source sees a Gaussian, relative to the median depth.
+fn nearest(own: &GaussianBlock, cameras: &[CameraBlock], extent: &Extent) -> f32 {
+    let position = Vec3::from_array(own.position);
+    let depths = cameras.iter().map(|camera| camera.pose.rotate_to_camera(position - camera.centre_world()).z);
+    let least = depths.filter(|depth| *depth > 0.25 * extent.depth).fold(f32::INFINITY, f32::min);
+    least.min(1.0e6 * extent.depth) / extent.depth
+}
+
+/// Two Gaussians in the place of one, apart along its longest axis.
+fn halves(own: &GaussianBlock, axis: usize) -> [GaussianBlock; 2] {
+    let apart = axes(own.rotation)[axis] * (0.5 * own.log_scales[axis].exp());
+    let solid = 1.0 - (1.0 - opacity(own.opacity)).powf(0.8);
+    let half = |side: f32| {
+        let mut half = *own;
+        half.position = (Vec3::from_array(own.position) + apart * side).to_array();
+        // A standard deviation of 0.62: with the distance, that of both together stays.
+        half.log_scales[axis] -= 0.47;
+        half.opacity = (solid / (1.0 - solid)).ln();
+        half
+    };
+    [half(-1.0), half(1.0)]
+}

@@ -1,0 +1,113 @@
+//! Pictures of Gaussians and their derivatives, on a device.
+
+use super::tiles::Tiles;
+use crate::Rendered;
+use viewfuse_core::camera::CameraBlock;
+use viewfuse_device::{Device, DeviceError};
+use viewfuse_kernels::gaussians::{SplatBlock, TileBlock};
+use viewfuse_kernels::rows::{GaussianBlock, ProjectedGaussian};
+
+/// Makes pictures of Gaussians on a device.
+#[derive(Debug)]
+pub struct Splatter<'d, D> {
+    /// The device.
+    pub device: &'d D,
+    /// Depth along the principal axis from which on Gaussians are seen, world units, above 0.
+    pub near: f32,
+    /// What is seen where nothing is: red, green, blue.
+    pub background: [f32; 3],
+}
+
+/// A picture on the device, with what its derivatives need.
+#[derive(Debug)]
+pub struct Splatted<D: Device> {
+    block: SplatBlock,
+    tiles: TileBlock,
+    lists: Tiles,
+    starts: D::Buffer<u32>,
+    entries: D::Buffer<u32>,
+    splats: D::Buffer<ProjectedGaussian>,
+    /// `[row][column]`: red, green, blue over the background, opacity.
+    pub colours: D::Buffer<[f32; 4]>,
+    /// `[row][column]`: weighted sums of depths; over the opacity, the depth along the principal axis.
+    pub depths: D::Buffer<f32>,
+}
+
+impl<'d, D: Device> Splatter<'d, D> {
+    /// The picture of these Gaussians from a camera.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn picture(
+        &self,
+        gaussians: &D::Buffer<GaussianBlock>,
+        gaussian_count: usize,
+        camera: &CameraBlock,
+    ) -> Result<Splatted<D>, DeviceError> {
+        let device = self.device;
+        let gaussian_count = gaussian_count as u32;
+        let camera = CameraBlock { first_texel: 0, ..*camera };
+        let block = SplatBlock { camera, near: self.near, gaussian_count, padding: [0; 2] };
+        let mut splats = device.zeros(gaussian_count as usize)?;
+        device.project_gaussians(&block, gaussians, &mut splats)?;
+        let tiles = TileBlock::new(camera.width, camera.height, self.background);
+        let lists = Tiles::of(&tiles, &device.download(&splats)?);
+        let starts = device.upload(&lists.starts)?;
+        // No device has empty buffers.
+        let entries = if lists.entries.is_empty() { device.upload(&[0])? } else { device.upload(&lists.entries)? };
+        let pixel_count = (camera.width * camera.height) as usize;
+        let (mut colours, mut depths) = (device.zeros(pixel_count)?, device.zeros(pixel_count)?);
+        device.blend_splats(&tiles, &starts, &entries, &splats, &mut colours, &mut depths)?;
+        Ok(Splatted { block, tiles, lists, starts, entries, splats, colours, depths })
+    }
+
+    /// The same as a field gives it: depths where the opacity is at least `least_opacity`, 0 elsewhere; confidences are the opacities.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn rendered(
+        &self,
+        gaussians: &D::Buffer<GaussianBlock>,
+        gaussian_count: usize,
+        camera: &CameraBlock,
+        least_opacity: f32,
+    ) -> Result<Rendered, DeviceError> {
+        let picture = self.picture(gaussians, gaussian_count, camera)?;
+        let mut colours = self.device.download(&picture.colours)?;
+        let mut depths = self.device.download(&picture.depths)?;
+        let confidences: Vec<f32> = colours.iter().map(|colour| colour[3]).collect();
+        for (depth, opacity) in depths.iter_mut().zip(&confidences) {
+            *depth = if *opacity >= least_opacity { *depth / opacity } else { 0.0 };
+        }
+        for colour in &mut colours {
+            (0..3).for_each(|channel| colour[channel] = colour[channel].clamp(0.0, 1.0));
+        }
+        let CameraBlock { width, height, .. } = *camera;
+        Ok(Rendered { colours, depths, confidences, width, height })
+    }
+
+    /// Derivatives of a loss by the Gaussians' parameters, in the places of these, from those by the picture's pixels,
+    /// `[row][column]` (by red, green, blue and opacity); and of how many tiles each Gaussian is seen in.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn gradients(
+        &self,
+        gaussians: &D::Buffer<GaussianBlock>,
+        picture: &Splatted<D>,
+        by_pixels: &[[f32; 4]],
+    ) -> Result<(Vec<GaussianBlock>, Vec<u32>), DeviceError> {
+        let device = self.device;
+        let Splatted { block, tiles, lists, starts, entries, splats, colours, .. } = picture;
+        let by_pixels = device.upload(by_pixels)?;
+        let mut sums = device.zeros(lists.entries.len().max(1))?;
+        device.blend_gradient(tiles, starts, entries, splats, colours, &by_pixels, &mut sums)?;
+        let (use_starts, uses) = lists.uses(block.gaussian_count as usize);
+        let uses = if uses.is_empty() { device.upload(&[0])? } else { device.upload(&uses)? };
+        let uploaded = device.upload(&use_starts)?;
+        let mut gradients = device.zeros(block.gaussian_count as usize)?;
+        device.project_gradients(block, gaussians, splats, &uploaded, &uses, &sums, &mut gradients)?;
+        let counts = use_starts.windows(2).map(|part| part[1] - part[0]).collect();
+        Ok((device.download(&gradients)?, counts))
+    }
+}

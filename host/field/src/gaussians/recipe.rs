@@ -1,0 +1,61 @@
+//! The settings of an optimisation. What was measured of them is in `host/research/results/gaussians.md`.
+
+/// Settings of an optimisation. Lengths are in footprints: the size of a level's pixel at the median depth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Recipe {
+    /// Longest side of the finest level, in pixels: larger sources are reduced to it.
+    pub side: u32,
+    /// Iterations at an eighth, a quarter, a half and the whole of the finest level's size.
+    pub iterations: [u32; 4],
+    /// Most Gaussians.
+    pub max_count: usize,
+    /// Points in a cube of this side become one Gaussian, in footprints of the finest level.
+    pub cell: f32,
+    /// Fewest points of a cube that become one.
+    pub least_points: u32,
+    /// Faint Gaussians at random.
+    pub random_count: u32,
+    /// Opacity of the Gaussians from points, and of those at random.
+    pub opacities: [f32; 2],
+    /// Thickness of the Gaussians from points along the surface's normal, relative to the surface's directions; 1 for balls.
+    pub flatness: f32,
+    /// Share of `1 - SSIM` in the loss; the rest is the mean absolute difference.
+    pub structure_share: f32,
+    /// Penalty on the sum of the opacities, a pixel.
+    pub opacity_penalty: f32,
+    /// Learning rates of position (footprints of the level), log scale, rotation, opacity, colour, and gain.
+    pub rates: [f32; 6],
+    /// Opacity below which a Gaussian is pruned when the level changes.
+    pub prune_opacity: f32,
+    /// Standard deviation from which on a Gaussian is split when the level changes, in footprints of the new level.
+    pub split_scale: f32,
+    /// Nearest depth at which anything is seen, relative to the median depth.
+    pub near: f32,
+    /// Weight of the opacity's difference from a silhouette in the loss.
+    pub silhouette_share: f32,
+    /// Seed of what is drawn at random.
+    pub seed: u64,
+}
+
+impl Default for Recipe {
+    fn default() -> Recipe {
+        Recipe {
+            side: 280,
+            iterations: [0, 100, 80, 60],
+            max_count: 60_000,
+            cell: 6.0,
+            least_points: 3,
+            random_count: 2000,
+            opacities: [0.4, 0.1],
+            flatness: 1.0,
+            structure_share: 0.2,
+            opacity_penalty: 0.02,
+            rates: [0.1, 1.0e-2, 2.0e-3, 5.0e-2, 5.0e-3, 5.0e-3],
+            prune_opacity: 0.03,
+            split_scale: 1.2,
+            near: 0.5,
+            silhouette_share: 0.5,
+            seed: 0,
+        }
+    }
+}

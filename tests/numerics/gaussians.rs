@@ -1,0 +1,181 @@
+//! Gaussians: the fast exponential, derivatives against differences of the `f64` evaluation, lists of tiles, and the same
+//! bytes for any number of threads.
+
+use viewfuse::check::gaussian_oracle::{blend, project};
+use viewfuse::device::Memory;
+use viewfuse::device::cpu::Cpu;
+use viewfuse::field::gaussians::{Splatter, Tiles};
+use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::pose::Pose;
+use viewfuse_kernels::gaussians::TileBlock;
+use viewfuse_kernels::gaussians::lanes::falloff;
+use viewfuse_kernels::rows::{GaussianBlock, ProjectedGaussian};
+
+const SIZE: [u32; 2] = [21, 18];
+const NEAR: f32 = 0.2;
+const BACKGROUND: [f32; 3] = [0.2, 0.5, 0.4];
+
+fn camera() -> CameraBlock {
+    let [width, height] = SIZE;
+    CameraBlock {
+        pose: Pose::IDENTITY.block(),
+        intrinsics: [20.0, 22.0, 10.0, 9.5],
+        width,
+        height,
+        first_texel: 0,
+        padding: 0,
+    }
+}
+
+/// Four Gaussians before the camera that hide one another in part, all within the picture.
+fn gaussians() -> Vec<GaussianBlock> {
+    let gaussian = |position: [f32; 3], opacity: f32, log_scales: [f32; 3], rotation: [f32; 4], colour: [f32; 3]| {
+        GaussianBlock { position, opacity, log_scales, rotation, colour, ..GaussianBlock::default() }
+    };
+    vec![
+        gaussian([0.1, 0.0, 2.0], 0.4, [-1.6, -2.2, -2.0], [1.0, 0.2, -0.3, 0.4], [0.9, 0.1, 0.3]),
+        gaussian([-0.2, 0.1, 2.5], 0.9, [-1.2, -1.5, -2.1], [0.7, -0.1, 0.5, 0.2], [0.2, 0.8, 0.5]),
+        gaussian([0.2, 0.2, 3.0], -0.3, [-1.0, -1.3, -1.9], [1.3, 0.3, 0.1, -0.6], [0.4, 0.3, 0.9]),
+        gaussian([0.0, -0.2, 3.4], 1.2, [-0.9, -1.4, -1.1], [0.5, 0.5, -0.2, 0.1], [0.7, 0.6, 0.2]),
+    ]
+}
+
+/// The derivative of the loss by a pixel: any smooth pattern.
+fn by_pixel(column: u32, row: u32) -> [f32; 4] {
+    let wave = |share: f32| (share * column as f32 + 0.7 * row as f32).sin();
+    [wave(0.9), wave(0.5), wave(0.3), 0.5 * wave(0.2)]
+}
+
+/// The loss, a sum over pixels and channels, in `f64`. The opacity at which splats begin to count is a step of the loss: pixels where a
+/// splat's is near it are left out, the same for all evaluations.
+fn loss(gaussians: &[GaussianBlock], counted: &[bool]) -> f64 {
+    let [width, height] = SIZE;
+    let splats: Vec<ProjectedGaussian> = gaussians.iter().map(rounded).collect();
+    let list: Vec<u32> = (0..splats.len() as u32).collect();
+    let block = TileBlock::new(width, height, BACKGROUND);
+    let pixels = (0..width * height).filter(|pixel| counted[*pixel as usize]);
+    pixels
+        .map(|pixel| {
+            let (column, row) = (pixel % width, pixel / width);
+            let by = by_pixel(column, row);
+            let blended = blend(&block, &list, &splats, column, row).expect("no pixel at a threshold");
+            (0..4).map(|channel| f64::from(by[channel]) * blended[channel].value).sum::<f64>()
+        })
+        .sum()
+}
+
+/// A splat of the evaluation in `f64`, rounded.
+fn rounded(gaussian: &GaussianBlock) -> ProjectedGaussian {
+    let values =
+        project(gaussian, &camera(), NEAR).expect("no Gaussian at a threshold").map(|bounded| bounded.value as f32);
+    let [x, y, depth, opacity, xx, xy, yy, _, red, green, blue, _, right, down, ..] = values;
+    ProjectedGaussian {
+        mean: [x, y],
+        depth,
+        opacity,
+        conic: [xx, xy, yy],
+        colour: [red, green, blue],
+        extent: [right, down],
+        ..ProjectedGaussian::default()
+    }
+}
+
+/// Pixels where no splat's opacity is near the least that counts.
+fn counted(gaussians: &[GaussianBlock]) -> Vec<bool> {
+    let splats: Vec<ProjectedGaussian> = gaussians.iter().map(rounded).collect();
+    let [width, height] = SIZE;
+    let is_far = |splat: &ProjectedGaussian, column: u32, row: u32| {
+        let (dx, dy) = (column as f32 + 0.5 - splat.mean[0], row as f32 + 0.5 - splat.mean[1]);
+        let [xx, xy, yy] = splat.conic;
+        let alpha = splat.opacity * (-0.5 * (xx * dx * dx + yy * dy * dy) - xy * dx * dy).exp();
+        !(0.8 / 255.0..1.25 / 255.0).contains(&alpha)
+    };
+    let all = (0..width * height).map(|pixel| splats.iter().all(|splat| is_far(splat, pixel % width, pixel / width)));
+    all.collect()
+}
+
+/// The 14 parameters of a Gaussian, in the order of its fields.
+fn parameters(own: &mut GaussianBlock) -> [&mut f32; 14] {
+    let ([x, y, z], [a, b, c]) = (&mut own.position, &mut own.log_scales);
+    let ([w, i, j, k], [red, green, blue]) = (&mut own.rotation, &mut own.colour);
+    [x, y, z, &mut own.opacity, a, b, c, w, i, j, k, red, green, blue]
+}
+
+#[test]
+fn the_fast_exponential_is_within_its_error() {
+    for step in 0..=200_000 {
+        let x = -16.0 * (step as f32 / 200_000.0);
+        let exact = f64::from(x).exp();
+        assert!((f64::from(falloff(x)) / exact - 1.0).abs() < 4.0e-6, "{x}");
+    }
+    assert_eq!((falloff(1.0), falloff(-1.0e9)), (falloff(0.0), falloff(-16.0)));
+}
+
+#[test]
+fn derivatives_are_those_of_differences() {
+    let (own, [width, height]) = (gaussians(), SIZE);
+    let counted = counted(&own);
+    assert!(counted.iter().filter(|counted| **counted).count() > counted.len() / 2, "most pixels are compared");
+    let splatter = Splatter { device: &Cpu, near: NEAR, background: BACKGROUND };
+    let uploaded = Cpu.upload(&own).expect("memory");
+    let picture = splatter.picture(&uploaded, own.len(), &camera()).expect("a picture");
+    let pixels = 0..width * height;
+    let by_pixels: Vec<[f32; 4]> = pixels
+        .map(|pixel| if counted[pixel as usize] { by_pixel(pixel % width, pixel / width) } else { [0.0; 4] })
+        .collect();
+    let (mut gradients, tile_counts) = splatter.gradients(&uploaded, &picture, &by_pixels).expect("derivatives");
+    assert!(tile_counts.iter().all(|count| *count > 0));
+    for index in 0..own.len() {
+        let analytic = parameters(&mut gradients[index]).map(|value| f64::from(*value));
+        let largest = analytic.iter().map(|value| value.abs()).fold(0.0, f64::max);
+        for (parameter, analytic) in analytic.into_iter().enumerate() {
+            let at = |offset: f32| {
+                let mut moved = own.clone();
+                let value = &mut *parameters(&mut moved[index])[parameter];
+                *value += offset;
+                (f64::from(*value), loss(&moved, &counted))
+            };
+            let ((low, before), (high, after)) = (at(-4.0e-3), at(4.0e-3));
+            let difference = (after - before) / (high - low);
+            // The differences' own error: of third order in the step, and the splats' rounding.
+            let bound = 2.0e-3 * largest + 2.0e-3;
+            assert!(
+                (analytic - difference).abs() < bound,
+                "Gaussian {index}, parameter {parameter}: {analytic} by the chain rule, {difference} by differences"
+            );
+        }
+    }
+}
+
+#[test]
+fn tiles_list_splats_front_to_back() {
+    let own = gaussians();
+    let splats: Vec<ProjectedGaussian> = own.iter().rev().map(rounded).collect();
+    let block = TileBlock::new(SIZE[0], SIZE[1], BACKGROUND);
+    let Tiles { starts, entries } = Tiles::of(&block, &splats);
+    assert_eq!(starts.len(), block.tile_count() as usize + 1);
+    assert_eq!(starts.last().copied(), Some(entries.len() as u32));
+    for (tile, bounds) in starts.windows(2).enumerate() {
+        let depths: Vec<f32> =
+            entries[bounds[0] as usize..bounds[1] as usize].iter().map(|splat| splats[*splat as usize].depth).collect();
+        assert!(depths.is_sorted(), "tile {tile}: {depths:?}");
+    }
+    assert!(entries.len() > own.len(), "they reach over several tiles");
+}
+
+#[test]
+fn pictures_do_not_depend_on_the_number_of_threads() {
+    let own = gaussians();
+    let picture = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| {
+            let splatter = Splatter { device: &Cpu, near: NEAR, background: BACKGROUND };
+            let uploaded = Cpu.upload(&own).expect("memory");
+            let picture = splatter.picture(&uploaded, own.len(), &camera()).expect("a picture");
+            let by_pixels = vec![[0.3, -0.2, 0.1, 0.4]; (SIZE[0] * SIZE[1]) as usize];
+            let (gradients, _) = splatter.gradients(&uploaded, &picture, &by_pixels).expect("derivatives");
+            (Cpu.download(&picture.colours).expect("colours"), gradients)
+        })
+    };
+    assert_eq!(picture(1), picture(3));
+}
