@@ -40,7 +40,6 @@ pub(crate) fn trials() -> Vec<Trial> {
         needs("what_does_not_belong_is_left_out_by_name", what_does_not_belong_is_left_out_by_name),
         needs("sizes_and_orientations_may_differ", sizes_and_orientations_may_differ),
         needs("photographs_of_nothing_in_common", photographs_of_nothing_in_common),
-        #[cfg(unix)]
         needs("ctrl_c_leaves_nothing", ctrl_c_leaves_nothing),
         trial("commands::pose::formats_that_are_not_read", formats_that_are_not_read),
         trial("commands::pose::too_many_and_too_few", too_many_and_too_few),
@@ -222,7 +221,6 @@ fn photographs_of_nothing_in_common() {
     assert_eq!(files_below(folder.path()), before);
 }
 
-#[cfg(unix)]
 fn ctrl_c_leaves_nothing() {
     let folder = bare(0..8);
     let before = files_below(folder.path());
