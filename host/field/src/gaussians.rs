@@ -29,7 +29,7 @@ mod recipe;
 mod start;
 mod tiles;
 
-pub use given::{GivenGaussians, scene_of};
+pub use given::{GivenGaussians, behind, scene_of};
 pub use optimise::{Optimised, Optimiser};
 pub use picture::{Splatted, Splatter};
 pub use recipe::Recipe;

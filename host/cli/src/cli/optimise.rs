@@ -8,18 +8,20 @@ use super::{INTERRUPTED, say};
 use anyhow::bail;
 use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use viewfuse_core::Vec3;
+use viewfuse_core::camera::Camera;
 use viewfuse_core::gaussian::GaussianBlock;
 use viewfuse_device::Device;
 use viewfuse_device::choice::{AnyDevice, Chosen};
 use viewfuse_field::AnyField;
-use viewfuse_field::gaussians::{GivenGaussians, Optimiser, Recipe, scene_of};
+use viewfuse_field::gaussians::{GivenGaussians, Optimiser, Recipe, behind, scene_of};
 use viewfuse_field::point_cloud::{CloudOptions, point_cloud};
 use viewfuse_field::render::{RenderOptions, Stage, open_album};
 use viewfuse_job::files::check_writable;
 use viewfuse_job::progress::{Progress, Silent};
+use viewfuse_output::gaussian_page::{GaussianPage, write_html};
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{Selection, target_of};
 use viewfuse_scene::gaussians::GaussianScene;
@@ -31,6 +33,7 @@ const SCORED: u32 = 40;
 #[derive(Args)]
 #[command(after_help = "Examples:\n  viewfuse optimise photos/ -o photos.ply\n  \
     viewfuse optimise dino/ --left-out 3 -o dino.ply\n      view 3 is kept back, and scored as the Gaussians become better\n  \
+    viewfuse optimise photos/ -o photos.html\n      one page for any browser, without a server: to share\n  \
     viewfuse render photos/ --gaussians photos.ply --orbit 24 -o out\n\n\
     Begins with the surfaces that the training-free field finds, and takes a few seconds. Ctrl-C writes what there is so far; \
     --resume goes on from a file. The file has the layout of \"3D Gaussian Splatting\", which other viewers read, in the \
@@ -61,8 +64,8 @@ pub(crate) struct Arguments {
     picture: PictureOptions,
     #[command(flatten)]
     device: DeviceOptions,
-    /// The .ply file
-    #[arg(short, long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(ply_file))]
+    /// The .ply file, or an .html page with the source cameras and their weights
+    #[arg(short, long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(known_file))]
     output: PathBuf,
 }
 
@@ -70,17 +73,23 @@ fn scheme_help() -> String {
     format!("Weighting scheme of the surfaces: {}", grammar())
 }
 
-/// A file of the one format that is written.
-fn ply_file(path: PathBuf) -> Result<PathBuf, &'static str> {
-    match path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ply")) {
+/// A file of a format that is written.
+fn known_file(path: PathBuf) -> Result<PathBuf, &'static str> {
+    match ["ply", "html"].iter().any(|own| is_of(&path, own)) {
         true => Ok(path),
-        false => Err("scenes of Gaussians are written as .ply"),
+        false => Err("scenes of Gaussians are written as .ply or .html"),
     }
+}
+
+fn is_of(path: &Path, extension: &str) -> bool {
+    path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension))
 }
 
 /// What an optimisation ends with.
 struct Ended {
     gaussians: Vec<GaussianBlock>,
+    /// What lies behind them.
+    background: [f32; 3],
     done: u32,
     of: u32,
 }
@@ -106,14 +115,24 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let before = arguments.resume.as_ref().map(|path| GaussianScene::read(path, &scene.frame)).transpose()?;
     let Chosen { device, reason } = arguments.device.open()?;
     let progress = Terminal::new("optimising");
-    let job = Job { arguments, scene: &scene, sources, targets, options, weighting, before };
+    let job = Job { arguments, scene: &scene, sources: sources.clone(), targets, options, weighting, before };
     let ended = on_threads(arguments.picture.threads, || match &device {
         AnyDevice::Cpu(own) => job.optimise(own, &device, &field, &progress),
         AnyDevice::Vulkan(own) => job.optimise(own.as_ref(), &device, &field, &progress),
     })??;
     drop(progress);
-    scene_of(&ended.gaussians).write(&arguments.output, &scene.frame)?;
-    let Ended { gaussians, done, of } = &ended;
+    let Ended { gaussians, background, done, of } = &ended;
+    let optimised = scene_of(gaussians);
+    match is_of(&arguments.output, "html") {
+        true => {
+            let cameras: Vec<(String, Camera)> =
+                sources.iter().map(|view| &scene.views[*view]).map(|own| (own.name.clone(), own.camera)).collect();
+            let page =
+                GaussianPage { title: &scene.name(), scene: &optimised, cameras: &cameras, background: *background };
+            write_html(&arguments.output, &page)?;
+        }
+        false => optimised.write(&arguments.output, &scene.frame)?,
+    }
     let count = gaussians.len();
     say(format_args!("{}: {count} Gaussians after {done} of {of} iterations", arguments.output.display()))?;
     say(format_args!("device: {}, {reason}", device.name()))?;
@@ -169,7 +188,8 @@ impl Job<'_> {
                 progress.note(&format!("iteration {done} of {of}: views left out have a PSNR of {psnr:.2} dB"));
             }
         }
-        Ok(Ended { gaussians: optimiser.optimised().gaussians, done: optimiser.done(), of })
+        let (gaussians, done) = (optimiser.optimised().gaussians, optimiser.done());
+        Ok(Ended { gaussians, background: behind(&stage.images), done, of })
     }
 
     /// Mean PSNR of the views that are left out.

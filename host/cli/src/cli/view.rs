@@ -9,7 +9,10 @@ use clap::Args;
 use std::path::PathBuf;
 use std::process::{Command, ExitCode, Stdio};
 use viewfuse_device::choice::Chosen;
+use viewfuse_field::AnyField;
+use viewfuse_field::gaussians::GivenGaussians;
 use viewfuse_job::shell::quoted;
+use viewfuse_scene::gaussians::GaussianScene;
 use viewfuse_scene::{READERS, Scene, looked_for};
 use viewfuse_view::{Commands, ViewError, Viewed, Viewer};
 use viewfuse_weighting::{Weighting, WeightingChoice};
@@ -18,6 +21,7 @@ use viewfuse_weighting::{Weighting, WeightingChoice};
 #[command(after_help = "Examples:\n  \
     viewfuse view photos/\n      drag to turn around the subject, scroll or pinch to move; see which photographs count\n  \
     viewfuse view car/ --model genvs.safetensors --sources 1,5,9 --device vulkan\n      a learned field, from three views\n  \
+    viewfuse view photos/ --gaussians photos.ply\n      the Gaussians that `optimise` wrote: thirty pictures a second while the hand drags\n  \
     viewfuse view photos/ --port 8000 --no-browser\n      only prints the address: for another browser, or through a tunnel (ssh -L 8000:127.0.0.1:8000)\n\n\
     The page is for this machine alone, under an address that nobody can guess. Ctrl-C ends it.")]
 pub(crate) struct Arguments {
@@ -33,6 +37,9 @@ pub(crate) struct Arguments {
     bound: BoundOptions,
     #[command(flatten)]
     model: ModelOptions,
+    /// Show the Gaussians of this file, of `optimise` or of another program, in the coordinates of the scene's files
+    #[arg(long, value_name = "FILE", conflicts_with = "model")]
+    gaussians: Option<PathBuf>,
     #[command(flatten)]
     device: DeviceOptions,
     /// Seed of every random draw (the training-free field makes none)
@@ -58,11 +65,14 @@ pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> 
     let (weighting, chooses) = match &arguments.weights {
         Some(WeightingChoice::Given(spec)) => (spec.open()?, false),
         Some(WeightingChoice::Auto) => (Weighting::default_scheme(), true),
-        // As `render`: a network's pictures take too long to try out schemes unasked.
-        None => (Weighting::default_scheme(), arguments.model.label().is_none()),
+        // As `render`: a network's pictures take too long to try out schemes unasked, and Gaussians show the same under all.
+        None => (Weighting::default_scheme(), arguments.model.label().is_none() && arguments.gaussians.is_none()),
     };
     let scene = Scene::open(&arguments.scene)?;
-    let field = arguments.model.open(arguments.seed, None)?;
+    let field = match &arguments.gaussians {
+        Some(path) => AnyField::new(GivenGaussians { scene: GaussianScene::read(path, &scene.frame)? }),
+        None => arguments.model.open(arguments.seed, None)?,
+    };
     let about = field.about();
     let sources = arguments.sources.to_selection(None, None).sources_without(&scene, &[], about.least_sources)?;
     let options = arguments.bound.bounded(arguments.picture.to_render_options(arguments.model.exact, &about)?);

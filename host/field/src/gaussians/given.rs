@@ -44,8 +44,13 @@ impl Field for GivenGaussians {
         sources: &SourceImages,
         _progress: &dyn Progress,
     ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
-        let background = if sources.has_silhouettes { sources.background } else { mean_colour(sources) };
-        Ok(Box::new(Prepare { device, scene: &self.scene, near: NEAR * self.median_depth(sources), background }))
+        let near = NEAR * self.median_depth(sources);
+        Ok(Box::new(Prepare { device, scene: &self.scene, near, background: behind(sources) }))
+    }
+
+    /// The Gaussians are only drawn.
+    fn is_live(&self) -> bool {
+        true
     }
 }
 
@@ -100,6 +105,11 @@ pub fn scene_of(gaussians: &[GaussianBlock]) -> GaussianScene {
         f_dc: block.colour.map(|value| (value - 0.5) / SH_0),
     };
     GaussianScene { gaussians: gaussians.iter().map(own).collect(), ..GaussianScene::default() }
+}
+
+/// What lies behind Gaussians: the background of sources with silhouettes, otherwise the mean of all photographs.
+pub fn behind(sources: &SourceImages) -> [f32; 3] {
+    if sources.has_silhouettes { sources.background } else { mean_colour(sources) }
 }
 
 /// The mean of all photographs.
