@@ -101,6 +101,19 @@ impl Arguments {
             Some(WeightingChoice::Auto) | None => None,
         })
     }
+
+    /// The field that renders the scene.
+    fn field(&self, scene: &Scene) -> anyhow::Result<AnyField> {
+        match &self.gaussians {
+            Some(path) => Ok(AnyField::new(GivenGaussians { scene: GaussianScene::read(path, &scene.frame)? })),
+            None => self.model.open(self.seed, Some(&self.sequence)),
+        }
+    }
+
+    /// The files of the field.
+    fn files(&self) -> impl Iterator<Item = &Path> {
+        self.model.file().into_iter().chain(self.gaussians.as_deref())
+    }
 }
 
 /// `values` are all options and their values as a person would write them.
@@ -113,10 +126,7 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
         keep_folder_apart([&scene], &arguments.output)?;
     }
     let open_time = start.elapsed();
-    let field = match &arguments.gaussians {
-        Some(path) => AnyField::new(GivenGaussians { scene: GaussianScene::read(path, &scene.frame)? }),
-        None => arguments.model.open(arguments.seed, Some(&arguments.sequence))?,
-    };
+    let field = arguments.field(&scene)?;
     let about = field.about();
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), arguments.path.choice());
     let job = selection.resolve(&scene, about.least_sources)?;
@@ -142,8 +152,7 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
     writer.lock()?;
     writer.set_outputs(arguments.outputs.outputs());
     leaving.into_iter().for_each(|warning| writer.warn(warning));
-    let given = arguments.gaussians.as_deref();
-    let files: Vec<&Path> = arguments.model.file().into_iter().chain(before.file()).chain(given).collect();
+    let files: Vec<&Path> = arguments.files().chain(before.file()).collect();
     // Frames that follow from one another are not continued.
     let job = if arguments.sequence.is_empty() {
         let run = run_identity(values, &device.name(), &scene, &job, &files)?;

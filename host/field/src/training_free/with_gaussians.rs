@@ -27,7 +27,9 @@ const MIN_OPACITY: f32 = 0.5;
 pub(super) const TUNABLES: &[Tunable] = &with_share::<{ super::sweep::TUNABLES.len() + 1 }>(super::sweep::TUNABLES);
 
 const fn with_share<const COUNT: usize>(own: &[Tunable]) -> [Tunable; COUNT] {
-    let share = Tunable { name: SHARE, default: 0.0, others: &[0.25, 0.5, 0.75, 1.0] };
+    // Sources are left out at a small size, where Gaussians are as sharp as the sweep: trials take greater shares than pictures of
+    // full size should have (host/research/results/gaussians.md).
+    let share = Tunable { name: SHARE, default: 0.0, others: &[0.25] };
     let mut all = [share; COUNT];
     let mut index = 0;
     while index < own.len() {
