@@ -53,6 +53,7 @@ const _: () = assert!(size_of::<GaussianBlock>() == 64);
 
 /// A Gaussian in an image, as plain data. Made by [`project`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
 pub struct ProjectedGaussian {
     /// Image coordinates x, y of the mean, in pixels.

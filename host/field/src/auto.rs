@@ -52,7 +52,8 @@ pub fn schemes() -> Vec<Scheme> {
 const MIN_GAIN: f64 = 0.1;
 
 /// A mixture is taken unless its score on left-out sources is lower than that of the best single picture by more than this,
-/// decibels: on the targets of six scenes it was above the default picture by 0.07 to 0.72.
+/// decibels: on the targets of six scenes prototypes of it were above the default picture by 0.07 to 0.72
+/// (host/research/results/front_to_back.md).
 const MAX_LOSS: f64 = 0.05;
 /// The name in [`Candidate::settings`] of the number of pictures that are mixed.
 const MIXED: &str = "mixed pictures";

@@ -164,7 +164,7 @@ pub fn write(
     write_with(scene, layout, folder, &[], progress)
 }
 
-/// As [`write`], with more files in the folder, each a name and its bytes: they appear with the scene or not at all.
+/// As [`write()`], with more files in the folder, each a name and its bytes: they appear with the scene or not at all.
 ///
 /// # Errors
 /// [`WriteSceneError`]; no files remain then.

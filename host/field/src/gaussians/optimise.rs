@@ -238,8 +238,8 @@ impl Gain {
     fn step(&mut self, by_gain: [f32; 3], rate: f32) {
         self.step_count += 1;
         let corrections = [1.0 - 0.9_f32.powi(self.step_count), 1.0 - 0.99_f32.powi(self.step_count)];
-        for channel in 0..3 {
-            let pulled = by_gain[channel] + GAIN_PULL * (self.value[channel] - 1.0);
+        for (channel, by_channel) in by_gain.into_iter().enumerate() {
+            let pulled = by_channel + GAIN_PULL * (self.value[channel] - 1.0);
             adam_step(&mut self.value[channel], &mut self.moments[channel], pulled, rate, corrections);
         }
     }

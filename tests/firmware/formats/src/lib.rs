@@ -7,6 +7,7 @@ use viewfuse_core::attention::quantised::SourceKeys;
 use viewfuse_core::camera::{Camera, Pinhole, PinholeError, Projection, Ray};
 use viewfuse_core::composite::{Composite, Compositor};
 use viewfuse_core::fuse::VisibleFusion;
+use viewfuse_core::gaussian::ProjectedGaussian;
 use viewfuse_core::lens::{self, Lens, LensError, Undistorted};
 use viewfuse_core::pose::{Pose, PoseError};
 use viewfuse_core::rays::{RayPoint, TargetRay};
@@ -32,7 +33,7 @@ pub fn all() {
     has_format::<(HeunStep, NoiseSchedule, Preconditioning, ScheduleError)>();
     has_format::<(Sources<8>, SourcesError, AngleKind, Choice)>();
     has_format::<(Formula, Parameter, Row, Scheme)>();
-    has_format::<(SchemeError, Omission<8>, Weights<8>)>();
+    has_format::<(SchemeError, Omission<8>, Weights<8>, ProjectedGaussian)>();
 }
 
 /// As a firmware logs them.

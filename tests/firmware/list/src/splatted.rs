@@ -70,7 +70,7 @@ pub fn splatting(inputs: Inputs, emit: Emit) {
     projected(&gaussians, &camera(inputs), &mut seen, &mut order);
     for own in &seen {
         emit_all("conic", &own.conic, emit);
-        emit_all("mean", &own.mean, emit);
+        emit_all("place", &own.mean, emit);
         emit_all("extent", &own.extent, emit);
         emit_all("colour", &own.colour, emit);
     }

@@ -109,7 +109,7 @@ mod tests {
             super::model_help(),
             "Checkpoint of a PixelNeRF or a GeNVS (.pth, .pt, .safetensors, .pkl), or a test network with deterministic \
              initialisation: formula[:WIDTH], body[:WIDTH] (PixelNeRF), genvs[:small] (GeNVS), or a field without a network: \
-             training-free, plane-sweep [default: training-free]"
+             training-free, plane-sweep, gaussians [default: training-free]"
         );
     }
 
