@@ -52,15 +52,9 @@ fn done_with_warnings(folder: &Path, arguments: &str) {
     assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
 }
 
-/// Whether a coarse picture was on the page since [`NOTE_COARSE`]; it is there only until the full one is.
-const COARSE: &str = "window.sawCoarse";
-const NOTE_COARSE: &str = "(() => {
-    const picture = document.getElementById('picture');
-    window.sawCoarse = false;
-    if (window.coarseObserver) return;
-    window.coarseObserver = new MutationObserver(() => { window.sawCoarse ||= picture.dataset.kind === 'coarse'; });
-    window.coarseObserver.observe(picture, { attributes: true });
-})()";
+/// Whether a picture came since [`NOTE_PICTURES`]: a coarse one, or at once a full one where those take no longer.
+const FOLLOWED: &str = "Number(document.getElementById('picture').dataset.pictures) > window.notedPictures";
+const NOTE_PICTURES: &str = "window.notedPictures = Number(document.getElementById('picture').dataset.pictures)";
 const WEIGHTS: &str = "[...document.querySelectorAll('#sources output')].map((own) => Number(own.dataset.weight))";
 const COUNT: &str = "Number(document.getElementById('picture').dataset.pictures)";
 
