@@ -108,7 +108,7 @@ impl Field for TrainingFree {
             Ok(Box::new(self.hull.views(device, sources, progress)?))
         } else {
             let sweep = self.sweep.prepare_kept(device, sources, self.cache.as_ref(), progress)?;
-            Ok(Box::new(WithGaussians::new(device, sweep, sources, self.recipe, 0.0)))
+            Ok(Box::new(WithGaussians::new(device, sweep, sources, self.recipe, false)))
         }
     }
 

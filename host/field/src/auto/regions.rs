@@ -5,6 +5,7 @@
 //! other ones.
 
 use super::leave_out::{Outcome, Trials, mean};
+use super::{MAX_LOSS, mean_score};
 use crate::mixture::{Mixture, term_count, terms};
 use crate::render::{Frame, RenderError};
 use crate::{Rendered, Setting};
@@ -37,7 +38,7 @@ struct Example {
     seen: Vec<bool>,
 }
 
-/// Mixes the pictures under these settings. `None` if there are too few sources or pictures.
+/// Mixes the pictures under these settings, with the last one unless its place among them loses more than [`MAX_LOSS`]. `None` if there are too few sources or pictures.
 ///
 /// # Errors
 /// [`RenderError`].
@@ -73,7 +74,19 @@ pub(super) fn mixed(
             example.parts.push(Rendered { colours, depths, confidences, width, height });
         }
     }
-    for example in &mut examples {
+    let all = fitted(trials, &mut examples, parts.clone());
+    if parts.len() < 3 {
+        return Ok(Some(all));
+    }
+    examples.iter_mut().for_each(|example| drop(example.parts.pop()));
+    let without_last = fitted(trials, &mut examples, parts[..parts.len() - 1].to_vec());
+    let is_worth_it = mean_score(&all.outcomes) > mean_score(&without_last.outcomes) - MAX_LOSS;
+    Ok(Some(if is_worth_it { all } else { without_last }))
+}
+
+/// The mixture of the examples' pictures.
+fn fitted(trials: &Trials<'_>, examples: &mut [Example], parts: Vec<Vec<Setting>>) -> Mixed {
+    for example in &mut *examples {
         example.terms = terms(&example.parts);
     }
     let sums: Vec<Sums> = examples.iter().map(Sums::of).collect();
@@ -86,7 +99,7 @@ pub(super) fn mixed(
         let picture = to_rgb8(&rendered.colours, [rendered.width, rendered.height]);
         outcomes.push(trials.outcome(index, &picture, mean(&rendered.confidences)));
     }
-    Ok(Some(Mixed { mixture: Mixture { constants: solved(sums.iter(), count), parts }, outcomes }))
+    Mixed { mixture: Mixture { constants: solved(sums.iter(), count), parts }, outcomes }
 }
 
 /// The normal equations of a source's errors, over the mean square error of the plain mean.

@@ -48,6 +48,6 @@ impl Field for Gaussians {
             true => Box::new(self.hull.views(device, sources, progress)?),
             false => self.sweep.prepare_kept(device, sources, None, progress)?,
         };
-        Ok(Box::new(WithGaussians::new(device, depths, sources, self.recipe, 1.0)))
+        Ok(Box::new(WithGaussians::new(device, depths, sources, self.recipe, true)))
     }
 }

@@ -29,7 +29,6 @@ use crate::{
 pub use kept::Cache;
 use kept::{Kept, Key};
 use matching::{Images, Matching, Range};
-pub(super) use scalars::TUNABLES;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;

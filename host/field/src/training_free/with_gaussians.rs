@@ -1,9 +1,8 @@
 //! Pictures of the plane sweep mixed with those of Gaussians, and the Gaussians alone.
 //!
 //! The Gaussians are optimised for the sources when a picture first needs them, from the depths that the sweep found: once for a
-//! weighting. The share of them in a picture is a scalar that is chosen for a scene by leaving sources out, as the sweep's own are;
-//! its default is 0. With a bound on the time or on the error the pictures are the sweep's: what is left out of them is measured
-//! against a picture without Gaussians.
+//! weighting. They are one of the pictures that are mixed by region. With a bound on the time or on the error the pictures are the
+//! sweep's: what is left out of them is measured against a picture without Gaussians.
 
 use crate::gaussians::{Optimised, Optimiser, Recipe, Splatter};
 use crate::point_cloud::{CloudOptions, cloud_of};
@@ -18,26 +17,13 @@ use viewfuse_kernels::rows::GaussianBlock;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_weighting::sources::SourceWeights;
 
-/// The share of the Gaussians in a picture.
-const SHARE: &str = "gaussian share";
+/// The setting under which a picture is that of the Gaussians: 1 for them, 0 for the sweep.
+const GAUSSIANS: &str = "gaussians";
 /// Opacity below which a pixel has no depth.
 const MIN_OPACITY: f32 = 0.5;
 
-/// The scalars: the share, and the sweep's.
-pub(super) const TUNABLES: &[Tunable] = &with_share::<{ super::sweep::TUNABLES.len() + 1 }>(super::sweep::TUNABLES);
-
-const fn with_share<const COUNT: usize>(own: &[Tunable]) -> [Tunable; COUNT] {
-    // Sources are left out at a small size, where Gaussians are as sharp as the sweep: trials take greater shares than pictures of
-    // full size should have (host/research/results/gaussians.md).
-    let share = Tunable { name: SHARE, default: 0.0, others: &[0.25] };
-    let mut all = [share; COUNT];
-    let mut index = 0;
-    while index < own.len() {
-        all[index] = own[index];
-        index += 1;
-    }
-    all
-}
+/// Part of the iterations that are made for pictures of sources that are left out: those are small and only compared.
+const TRIAL_DIVISOR: u32 = 2;
 
 /// Gaussians on a device.
 struct Scene<D: Device> {
@@ -45,6 +31,8 @@ struct Scene<D: Device> {
     count: usize,
     near: f32,
     background: [f32; 3],
+    /// How much brighter each source is than they are: red, green, blue.
+    gains: Vec<[f32; 3]>,
 }
 
 /// The sweep's views, and the Gaussians of the same sources.
@@ -53,12 +41,16 @@ pub(super) struct WithGaussians<'a, D: Device> {
     sweep: Box<dyn Prepared + 'a>,
     images: Arc<SourceImages>,
     recipe: Recipe,
-    /// The share, and the one before any was chosen.
-    shares: [f32; 2],
+    /// Whether all pictures are those of the Gaussians, of all sources.
+    is_alone: bool,
+    /// Whether this picture is.
+    is_splatted: bool,
     encoded: Vec<bool>,
     relevance: Vec<SourceWeights>,
     /// The sweep's efforts.
     efforts: Vec<Effort>,
+    /// The sweep's scalars.
+    tunables: &'static [Tunable],
     /// Whether the exact picture is made.
     is_exact: bool,
     /// The Gaussians of the current weighting, when they are needed; none where the sources have too few surfaces.
@@ -71,9 +63,10 @@ impl<'a, D: Device> WithGaussians<'a, D> {
         mut sweep: Box<dyn Prepared + 'a>,
         sources: &SourceImages,
         recipe: Recipe,
-        share: f32,
+        is_alone: bool,
     ) -> WithGaussians<'a, D> {
         let efforts = sweep.efforts().map_or_else(Vec::new, |efforts| efforts.list());
+        let tunables = sweep.tuned().map_or(&[][..], |tuned| tuned.tunables());
         let encoded = vec![false; sources.images.len()];
         let images = Arc::new(sources.clone());
         let (relevance, scene) = (Vec::new(), None);
@@ -82,10 +75,12 @@ impl<'a, D: Device> WithGaussians<'a, D> {
             sweep,
             images,
             recipe,
-            shares: [share; 2],
+            is_alone,
+            is_splatted: is_alone,
             encoded,
             relevance,
             efforts,
+            tunables,
             is_exact: true,
             scene,
         }
@@ -106,9 +101,9 @@ impl<'a, D: Device> WithGaussians<'a, D> {
         let scene = match Optimiser::new(self.device, &self.images, &points, self.recipe)? {
             Some(mut optimiser) => {
                 optimiser.run(quiet)?;
-                let Optimised { gaussians, near, background, .. } = optimiser.optimised();
+                let Optimised { gaussians, near, background, gains } = optimiser.optimised();
                 let count = gaussians.len();
-                Some(Scene { gaussians: self.device.upload(&gaussians)?, count, near, background })
+                Some(Scene { gaussians: self.device.upload(&gaussians)?, count, near, background, gains })
             }
             None => None,
         };
@@ -119,22 +114,31 @@ impl<'a, D: Device> WithGaussians<'a, D> {
     /// The Gaussians from a target; `None` if there are none.
     fn splatted(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Option<Rendered>, FieldError> {
         self.prepare_scene(progress)?;
-        let Some(Some(Scene { gaussians, count, near, background })) = &self.scene else { return Ok(None) };
+        let Some(Some(Scene { gaussians, count, near, background, gains })) = &self.scene else { return Ok(None) };
         let splatter = Splatter { device: self.device, near: *near, background: *background };
-        splatter.rendered(gaussians, *count, &request.camera.block(0), MIN_OPACITY).map(Some).map_err(FieldError::from)
+        let mut splatted = splatter.rendered(gaussians, *count, &request.camera.block(0), MIN_OPACITY)?;
+        // As bright as the sources that count for this target, as the sweep's picture is.
+        let weights: Vec<(usize, f32)> = request.views.iter().copied().zip(request.view_weights()).collect();
+        let gain = common_gain(gains, &weights);
+        for colour in &mut splatted.colours {
+            (0..3).for_each(|channel| colour[channel] = (colour[channel] * gain[channel]).clamp(0.0, 1.0));
+        }
+        Ok(Some(splatted))
     }
 }
 
-impl<D: Device> WithGaussians<'_, D> {
-    /// Whether pictures are those of the Gaussians alone, of all sources.
-    fn is_alone(&self) -> bool {
-        self.shares[1] >= 1.0
-    }
+/// The weighted geometric mean of the views' gains.
+fn common_gain(gains: &[[f32; 3]], weights: &[(usize, f32)]) -> [f32; 3] {
+    let sum: f32 = weights.iter().map(|(_, weight)| weight).sum();
+    [0, 1, 2].map(|channel| {
+        let part = |(view, weight): &(usize, f32)| weight * gains[*view][channel].max(f32::MIN_POSITIVE).ln();
+        if sum > 0.0 { (weights.iter().map(part).sum::<f32>() / sum).exp() } else { 1.0 }
+    })
 }
 
 impl<D: Device> Prepared for WithGaussians<'_, D> {
     fn encoding(&self) -> Encoding {
-        if self.is_alone() { Encoding::All } else { self.sweep.encoding() }
+        if self.is_alone { Encoding::All } else { self.sweep.encoding() }
     }
 
     fn encode(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
@@ -146,19 +150,13 @@ impl<D: Device> Prepared for WithGaussians<'_, D> {
     }
 
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
-        let share = if self.is_exact { self.shares[0] } else { 0.0 };
-        let splatted = if share > 0.0 { self.splatted(request, progress)? } else { None };
-        match splatted {
-            Some(splatted) if share >= 1.0 => Ok(splatted),
-            Some(splatted) => {
-                let mut rendered = self.sweep.render(request, progress)?;
-                for (own, other) in rendered.colours.iter_mut().zip(&splatted.colours) {
-                    (0..3).for_each(|channel| own[channel] += share * (other[channel] - own[channel]));
-                }
-                Ok(rendered)
-            }
-            None => self.sweep.render(request, progress),
+        if self.is_splatted
+            && self.is_exact
+            && let Some(splatted) = self.splatted(request, progress)?
+        {
+            return Ok(splatted);
         }
+        self.sweep.render(request, progress)
     }
 
     fn record(&self) -> Record {
@@ -170,11 +168,11 @@ impl<D: Device> Prepared for WithGaussians<'_, D> {
     }
 
     fn efforts(&mut self) -> Option<&mut dyn Efforts> {
-        if self.is_alone() { None } else { Some(self) }
+        if self.is_alone || self.efforts.is_empty() { None } else { Some(self) }
     }
 
     fn tuned(&mut self) -> Option<&mut dyn Tuned> {
-        if self.is_alone() { None } else { Some(self) }
+        if self.is_alone { None } else { Some(self) }
     }
 
     fn geometry(&self) -> Option<&dyn Geometry> {
@@ -208,6 +206,7 @@ impl<D: Device> Efforts for WithGaussians<'_, D> {
     }
 
     fn set_trial(&mut self) {
+        self.recipe.iterations = self.recipe.iterations.map(|count| count / TRIAL_DIVISOR);
         if let Some(efforts) = self.sweep.efforts() {
             efforts.set_trial();
         }
@@ -216,19 +215,21 @@ impl<D: Device> Efforts for WithGaussians<'_, D> {
 
 impl<D: Device> Tuned for WithGaussians<'_, D> {
     fn tunables(&self) -> &'static [Tunable] {
-        TUNABLES
+        self.tunables
     }
 
     fn tune(&mut self, settings: &[Setting]) {
-        self.shares[0] = settings.iter().find(|own| own.name == SHARE).map_or(self.shares[1], |own| own.value);
+        self.is_splatted = self.is_alone || settings.iter().any(|own| own.name == GAUSSIANS && own.value > 0.0);
         if let Some(tuned) = self.sweep.tuned() {
             tuned.tune(settings);
         }
     }
 
-    /// The sweep's: each has the chosen share of the Gaussians.
+    /// The sweep's, and that of the Gaussians alone: their errors are the least like the others'.
     fn parts(&mut self, chosen: &[Setting]) -> Vec<Vec<Setting>> {
-        self.sweep.tuned().map_or_else(Vec::new, |tuned| tuned.parts(chosen))
+        let mut parts = self.sweep.tuned().map_or_else(Vec::new, |tuned| tuned.parts(chosen));
+        parts.push(chosen.iter().copied().chain([Setting { name: GAUSSIANS, value: 1.0 }]).collect());
+        parts
     }
 }
 

@@ -11,7 +11,7 @@ const TEMPERATURE_NAME: &str = "temperature";
 const SECOND_SHARE: &str = "second share";
 
 /// The scalars that differ most from scene to scene, the most effective ones first.
-pub(in crate::training_free) const TUNABLES: &[Tunable] = &[
+const TUNABLES: &[Tunable] = &[
     Tunable { name: FRONT_SHARE, default: DEFAULT.front_share, others: &[0.0, 0.2] },
     Tunable { name: NEAR_COST, default: DEFAULT.near_cost, others: &[0.002, 0.02] },
     Tunable { name: DISSENT_SHARE, default: DEFAULT.dissent_share, others: &[0.0, 0.125] },
