@@ -136,7 +136,7 @@ pub(super) fn of_the_field() -> Vec<Row> {
             &["gaussian_recipe.txt"],
             Hours::Estimated(0.15),
             vec![print(format!(
-                "viewfuse-research gaussian_recipe 200 4{}",
+                "viewfuse-research gaussian_recipe 200 3{}",
                 at(&["kangaroo=llff:9", "fern=llff:3", "cup=llff:9", "gold_cape=llff:9"])
             ))],
         )
@@ -161,7 +161,7 @@ pub(super) fn of_the_field() -> Vec<Row> {
             Hours::Estimated(0.01),
             vec![
                 work("viewfuse optimise {DATA}/cup --size 400x300 --sources all/9 --count 40000 -o {WORK}/cup.ply"),
-                print("viewfuse-research gaussian_frames {DATA}/cup {WORK}/cup.ply 60 320x240 504x378"),
+                print("viewfuse-research gaussian_frames {DATA}/cup {WORK}/cup.ply 40 320x240 504x378"),
             ],
         )
         .needs(&[CUP])
