@@ -32,6 +32,8 @@ use viewfuse_weighting::{Weighting, WeightingSpec, grammar};
 
 /// Iterations between two scores, and between two files on the way.
 const SCORED: u32 = 40;
+/// Most sources whose points count without a second view that confirms them: so few leave too few that are.
+const MAX_UNCONFIRMED: usize = 3;
 /// Iterations with the weights of `--towards`.
 const TOWARDS: u32 = 60;
 
@@ -185,7 +187,9 @@ impl Job<'_> {
         let album = open_album(self.scene, shown, renderer.as_ref(), &self.options, progress)?;
         let mut stage = Stage::prepare(self.scene, &album, &self.sources, renderer.as_ref(), &self.options, progress)?;
         progress.stage("finding surfaces", 1..3, 10);
-        let points = point_cloud(&mut stage, &self.weighting, CloudOptions::default(), &Silent)?;
+        let own = CloudOptions::default();
+        let least_views = if self.sources.len() <= MAX_UNCONFIRMED { 1 } else { own.least_views };
+        let points = point_cloud(&mut stage, &self.weighting, CloudOptions { least_views }, &Silent)?;
         let own = Recipe { seed: self.arguments.seed, ..Recipe::default() };
         let recipe = own.with(self.arguments.iterations, self.arguments.count);
         let Some(mut optimiser) = Optimiser::new(device, &stage.images, &points, recipe)? else {
