@@ -21,6 +21,7 @@ mod limits;
 mod lists;
 mod memory;
 mod moving;
+mod optimise;
 mod outputs;
 mod pareto;
 mod pose;
@@ -73,6 +74,7 @@ fn main() -> ExitCode {
         lists::trials(),
         memory::trials(),
         moving::trials(),
+        optimise::trials(),
         outputs::trials(),
         pareto::trials(),
         pose::trials(),

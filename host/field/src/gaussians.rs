@@ -32,5 +32,5 @@ mod tiles;
 pub use given::{GivenGaussians, behind, scene_of};
 pub use optimise::{Optimised, Optimiser};
 pub use picture::{Splatted, Splatter};
-pub use recipe::Recipe;
+pub use recipe::{MAX_COUNT, MAX_ITERATIONS, Recipe};
 pub use tiles::Tiles;

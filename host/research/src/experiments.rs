@@ -2,12 +2,13 @@
 //!
 //! ```text
 //! planes                                      a target's planes, for two of them
-//! efforts, headroom, mixture, paper_question,
-//! poses, refinement, self_knowledge,
-//! sweep_time                                  the experiments
+//! efforts, gaussians, headroom, mixture,
+//! paper_question, poses, refinement,
+//! self_knowledge, sweep_time                  the experiments
 //! ```
 
 mod efforts;
+mod gaussians;
 mod headroom;
 mod mixture;
 mod paper_question;
@@ -22,8 +23,11 @@ use anyhow::Context;
 /// Takes what stands behind the experiment's name.
 type Experiment = fn(&[String]) -> anyhow::Result<()>;
 
-const EXPERIMENTS: [(&str, Experiment); 8] = [
+const EXPERIMENTS: [(&str, Experiment); 11] = [
     ("efforts", efforts::run),
+    ("gaussian_frames", gaussians::frames::run),
+    ("gaussian_recipe", gaussians::recipe::run),
+    ("gaussian_weights", gaussians::weights::run),
     ("headroom", headroom::run),
     ("mixture", mixture::run),
     ("paper_question", paper_question::run),

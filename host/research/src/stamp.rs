@@ -155,12 +155,23 @@ pub(crate) fn machine() -> String {
 
 /// CPU seconds of all finished children so far, where the system tells (Linux).
 pub(crate) fn cpu_seconds() -> f64 {
+    // The children's times are fields 14 and 15 behind the name.
+    seconds_of([13, 14])
+}
+
+/// CPU seconds of this process so far; 0 where the system does not tell.
+pub(crate) fn own_cpu_seconds() -> f64 {
+    seconds_of([11, 12])
+}
+
+/// The sum of two times of this process, by their places behind its name.
+fn seconds_of(places: [usize; 2]) -> f64 {
     const TICKS_A_SECOND: f64 = 100.0;
     let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    // Behind the name, which stands in parentheses, the state is the first field; the children's times are fields 14 and 15.
+    // Behind the name, which stands in parentheses, the state is the first field.
     let fields: Vec<&str> = text.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
-    let ticks = |field: usize| fields.get(field).and_then(|text| text.parse::<f64>().ok()).unwrap_or(0.0);
-    (ticks(13) + ticks(14)) / TICKS_A_SECOND
+    let ticks = |place: usize| fields.get(place).and_then(|text| text.parse::<f64>().ok()).unwrap_or(0.0);
+    places.map(ticks).iter().sum::<f64>() / TICKS_A_SECOND
 }
 
 #[cfg(test)]

@@ -1,11 +1,12 @@
 //! Pictures that follow a hand that drags, and that memory does not grow.
 
 use super::super::browser::{self, Browser, InBrowser};
-use super::super::numbers;
+use super::super::{done, numbers};
 use super::devtools::{Chromium, Tab};
 use super::{COUNT, keep, room, start, weights};
 use libtest_mimic::Trial;
 use serde_json::{Value, json};
+use viewfuse_tests::command::toy;
 use viewfuse_tests::patience::wait_until;
 use viewfuse_tests::places::repository;
 use viewfuse_tests::trials::{needing, trial};
@@ -25,7 +26,8 @@ pub(super) fn trials() -> Vec<Trial> {
     let no_count = (!cfg!(target_os = "linux")).then(|| "the system does not say what a process takes".to_owned());
     trials.push(needing(no_count, false, trial("commands::view::memory_does_not_grow", memory_does_not_grow)));
     if cfg!(target_os = "linux") {
-        let tests: [(&str, InBrowser); 3] = [
+        let tests: [(&str, InBrowser); 4] = [
+            ("view::browser::pictures_of_gaussians_follow_the_hand", pictures_of_gaussians_follow_the_hand),
             ("view::browser::pictures_of_the_room_follow_the_hand", pictures_of_the_room_follow_the_hand),
             ("view::browser::pictures_of_the_lorry_follow_the_hand", pictures_of_the_lorry_follow_the_hand),
             ("view::browser::many_moves_of_a_hand_take_no_memory", many_moves_of_a_hand_take_no_memory),
@@ -45,6 +47,13 @@ fn pictures_of_the_room_follow_the_hand(browser: &Browser) {
 
 fn pictures_of_the_lorry_follow_the_hand(browser: &Browser) {
     pictures_follow_the_hand(browser, "tests/data/toy", [128.0, 128.0], "lorry.png");
+}
+
+fn pictures_of_gaussians_follow_the_hand(browser: &Browser) {
+    let folder = toy();
+    done(folder.path(), "optimise toy --size 96x96 --device cpu -o toy.ply");
+    let scene = format!("{0}/toy --gaussians {0}/toy.ply", folder.path().display());
+    pictures_follow_the_hand(browser, &scene, [128.0, 128.0], "gaussians.png");
 }
 
 /// On the page, from now on: the sizes of the pictures and which requests they answer, and how often weights were drawn.

@@ -1,6 +1,7 @@
 //! A scene of Gaussians as one page, in a browser: its picture beside core's, the weights of the view on the screen, a hand, a phone.
 
 use super::super::browser::{self, Browser, InBrowser};
+use super::super::done;
 use super::devtools::{Chromium, Tab};
 use super::keep;
 use glam::{Quat, Vec3};
@@ -10,15 +11,18 @@ use serde_json::json;
 use std::path::Path;
 use tempfile::TempDir;
 use viewfuse::output::gaussian_page::{GaussianPage, write_html};
+use viewfuse::scene::SceneFrame;
 use viewfuse::scene::gaussians::{Gaussian, GaussianScene};
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::gaussian::{ProjectedGaussian, SH_0, composite_row, nearest_first, project};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::sources::Sources;
 use viewfuse_core::weighting::{Scheme, weigh};
+use viewfuse_tests::command::toy;
 
-pub(super) fn trials() -> [Trial; 2] {
-    let tests: [(&str, InBrowser); 2] = [
+pub(super) fn trials() -> [Trial; 3] {
+    let tests: [(&str, InBrowser); 3] = [
+        ("view::browser::the_page_of_a_command_opens", the_page_of_a_command_opens),
         ("view::browser::a_page_shows_the_gaussians_of_core", a_page_shows_the_gaussians_of_core),
         ("view::browser::a_page_follows_a_hand_and_a_finger", a_page_follows_a_hand_and_a_finger),
     ];
@@ -219,4 +223,26 @@ fn a_page_follows_a_hand_and_a_finger(browser: &Browser) {
     assert_eq!(phone.evaluate("document.querySelector('.mouse').checkVisibility()"), json!(false));
     keep(&phone, "one_file_phone.png");
     assert_eq!(complaints(&phone), [""; 0]);
+}
+
+/// The page that `optimise` writes, beside `render` with the file that it writes.
+fn the_page_of_a_command_opens(browser: &Browser) {
+    let folder = toy();
+    for output in ["toy.ply", "toy.html"] {
+        done(folder.path(), &format!("optimise toy --size 96x96 --sources 0..19 --device cpu -o {output}"));
+    }
+    let chromium = Chromium::start(browser);
+    let tab = chromium.open(&address(&folder.path().join("toy.html")), [400, 900], false);
+    tab.wait_for(STILL);
+    let count = GaussianScene::read(&folder.path().join("toy.ply"), &SceneFrame::FILE).expect("a file").gaussians.len();
+    assert_eq!(
+        tab.text("document.querySelector('header p').textContent"),
+        format!("{count} Gaussians of 20 source views")
+    );
+    let before = tab.picture();
+    tab.evaluate("document.querySelectorAll('#sources button')[3].click()");
+    tab.wait_for(STILL);
+    assert_ne!(tab.picture(), before, "another source is shown");
+    keep(&tab, "optimised.png");
+    assert_eq!(complaints(&tab), [""; 0]);
 }

@@ -30,6 +30,7 @@ pub(super) fn trials() -> Vec<Trial> {
         trial("commands::view::ctrl_c_ends_it_and_nothing_is_written", ctrl_c_ends_it_and_nothing_is_written),
         trial("commands::view::a_taken_port_is_an_error", a_taken_port_is_an_error),
         trial("commands::view::learned_fields_are_shown", learned_fields_are_shown),
+        trial("commands::view::gaussians_are_shown", gaussians_are_shown),
     ]
 }
 
@@ -303,5 +304,34 @@ fn learned_fields_are_shown() {
         let (full, picture) = connection.picture(&request("a", &start, false)).unpacked();
         assert_eq!((full["full"].as_bool(), picture.dimensions()), (Some(true), (32, 32)), "{model}");
         assert_eq!(full["layers"], layers, "{model}");
+    }
+}
+
+/// At rest the picture of `render`, while moving a smaller one of the same.
+fn gaussians_are_shown() {
+    let folder = toy();
+    done_with_warnings(folder.path(), "optimise toy --size 48x48 --device cpu -o toy.ply");
+    done_with_warnings(folder.path(), "render toy --gaussians toy.ply --targets 20 --size 64x64 --device cpu -o out");
+    let expected = image::open(folder.path().join("out/000020.png")).expect("a picture").to_rgb8();
+    let program = start(folder.path(), "toy --gaussians toy.ply --sources 0..19 --size 64x64");
+    let found = program.scene();
+    let others = found["others"].as_array().expect("other views");
+    let pose = &others.iter().find(|view| view["name"] == "000020").expect("view 20")["pose"];
+    let mut connection = program.connect();
+    let (full, picture) = connection.picture(&request("a", pose, false)).unpacked();
+    assert_eq!(full["full"], true);
+    assert!(picture == expected, "it is not the picture of render");
+    let mut moving = request("a", pose, true);
+    moving["side"] = found["moving_side"].clone();
+    assert_eq!(found["moving_side"], 320);
+    for _ in 0..3 {
+        let (coarse, picture) = connection.picture(&moving).unpacked();
+        assert_eq!(coarse["full"], false);
+        let (width, height) = picture.dimensions();
+        assert!(width == height && (16..=64).contains(&width), "{width}x{height}");
+        let small = image::imageops::resize(&expected, width, height, image::imageops::FilterType::Triangle);
+        let difference = picture.iter().zip(small.iter()).map(|(a, b)| f64::from(a.abs_diff(*b))).sum::<f64>();
+        let mean = difference / f64::from(3 * width * height);
+        assert!(mean < 12.0, "{mean} levels beside the picture at rest");
     }
 }

@@ -78,7 +78,7 @@ impl NetworkOptions {
 
     /// Opens the field, with further options.
     fn open_with(&self, options: FieldOptions) -> anyhow::Result<AnyField> {
-        let Some(model) = &self.model else { return Ok(AnyField::default()) };
+        let model = self.model.clone().unwrap_or(Model::TrainingFree(ROWS[0]));
         match model.open(&self.flags.given_to(options)) {
             Err(OpenError::Refused { option, problem, reason }) => {
                 Err(wrong(format_args!("--{option} {problem} with '--model {model}', which {reason}")))

@@ -16,27 +16,35 @@ use viewfuse_core::gaussian::GaussianBlock;
 use viewfuse_device::Device;
 use viewfuse_device::choice::{AnyDevice, Chosen};
 use viewfuse_field::AnyField;
-use viewfuse_field::gaussians::{GivenGaussians, Optimiser, Recipe, behind, scene_of};
+use viewfuse_field::gaussians::{GivenGaussians, MAX_COUNT, MAX_ITERATIONS, Optimiser, Recipe, behind, scene_of};
 use viewfuse_field::point_cloud::{CloudOptions, point_cloud};
 use viewfuse_field::render::{RenderOptions, Stage, open_album};
 use viewfuse_job::files::check_writable;
 use viewfuse_job::progress::{Progress, Silent};
 use viewfuse_output::gaussian_page::{GaussianPage, write_html};
 use viewfuse_scene::Scene;
-use viewfuse_scene::few_shot::{Selection, target_of};
+use viewfuse_scene::few_shot::{Selection, Target, target_of};
 use viewfuse_scene::gaussians::GaussianScene;
+use viewfuse_scene::photographs::Album;
+use viewfuse_scene::unit::RigUnit;
+use viewfuse_weighting::sources::SourcePoses;
 use viewfuse_weighting::{Weighting, WeightingSpec, grammar};
 
-/// Iterations between two scores.
+/// Iterations between two scores, and between two files on the way.
 const SCORED: u32 = 40;
+/// Most sources whose points count without a second view that confirms them: so few leave too few that are.
+const MAX_UNCONFIRMED: usize = 3;
+/// Iterations with the weights of `--towards`.
+const TOWARDS: u32 = 60;
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  viewfuse optimise photos/ -o photos.ply\n  \
     viewfuse optimise dino/ --left-out 3 -o dino.ply\n      view 3 is kept back, and scored as the Gaussians become better\n  \
+    viewfuse optimise dino/ --towards 3 --left-out 3 -o dino.ply\n      at last for view 3: its nearest photographs count most\n  \
     viewfuse optimise photos/ -o photos.html\n      one page for any browser, without a server: to share\n  \
     viewfuse render photos/ --gaussians photos.ply --orbit 24 -o out\n\n\
-    Begins with the surfaces that the training-free field finds, and takes a few seconds. Ctrl-C writes what there is so far; \
-    --resume goes on from a file. The file has the layout of \"3D Gaussian Splatting\", which other viewers read, in the \
+    Begins with the surfaces that the training-free field finds, and takes a few seconds. Ctrl-C writes what there is so far, \
+    and a .ply is written every 40 iterations: --resume goes on from it with the iterations of the finest size. The file has the layout of \"3D Gaussian Splatting\", which other viewers read, in the \
     coordinates of the scene's files.")]
 pub(crate) struct Arguments {
     /// The scene
@@ -48,11 +56,12 @@ pub(crate) struct Arguments {
     /// Views that are kept back, to be rendered and scored on the way
     #[arg(long, value_name = "VIEWS")]
     left_out: Option<String>,
-    /// Most Gaussians
-    #[arg(long, value_name = "N", default_value_t = Recipe::default().max_count as u32, value_parser = clap::value_parser!(u32).range(1..=2_000_000))]
-    count: u32,
+    #[arg(long, value_name = "VIEWS", help = towards_help())]
+    towards: Option<String>,
+    #[arg(long, value_name = "N", help = count_help(), value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_COUNT)))]
+    count: Option<u32>,
     /// Iterations at each size of the sources, the finest last
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_ITERATIONS)))]
     iterations: Option<u32>,
     /// Go on from the Gaussians of this file, at the finest size
     #[arg(long, value_name = "FILE")]
@@ -70,7 +79,16 @@ pub(crate) struct Arguments {
 }
 
 fn scheme_help() -> String {
-    format!("Weighting scheme of the surfaces: {}", grammar())
+    format!("Weighting scheme of the surfaces and of --towards: {}", grammar())
+}
+
+fn towards_help() -> String {
+    format!("{TOWARDS} iterations more with the loss of each source by its weight for these views, which are kept back")
+}
+
+fn count_help() -> String {
+    let Recipe { max_count, max_per_pixel, .. } = Recipe::default();
+    format!("Most Gaussians [default: {max_per_pixel} a pixel of a source, at most {max_count}]")
 }
 
 /// A file of a format that is written.
@@ -99,39 +117,42 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let scene = Scene::open(&arguments.scene)?;
     let field = AnyField::default();
     let about = field.about();
-    let targets = match &arguments.left_out {
-        Some(views) => {
-            let selection = Selection { targets: Some(views.clone()), ..Selection::default() };
-            let job = selection.resolve(&scene, about.least_sources)?;
-            job.targets.iter().filter_map(|target| target.truth).collect()
+    let views = |list: &Option<String>| -> anyhow::Result<Vec<Target>> {
+        if list.is_none() {
+            return Ok(Vec::new());
         }
-        None => Vec::new(),
+        let selection = Selection { targets: list.clone(), ..Selection::default() };
+        Ok(selection.resolve(&scene, about.least_sources)?.targets)
     };
+    let (left_out, towards) = (views(&arguments.left_out)?, views(&arguments.towards)?);
+    let photographs = |targets: &[Target]| targets.iter().filter_map(|own| own.truth).collect::<Vec<usize>>();
+    let targets = photographs(&left_out);
+    let kept_back = [targets.clone(), photographs(&towards)].concat();
     let selection = arguments.sources.to_selection(None, None);
-    let sources = selection.sources_without(&scene, &targets, about.least_sources)?;
+    let sources = selection.sources_without(&scene, &kept_back, about.least_sources)?;
     let options = arguments.picture.to_render_options(false, &about)?;
     check_writable(&arguments.output)?;
     keep_file_apart([&scene], &arguments.output)?;
     let before = arguments.resume.as_ref().map(|path| GaussianScene::read(path, &scene.frame)).transpose()?;
     let Chosen { device, reason } = arguments.device.open()?;
     let progress = Terminal::new("optimising");
-    let job = Job { arguments, scene: &scene, sources: sources.clone(), targets, options, weighting, before };
+    let sources_of_job = sources.clone();
+    let job = Job { arguments, scene: &scene, sources: sources_of_job, targets, towards, options, weighting, before };
     let ended = on_threads(arguments.picture.threads, || match &device {
         AnyDevice::Cpu(own) => job.optimise(own, &device, &field, &progress),
         AnyDevice::Vulkan(own) => job.optimise(own.as_ref(), &device, &field, &progress),
     })??;
     drop(progress);
     let Ended { gaussians, background, done, of } = &ended;
-    let optimised = scene_of(gaussians);
     match is_of(&arguments.output, "html") {
         true => {
             let cameras: Vec<(String, Camera)> =
                 sources.iter().map(|view| &scene.views[*view]).map(|own| (own.name.clone(), own.camera)).collect();
-            let page =
-                GaussianPage { title: &scene.name(), scene: &optimised, cameras: &cameras, background: *background };
+            let (title, optimised) = (scene.name(), scene_of(gaussians));
+            let page = GaussianPage { title: &title, scene: &optimised, cameras: &cameras, background: *background };
             write_html(&arguments.output, &page)?;
         }
-        false => optimised.write(&arguments.output, &scene.frame)?,
+        false => scene_of(gaussians).write(&arguments.output, &scene.frame)?,
     }
     let count = gaussians.len();
     say(format_args!("{}: {count} Gaussians after {done} of {of} iterations", arguments.output.display()))?;
@@ -145,6 +166,8 @@ struct Job<'a> {
     scene: &'a Scene,
     sources: Vec<usize>,
     targets: Vec<usize>,
+    /// Views that the optimisation ends with the weights of.
+    towards: Vec<Target>,
     options: RenderOptions,
     weighting: Weighting,
     before: Option<GaussianScene>,
@@ -164,41 +187,74 @@ impl Job<'_> {
         let album = open_album(self.scene, shown, renderer.as_ref(), &self.options, progress)?;
         let mut stage = Stage::prepare(self.scene, &album, &self.sources, renderer.as_ref(), &self.options, progress)?;
         progress.stage("finding surfaces", 1..3, 10);
-        let points = point_cloud(&mut stage, &self.weighting, CloudOptions::default(), &Silent)?;
-        let mut recipe =
-            Recipe { max_count: self.arguments.count as usize, seed: self.arguments.seed, ..Recipe::default() };
-        if let Some(count) = self.arguments.iterations {
-            recipe.iterations.iter_mut().filter(|own| **own > 0).for_each(|own| *own = count);
-        }
+        let own = CloudOptions::default();
+        let least_views = if self.sources.len() <= MAX_UNCONFIRMED { 1 } else { own.least_views };
+        let points = point_cloud(&mut stage, &self.weighting, CloudOptions { least_views }, &Silent)?;
+        let own = Recipe { seed: self.arguments.seed, ..Recipe::default() };
+        let recipe = own.with(self.arguments.iterations, self.arguments.count);
         let Some(mut optimiser) = Optimiser::new(device, &stage.images, &points, recipe)? else {
             bail!("{}: too few views agree on any surface to begin Gaussians with", self.scene.path.display());
         };
         if let Some(before) = &self.before {
             optimiser.resume(&before.blocks(Vec3::ZERO));
         }
-        let of = optimiser.iteration_count();
         progress.stage("optimising", 3..10, 10);
-        progress.expect((of - optimiser.done()) as usize);
+        let more = if self.towards.is_empty() { 0 } else { TOWARDS };
+        progress.expect((optimiser.iteration_count() + more - optimiser.done()) as usize);
+        self.advance(&mut optimiser, any, &album, progress)?;
+        if more > 0 && !progress.is_cancelled() {
+            optimiser.extend(more);
+            optimiser.weigh(&self.weights()?);
+            self.advance(&mut optimiser, any, &album, progress)?;
+        }
+        let (gaussians, done, of) = (optimiser.optimised().gaussians, optimiser.done(), optimiser.iteration_count());
+        Ok(Ended { gaussians, background: behind(&stage.images), done, of })
+    }
+
+    /// All iterations, with scores and files on the way; fewer if it is cancelled.
+    fn advance<D: Device>(
+        &self,
+        optimiser: &mut Optimiser<'_, D>,
+        any: &AnyDevice,
+        album: &Album<'_>,
+        progress: &Terminal,
+    ) -> anyhow::Result<()> {
+        let of = optimiser.iteration_count();
         while optimiser.done() < of && !progress.is_cancelled() {
             optimiser.advance()?;
             progress.step();
             let done = optimiser.done();
-            if !self.targets.is_empty() && (done % SCORED == 0 || done == of) {
-                let psnr = self.score(&optimiser.optimised().gaussians, any, &album)?;
+            if done % SCORED != 0 && done != of {
+                continue;
+            }
+            let gaussians = optimiser.optimised().gaussians;
+            if done < of && is_of(&self.arguments.output, "ply") {
+                // For --resume, if the program is killed.
+                scene_of(&gaussians).write(&self.arguments.output, &self.scene.frame)?;
+            }
+            if !self.targets.is_empty() {
+                let psnr = self.score(&gaussians, any, album)?;
                 progress.note(&format!("iteration {done} of {of}: views left out have a PSNR of {psnr:.2} dB"));
             }
         }
-        let (gaussians, done) = (optimiser.optimised().gaussians, optimiser.done());
-        Ok(Ended { gaussians, background: behind(&stage.images), done, of })
+        Ok(())
+    }
+
+    /// The sources' weights for the views of `--towards`: their sum over these.
+    fn weights(&self) -> anyhow::Result<Vec<f32>> {
+        let unit = RigUnit::of_scene(self.scene);
+        let poses: Vec<_> = self.sources.iter().map(|view| unit.pose(&self.scene.views[*view].camera.pose)).collect();
+        let sources = SourcePoses::new(&poses)?;
+        let mut sums = vec![0.0; poses.len()];
+        for target in &self.towards {
+            let weights = self.weighting.weigh(&sources, &unit.pose(&target.camera.pose));
+            sums.iter_mut().zip(weights.values()).for_each(|(sum, weight)| *sum += weight);
+        }
+        Ok(sums)
     }
 
     /// Mean PSNR of the views that are left out.
-    fn score(
-        &self,
-        gaussians: &[GaussianBlock],
-        any: &AnyDevice,
-        album: &viewfuse_scene::photographs::Album<'_>,
-    ) -> anyhow::Result<f64> {
+    fn score(&self, gaussians: &[GaussianBlock], any: &AnyDevice, album: &Album<'_>) -> anyhow::Result<f64> {
         let given = AnyField::new(GivenGaussians { scene: scene_of(gaussians) });
         let renderer = given.on(any);
         let mut stage = Stage::prepare(self.scene, album, &self.sources, renderer.as_ref(), &self.options, &Silent)?;

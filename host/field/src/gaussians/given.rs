@@ -5,7 +5,7 @@ use crate::{About, Encoding, Field, FieldError, Prepared, Rendered, Request};
 use viewfuse_core::Vec3;
 use viewfuse_core::gaussian::SH_0;
 use viewfuse_core::random::uniform;
-use viewfuse_device::Device;
+use viewfuse_device::{Device, DeviceError};
 use viewfuse_job::progress::Progress;
 use viewfuse_kernels::rows::GaussianBlock;
 use viewfuse_scene::gaussians::{Gaussian, GaussianScene};
@@ -31,6 +31,16 @@ struct Prepare<'a, D: Device> {
     scene: &'a GaussianScene,
     near: f32,
     background: [f32; 3],
+    /// The Gaussians as they are on the device, once they are there.
+    uploaded: Option<Uploaded<D>>,
+}
+
+/// Gaussians on a device.
+struct Uploaded<D: Device> {
+    gaussians: D::Buffer<GaussianBlock>,
+    count: usize,
+    /// What their colours are seen from; those of degree 0 are the same from everywhere.
+    centre_world: Vec3,
 }
 
 impl Field for GivenGaussians {
@@ -45,7 +55,8 @@ impl Field for GivenGaussians {
         _progress: &dyn Progress,
     ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
         let near = NEAR * self.median_depth(sources);
-        Ok(Box::new(Prepare { device, scene: &self.scene, near, background: behind(sources) }))
+        let background = behind(sources);
+        Ok(Box::new(Prepare { device, scene: &self.scene, near, background, uploaded: None }))
     }
 
     /// The Gaussians are only drawn.
@@ -73,6 +84,27 @@ impl GivenGaussians {
     }
 }
 
+impl<D: Device> Prepare<'_, D> {
+    /// The Gaussians on the device with the colours that a camera at this point sees. Those of one colour in all directions are
+    /// taken there once.
+    fn uploaded(&mut self, centre_world: Vec3) -> Result<&Uploaded<D>, DeviceError> {
+        let is_there = |own: &Uploaded<D>| self.scene.degree == 0 || own.centre_world == centre_world;
+        let kept = self.uploaded.take().filter(is_there);
+        let uploaded = match kept {
+            Some(uploaded) => uploaded,
+            None => {
+                let mut blocks = self.scene.blocks(centre_world);
+                if blocks.is_empty() {
+                    // No device has empty buffers.
+                    blocks.push(GaussianBlock { opacity: -80.0, ..GaussianBlock::default() });
+                }
+                Uploaded { gaussians: self.device.upload(&blocks)?, count: blocks.len(), centre_world }
+            }
+        };
+        Ok(self.uploaded.insert(uploaded))
+    }
+}
+
 impl<D: Device> Prepared for Prepare<'_, D> {
     fn encoding(&self) -> Encoding {
         Encoding::Used
@@ -85,13 +117,9 @@ impl<D: Device> Prepared for Prepare<'_, D> {
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
         progress.check()?;
         let camera = request.camera.block(0);
-        // Colours of higher degrees are those from this camera.
-        let blocks = self.scene.blocks(camera.centre_world());
-        let blocks =
-            if blocks.is_empty() { vec![GaussianBlock { opacity: -80.0, ..GaussianBlock::default() }] } else { blocks };
-        let gaussians = self.device.upload(&blocks)?;
         let splatter = Splatter { device: self.device, near: self.near, background: self.background };
-        Ok(splatter.rendered(&gaussians, blocks.len(), &camera, MIN_OPACITY)?)
+        let Uploaded { gaussians, count, .. } = self.uploaded(camera.centre_world())?;
+        Ok(splatter.rendered(gaussians, *count, &camera, MIN_OPACITY)?)
     }
 }
 
@@ -113,7 +141,7 @@ pub fn behind(sources: &SourceImages) -> [f32; 3] {
 }
 
 /// The mean of all photographs.
-pub(super) fn mean_colour(sources: &SourceImages) -> [f32; 3] {
+fn mean_colour(sources: &SourceImages) -> [f32; 3] {
     [0, 1, 2].map(|channel| {
         let (mut sum, mut count) = (0.0_f64, 0);
         for image in &sources.images {

@@ -1,6 +1,6 @@
 //! The loop: a source at a time is drawn, compared with its photograph, and what made it is stepped.
 
-use super::given::mean_colour;
+use super::given::behind;
 use super::level::{LevelView, level};
 use super::loss::{Pair, gradient};
 use super::particles::{Particle, Step, refined, step_all};
@@ -9,6 +9,7 @@ use super::recipe::Recipe;
 use super::start::{Extent, start};
 use crate::FieldError;
 use crate::point_cloud::CloudPoint;
+use std::sync::Arc;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::random::uniform;
 use viewfuse_device::Device;
@@ -44,14 +45,14 @@ struct Gain {
     step_count: i32,
 }
 
-/// Optimises Gaussians for source views, an iteration at a time.
+/// Optimises Gaussians for source views, an iteration at a time. A copy goes on by itself.
 #[derive(Debug)]
 pub struct Optimiser<'d, D> {
     splatter: Splatter<'d, D>,
     recipe: Recipe,
     extent: Extent,
     /// `[level][source]`, the finest level first.
-    levels: Vec<Vec<LevelView>>,
+    levels: Arc<Vec<Vec<LevelView>>>,
     particles: Vec<Particle>,
     gains: Vec<Gain>,
     /// How much each source counts, 1 in the mean.
@@ -60,6 +61,26 @@ pub struct Optimiser<'d, D> {
     round: Vec<usize>,
     iteration: u32,
     level: Option<usize>,
+}
+
+impl<D> Clone for Optimiser<'_, D> {
+    fn clone(&self) -> Self {
+        Optimiser {
+            splatter: Splatter { ..self.splatter },
+            levels: Arc::clone(&self.levels),
+            particles: self.particles.clone(),
+            gains: self.gains.clone(),
+            weights: self.weights.clone(),
+            round: self.round.clone(),
+            ..*self
+        }
+    }
+}
+
+/// Most Gaussians for the pixels of the largest source.
+fn most_for(views: &[LevelView], max_per_pixel: f32) -> usize {
+    let pixels = views.iter().map(|view| view.camera.width * view.camera.height).max().unwrap_or(0);
+    (pixels as f32 * max_per_pixel).ceil() as usize
 }
 
 impl<'d, D: Device> Optimiser<'d, D> {
@@ -71,7 +92,7 @@ impl<'d, D: Device> Optimiser<'d, D> {
         device: &'d D,
         images: &SourceImages,
         points: &[CloudPoint],
-        recipe: Recipe,
+        mut recipe: Recipe,
     ) -> Result<Option<Optimiser<'d, D>>, FieldError> {
         let own_side = images.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
         let side = own_side.min(recipe.side);
@@ -80,10 +101,8 @@ impl<'d, D: Device> Optimiser<'d, D> {
             levels.into_iter().collect::<Result<_, _>>().map_err(FieldError::unsuitable)?;
         let finest = levels.first().and_then(|views| views.first()).map_or(1.0, |view| view.camera.intrinsics[0]);
         let Some(extent) = Extent::of(points, images, finest) else { return Ok(None) };
-        let background = match images.has_silhouettes {
-            true => images.background,
-            false => mean_colour(images),
-        };
+        recipe.max_count = recipe.max_count.min(most_for(&levels[0], recipe.max_per_pixel));
+        let background = behind(images);
         let particles = start(points, images, &extent, &recipe).into_iter().map(Particle::new).collect();
         let gain = Gain { value: [1.0; 3], moments: [[0.0; 2]; 3], step_count: 0 };
         let source_count = images.images.len();
@@ -91,7 +110,7 @@ impl<'d, D: Device> Optimiser<'d, D> {
             splatter: Splatter { device, near: recipe.near * extent.depth, background },
             recipe,
             extent,
-            levels,
+            levels: Arc::new(levels),
             particles,
             gains: vec![gain; source_count],
             weights: vec![1.0; source_count],
@@ -115,6 +134,12 @@ impl<'d, D: Device> Optimiser<'d, D> {
         let [.., finest] = self.recipe.iterations;
         self.iteration = self.iteration_count() - finest;
         self.level = Some(self.level_of(self.iteration).0);
+    }
+
+    /// Adds iterations at the finest level.
+    pub fn extend(&mut self, iterations: u32) {
+        let [.., finest] = &mut self.recipe.iterations;
+        *finest += iterations;
     }
 
     /// How many iterations are done.

@@ -1,5 +1,10 @@
 //! The settings of an optimisation. What was measured of them is in `host/research/results/gaussians.md`.
 
+/// Most Gaussians that a person can ask for.
+pub const MAX_COUNT: u32 = 2_000_000;
+/// Most iterations at a size that a person can ask for.
+pub const MAX_ITERATIONS: u32 = 100_000;
+
 /// Settings of an optimisation. Lengths are in footprints: the size of a level's pixel at the median depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Recipe {
@@ -9,6 +14,8 @@ pub struct Recipe {
     pub iterations: [u32; 4],
     /// Most Gaussians.
     pub max_count: usize,
+    /// Most Gaussians a pixel of a source at the finest level.
+    pub max_per_pixel: f32,
     /// Points in a cube of this side become one Gaussian, in footprints of the finest level.
     pub cell: f32,
     /// Fewest points of a cube that become one.
@@ -43,11 +50,12 @@ impl Default for Recipe {
             side: 280,
             iterations: [0, 100, 80, 60],
             max_count: 60_000,
+            max_per_pixel: 1.5,
             cell: 6.0,
             least_points: 3,
             random_count: 2000,
             opacities: [0.4, 0.1],
-            flatness: 1.0,
+            flatness: 0.2,
             structure_share: 0.2,
             opacity_penalty: 0.02,
             rates: [0.1, 1.0e-2, 2.0e-3, 5.0e-2, 5.0e-3, 5.0e-3],
@@ -57,5 +65,18 @@ impl Default for Recipe {
             silhouette_share: 0.5,
             seed: 0,
         }
+    }
+}
+
+impl Recipe {
+    /// The recipe with so many iterations at each level that has some, and at most so many Gaussians, whatever the sources' size.
+    pub fn with(mut self, iterations: Option<u32>, count: Option<u32>) -> Recipe {
+        if let Some(iterations) = iterations {
+            self.iterations.iter_mut().filter(|own| **own > 0).for_each(|own| *own = iterations);
+        }
+        if let Some(count) = count {
+            (self.max_count, self.max_per_pixel) = (count as usize, f32::INFINITY);
+        }
+        self
     }
 }

@@ -3,7 +3,8 @@
 use super::hull::Hull;
 use super::sweep::Sweep;
 use super::with_gaussians::WithGaussians;
-use crate::gaussians::Recipe;
+use crate::gaussians::{MAX_COUNT, MAX_ITERATIONS, Recipe};
+use crate::options::{FieldOptions, Flag, FlagAbout, OpenError, count, flags};
 use crate::row::{Origin, Row};
 use crate::{About, AnyField, Field, FieldError, Prepared};
 use viewfuse_device::Device;
@@ -26,11 +27,30 @@ pub(crate) const ROW: Row = Row {
     name: "gaussians",
     title: "field of Gaussians",
     heading: "Options of the field of Gaussians",
-    origin: Origin::TrainingFree { open: |_| Ok(AnyField::new(Gaussians::default())) },
-    flags: &[],
+    origin: Origin::TrainingFree { open },
+    flags: Given::FLAGS,
     omissions: &[],
     presets: |_, _, _| Vec::new(),
 };
+
+flags! {
+    iterations: u32 = "gaussian-iterations", "N", parse_iterations, Picture, &[], "Iterations at each size of the sources";
+    count: u32 = "gaussian-count", "N", parse_count, Picture, &[], "Most Gaussians";
+}
+
+fn parse_iterations(text: &str) -> Result<u32, String> {
+    count(text, 1..=MAX_ITERATIONS)
+}
+
+fn parse_count(text: &str) -> Result<u32, String> {
+    count(text, 1..=MAX_COUNT)
+}
+
+fn open(options: &FieldOptions) -> Result<AnyField, OpenError> {
+    let given = Given::of(options);
+    let recipe = Recipe { seed: options.seed, ..Recipe::default() }.with(given.iterations, given.count);
+    Ok(AnyField::new(Gaussians { recipe, ..Gaussians::default() }))
+}
 
 impl Field for Gaussians {
     /// Sources at the size of the pictures.

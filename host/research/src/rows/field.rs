@@ -44,6 +44,7 @@ pub(super) fn of_the_field() -> Vec<Row> {
             .iter()
             .map(|job| format!(" photographs={{DATA}}/{job}"))
             .collect();
+    let at = |jobs: &[&str]| -> String { jobs.iter().map(|job| format!(" {{DATA}}/{job}")).collect() };
     let selections: String = [
         "fern=llff:3",
         "fern=llff:6",
@@ -129,6 +130,42 @@ pub(super) fn of_the_field() -> Vec<Row> {
             vec![print("viewfuse-research sweep_time tests/data/room")],
         )
         .also(&["host/research/src/experiments/sweep_time.rs"]),
+        row(
+            "gaussian_recipe",
+            "Gaussians: what matters in the recipe",
+            &["gaussian_recipe.txt"],
+            Hours::Estimated(0.15),
+            vec![print(format!(
+                "viewfuse-research gaussian_recipe 200 3{}",
+                at(&["kangaroo=llff:9", "fern=llff:3", "cup=llff:9", "gold_cape=llff:9"])
+            ))],
+        )
+        .needs(&[KANGAROO, FERN, CUP, CAPE])
+        .also(&["host/research/src/experiments/gaussians"]),
+        row(
+            "gaussian_weights",
+            "Gaussians: the paper's question, weights of the sources in the loss",
+            &["gaussian_weights.txt"],
+            Hours::Estimated(0.1),
+            vec![print(format!(
+                "viewfuse-research gaussian_weights 200 5 60{}",
+                at(&["kangaroo=llff:9", "cup=llff:9", "fern=llff:3", "herz_jesus_p8=fixed:0,1,3,4,6,7:2,5"])
+            ))],
+        )
+        .needs(&[KANGAROO, CUP, FERN, HERZ])
+        .also(&["host/research/src/experiments/gaussians"]),
+        row(
+            "gaussian_frames",
+            "Gaussians: time of a picture by its stages",
+            &["gaussian_frames.txt"],
+            Hours::Estimated(0.01),
+            vec![
+                work("viewfuse optimise {DATA}/cup --size 400x300 --sources all/9 --count 40000 -o {WORK}/cup.ply"),
+                print("viewfuse-research gaussian_frames {DATA}/cup {WORK}/cup.ply 40 320x240 504x378"),
+            ],
+        )
+        .needs(&[CUP])
+        .also(&["host/research/src/experiments/gaussians"]),
         row(
             "points",
             "the point cloud of an object",

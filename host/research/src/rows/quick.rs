@@ -92,6 +92,24 @@ pub(super) fn rows() -> Vec<Row> {
                 print("viewfuse-research efforts {WORK}/room 0,1,3,4 2"),
             ],
         ),
+        quick(
+            "gaussian_recipe",
+            &["gaussian_recipe.txt"],
+            vec![print("viewfuse-research gaussian_recipe 48 1 tests/data/room=llff:4")],
+        ),
+        quick(
+            "gaussian_weights",
+            &["gaussian_weights.txt"],
+            vec![print("viewfuse-research gaussian_weights 48 2 12 tests/data/room=llff:4")],
+        ),
+        quick(
+            "gaussian_frames",
+            &["gaussian_frames.txt"],
+            vec![
+                work("viewfuse optimise tests/data/room --size 64x48 --iterations 8 -o {WORK}/room.ply"),
+                print("viewfuse-research gaussian_frames tests/data/room {WORK}/room.ply 3 64x48"),
+            ],
+        ),
         quick("sweep_time", &["sweep_time.txt"], vec![print("viewfuse-research sweep_time tests/data/room")]),
         quick(
             "pareto_training_free",

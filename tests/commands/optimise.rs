@@ -1,0 +1,194 @@
+//! `viewfuse optimise`: the scene of Gaussians, its score on the way, what interruptions leave, and who reads its files.
+#![cfg(unix)]
+
+use super::{BINARY, done};
+use std::fs;
+use std::path::Path;
+use viewfuse::scene::SceneFrame;
+use viewfuse::scene::gaussians::GaussianScene;
+use viewfuse_tests::command::{
+    Outcome, assert_refused, assert_wrong_arguments, command, files_below, killed_when, names_in, start, toy,
+};
+use viewfuse_tests::patience::{end, send, wait_while_running};
+
+viewfuse_tests::trials![
+    views_left_out_are_scored_on_the_way,
+    it_ends_with_the_weights_of_a_view,
+    the_number_follows_the_pixels,
+    ctrl_c_keeps_what_there_is,
+    after_a_kill_it_goes_on_from_the_file,
+    its_files_are_rendered,
+    what_it_refuses,
+    hostile_files_are_errors_of_every_command,
+    a_page_holds_what_the_file_holds,
+];
+
+const OPTIMISE: &str = "optimise toy --size 48x48 --device cpu";
+
+fn gaussians(path: &Path) -> GaussianScene {
+    GaussianScene::read(path, &SceneFrame::FILE).expect("a file of Gaussians")
+}
+
+/// Iteration and decibels of the lines about views that are left out.
+fn scores(text: &str) -> Vec<(u32, f64)> {
+    let score = |line: &str| {
+        let (iteration, rest) = line.strip_prefix("iteration ")?.split_once(" of ")?;
+        let (_, psnr) = rest.split_once(": views left out have a PSNR of ")?;
+        Some((iteration.parse().ok()?, psnr.strip_suffix(" dB")?.parse().ok()?))
+    };
+    text.lines().filter_map(score).collect()
+}
+
+fn views_left_out_are_scored_on_the_way() {
+    let folder = toy();
+    let text = done(folder.path(), &format!("{OPTIMISE} --left-out 20,21 -o a.ply"));
+    let scores = scores(&text);
+    assert_eq!(scores.iter().map(|own| own.0).collect::<Vec<_>>(), [40, 80, 120, 160, 200, 240], "{text}");
+    assert!(scores[5].1 > scores[0].1 + 3.0, "it becomes better: {text}");
+    let count = gaussians(&folder.path().join("a.ply")).gaussians.len();
+    assert!(text.contains(&format!("a.ply: {count} Gaussians after 240 of 240 iterations\n")), "{text}");
+    // The last score is that of `render` with the file, from the same sources.
+    let rendered = done(folder.path(), "render toy --gaussians a.ply --targets 20,21 --size 48x48 --device cpu -o out");
+    let psnr = |line: &str| line.split("PSNR ").nth(1)?.split(" dB").next()?.parse::<f64>().ok();
+    let own: Vec<f64> = rendered.lines().filter_map(psnr).collect();
+    assert!(own.len() == 2 && (own.iter().sum::<f64>() / 2.0 - scores[5].1).abs() < 0.02, "{rendered}\n{text}");
+    // The same seed, any number of threads.
+    done(folder.path(), &format!("{OPTIMISE} --left-out 20,21 --threads 1 -o b.ply"));
+    let read = |name: &str| fs::read(folder.path().join(name)).expect("a file");
+    assert!(read("a.ply") == read("b.ply"), "one thread makes another scene");
+    done(folder.path(), &format!("{OPTIMISE} --left-out 20,21 --seed 5 -o c.ply"));
+    assert!(read("a.ply") != read("c.ply"), "the seed changes nothing");
+}
+
+fn it_ends_with_the_weights_of_a_view() {
+    let folder = toy();
+    let optimised = |options: &str, output: &str| {
+        let text = done(folder.path(), &format!("{OPTIMISE} --left-out 20,21 {options} -o {output}"));
+        (scores(&text), fs::read(folder.path().join(output)).expect("a file"))
+    };
+    let (without, one, other) =
+        (optimised("", "a.ply"), optimised("--towards 20", "b.ply"), optimised("--towards 21", "c.ply"));
+    // The same up to there, then 60 iterations more, which differ by the view and by the scheme.
+    assert_eq!(one.0[..6], without.0[..]);
+    assert_eq!(one.0[6..].iter().map(|own| own.0).collect::<Vec<_>>(), [280, 300]);
+    assert!(one.1 != other.1, "both views have the same weights");
+    let mean = optimised("--towards 20 --weights mean", "d.ply");
+    assert!(mean.1 != one.1, "the scheme does not count");
+}
+
+fn the_number_follows_the_pixels() {
+    let folder = toy();
+    let count = |options: &str| {
+        done(folder.path(), &format!("optimise toy --device cpu --iterations 4 {options} -o toy.ply"));
+        gaussians(&folder.path().join("toy.ply")).gaussians.len()
+    };
+    let own = count("--size 32x32");
+    assert!(own > 200 && own <= 32 * 32 * 3 / 2, "{own} Gaussians for 32x32 pixels");
+    let fewer = count("--size 32x32 --count 300");
+    assert!(fewer > 200 && fewer <= 300, "{fewer}");
+}
+
+fn ctrl_c_keeps_what_there_is() {
+    let folder = toy();
+    let path = folder.path().join("toy.ply");
+    let mut child = start(BINARY, folder.path(), &format!("{OPTIMISE} --iterations 100000 -o toy.ply"));
+    wait_while_running(&mut child, || path.exists());
+    send("-INT", &child);
+    assert_eq!(end(&mut child).expect("an end").code(), Some(130));
+    let text = String::from_utf8(child.wait_with_output().expect("its output").stdout).expect("text");
+    let count = gaussians(&path).gaussians.len();
+    assert!(count > 100 && text.contains(&format!("toy.ply: {count} Gaussians after ")), "{text}");
+    assert!(text.contains(" of 300000 iterations\n"), "{text}");
+    assert_eq!(names_in(folder.path()), ["toy", "toy.ply"]);
+}
+
+fn after_a_kill_it_goes_on_from_the_file() {
+    let folder = toy();
+    let path = folder.path().join("toy.ply");
+    killed_when(BINARY, folder.path(), &format!("{OPTIMISE} --iterations 100000 --left-out 20 -o toy.ply"), || {
+        path.exists()
+    });
+    let before = fs::read(&path).expect("a file");
+    assert!(gaussians(&path).gaussians.len() > 100);
+    let resumed = |output: &str| {
+        let text = done(folder.path(), &format!("{OPTIMISE} --left-out 20 --resume toy.ply -o {output}"));
+        (scores(&text), fs::read(folder.path().join(output)).expect("a file"))
+    };
+    // What goes on from a file is the same each time; it has the finest size's 60 iterations, and is better than the file.
+    let (first, second) = (resumed("a.ply"), resumed("b.ply"));
+    assert!(first == second, "two scenes from one file");
+    assert_eq!(first.0.iter().map(|own| own.0).collect::<Vec<_>>(), [200, 240]);
+    let rendered = done(folder.path(), "render toy --gaussians toy.ply --targets 20 --size 48x48 --device cpu -o out");
+    let psnr = rendered.split("PSNR ").nth(1).and_then(|rest| rest.split(' ').next()).expect("a score");
+    assert!(first.0[1].1 > psnr.parse().expect("a number"), "{rendered} {:?}", first.0);
+    assert!(fs::read(&path).expect("a file") == before, "the file that it goes on from has changed");
+}
+
+fn its_files_are_rendered() {
+    let folder = toy();
+    done(folder.path(), &format!("{OPTIMISE} -o toy.ply"));
+    done(folder.path(), "render toy --gaussians toy.ply --orbit 5 --size 40x40 --video webp --device cpu -o orbit");
+    let pictures = names_in(&folder.path().join("orbit")).into_iter().filter(|name| {
+        let is_picture = name.starts_with("orbit-") && name.len() == "orbit-001.png".len();
+        is_picture && image::open(folder.path().join("orbit").join(name)).expect("a picture").width() == 40
+    });
+    assert_eq!(pictures.count(), 5);
+    let record = fs::read_to_string(folder.path().join("orbit/run.json")).expect("a record");
+    assert!(record.contains("\"gaussians\""), "{record}");
+}
+
+fn what_it_refuses() {
+    let folder = toy();
+    assert_wrong_arguments(BINARY, folder.path(), &format!("{OPTIMISE} -o toy.obj"), &["written as .ply or .html"]);
+    assert_wrong_arguments(BINARY, folder.path(), &format!("{OPTIMISE} --count 0 -o toy.ply"), &["--count"]);
+    assert_refused(BINARY, folder.path(), &format!("{OPTIMISE} --resume no.ply -o toy.ply"), &["no.ply"]);
+    assert_refused(BINARY, folder.path(), &format!("{OPTIMISE} --left-out 99 -o toy.ply"), &["99"]);
+}
+
+/// What a file of Gaussians may not be, and a word of the message.
+fn hostile(whole: &[u8]) -> Vec<(Vec<u8>, &'static str)> {
+    let header = whole.windows(11).position(|part| part == b"end_header\n").expect("a header") + 11;
+    let text = String::from_utf8(whole[..header].to_vec()).expect("text");
+    let with = |from: &str, to: &str| [text.replacen(from, to, 1).as_bytes(), &whole[header..]].concat();
+    let count = text.lines().find(|line| line.starts_with("element vertex ")).expect("a count");
+    let mut infinite = whole.to_vec();
+    infinite[header..header + 4].copy_from_slice(&f32::NAN.to_le_bytes());
+    vec![
+        (Vec::new(), "evil.ply"),
+        (whole[..whole.len() - 5].to_vec(), "evil.ply"),
+        (with(count, "element vertex 4294967295"), "evil.ply"),
+        (with(count, "element vertex 99999999999999999999"), "evil.ply"),
+        (with("property float opacity", "property float other"), "opacity"),
+        (infinite, "evil.ply"),
+    ]
+}
+
+fn hostile_files_are_errors_of_every_command() {
+    let folder = toy();
+    done(folder.path(), &format!("{OPTIMISE} --iterations 4 -o toy.ply"));
+    let whole = fs::read(folder.path().join("toy.ply")).expect("a file");
+    for (bytes, word) in hostile(&whole) {
+        folder.write("evil.ply", &bytes);
+        for arguments in [
+            "render toy --gaussians evil.ply --targets 20 --size 16x16 --device cpu -o out",
+            "view toy --gaussians evil.ply --no-browser --device cpu",
+            &format!("{OPTIMISE} --resume evil.ply -o more.ply"),
+        ] {
+            assert_refused(BINARY, folder.path(), arguments, &["evil.ply", word]);
+        }
+    }
+}
+
+fn a_page_holds_what_the_file_holds() {
+    let folder = toy();
+    let file = done(folder.path(), &format!("{OPTIMISE} -o toy.ply"));
+    let Outcome { code, stdout, stderr } =
+        Outcome::of(command(BINARY, folder.path(), &format!("{OPTIMISE} -o toy.html")));
+    assert_eq!((code, stderr.as_str()), (Some(0), ""));
+    assert_eq!(stdout.replace("toy.html", "toy.ply"), file);
+    let page = fs::read_to_string(folder.path().join("toy.html")).expect("a page");
+    assert!(page.starts_with("<!doctype html>") || page.starts_with("<!DOCTYPE html>"), "{}", &page[..40]);
+    assert!(!page.contains("src=\"http") && !page.contains("href=\"http"), "it needs a network");
+    let bytes = files_below(folder.path()).into_iter().find(|(path, _)| path.ends_with("toy.ply")).expect("a file").1;
+    assert!((page.len() as u64) < bytes + 200_000, "{} bytes of a page for {bytes} of a file", page.len());
+}
