@@ -4,9 +4,9 @@ use crate::advice::Neighbours;
 use crate::attempt::Tried;
 use crate::find::{Found, Options};
 use crate::focal::FocalSource;
-use crate::intake::file_name;
+use crate::intake::{IntakeError, file_name, listed};
 use crate::verdict::{Verdict, Verified};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::write::{Layout, WriteSceneError, Written, write_with};
@@ -21,6 +21,8 @@ pub struct Record<'a> {
     pub viewfuse: &'static str,
     /// The folder of the photographs.
     pub photographs: String,
+    /// All that were taken, usable or not: names and lengths in bytes.
+    pub files: &'a [(String, u64)],
     /// The seed.
     pub seed: u64,
     /// Every so many photographs were taken.
@@ -89,6 +91,7 @@ impl Found {
         Record {
             viewfuse: env!("CARGO_PKG_VERSION"),
             photographs: self.intake.folder.display().to_string(),
+            files: &self.intake.files,
             seed: options.seed,
             every: options.every,
             cameras: cameras.filter(|camera| camera.photographs > 0).collect(),
@@ -121,4 +124,20 @@ pub fn write(
     let mut files = vec![(RECORD, record)];
     files.extend(beside.iter().cloned());
     write_with(&verdict.scene, layout, folder, &files, progress)
+}
+
+/// What of a record tells whether a scene is still that of a folder.
+#[derive(Deserialize)]
+struct Earlier {
+    files: Vec<(String, u64)>,
+}
+
+/// Whether [`write()`] wrote the scene in `posed` for the photographs that a folder has now, by their names and lengths.
+///
+/// # Errors
+/// [`IntakeError`] if the folder's photographs cannot be listed.
+pub fn is_current(posed: &Path, photographs: &Path) -> Result<bool, IntakeError> {
+    let now = listed(photographs)?;
+    let record = std::fs::read(posed.join(RECORD)).unwrap_or_default();
+    Ok(serde_json::from_slice::<Earlier>(&record).is_ok_and(|earlier| earlier.files == now))
 }

@@ -3,7 +3,7 @@
 //! ```text
 //! planes                                      a target's planes, for two of them
 //! efforts, headroom, mixture, paper_question,
-//! poses, refinement, self_knowledge,
+//! poses (and posed_pictures), refinement, self_knowledge,
 //! sweep_time                                  the experiments
 //! ```
 
@@ -22,11 +22,12 @@ use anyhow::Context;
 /// Takes what stands behind the experiment's name.
 type Experiment = fn(&[String]) -> anyhow::Result<()>;
 
-const EXPERIMENTS: [(&str, Experiment); 8] = [
+const EXPERIMENTS: [(&str, Experiment); 9] = [
     ("efforts", efforts::run),
     ("headroom", headroom::run),
     ("mixture", mixture::run),
     ("paper_question", paper_question::run),
+    ("posed_pictures", poses::pictures::run),
     ("poses", poses::run),
     ("refinement", refinement::run),
     ("self_knowledge", self_knowledge::run),
