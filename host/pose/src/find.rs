@@ -19,7 +19,8 @@ pub struct Options {
     pub seed: u64,
     /// Every so many photographs are taken.
     pub every: usize,
-    /// Whether accepted poses are refined by the photographs themselves.
+    /// Whether accepted poses are refined by the photographs themselves: off, because poses that meet left-out photographs better
+    /// were more often farther from the true ones than nearer (`host/research/results/poses.md`).
     pub refine: bool,
 }
 

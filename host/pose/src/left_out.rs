@@ -201,23 +201,24 @@ pub(crate) struct Rendered<'a> {
 }
 
 impl Rendered<'_> {
-    /// The picture at a pose, of the truth's size.
+    /// What is shown at a pose, of the truth's size.
     ///
     /// # Errors
     /// [`RenderError`].
-    pub(crate) fn picture(&mut self, pose: Pose) -> Result<RgbImage, RenderError> {
+    pub(crate) fn shown(&mut self, pose: Pose) -> Result<Shown, RenderError> {
         let camera = Camera { pose, ..self.camera };
         let frame = self.stage.frame_of_size(&self.weighting, &camera, self.size, self.progress)?;
-        Ok(self.truth.resized(frame.picture))
+        let size = frame.picture.dimensions().into();
+        Ok(Shown { picture: self.truth.resized(frame.picture), depths: frame.depths, size })
     }
 
-    /// The score of that picture.
+    /// The score of the picture at a pose.
     ///
     /// # Errors
     /// [`RenderError`].
     pub(crate) fn score(&mut self, pose: Pose) -> Result<f64, RenderError> {
-        let picture = self.picture(pose)?;
-        Ok(self.truth.score(&picture))
+        let shown = self.shown(pose)?;
+        Ok(self.truth.score(&shown.picture))
     }
 }
 
@@ -248,6 +249,22 @@ fn turned(pose: &Pose) -> Vec<Pose> {
         ]
     };
     [about(sin), about(-sin)].into_iter().flatten().flatten().collect()
+}
+
+/// A rendered picture of the truth's size, with its depths as they were rendered.
+pub(crate) struct Shown {
+    pub(crate) picture: RgbImage,
+    depths: Vec<f32>,
+    size: [u32; 2],
+}
+
+impl Shown {
+    /// The depth of a pixel of the picture, along the principal axis in world units; 0 without a surface.
+    pub(crate) fn depth(&self, pixel: [u32; 2]) -> f32 {
+        let (width, height) = self.picture.dimensions();
+        let [x, y] = [pixel[0] * self.size[0] / width, pixel[1] * self.size[1] / height];
+        self.depths.get((y * self.size[0] + x) as usize).copied().unwrap_or(0.0)
+    }
 }
 
 /// A photograph as it is compared.
@@ -288,10 +305,10 @@ impl Truth {
         (pairs().flat_map(|((truth, own), _)| of(truth, own)).collect(), gains)
     }
 
-    /// The levels of a picture of its size, three for each pixel that counts.
-    pub(crate) fn levels(&self, picture: &RgbImage) -> Vec<f64> {
-        let shown = picture.pixels().zip(&self.shown).filter(|(_, shown)| **shown);
-        shown.flat_map(|(pixel, _)| pixel.0.map(|level| f64::from(level) / 255.0)).collect()
+    /// The pixels that count, in the order of the differences.
+    pub(crate) fn places(&self) -> impl Iterator<Item = (u32, u32)> {
+        let shown = self.picture.enumerate_pixels().zip(&self.shown).filter(|(_, shown)| **shown);
+        shown.map(|((x, y, _), _)| (x, y))
     }
 
     /// The score of a picture of its size.

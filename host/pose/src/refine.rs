@@ -1,16 +1,19 @@
-//! Poses refined by the photographs themselves: each is moved until what its neighbours show at its pose is nearest to it.
+//! Poses refined by the photographs themselves: each is moved until what its neighbours show at its pose is nearest to it
+//! (direct image alignment, as of Newcombe et al., "DTAM", 2011, with the field's depths and pictures as the model).
 //!
 //! ```text
-//! r = truth - gain picture(pose)            differences of levels, over the pixels that the photograph shows
-//! J = d picture / d pose                    six central differences of rendered pictures, half a pixel to each side
+//! r = truth - gain picture(pose)          differences of levels, over the pixels that the photograph shows
+//! J = - grad picture  d(u, v) / d pose    the pixel's way in the picture, by its depth
 //! (J^T W J + damping diag) step = J^T W r   W by Huber: what the neighbours cannot show must not pull
 //! ```
 //!
 //! All photographs move at the same time, and then stand as neighbours at their new poses. A step that meets its photograph
-//! no better is halved, then given up. The whole is kept if the mean score of all photographs, left out again, is better.
+//! no better is halved once, then given up. The whole is kept if the mean score of all photographs, left out again, is better
+//! and no photograph is met clearly worse.
 
-use crate::left_out::{LeftOut, Photographs, Rendered, open_album};
+use crate::left_out::{Photographs, Rendered, Shown, open_album};
 use glam::{DMat3, DVec3};
+use viewfuse_core::camera::Camera;
 use viewfuse_core::pose::Pose;
 use viewfuse_field::render::RenderError;
 use viewfuse_job::progress::{Progress, Quiet};
@@ -18,9 +21,9 @@ use viewfuse_scene::Scene;
 use viewfuse_scene::rig::Rig;
 
 /// Times that all photographs move.
-const SWEEPS: usize = 3;
-/// Half of the difference for a derivative, in pixels of the rendered picture.
-const DIFFERENCE: f64 = 0.5;
+const SWEEPS: usize = 2;
+/// Steps of a photograph each time.
+const STEPS: usize = 2;
 /// Damping, as a share of the diagonal.
 const DAMPING: f64 = 0.05;
 /// Longest step in pixels of the rendered picture.
@@ -29,6 +32,8 @@ const MAX_STEP: f64 = 1.0;
 const HUBER: f64 = 0.1;
 /// Least gain of the mean score in decibels for which refined poses are kept.
 const MIN_GAIN: f64 = 0.02;
+/// Most decibels that a photograph may lose.
+const MAX_LOSS: f64 = 0.2;
 
 /// A motion of a camera in its own axes (right, down, forward): a rotation vector in radians, a way in world units.
 pub(crate) type Motion = [f64; 6];
@@ -37,89 +42,100 @@ pub(crate) type Motion = [f64; 6];
 pub(crate) struct Refined {
     /// The motions of each view, one after the other.
     pub(crate) motions: Vec<Vec<Motion>>,
-    /// The photographs, left out at the new poses.
-    pub(crate) left_out: Vec<LeftOut>,
+    /// Mean score of the photographs, left out at the new poses.
+    pub(crate) score: f64,
 }
 
-/// Refines the poses of a scene whose photographs scored so when they were left out; `None` if that gains nothing.
+/// Refines the poses of a scene whose photographs have these scores when they are left out; `None` if that gains nothing.
 ///
 /// # Errors
 /// [`RenderError`].
-pub(crate) fn refine(
-    scene: &Scene,
-    before: &[LeftOut],
-    progress: &dyn Progress,
-) -> Result<Option<Refined>, RenderError> {
+pub(crate) fn refine(scene: &Scene, before: &[f64], progress: &dyn Progress) -> Result<Option<Refined>, RenderError> {
     let quiet = Quiet(progress);
     let album = open_album(scene, &quiet)?;
     let mut photographs = Photographs::of(scene, &album, &quiet)?;
     let mut motions = vec![Vec::new(); scene.views.len()];
     for _ in 0..SWEEPS {
-        let focus = Rig::of(&scene.views.iter().map(|view| view.camera).collect::<Vec<_>>()).focus;
-        let steps = photographs.each(progress, |_, rendered| step(rendered, focus.as_dvec3()))?;
-        let poses: Vec<Pose> = photographs
-            .scene
-            .views
-            .iter()
-            .zip(&steps)
-            .map(|(view, step)| moved(&view.camera.pose, step).unwrap_or(view.camera.pose))
-            .collect();
+        let cameras: Vec<_> = photographs.scene.views.iter().map(|view| view.camera).collect();
+        let focus = Rig::of(&cameras).focus.as_dvec3();
+        let steps = photographs.each(progress, |_, rendered| steps(rendered, focus))?;
+        let end = |(camera, steps): (&Camera, &Vec<Motion>)| {
+            steps.iter().try_fold(camera.pose, |pose, step| moved(&pose, step)).unwrap_or(camera.pose)
+        };
+        let poses: Vec<Pose> = cameras.iter().zip(&steps).map(end).collect();
         photographs = photographs.at(&poses);
-        motions.iter_mut().zip(steps).for_each(|(all, step)| all.push(step));
+        motions.iter_mut().zip(steps).for_each(|(all, steps)| all.extend(steps));
     }
-    let left_out = photographs.left_out(progress)?;
-    let mean = |all: &[LeftOut]| all.iter().map(|own| own.score).sum::<f64>() / all.len().max(1) as f64;
-    Ok((mean(&left_out) >= mean(before) + MIN_GAIN).then_some(Refined { motions, left_out }))
+    let after = photographs.each(progress, |_, rendered| rendered.score(rendered.camera.pose))?;
+    let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len().max(1) as f64;
+    let is_better = mean(&after) >= mean(before) + MIN_GAIN;
+    let is_worse = before.iter().zip(&after).any(|(before, after)| after < &(before - MAX_LOSS));
+    Ok((is_better && !is_worse).then(|| Refined { motions, score: mean(&after) }))
 }
 
-/// The motion that brings a photograph nearest to what its neighbours show; none where no step does.
-fn step(rendered: &mut Rendered<'_>, focus: DVec3) -> Result<Motion, RenderError> {
-    let camera = rendered.camera;
-    let (pose, pinhole) = (camera.pose, camera.pinhole);
-    let longest = f64::from(pinhole.width().max(pinhole.height()));
-    let picture = rendered.picture(pose)?;
-    let pixels = longest / f64::from(picture.width().max(picture.height()));
-    // A pixel of the rendered picture, as an angle and as a way at the distance of what the cameras look at.
-    let angle = pixels / f64::from(pinhole.focal()[0]);
-    let way = angle * focus.distance(pose.centre_world().as_dvec3());
-    let units: Motion = [angle, angle, angle, way, way, way];
-    let (differences, gains) = rendered.truth.differences(&picture);
-    let mut derivatives: Vec<Vec<f64>> = Vec::with_capacity(6);
-    for axis in 0..6 {
-        let mut levels = |share: f64| -> Result<Vec<f64>, RenderError> {
-            let mut motion = [0.0; 6];
-            motion[axis] = share * units[axis];
-            let picture = rendered.picture(moved(&pose, &motion).unwrap_or(pose))?;
-            Ok(rendered.truth.levels(&picture))
-        };
-        let (ahead, behind) = (levels(DIFFERENCE)?, levels(-DIFFERENCE)?);
-        let of =
-            |(index, (ahead, behind)): (usize, (f64, f64))| gains[index % 3] * (ahead - behind) / (2.0 * DIFFERENCE);
-        derivatives.push(ahead.into_iter().zip(behind).enumerate().map(of).collect());
-    }
-    let weights: Vec<f64> = differences.iter().map(|own| (HUBER / own.abs().max(HUBER)).min(1.0)).collect();
-    let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).zip(&weights).map(|((a, b), w)| w * a * b).sum::<f64>();
-    let mut matrix = [[0.0; 7]; 6];
-    for row in 0..6 {
-        for column in 0..6 {
-            matrix[row][column] = sum(&derivatives[row], &derivatives[column]);
+/// The motions that bring a photograph nearer to what its neighbours show.
+fn steps(rendered: &mut Rendered<'_>, focus: DVec3) -> Result<Vec<Motion>, RenderError> {
+    let mut pose = rendered.camera.pose;
+    let mut shown = rendered.shown(pose)?;
+    let mut motions = Vec::new();
+    'steps: for _ in 0..STEPS {
+        let Some(full) = step(rendered, &pose, &shown, focus) else { break };
+        for share in [1.0, 0.5] {
+            let motion = full.map(|own| share * own);
+            let Some(next) = moved(&pose, &motion) else { continue };
+            let there = rendered.shown(next)?;
+            if rendered.truth.score(&there.picture) > rendered.truth.score(&shown.picture) {
+                (pose, shown) = (next, there);
+                motions.push(motion);
+                continue 'steps;
+            }
         }
-        matrix[row][row] *= 1.0 + DAMPING;
-        matrix[row][6] = sum(&derivatives[row], &differences);
+        break;
     }
-    let Some(mut found) = solve(matrix) else { return Ok([0.0; 6]) };
+    Ok(motions)
+}
+
+/// The damped least-squares step at a pose; `None` where the picture does not tell one.
+fn step(rendered: &Rendered<'_>, pose: &Pose, shown: &Shown, focus: DVec3) -> Option<Motion> {
+    let (width, height) = shown.picture.dimensions();
+    let pinhole = rendered.camera.pinhole.resized(width, height).ok()?;
+    let focal = pinhole.focal().map(f64::from);
+    let principal = pinhole.principal().map(f64::from);
+    // A pixel as an angle, and as a way at the distance of what the cameras look at.
+    let (angle, distance) = (1.0 / focal[0], focus.distance(pose.centre_world().as_dvec3()));
+    let units: Motion = [angle, angle, angle, angle * distance, angle * distance, angle * distance];
+    let (differences, gains) = rendered.truth.differences(&shown.picture);
+    let mut rows = [[0.0; 7]; 6];
+    for ((x, y), difference) in rendered.truth.places().zip(differences.chunks_exact(3)) {
+        let depth = f64::from(shown.depth([x, y]));
+        if depth <= 0.0 || x == 0 || y == 0 || x + 1 == width || y + 1 == height {
+            continue;
+        }
+        // The point's place, and per motion of the camera its way: -way - turn x point.
+        let across = [(x, focal[0], principal[0]), (y, focal[1], principal[1])];
+        let [a, b] = across.map(|(own, focal, principal)| (f64::from(own) + 0.5 - principal) / focal);
+        let flow_u = [a * b, -(1.0 + a * a), b, -1.0 / depth, 0.0, a / depth].map(|own| focal[0] * own);
+        let flow_v = [1.0 + b * b, -a * b, -a, 0.0, -1.0 / depth, b / depth].map(|own| focal[1] * own);
+        let level = |x: u32, y: u32, channel: usize| f64::from(shown.picture.get_pixel(x, y)[channel]) / 255.0;
+        for channel in 0..3 {
+            let slope_u = 0.5 * (level(x + 1, y, channel) - level(x - 1, y, channel));
+            let slope_v = 0.5 * (level(x, y + 1, channel) - level(x, y - 1, channel));
+            let derivative: [f64; 6] = std::array::from_fn(|axis| {
+                -gains[channel] * units[axis] * (slope_u * flow_u[axis] + slope_v * flow_v[axis])
+            });
+            let weight = HUBER / difference[channel].abs().max(HUBER);
+            for row in 0..6 {
+                let own = weight * derivative[row];
+                rows[row][..6].iter_mut().zip(derivative).for_each(|(sum, other)| *sum += own * other);
+                rows[row][6] += own * difference[channel];
+            }
+        }
+    }
+    (0..6).for_each(|axis| rows[axis][axis] *= 1.0 + DAMPING);
+    let found = solve(rows)?;
     let longest = found.iter().fold(0.0_f64, |longest, own| longest.max(own.abs()));
-    found.iter_mut().for_each(|own| *own *= (MAX_STEP / longest.max(f64::MIN_POSITIVE)).min(1.0));
-    let score = rendered.truth.score(&picture);
-    for share in [1.0, 0.5, 0.25] {
-        let motion: Motion = std::array::from_fn(|axis| share * found[axis] * units[axis]);
-        if let Some(pose) = moved(&pose, &motion)
-            && rendered.score(pose)? > score
-        {
-            return Ok(motion);
-        }
-    }
-    Ok([0.0; 6])
+    let share = (MAX_STEP / longest.max(f64::MIN_POSITIVE)).min(1.0);
+    Some(std::array::from_fn(|axis| share * found[axis] * units[axis]))
 }
 
 /// Solves six equations by elimination with the largest pivot; `None` if one of them is empty.
@@ -132,9 +148,8 @@ fn solve(mut rows: [[f64; 7]; 6]) -> Option<[f64; 6]> {
         }
         for row in (0..6).filter(|row| *row != column) {
             let factor = rows[row][column] / rows[column][column];
-            for place in column..7 {
-                rows[row][place] -= factor * rows[column][place];
-            }
+            let pivot = rows[column];
+            rows[row].iter_mut().zip(pivot).for_each(|(own, pivot)| *own -= factor * pivot);
         }
     }
     Some(std::array::from_fn(|row| rows[row][6] / rows[row][row]))

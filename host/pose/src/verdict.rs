@@ -154,26 +154,22 @@ pub(crate) fn verdict(
     Ok(Err(Refusal { reasons: attempts.iter().map(reason).collect() }))
 }
 
-/// Refines the poses of what was accepted, and keeps them if all photographs still pass.
+/// Refines the poses of what was accepted, where that gains.
 fn refine_verdict(
     (folder, photos, cameras): (&Path, &[Photo], &Cameras),
     verdict: &mut Verdict,
     progress: &dyn Progress,
 ) -> Result<(), VerdictError> {
-    let before: Vec<LeftOut> = verdict.verified.iter().map(|own| own.left_out.clone()).collect();
+    let before: Vec<f64> = verdict.verified.iter().map(|own| own.left_out.score).collect();
     let Some(refined) = refine(&verdict.scene, &before, progress)? else { return Ok(()) };
-    if refined.left_out.iter().any(|own| failure(own).is_some()) {
-        return Ok(());
-    }
     for (photo, motions) in verdict.photos.iter().zip(&refined.motions) {
         for motion in motions {
             verdict.solution.photographs[*photo].shift(motion, verdict.scene.frame.scale);
         }
     }
-    let mean = |all: &[LeftOut]| all.iter().map(|own| own.score).sum::<f64>() / all.len().max(1) as f64;
-    verdict.refinement = Some(Refinement { before: mean(&before), after: mean(&refined.left_out) });
+    let mean = before.iter().sum::<f64>() / before.len().max(1) as f64;
+    verdict.refinement = Some(Refinement { before: mean, after: refined.score });
     verdict.scene = posed::scene(folder, photos, cameras, &verdict.solution, &verdict.photos)?;
-    verdict.verified.iter_mut().zip(refined.left_out).for_each(|(own, left_out)| own.left_out = left_out);
     Ok(())
 }
 

@@ -5,7 +5,7 @@ use crate::attempt::Tried;
 use crate::find::{Found, Options};
 use crate::focal::FocalSource;
 use crate::intake::{IntakeError, file_name, listed};
-use crate::verdict::{Verdict, Verified};
+use crate::verdict::{Refinement, Verdict, Verified};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use viewfuse_job::progress::Progress;
@@ -37,6 +37,8 @@ pub struct Record<'a> {
     pub attempts: Vec<&'a Tried>,
     /// The accepted photographs with what they passed.
     pub accepted: &'a [Verified],
+    /// What refinement by the photographs gained; `None` if it was not asked for or gained nothing.
+    pub refinement: Option<Refinement>,
     /// Photographs that were left out, each with the reason.
     pub left_out: Vec<(String, String)>,
     /// The accepted ones as neighbours.
@@ -79,8 +81,7 @@ impl Found {
     /// The record of an accepted verdict.
     pub fn record<'a>(&'a self, verdict: &'a Verdict, options: &Options) -> Record<'a> {
         let attempt = &self.attempts[verdict.attempt];
-        let k1 =
-            |index: usize| attempt.solution.as_ref().and_then(|own| own.cameras.get(index)).map_or(0.0, |own| own.k1);
+        let k1 = |index: usize| verdict.solution.cameras.get(index).map_or(0.0, |own| own.k1);
         let cameras = self.cameras.groups.iter().enumerate().map(|(index, group)| CameraRecord {
             size: group.size,
             photographs: group.photos.iter().filter(|photo| verdict.photos.contains(photo)).count(),
@@ -99,6 +100,7 @@ impl Found {
             attempt: verdict.attempt,
             attempts: self.attempts.iter().map(|attempt| &attempt.tried).collect(),
             accepted: &verdict.verified,
+            refinement: verdict.refinement,
             left_out: self.left_out(Some(verdict)),
             neighbours: Neighbours::of(&verdict.scene),
         }

@@ -3,7 +3,8 @@
 //! ```text
 //! planes                                      a target's planes, for two of them
 //! efforts, headroom, mixture, paper_question,
-//! poses (and posed_pictures), refinement, self_knowledge,
+//! poses (posed_pictures, refined_poses),
+//! refinement, self_knowledge,
 //! sweep_time                                  the experiments
 //! ```
 
@@ -22,13 +23,14 @@ use anyhow::Context;
 /// Takes what stands behind the experiment's name.
 type Experiment = fn(&[String]) -> anyhow::Result<()>;
 
-const EXPERIMENTS: [(&str, Experiment); 9] = [
+const EXPERIMENTS: [(&str, Experiment); 10] = [
     ("efforts", efforts::run),
     ("headroom", headroom::run),
     ("mixture", mixture::run),
     ("paper_question", paper_question::run),
     ("posed_pictures", poses::pictures::run),
     ("poses", poses::run),
+    ("refined_poses", poses::refined::run),
     ("refinement", refinement::run),
     ("self_knowledge", self_knowledge::run),
     ("sweep_time", sweep_time::run),

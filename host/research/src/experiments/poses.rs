@@ -16,6 +16,7 @@
 
 mod exif;
 pub(super) mod pictures;
+pub(super) mod refined;
 mod sets;
 mod truth;
 
@@ -58,12 +59,8 @@ struct Row {
 /// Removes the poses of a set and finds them again.
 fn one(scene: &Scene, set: &Set, solver: &OpenMvg) -> anyhow::Result<Row> {
     let views = neighbours(scene, set);
-    let found = match found(scene, set, &views, solver, false) {
-        // Too few photographs that can be used.
-        Err(error) if matches!(error.downcast_ref(), Some(PoseError::Few { .. })) => {
-            return Ok(Row { asked: views.len(), accepted: None, attempts: 0.0 });
-        }
-        found => found?.0,
+    let Some((found, _)) = found_or_few(scene, set, &views, solver, Options::default().refine)? else {
+        return Ok(Row { asked: views.len(), accepted: None, attempts: 0.0 });
     };
     let view_of = |photo: usize| view_of(&found, &views, photo);
     let accepted_attempt = found.verdict.as_ref().ok().map(|verdict| verdict.attempt);
@@ -80,13 +77,14 @@ fn one(scene: &Scene, set: &Set, solver: &OpenMvg) -> anyhow::Result<Row> {
 }
 
 /// Looks for the poses of copies of these views' photographs; with the folder of the copies, which the found scene refers to.
-fn found(
+/// `None` with too few photographs that can be used.
+fn found_or_few(
     scene: &Scene,
     set: &Set,
     views: &[usize],
     solver: &OpenMvg,
     refine: bool,
-) -> anyhow::Result<(Found, TempDir)> {
+) -> anyhow::Result<Option<(Found, TempDir)>> {
     let folder = tempfile::tempdir()?;
     let focal = f64::from(scene.views[views[0]].camera.pinhole.focal()[0]);
     for (place, view) in views.iter().enumerate() {
@@ -95,7 +93,10 @@ fn found(
     }
     let focal = (set.focal == Focal::Known).then_some(focal);
     let options = Options { focal, seed: set.seed, every: 1, refine };
-    Ok((find(folder.path(), &[solver], &options, &Silent)?, folder))
+    match find(folder.path(), &[solver], &options, &Silent) {
+        Err(PoseError::Few { .. }) => Ok(None),
+        found => Ok(Some((found?, folder))),
+    }
 }
 
 /// The view of the known scene that a photograph shows.
