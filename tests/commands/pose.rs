@@ -2,6 +2,9 @@
 //!
 //! Most tests need the program `viewfuse-openmvg` beside the command or named by `VIEWFUSE_OPENMVG`; `tests/run` builds it.
 
+mod colmap;
+mod on_the_way;
+
 use super::BINARY;
 use image::{DynamicImage, ImageFormat, RgbImage, imageops};
 use libtest_mimic::Trial;
@@ -30,12 +33,17 @@ const ROOM_FILM: u16 = 32;
 const ORIENTATION: u16 = 0x0112;
 const FILM: u16 = 0xa405;
 
-pub(crate) fn trials() -> Vec<Trial> {
+/// Photographs of a set whose poses a played solver says.
+const COUNT_ALONE: usize = 5;
+
+/// A test that needs the program.
+fn needs(name: &str, test: fn()) -> Trial {
     let missing = program().is_none().then(|| "no viewfuse-openmvg: `cargo openmvg` builds it".to_owned());
-    let needs = |name: &str, test: fn()| {
-        needing(missing.clone(), is_required(REQUIRE), trial(&format!("commands::pose::{name}"), test))
-    };
-    vec![
+    needing(missing, is_required(REQUIRE), trial(&format!("commands::pose::{name}"), test))
+}
+
+pub(crate) fn trials() -> Vec<Trial> {
+    let own = vec![
         needs("eight_photographs_to_a_picture", eight_photographs_to_a_picture),
         needs("what_does_not_belong_is_left_out_by_name", what_does_not_belong_is_left_out_by_name),
         needs("sizes_and_orientations_may_differ", sizes_and_orientations_may_differ),
@@ -45,7 +53,8 @@ pub(crate) fn trials() -> Vec<Trial> {
         trial("commands::pose::too_many_and_too_few", too_many_and_too_few),
         trial("commands::pose::without_the_program", without_the_program),
         trial("commands::pose::bare_photographs_say_how", bare_photographs_say_how),
-    ]
+    ];
+    own.into_iter().chain(colmap::trials()).chain(on_the_way::trials()).collect()
 }
 
 /// The program, if there is one.
@@ -101,11 +110,12 @@ fn bare(views: impl IntoIterator<Item = usize>) -> Folder {
     folder
 }
 
-/// What the command prints; warnings and progress aside, it succeeds.
+/// What a command prints; warnings and progress aside, it succeeds.
 #[track_caller]
-fn posed(folder: &Folder, arguments: &str) -> String {
-    let outcome = Outcome::of(command(BINARY, folder.path(), arguments));
-    assert_eq!(outcome.code, Some(0), "viewfuse {arguments}\n{}{}", outcome.stdout, outcome.stderr);
+fn posed(command: Command) -> String {
+    let told = format!("{command:?}");
+    let outcome = Outcome::of(command);
+    assert_eq!(outcome.code, Some(0), "{told}\n{}{}", outcome.stdout, outcome.stderr);
     outcome.stdout
 }
 
@@ -137,7 +147,7 @@ fn json(path: &Path) -> Value {
 
 fn eight_photographs_to_a_picture() {
     let folder = bare(0..8);
-    let said = posed(&folder, "pose bare -o posed --seed 3");
+    let said = posed(command(BINARY, folder.path(), "pose bare -o posed --seed 3"));
     assert!(said.starts_with("registered 8 of 8 photographs\n") && said.contains("from EXIF; 320x240"), "{said}");
     let scene = Scene::open(folder.path().join("posed")).expect("a scene");
     assert_eq!((scene.layout, scene.views.len()), ("colmap", 8));
@@ -149,11 +159,15 @@ fn eight_photographs_to_a_picture() {
     assert!(record["attempts"][0]["solver"].as_str().is_some_and(|name| name.starts_with("openmvg-sfm ")), "{record}");
     assert!(image::open(folder.path().join("posed/cameras.png")).is_ok());
     // From nothing to a picture.
-    posed(&folder, "render posed --targets 3 -o out --size 160x120 --weights distance:power=2 --device cpu");
+    posed(command(
+        BINARY,
+        folder.path(),
+        "render posed --targets 3 -o out --size 160x120 --weights distance:power=2 --device cpu",
+    ));
     let psnr = json(&folder.path().join("out/run.json"))["frames"][0]["psnr"].as_f64().expect("a score");
     assert!(psnr > 21.0, "{psnr} dB");
     // Once more: the same bytes, but for the times.
-    posed(&folder, "pose bare -o again --seed 3");
+    posed(command(BINARY, folder.path(), "pose bare -o again --seed 3"));
     for (path, _) in files_below(&folder.path().join("posed")).into_iter().filter(|(path, _)| path.is_file()) {
         let again = folder.path().join("again").join(path.strip_prefix(folder.path().join("posed")).expect("inside"));
         if !path.ends_with("pose.json") {
@@ -171,7 +185,7 @@ fn what_does_not_belong_is_left_out_by_name() {
     let other = image::open(data("toy/rgb/000003.png")).expect("another scene").to_rgb8();
     let other = imageops::resize(&other, 320, 240, imageops::FilterType::Triangle);
     folder.write("bare/other.jpg", with_exif(&jpeg(other), &[(FILM, ROOM_FILM)]));
-    let said = posed(&folder, "pose bare -o posed");
+    let said = posed(command(BINARY, folder.path(), "pose bare -o posed"));
     assert!(said.starts_with("registered 5 of 9 photographs\n"), "{said}");
     for (name, reason) in [
         ("cut.jpg", "the file ends before the picture does"),
@@ -193,7 +207,7 @@ fn sizes_and_orientations_may_differ() {
     folder.write("bare/004.jpg", with_exif(&jpeg(small), &[(FILM, ROOM_FILM)]));
     let lying = with_exif(&jpeg(imageops::rotate270(&decoded(5))), &[(ORIENTATION, 6), (FILM, ROOM_FILM)]);
     folder.write("bare/005.jpg", lying);
-    let said = posed(&folder, "pose bare -o posed --layout transforms");
+    let said = posed(command(BINARY, folder.path(), "pose bare -o posed --layout transforms"));
     assert!(said.contains("320x240"), "{said}");
     let scene = Scene::open(folder.path().join("posed")).expect("a scene");
     let turned = scene.view_named("005").map(|view| &scene.views[view].camera.pinhole).expect("the lying one");
@@ -300,7 +314,7 @@ fn bare_photographs_say_how() {
             BINARY,
             folder.path(),
             arguments,
-            &["bare: 3 photographs, and nothing that gives their poses", "`viewfuse pose FOLDER -o posed`"],
+            &["bare: 3 photographs, and nothing that gives their poses", "`viewfuse pose FOLDER -o posed`", "--pose"],
         );
     }
 }

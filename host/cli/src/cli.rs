@@ -29,6 +29,7 @@ mod path;
 mod points;
 #[cfg(feature = "pose")]
 mod pose;
+mod posed;
 mod printing;
 mod render;
 #[cfg(feature = "report")]

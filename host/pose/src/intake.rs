@@ -71,6 +71,8 @@ pub struct Unusable {
 pub struct Intake {
     /// The folder.
     pub folder: PathBuf,
+    /// All that were taken, usable or not: names and lengths in bytes.
+    pub files: Vec<(String, u64)>,
     /// Those that can be used, in natural order of their names.
     pub photos: Vec<Photo>,
     /// Those that cannot.
@@ -174,8 +176,22 @@ impl Intake {
             }
         }
         unusable.extend(blurred(&mut photos));
-        Ok(Intake { folder: folder.to_path_buf(), photos, unusable, _scratch: scratch })
+        let files = lengths(&files)?;
+        Ok(Intake { folder: folder.to_path_buf(), files, photos, unusable, _scratch: scratch })
     }
+}
+
+/// Names and lengths of the photographs of a folder, of every one, as [`Intake::files`].
+pub(crate) fn listed(folder: &Path) -> Result<Vec<(String, u64)>, IntakeError> {
+    lengths(&files(folder, 1)?)
+}
+
+fn lengths(files: &[PathBuf]) -> Result<Vec<(String, u64)>, IntakeError> {
+    let of = |path: &PathBuf| match fs::metadata(path) {
+        Ok(about) => Ok((file_name(path), about.len())),
+        Err(cause) => Err(IntakeError::Io { path: path.clone(), cause }),
+    };
+    files.iter().map(of).collect()
 }
 
 /// Takes the blurred ones out.

@@ -71,63 +71,155 @@ impl LeftOut {
 /// # Errors
 /// [`RenderError`].
 pub(crate) fn left_out(scene: &Scene, progress: &dyn Progress) -> Result<Vec<LeftOut>, RenderError> {
-    let views: Vec<usize> = (0..scene.views.len()).collect();
     let quiet = Quiet(progress);
-    let album = Album::open_at(scene, views.iter().copied(), SIDE, &quiet)?;
-    let all = album.sources(&views, SIDE, BackgroundChoice::None, &quiet)?;
-    progress.expect(views.len());
-    let one = |&view: &usize| {
-        progress.check().map_err(|stopped| RenderError::Field(stopped.into()))?;
-        let scores = scores(scene, &album, &all, view, &quiet)?;
-        progress.step();
-        Ok(scores)
-    };
-    views.par_iter().map(one).collect::<Vec<_>>().into_iter().collect()
+    let album = open_album(scene, &quiet)?;
+    Photographs::of(scene, &album, &quiet)?.left_out(progress)
 }
 
-fn scores(
-    scene: &Scene,
-    album: &Album<'_>,
-    all: &SourceImages,
-    view: usize,
-    progress: &dyn Progress,
-) -> Result<LeftOut, RenderError> {
-    let neighbours = nearest(scene, view);
-    let images = Arc::new(SourceImages {
-        images: neighbours.iter().map(|&own| all.images[own].clone()).collect(),
-        warnings: Vec::new(),
-        ..all.clone()
-    });
-    let shots: Vec<Shot> = (0..neighbours.len())
-        .map(|own| Shot { camera: images.images[own].camera, picture: images.picture(own) })
-        .collect();
-    let truth = Truth::of(all, view);
-    let (renderer, options) = (
-        On { device: &Cpu, field: &TrainingFree::default() },
-        RenderOptions { background: BackgroundChoice::None, ..RenderOptions::default() },
-    );
-    let mut stage = Stage::of_images(scene, album, &neighbours, images, &renderer, &options, progress)?;
-    let weighting = Weighting::default_scheme();
-    stage.weigh(&weighting, progress)?;
-    let camera = scene.views[view].camera;
-    let (width, height) = scaled_size(&camera, SIDE.min(truth.picture.width().max(truth.picture.height())));
-    let mut rendered = |pose: Pose| -> Result<f64, RenderError> {
-        let camera = Camera { pose, ..camera };
-        let frame = stage.frame_of_size(&weighting, &camera, [width, height], progress)?;
-        Ok(truth.score(&frame.picture))
-    };
-    let score = rendered(camera.pose)?;
-    let mut disturbed = f64::NEG_INFINITY;
-    for pose in turned(&camera.pose) {
-        disturbed = disturbed.max(rendered(pose)?);
+/// The photographs of a scene at the size at which they are compared.
+///
+/// # Errors
+/// [`RenderError`].
+pub(crate) fn open_album<'a>(scene: &'a Scene, progress: &dyn Progress) -> Result<Album<'a>, RenderError> {
+    Ok(Album::open_at(scene, 0..scene.views.len(), SIDE, progress)?)
+}
+
+/// Photographs with their cameras, each of which is rendered from the others.
+pub(crate) struct Photographs<'a> {
+    pub(crate) scene: Scene,
+    album: &'a Album<'a>,
+    all: SourceImages,
+}
+
+impl<'a> Photographs<'a> {
+    /// Of a scene whose views all have photographs, in an album of it.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub(crate) fn of(
+        scene: &Scene,
+        album: &'a Album<'a>,
+        progress: &dyn Progress,
+    ) -> Result<Photographs<'a>, RenderError> {
+        let views: Vec<usize> = (0..scene.views.len()).collect();
+        let all = album.sources(&views, SIDE, BackgroundChoice::None, progress)?;
+        Ok(Photographs { scene: scene.clone(), album, all })
     }
-    let target = all.images[view].camera;
-    let cameras: Vec<Camera> = scene.views.iter().map(|view| view.camera).collect();
-    let depth = plane_depth(&target, all.points.iter().copied(), None, &cameras);
-    let near: Vec<&Shot> = shots.iter().collect();
-    let of = |baseline: Baseline| truth.score(&baseline.picture(&near, &target, depth));
-    let (copy, warp) = (of(Baseline::NearestCopy), of(Baseline::WarpedCopy));
-    Ok(LeftOut { photograph: scene.views[view].name.clone(), score, copy, warp, disturbed })
+
+    /// The same photographs at other poses, one for each view.
+    pub(crate) fn at(&self, poses: &[Pose]) -> Photographs<'a> {
+        let (mut scene, mut all) = (self.scene.clone(), self.all.clone());
+        for ((view, image), pose) in scene.views.iter_mut().zip(&mut all.images).zip(poses) {
+            (view.camera.pose, image.camera.pose) = (*pose, *pose);
+        }
+        Photographs { scene, album: self.album, all }
+    }
+
+    /// What each is met with.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub(crate) fn left_out(&self, progress: &dyn Progress) -> Result<Vec<LeftOut>, RenderError> {
+        self.each(progress, |view, rendered| self.scores(view, rendered))
+    }
+
+    /// Does something with each view, rendered from the others, on all cores.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub(crate) fn each<T: Send>(
+        &self,
+        progress: &dyn Progress,
+        work: impl Fn(usize, &mut Rendered<'_>) -> Result<T, RenderError> + Sync,
+    ) -> Result<Vec<T>, RenderError> {
+        let views: Vec<usize> = (0..self.scene.views.len()).collect();
+        progress.expect(views.len());
+        let one = |&view: &usize| {
+            progress.check().map_err(|stopped| RenderError::Field(stopped.into()))?;
+            let done = self.rendered(view, &Quiet(progress), |rendered| work(view, rendered))?;
+            progress.step();
+            Ok(done)
+        };
+        views.par_iter().map(one).collect::<Vec<_>>().into_iter().collect()
+    }
+
+    fn rendered<T>(
+        &self,
+        view: usize,
+        progress: &dyn Progress,
+        work: impl FnOnce(&mut Rendered<'_>) -> Result<T, RenderError>,
+    ) -> Result<T, RenderError> {
+        let neighbours = nearest(&self.scene, view);
+        let images = Arc::new(SourceImages {
+            images: neighbours.iter().map(|&own| self.all.images[own].clone()).collect(),
+            warnings: Vec::new(),
+            ..self.all.clone()
+        });
+        let truth = Truth::of(&self.all, view);
+        let (renderer, options) = (
+            On { device: &Cpu, field: &TrainingFree::default() },
+            RenderOptions { background: BackgroundChoice::None, ..RenderOptions::default() },
+        );
+        let mut stage = Stage::of_images(&self.scene, self.album, &neighbours, images, &renderer, &options, progress)?;
+        let weighting = Weighting::default_scheme();
+        stage.weigh(&weighting, progress)?;
+        let camera = self.scene.views[view].camera;
+        let (width, height) = scaled_size(&camera, SIDE.min(truth.picture.width().max(truth.picture.height())));
+        work(&mut Rendered { stage, weighting, camera, size: [width, height], truth, progress })
+    }
+
+    fn scores(&self, view: usize, rendered: &mut Rendered<'_>) -> Result<LeftOut, RenderError> {
+        let pose = rendered.camera.pose;
+        let score = rendered.score(pose)?;
+        let mut disturbed = f64::NEG_INFINITY;
+        for pose in turned(&pose) {
+            disturbed = disturbed.max(rendered.score(pose)?);
+        }
+        let neighbours = nearest(&self.scene, view);
+        let shots: Vec<Shot> = neighbours
+            .iter()
+            .map(|&own| Shot { camera: self.all.images[own].camera, picture: self.all.picture(own) })
+            .collect();
+        let target = self.all.images[view].camera;
+        let cameras: Vec<Camera> = self.scene.views.iter().map(|view| view.camera).collect();
+        let depth = plane_depth(&target, self.all.points.iter().copied(), None, &cameras);
+        let near: Vec<&Shot> = shots.iter().collect();
+        let of = |baseline: Baseline| rendered.truth.score(&baseline.picture(&near, &target, depth));
+        let (copy, warp) = (of(Baseline::NearestCopy), of(Baseline::WarpedCopy));
+        Ok(LeftOut { photograph: self.scene.views[view].name.clone(), score, copy, warp, disturbed })
+    }
+}
+
+/// A photograph, and its neighbours from which it is rendered.
+pub(crate) struct Rendered<'a> {
+    stage: Stage<'a>,
+    weighting: Weighting,
+    pub(crate) camera: Camera,
+    size: [u32; 2],
+    pub(crate) truth: Truth,
+    progress: &'a dyn Progress,
+}
+
+impl Rendered<'_> {
+    /// What is shown at a pose, of the truth's size.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub(crate) fn shown(&mut self, pose: Pose) -> Result<Shown, RenderError> {
+        let camera = Camera { pose, ..self.camera };
+        let frame = self.stage.frame_of_size(&self.weighting, &camera, self.size, self.progress)?;
+        let size = frame.picture.dimensions().into();
+        Ok(Shown { picture: self.truth.resized(frame.picture), depths: frame.depths, size })
+    }
+
+    /// The score of the picture at a pose.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub(crate) fn score(&mut self, pose: Pose) -> Result<f64, RenderError> {
+        let shown = self.shown(pose)?;
+        Ok(self.truth.score(&shown.picture))
+    }
 }
 
 /// The nearest other views, the nearest first.
@@ -159,8 +251,24 @@ fn turned(pose: &Pose) -> Vec<Pose> {
     [about(sin), about(-sin)].into_iter().flatten().flatten().collect()
 }
 
+/// A rendered picture of the truth's size, with its depths as they were rendered.
+pub(crate) struct Shown {
+    pub(crate) picture: RgbImage,
+    depths: Vec<f32>,
+    size: [u32; 2],
+}
+
+impl Shown {
+    /// The depth of a pixel of the picture, along the principal axis in world units; 0 without a surface.
+    pub(crate) fn depth(&self, pixel: [u32; 2]) -> f32 {
+        let (width, height) = self.picture.dimensions();
+        let [x, y] = [pixel[0] * self.size[0] / width, pixel[1] * self.size[1] / height];
+        self.depths.get((y * self.size[0] + x) as usize).copied().unwrap_or(0.0)
+    }
+}
+
 /// A photograph as it is compared.
-struct Truth {
+pub(crate) struct Truth {
     picture: RgbImage,
     /// The pixels that count.
     shown: Vec<bool>,
@@ -172,31 +280,41 @@ impl Truth {
         Truth { picture: all.picture(view), shown: texels.iter().map(|texel| texel[3] > 0.999).collect() }
     }
 
-    /// The score of a picture of its size; of another size it is resampled.
-    fn score(&self, picture: &RgbImage) -> f64 {
+    /// A picture, resampled if it is of another size.
+    fn resized(&self, picture: RgbImage) -> RgbImage {
         let (width, height) = self.picture.dimensions();
-        let resized;
-        let picture = if picture.dimensions() == (width, height) {
-            picture
-        } else {
-            resized = image::imageops::resize(picture, width, height, image::imageops::FilterType::Triangle);
-            &resized
-        };
+        if picture.dimensions() == (width, height) {
+            return picture;
+        }
+        image::imageops::resize(&picture, width, height, image::imageops::FilterType::Triangle)
+    }
+
+    /// The differences `truth - gain picture` of a picture of its size, three for each pixel that counts, and the gains.
+    pub(crate) fn differences(&self, picture: &RgbImage) -> (Vec<f64>, [f64; 3]) {
         let pairs = || self.picture.pixels().zip(picture.pixels()).zip(&self.shown).filter(|(_, shown)| **shown);
-        let (mut error, mut count) = (0.0, 0_usize);
-        for channel in 0..3 {
-            let level = |pixel: &image::Rgb<u8>| f64::from(pixel[channel]) / 255.0;
+        let level = |pixel: &image::Rgb<u8>, channel: usize| f64::from(pixel[channel]) / 255.0;
+        let gains = std::array::from_fn(|channel| {
             let (mut both, mut square) = (0.0, 0.0);
             for ((truth, own), _) in pairs() {
-                both += level(truth) * level(own);
-                square += level(own).powi(2);
+                both += level(truth, channel) * level(own, channel);
+                square += level(own, channel).powi(2);
             }
-            let gain = if square > 0.0 { (both / square).clamp(0.5, 2.0) } else { 1.0 };
-            for ((truth, own), _) in pairs() {
-                error += (level(truth) - gain * level(own)).powi(2);
-                count += 1;
-            }
-        }
-        if count == 0 { 0.0 } else { (-10.0 * (error / count as f64).log10()).min(MAX_SCORE) }
+            if square > 0.0 { (both / square).clamp(0.5, 2.0) } else { 1.0 }
+        });
+        let of = |truth, own| (0..3).map(move |channel| level(truth, channel) - gains[channel] * level(own, channel));
+        (pairs().flat_map(|((truth, own), _)| of(truth, own)).collect(), gains)
+    }
+
+    /// The pixels that count, in the order of the differences.
+    pub(crate) fn places(&self) -> impl Iterator<Item = (u32, u32)> {
+        let shown = self.picture.enumerate_pixels().zip(&self.shown).filter(|(_, shown)| **shown);
+        shown.map(|((x, y, _), _)| (x, y))
+    }
+
+    /// The score of a picture of its size.
+    pub(crate) fn score(&self, picture: &RgbImage) -> f64 {
+        let differences = self.differences(picture).0;
+        let error: f64 = differences.iter().map(|own| own * own).sum();
+        if differences.is_empty() { 0.0 } else { (-10.0 * (error / differences.len() as f64).log10()).min(MAX_SCORE) }
     }
 }

@@ -8,26 +8,33 @@
 //! The modules are listed in the order of the data; a module uses only modules listed above it:
 //!
 //! ```text
-//! exif          what a photograph states of its camera: Exif
-//! intake        the photographs of a folder, and those that cannot be used: Intake
-//! solution      a job for a solver and its answer: Job, Solution, Solver
-//! focal         cameras before the work, with where their focal lengths come from: Cameras
-//! openmvg       OpenMVG's crates, as a process: OpenMvg
-//! posed         a solution as a scene
-//! agreement     rotations of two solutions between the same photographs
-//! support       parallax and the shape of the points: Support
-//! left_out      photographs rendered from the others: LeftOut
-//! attempt       the attempts that are made: Attempt
-//! verdict       the attempt that is accepted, with the photographs that are: Verdict
-//! advice        where more photographs help: Neighbours
-//! find          from a folder to a verdict: find
-//! write         the scene with its record, whole or not at all
+//! exif           what a photograph states of its camera: Exif
+//! intake         the photographs of a folder, and those that cannot be used: Intake
+//! solution       a job for a solver and its answer: Job, Solution, Solver
+//! focal          cameras before the work, with where their focal lengths come from: Cameras
+//! process        programs that end with their owner
+//! openmvg        OpenMVG's crates, as a process: OpenMvg
+//! colmap_folder  the folder in which COLMAP works, and the model that it leaves
+//! colmap         the person's own COLMAP, as a process: Colmap
+//! pycolmap       the person's own pycolmap, as a process: PyColmap
+//! posed          a solution as a scene
+//! agreement      rotations of two solutions between the same photographs
+//! support        parallax and the shape of the points: Support
+//! left_out       photographs rendered from the others: LeftOut
+//! refine         poses refined by the photographs themselves
+//! attempt        the attempts that are made: Attempt
+//! verdict        the attempt that is accepted, with the photographs that are: Verdict
+//! advice         where more photographs help: Neighbours
+//! find           from a folder to a verdict: find
+//! write          the scene with its record, whole or not at all
 //! ```
 #![forbid(unsafe_code)]
 
 mod advice;
 mod agreement;
 mod attempt;
+mod colmap;
+mod colmap_folder;
 mod exif;
 mod find;
 mod focal;
@@ -35,6 +42,9 @@ mod intake;
 mod left_out;
 mod openmvg;
 mod posed;
+mod process;
+mod pycolmap;
+mod refine;
 mod solution;
 mod support;
 mod verdict;
@@ -42,19 +52,21 @@ mod write;
 
 pub use advice::Neighbours;
 pub use attempt::{Attempt, Tried};
+pub use colmap::Colmap;
 pub use exif::Exif;
 pub use find::{Found, Options, PoseError, find};
 pub use focal::{CameraGroup, Cameras, FocalSource};
 pub use intake::{Intake, IntakeError, MAX_PHOTOGRAPHS, Photo, Unusable, is_photograph};
 pub use left_out::LeftOut;
 pub use openmvg::OpenMvg;
+pub use pycolmap::PyColmap;
 pub use solution::{
     CameraGuess, Features, Job, JobPhotograph, Solution, SolvedCamera, SolvedPair, SolvedPhotograph, SolvedPoint,
     Solver, SolverError,
 };
 pub use support::Support;
-pub use verdict::{Refusal, Verdict, Verified};
-pub use write::{CameraRecord, Record, write};
+pub use verdict::{Refinement, Refusal, Verdict, Verified};
+pub use write::{CameraRecord, Record, is_current, write};
 
 /// The examples of the README, compiled and run.
 #[cfg(doctest)]

@@ -1,16 +1,13 @@
 //! OpenMVG's crates, as a process of their own: `viewfuse-openmvg`, which is built from this crate's folder `openmvg`.
 
+use crate::process::{LOOK, Process};
 use crate::solution::{Features, Job, Solution, Solver, SolverError};
 use serde::Deserialize;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::time::Duration;
 use viewfuse_job::progress::Progress;
-
-/// How often the person's wish to stop is looked at while the process says nothing.
-const LOOK: Duration = Duration::from_millis(50);
 
 /// Most bytes of an answer: what is longer is not one.
 const MAX_ANSWER: u64 = 1 << 30;
@@ -32,17 +29,6 @@ enum Line {
     Progress { stage: String, of: usize, done: usize },
     Solution(Solution),
     Failed { reason: String },
-}
-
-/// Ended with its owner.
-struct Process(Child);
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        // It may have ended by itself.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
 }
 
 impl Solver for OpenMvg {
@@ -109,7 +95,7 @@ impl Solver for OpenMvg {
 impl OpenMvg {
     /// Starts the process and gives it the job.
     fn start(&self, job: &Job) -> Result<Process, SolverError> {
-        let missing = |cause| SolverError::Missing { program: self.program.clone(), cause };
+        let missing = |cause| SolverError::not_started(self.name(), &self.program, &cause);
         let threads = rayon::current_num_threads().to_string();
         let child = Command::new(&self.program)
             .env("RAYON_NUM_THREADS", threads)

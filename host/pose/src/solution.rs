@@ -1,8 +1,9 @@
 //! A job for a solver of structure from motion, and its answer.
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use std::fmt::{self, Display, Formatter};
+use std::path::{Path, PathBuf};
 use viewfuse_job::progress::{Interrupted, Progress};
 
 /// A kind of features.
@@ -13,6 +14,19 @@ pub enum Features {
     Alp,
     /// SIFT.
     Sift,
+    /// SIFT with affine shapes, its descriptors averaged over domain sizes (DSP-SIFT).
+    #[serde(rename = "dsp-sift")]
+    DspSift,
+}
+
+impl Display for Features {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Features::Alp => "ALP",
+            Features::Sift => "SIFT",
+            Features::DspSift => "DSP-SIFT",
+        })
+    }
 }
 
 /// What a solver is asked.
@@ -100,6 +114,19 @@ impl SolvedPhotograph {
     }
 }
 
+impl SolvedPhotograph {
+    /// Moves the camera in its own axes (right, down, forward): a rotation vector in radians, and a way in units of `scale`.
+    pub(crate) fn shift(&mut self, motion: &[f64; 6], scale: f64) {
+        let (Some(rotation), Some(centre)) = (self.rotation(), self.centre()) else { return };
+        let [turn, way] = [&motion[..3], &motion[3..]].map(|own| DVec3::new(own[0], own[1], own[2]));
+        let centre = centre + rotation.transpose() * (scale * way);
+        let rotation = DMat3::from_quat(DQuat::from_scaled_axis(turn)).transpose() * rotation;
+        let translation = -(rotation * centre);
+        let row = |row: usize| [rotation.x_axis[row], rotation.y_axis[row], rotation.z_axis[row], translation[row]];
+        self.camera_from_world = Some([row(0), row(1), row(2)]);
+    }
+}
+
 /// A surface point.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct SolvedPoint {
@@ -163,13 +190,15 @@ impl Solution {
 /// Why a solver has no answer.
 #[derive(Debug, thiserror::Error)]
 pub enum SolverError {
-    /// The program is not there.
-    #[error("{}: the program is not there or cannot be started: {cause}", program.display())]
+    /// The program is not there, or lacks what it works with.
+    #[error("{}: {problem}", program.display())]
     Missing {
+        /// The solver's name.
+        solver: &'static str,
         /// The program.
         program: PathBuf,
-        /// What the system said.
-        cause: std::io::Error,
+        /// What is missing.
+        problem: String,
     },
     /// The program broke.
     #[error("{}: {problem}", program.display())]
@@ -187,6 +216,14 @@ pub enum SolverError {
     Interrupted(#[from] Interrupted),
 }
 
+impl SolverError {
+    /// That a solver's program could not be started.
+    pub(crate) fn not_started(solver: &'static str, program: &Path, cause: &std::io::Error) -> SolverError {
+        let problem = format!("the program is not there or cannot be started: {cause}");
+        SolverError::Missing { solver, program: program.to_path_buf(), problem }
+    }
+}
+
 /// A solver of structure from motion.
 pub trait Solver: Sync {
     /// Its name, for records and messages.
@@ -195,7 +232,7 @@ pub trait Solver: Sync {
     /// The kinds of features that it has.
     fn features(&self) -> &'static [Features];
 
-    /// Works on a job. The same job has the same answer, byte for byte, on one machine.
+    /// Works on a job. The same job has the same answer, byte for byte, on one machine, as far as the program that it runs allows.
     ///
     /// # Errors
     /// [`SolverError`].

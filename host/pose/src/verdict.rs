@@ -15,6 +15,7 @@ use crate::focal::Cameras;
 use crate::intake::Photo;
 use crate::left_out::{LeftOut, left_out};
 use crate::posed;
+use crate::refine::refine;
 use crate::solution::Solution;
 use std::path::Path;
 use viewfuse_field::render::RenderError;
@@ -51,12 +52,25 @@ pub struct Verdict {
     pub attempt: usize,
     /// Its scene of the accepted photographs.
     pub scene: Scene,
+    /// The attempt's solution, with refined poses if [`Verdict::refinement`] says so.
+    pub solution: Solution,
+    /// What refinement by the photographs gained; `None` if it gained nothing.
+    pub refinement: Option<Refinement>,
     /// The accepted photographs, as indices, ascending.
     pub photos: Vec<usize>,
     /// What each accepted photograph passed.
     pub verified: Vec<Verified>,
     /// Photographs that were taken out, as indices, with the reason.
     pub taken_out: Vec<(usize, String)>,
+}
+
+/// Mean scores of the left-out photographs in decibels.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Refinement {
+    /// At the solver's poses.
+    pub before: f64,
+    /// At the refined ones.
+    pub after: f64,
 }
 
 /// What a photograph passed.
@@ -103,6 +117,7 @@ pub(crate) fn verdict(
     photos: &[Photo],
     cameras: &Cameras,
     attempts: &mut [Attempt],
+    is_refined: bool,
     progress: &dyn Progress,
 ) -> Result<Result<Verdict, Refusal>, VerdictError> {
     let candidates = candidates(cameras, attempts);
@@ -116,7 +131,19 @@ pub(crate) fn verdict(
             Ok((scene, kept)) => {
                 let taken_out = trial.taken_out;
                 let (photos, verified) = kept.into_iter().unzip();
-                return Ok(Ok(Verdict { attempt, scene, photos, verified, taken_out }));
+                let mut verdict = Verdict {
+                    attempt,
+                    scene,
+                    solution: solution.clone(),
+                    refinement: None,
+                    photos,
+                    verified,
+                    taken_out,
+                };
+                if is_refined {
+                    refine_verdict((folder, trial.photos, cameras), &mut verdict, &part)?;
+                }
+                return Ok(Ok(verdict));
             }
             Err(reason) => attempts[attempt].tried.refused = Some(reason),
         }
@@ -125,6 +152,25 @@ pub(crate) fn verdict(
         attempt.tried.refused.clone().unwrap_or_else(|| "no other attempt agrees with it".to_owned())
     };
     Ok(Err(Refusal { reasons: attempts.iter().map(reason).collect() }))
+}
+
+/// Refines the poses of what was accepted, where that gains.
+fn refine_verdict(
+    (folder, photos, cameras): (&Path, &[Photo], &Cameras),
+    verdict: &mut Verdict,
+    progress: &dyn Progress,
+) -> Result<(), VerdictError> {
+    let before: Vec<f64> = verdict.verified.iter().map(|own| own.left_out.score).collect();
+    let Some(refined) = refine(&verdict.scene, &before, progress)? else { return Ok(()) };
+    for (photo, motions) in verdict.photos.iter().zip(&refined.motions) {
+        for motion in motions {
+            verdict.solution.photographs[*photo].shift(motion, verdict.scene.frame.scale);
+        }
+    }
+    let mean = before.iter().sum::<f64>() / before.len().max(1) as f64;
+    verdict.refinement = Some(Refinement { before: mean, after: refined.score });
+    verdict.scene = posed::scene(folder, photos, cameras, &verdict.solution, &verdict.photos)?;
+    Ok(())
 }
 
 /// Attempts that may be accepted, the most promising first, each with the photographs that another one confirms and by how much.

@@ -4,9 +4,9 @@ use crate::advice::Neighbours;
 use crate::attempt::Tried;
 use crate::find::{Found, Options};
 use crate::focal::FocalSource;
-use crate::intake::file_name;
-use crate::verdict::{Verdict, Verified};
-use serde::Serialize;
+use crate::intake::{IntakeError, file_name, listed};
+use crate::verdict::{Refinement, Verdict, Verified};
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::write::{Layout, WriteSceneError, Written, write_with};
@@ -21,6 +21,8 @@ pub struct Record<'a> {
     pub viewfuse: &'static str,
     /// The folder of the photographs.
     pub photographs: String,
+    /// All that were taken, usable or not: names and lengths in bytes.
+    pub files: &'a [(String, u64)],
     /// The seed.
     pub seed: u64,
     /// Every so many photographs were taken.
@@ -35,6 +37,8 @@ pub struct Record<'a> {
     pub attempts: Vec<&'a Tried>,
     /// The accepted photographs with what they passed.
     pub accepted: &'a [Verified],
+    /// What refinement by the photographs gained; `None` if it was not asked for or gained nothing.
+    pub refinement: Option<Refinement>,
     /// Photographs that were left out, each with the reason.
     pub left_out: Vec<(String, String)>,
     /// The accepted ones as neighbours.
@@ -77,8 +81,7 @@ impl Found {
     /// The record of an accepted verdict.
     pub fn record<'a>(&'a self, verdict: &'a Verdict, options: &Options) -> Record<'a> {
         let attempt = &self.attempts[verdict.attempt];
-        let k1 =
-            |index: usize| attempt.solution.as_ref().and_then(|own| own.cameras.get(index)).map_or(0.0, |own| own.k1);
+        let k1 = |index: usize| verdict.solution.cameras.get(index).map_or(0.0, |own| own.k1);
         let cameras = self.cameras.groups.iter().enumerate().map(|(index, group)| CameraRecord {
             size: group.size,
             photographs: group.photos.iter().filter(|photo| verdict.photos.contains(photo)).count(),
@@ -89,6 +92,7 @@ impl Found {
         Record {
             viewfuse: env!("CARGO_PKG_VERSION"),
             photographs: self.intake.folder.display().to_string(),
+            files: &self.intake.files,
             seed: options.seed,
             every: options.every,
             cameras: cameras.filter(|camera| camera.photographs > 0).collect(),
@@ -96,6 +100,7 @@ impl Found {
             attempt: verdict.attempt,
             attempts: self.attempts.iter().map(|attempt| &attempt.tried).collect(),
             accepted: &verdict.verified,
+            refinement: verdict.refinement,
             left_out: self.left_out(Some(verdict)),
             neighbours: Neighbours::of(&verdict.scene),
         }
@@ -121,4 +126,20 @@ pub fn write(
     let mut files = vec![(RECORD, record)];
     files.extend(beside.iter().cloned());
     write_with(&verdict.scene, layout, folder, &files, progress)
+}
+
+/// What of a record tells whether a scene is still that of a folder.
+#[derive(Deserialize)]
+struct Earlier {
+    files: Vec<(String, u64)>,
+}
+
+/// Whether [`write()`] wrote the scene in `posed` for the photographs that a folder has now, by their names and lengths.
+///
+/// # Errors
+/// [`IntakeError`] if the folder's photographs cannot be listed.
+pub fn is_current(posed: &Path, photographs: &Path) -> Result<bool, IntakeError> {
+    let now = listed(photographs)?;
+    let record = std::fs::read(posed.join(RECORD)).unwrap_or_default();
+    Ok(serde_json::from_slice::<Earlier>(&record).is_ok_and(|earlier| earlier.files == now))
 }

@@ -3,8 +3,9 @@
 //! ```text
 //! planes                                      a target's planes, for two of them
 //! efforts, gaussians, headroom, mixture,
-//! paper_question, poses, refinement,
-//! self_knowledge, sweep_time                  the experiments
+//! paper_question, poses (posed_pictures,
+//! refined_poses), refinement, self_knowledge,
+//! sweep_time                                  the experiments
 //! ```
 
 mod efforts;
@@ -23,7 +24,7 @@ use anyhow::Context;
 /// Takes what stands behind the experiment's name.
 type Experiment = fn(&[String]) -> anyhow::Result<()>;
 
-const EXPERIMENTS: [(&str, Experiment); 11] = [
+const EXPERIMENTS: [(&str, Experiment); 13] = [
     ("efforts", efforts::run),
     ("gaussian_frames", gaussians::frames::run),
     ("gaussian_recipe", gaussians::recipe::run),
@@ -31,7 +32,9 @@ const EXPERIMENTS: [(&str, Experiment); 11] = [
     ("headroom", headroom::run),
     ("mixture", mixture::run),
     ("paper_question", paper_question::run),
+    ("posed_pictures", poses::pictures::run),
     ("poses", poses::run),
+    ("refined_poses", poses::refined::run),
     ("refinement", refinement::run),
     ("self_knowledge", self_knowledge::run),
     ("sweep_time", sweep_time::run),

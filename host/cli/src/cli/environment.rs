@@ -38,6 +38,18 @@ pub(crate) fn openmvg() -> PathBuf {
     env::var_os("VIEWFUSE_OPENMVG").map(PathBuf::from).or_else(beside).unwrap_or_else(|| name.into())
 }
 
+/// The person's own COLMAP: `VIEWFUSE_COLMAP`, or `colmap` that the system finds.
+#[cfg(feature = "pose")]
+pub(crate) fn colmap() -> PathBuf {
+    env::var_os("VIEWFUSE_COLMAP").map_or_else(|| "colmap".into(), PathBuf::from)
+}
+
+/// The Python that has the person's own pycolmap: `VIEWFUSE_PYTHON`, or `python3` that the system finds.
+#[cfg(feature = "pose")]
+pub(crate) fn python() -> PathBuf {
+    env::var_os("VIEWFUSE_PYTHON").map_or_else(|| "python3".into(), PathBuf::from)
+}
+
 /// Where devices remember what they compiled and measured: `VIEWFUSE_CACHE`, or the folder for such files that the system
 /// has for the user. Nowhere if the variable is empty.
 fn cache_folder() -> Option<PathBuf> {

@@ -120,8 +120,8 @@ fn of_tiff(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
 fn of_bare(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
     match cause.downcast_ref::<SceneError>() {
         Some(SceneError::BarePhotographs { .. }) => Some(
-            "`viewfuse pose FOLDER -o posed` finds poses and writes a scene; `viewfuse --help` lists the layouts of posed \
-                 photographs",
+            "`viewfuse pose FOLDER -o posed` finds poses and writes a scene, and so does --pose on the way of `render`, `view` and \
+             `inspect`; `viewfuse --help` lists the layouts of posed photographs",
         ),
         _ => None,
     }
@@ -132,10 +132,20 @@ fn of_bare(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
 fn of_pose(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
     use viewfuse_pose::{IntakeError, PoseError, SolverError};
     match cause.downcast_ref::<PoseError>() {
-        Some(PoseError::Solver(SolverError::Missing { .. })) => Some(
-            "in the repository `cargo openmvg` builds it, and `cargo install --path host/pose/openmvg --ignore-rust-version` \
-             installs it; VIEWFUSE_OPENMVG names it where it lies elsewhere",
-        ),
+        Some(PoseError::Solver(SolverError::Missing { solver, .. })) => Some(match *solver {
+            "colmap" => {
+                "install COLMAP (Debian and Ubuntu: `apt install colmap`, macOS: `brew install colmap`, or conda-forge's `colmap`); \
+                 VIEWFUSE_COLMAP names the program where it lies elsewhere"
+            }
+            "pycolmap" => {
+                "`python3 -m pip install pycolmap` installs it; VIEWFUSE_PYTHON names the Python that has it, for example that of a \
+                 virtual environment"
+            }
+            _ => {
+                "in the repository `cargo openmvg` builds it, and `cargo install --path host/pose/openmvg \
+                 --ignore-rust-version` installs it; VIEWFUSE_OPENMVG names it where it lies elsewhere"
+            }
+        }),
         Some(PoseError::Intake(IntakeError::Many { .. })) => Some("--every N takes every Nth"),
         _ => None,
     }

@@ -3,6 +3,7 @@
 mod quality;
 
 use super::outputs::keep_file_apart;
+use super::posed::PoseOption;
 use super::say;
 use super::table::table;
 use super::terminal::Terminal;
@@ -15,7 +16,6 @@ use std::process::ExitCode;
 use viewfuse_job::files::check_writable;
 use viewfuse_output::camera_map::camera_map;
 use viewfuse_output::png::write_png;
-use viewfuse_scene::Scene;
 use viewfuse_scene::inspect::{Inspection, inspect};
 use viewfuse_scene::listing::{ListedView, Neighbour, list_views};
 use viewfuse_scene::photographs::BackgroundChoice;
@@ -27,6 +27,8 @@ use viewfuse_scene::photographs::BackgroundChoice;
 pub(crate) struct Arguments {
     /// The scene
     scene: PathBuf,
+    #[command(flatten)]
+    pose: PoseOption,
     /// Background of the object: auto, black, white, or RED,GREEN,BLUE (0 to 255)
     #[arg(long, value_name = "COLOUR", default_value = "auto")]
     background: BackgroundChoice,
@@ -46,7 +48,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    let scene = Scene::open(&arguments.scene)?;
+    let (_, scene) = arguments.pose.open(&arguments.scene)?;
     if arguments.views {
         return print_views(&list_views(&scene), arguments.json);
     }

@@ -1,18 +1,20 @@
 //! `viewfuse pose`.
 
-use super::environment::openmvg;
+mod solvers;
+
 use super::outputs::keep_folder_apart;
 use super::terminal::Terminal;
 use super::{on_threads, say};
 use anyhow::bail;
 use clap::Args;
 use image::DynamicImage;
-use std::path::PathBuf;
+use solvers::{From, solvers};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use viewfuse_job::progress::Progress;
 use viewfuse_job::shell::quoted;
 use viewfuse_output::camera_map::camera_map;
-use viewfuse_pose::{FocalSource, Found, OpenMvg, Options, Record, Refusal, Solver, Verdict, find, write};
+use viewfuse_pose::{FocalSource, Found, Options, Record, Refusal, Solver, Verdict, find, write};
 use viewfuse_scene::encode_png;
 use viewfuse_scene::inspect::inspect;
 use viewfuse_scene::photographs::BackgroundChoice;
@@ -21,7 +23,8 @@ use viewfuse_scene::write::Layout;
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     viewfuse pose photos/ -o posed\n      posed/sparse/0 and posed/images (COLMAP's layout), pose.json, cameras.png; then: viewfuse render posed --orbit 24 -o out\n  \
-    viewfuse pose photos/ --focal 1375 -o posed\n      photographs that do not state their focal length\n\n\
+    viewfuse pose photos/ --focal 1375 -o posed\n      photographs that do not state their focal length\n  \
+    viewfuse pose photos/ --from openmvg,colmap -o posed\n      with your own COLMAP as a second opinion\n\n\
     Poses are found several times, with other features and, where the focal length is unknown, other guesses of it. What is\n\
     written is what two attempts agree on, and what passes this: each photograph, left out and rendered from the others, is met\n\
     at its pose, better than by copies of its neighbours, and not two degrees beside it. If nothing passes, nothing is written.")]
@@ -31,6 +34,9 @@ pub(crate) struct Arguments {
     /// Focal length in pixels of the first photograph [default: as the photographs state it (EXIF), otherwise found]
     #[arg(long, value_name = "PIXELS", value_parser = parse_focal)]
     focal: Option<f64>,
+    /// What finds poses; several, with commas, confirm one another
+    #[arg(long, value_name = "SOLVERS", value_delimiter = ',', default_value = "openmvg")]
+    from: Vec<From>,
     /// Take every Nth photograph, in the order of the names
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     every: u16,
@@ -67,11 +73,37 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     if output.exists() && !std::fs::read_dir(output).is_ok_and(|mut entries| entries.next().is_none()) {
         bail!("{}: exists already and is not an empty folder; give another name", output.display());
     }
-    let options = Options { focal: arguments.focal, seed: arguments.seed, every: arguments.every.into() };
-    let openmvg = OpenMvg { program: openmvg() };
-    let solvers: [&dyn Solver; 1] = [&openmvg];
+    let options =
+        Options { focal: arguments.focal, seed: arguments.seed, every: arguments.every.into(), ..Options::default() };
+    let (from, to) = (solvers(&arguments.from), (arguments.layout, output.as_path()));
+    let work = || found(photographs, &from, &options, to);
+    let found = on_threads(arguments.threads, work)??;
+    let Ok(verdict) = &found.verdict else { bail!("{}: no verdict", photographs.display()) };
+    print(&found, verdict, &found.record(verdict, &options))?;
+    say(format_args!("written    {} ({}): {} photographs", output.display(), arguments.layout, verdict.photos.len()))?;
+    let word = quoted(output.as_os_str());
+    say(format_args!("next       viewfuse render {word} --orbit 24 -o out"))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What `viewfuse pose PHOTOGRAPHS -o OUTPUT` does, told in one line.
+pub(crate) fn find_with_defaults(photographs: &Path, output: &Path) -> anyhow::Result<String> {
+    let found = found(photographs, &solvers(&[From::Openmvg]), &Options::default(), (Layout::Colmap, output))?;
+    let all = found.intake.photos.len() + found.intake.unusable.len();
+    let registered = found.verdict.map_or(0, |verdict| verdict.photos.len());
+    Ok(format!("{}: written, {registered} of {all} photographs with poses", output.display()))
+}
+
+/// Finds poses and writes the scene; the verdict is an accepted one.
+fn found(
+    photographs: &Path,
+    from: &[Box<dyn Solver>],
+    options: &Options,
+    (layout, output): (Layout, &Path),
+) -> anyhow::Result<Found> {
+    let from: Vec<&dyn Solver> = from.iter().map(AsRef::as_ref).collect();
     let progress = Terminal::new("reading the photographs");
-    let found = on_threads(arguments.threads, || find(photographs, &solvers, &options, &progress))??;
+    let found = find(photographs, &from, options, &progress)?;
     let verdict = match &found.verdict {
         Ok(verdict) => verdict,
         Err(refusal) => {
@@ -90,13 +122,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let picture = camera_map(&verdict.scene, &inspect(&verdict.scene, BackgroundChoice::None, &progress)?);
     let files = [("cameras.png", encode_png(&DynamicImage::ImageRgb8(picture))?)];
     progress.stage("writing the scene", 9..10, 10);
-    write(&found, verdict, &options, (arguments.layout, output), &files, &progress)?;
-    drop(progress);
-    print(&found, verdict, &found.record(verdict, &options))?;
-    say(format_args!("written    {} ({}): {} photographs", output.display(), arguments.layout, verdict.photos.len()))?;
-    let word = quoted(output.as_os_str());
-    say(format_args!("next       viewfuse render {word} --orbit 24 -o out"))?;
-    Ok(ExitCode::SUCCESS)
+    write(&found, verdict, options, (layout, output), &files, &progress)?;
+    Ok(found)
 }
 
 /// Why each attempt was refused, and which photographs cannot be used.
@@ -108,7 +135,7 @@ fn told(found: &Found, refusal: &Refusal, progress: &Terminal) {
         let tried = &attempt.tried;
         let guess =
             tried.focal_guess.map_or(String::new(), |guess| format!(", focal length from {guess} longest sides"));
-        progress.warn(&format!("{} ({:?}{guess}): {reason}", tried.solver, tried.features));
+        progress.warn(&format!("{} ({}{guess}): {reason}", tried.solver, tried.features));
     }
 }
 
@@ -131,7 +158,7 @@ fn print(found: &Found, verdict: &Verdict, record: &Record<'_>) -> std::io::Resu
     }
     let tried = record.attempts[record.attempt];
     let (solver, points, error) = (&tried.solver, tried.points, record.reprojection_error);
-    let features = format!("{:?}", tried.features).to_lowercase();
+    let features = tried.features;
     say(format_args!("points     {points} by {solver} ({features}), reprojection error {error:.2} pixels"))?;
     for own in record.accepted {
         let scores = &own.left_out;

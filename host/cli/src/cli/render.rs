@@ -8,6 +8,7 @@ use super::model::{Flags, ModelOptions, SEQUENCE};
 use super::options::{BoundOptions, DeviceOptions, PictureOptions, SourceOptions};
 use super::outputs::keep_folder_apart;
 use super::path::PathOptions;
+use super::posed::PoseOption;
 use super::terminal::Terminal;
 use super::weighting::choice_help;
 use super::{complain, on_threads, say};
@@ -55,6 +56,8 @@ const MIN_FEW: f32 = 0.2;
 pub(crate) struct Arguments {
     #[arg(help = scene_help())]
     scene: PathBuf,
+    #[command(flatten)]
+    pose: PoseOption,
     /// Views to render, as for --sources; left out of the sources [default: the scene's target poses]
     #[arg(long, value_name = "VIEWS")]
     targets: Option<String>,
@@ -120,7 +123,7 @@ impl Arguments {
 pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> anyhow::Result<ExitCode> {
     let start = Instant::now();
     let weighting = arguments.weighting()?;
-    let scene = Scene::open(&arguments.scene)?;
+    let (folder, scene) = arguments.pose.open(&arguments.scene)?;
     let is_stream = arguments.output == Path::new("-");
     if !is_stream {
         keep_folder_apart([&scene], &arguments.output)?;
@@ -148,7 +151,7 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
         return Ok(ExitCode::SUCCESS);
     }
     let before = weighting.clone().unwrap_or_else(Weighting::default_scheme);
-    let mut writer = RunWriter::new(&arguments.output, &scene, arguments.scene.display().to_string(), &job, &before);
+    let mut writer = RunWriter::new(&arguments.output, &scene, folder.display().to_string(), &job, &before);
     writer.lock()?;
     writer.set_outputs(arguments.outputs.outputs());
     leaving.into_iter().for_each(|warning| writer.warn(warning));

@@ -2,18 +2,19 @@
 
 use super::model::ModelOptions;
 use super::options::{BoundOptions, DeviceOptions, PictureOptions, SourceOptions};
+use super::posed::PoseOption;
 use super::terminal::Terminal;
 use super::weighting::choice_help;
 use super::{on_threads, say};
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
 use viewfuse_device::choice::Chosen;
 use viewfuse_field::AnyField;
 use viewfuse_field::gaussians::GivenGaussians;
 use viewfuse_job::shell::quoted;
 use viewfuse_scene::gaussians::GaussianScene;
-use viewfuse_scene::{READERS, Scene, looked_for};
+use viewfuse_scene::{READERS, looked_for};
 use viewfuse_view::{Commands, ViewError, Viewed, Viewer};
 use viewfuse_weighting::{Weighting, WeightingChoice};
 
@@ -27,6 +28,8 @@ use viewfuse_weighting::{Weighting, WeightingChoice};
 pub(crate) struct Arguments {
     #[arg(help = scene_help())]
     scene: PathBuf,
+    #[command(flatten)]
+    pose: PoseOption,
     #[command(flatten)]
     sources: SourceOptions,
     #[arg(long, value_name = "SCHEME", help = choice_help())]
@@ -54,7 +57,7 @@ pub(crate) struct Arguments {
 }
 
 /// Options that only this command has, or that the page gives anew.
-const NOT_OF_RENDER: [&str; 5] = ["port", "no-browser", "weights", "sources", "views"];
+const NOT_OF_RENDER: [&str; 6] = ["port", "no-browser", "weights", "sources", "views", "pose"];
 
 fn scene_help() -> String {
     format!("The scene: {}", looked_for(&READERS))
@@ -68,7 +71,7 @@ pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> 
         // As `render`: a network's pictures take too long to try out schemes unasked, and Gaussians show the same under all.
         None => (Weighting::default_scheme(), arguments.model.label().is_none() && arguments.gaussians.is_none()),
     };
-    let scene = Scene::open(&arguments.scene)?;
+    let (folder, scene) = arguments.pose.open(&arguments.scene)?;
     let field = match &arguments.gaussians {
         Some(path) => AnyField::new(GivenGaussians { scene: GaussianScene::read(path, &scene.frame)? }),
         None => arguments.model.open(arguments.seed, None)?,
@@ -87,9 +90,9 @@ pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> 
             weighting: &weighting,
             chooses,
         };
-        let commands = commands(arguments, given, &viewed);
+        let commands = commands(&folder, given, &viewed);
         let viewer = Viewer::listen(viewed, commands, arguments.port).map_err(plain)?;
-        let (count, path) = (sources.len(), arguments.scene.display());
+        let (count, path) = (sources.len(), folder.display());
         say(format_args!("{path}: {count} sources, {} on {}, {reason}", about.name, viewer.device_name()))?;
         say(format_args!("{}", viewer.address()))?;
         if !arguments.no_browser && !start_browser(&viewer.address().to_string()) {
@@ -121,7 +124,7 @@ fn plain(error: ViewError) -> anyhow::Error {
 }
 
 /// The command line that renders a view of the page.
-fn commands(arguments: &Arguments, given: &[(String, Option<String>)], viewed: &Viewed<'_>) -> Commands {
+fn commands(folder: &Path, given: &[(String, Option<String>)], viewed: &Viewed<'_>) -> Commands {
     let Viewed { scene, sources, weighting: first, .. } = viewed;
     let mut options = String::new();
     if given.iter().any(|(name, _)| name == "sources" || name == "views") {
@@ -133,6 +136,6 @@ fn commands(arguments: &Arguments, given: &[(String, Option<String>)], viewed: &
         options.extend(value.iter().map(|value| format!(" {}", quoted(value))));
     }
     let first_weights = if viewed.chooses { WeightingChoice::Auto.to_string() } else { first.to_string() };
-    let render = format!("viewfuse render {}", quoted(&arguments.scene));
+    let render = format!("viewfuse render {}", quoted(folder));
     Commands { render, options, first_weights: quoted(first_weights) }
 }

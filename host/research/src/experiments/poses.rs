@@ -14,15 +14,19 @@
 //! attempts   the greatest median rotation error of an attempt that was not accepted: what the verdict had to tell apart
 //! ```
 
+mod exif;
+pub(super) mod pictures;
+pub(super) mod refined;
 mod sets;
 mod truth;
 
 use anyhow::{Context, bail};
-use sets::{SETS, Set, neighbours};
+use sets::{Focal, SETS, Set, neighbours};
 use std::path::{Path, PathBuf};
+use tempfile::TempDir;
 use truth::{Errors, errors};
 use viewfuse_job::progress::Silent;
-use viewfuse_pose::{OpenMvg, Options, PoseError, find};
+use viewfuse_pose::{Found, OpenMvg, Options, PoseError, find};
 use viewfuse_scene::{Scene, read_picture};
 
 pub(crate) fn run(arguments: &[String]) -> anyhow::Result<()> {
@@ -55,20 +59,10 @@ struct Row {
 /// Removes the poses of a set and finds them again.
 fn one(scene: &Scene, set: &Set, solver: &OpenMvg) -> anyhow::Result<Row> {
     let views = neighbours(scene, set);
-    let folder = tempfile::tempdir()?;
-    for (place, view) in views.iter().enumerate() {
-        let file = scene.views[*view].image.as_deref().context("a photograph")?;
-        put(file, &folder.path().join(format!("{place:03}")), set.is_known)?;
-    }
-    let pinhole = &scene.views[views[0]].camera.pinhole;
-    let focal = set.is_known.then(|| f64::from(pinhole.focal()[0]));
-    let options = Options { focal, seed: set.seed, every: 1 };
-    let found = match find(folder.path(), &[solver], &options, &Silent) {
-        // Too few photographs that can be used.
-        Err(PoseError::Few { .. }) => return Ok(Row { asked: views.len(), accepted: None, attempts: 0.0 }),
-        found => found?,
+    let Some((found, _)) = found_or_few(scene, set, &views, solver, Options::default().refine)? else {
+        return Ok(Row { asked: views.len(), accepted: None, attempts: 0.0 });
     };
-    let view_of = |photo: usize| views[found.intake.photos[photo].name.parse::<usize>().unwrap_or_default()];
+    let view_of = |photo: usize| view_of(&found, &views, photo);
     let accepted_attempt = found.verdict.as_ref().ok().map(|verdict| verdict.attempt);
     let mut attempts = 0.0_f64;
     for (index, attempt) in found.attempts.iter().enumerate().filter(|(index, _)| Some(*index) != accepted_attempt) {
@@ -77,25 +71,53 @@ fn one(scene: &Scene, set: &Set, solver: &OpenMvg) -> anyhow::Result<Row> {
             attempts = attempts.max(if found.attempts[index].tried.registered > 1 { own.rotation } else { 0.0 });
         }
     }
-    let accepted = found.verdict.as_ref().ok().and_then(|verdict| {
-        Some(errors(scene, found.attempts[verdict.attempt].solution.as_ref()?, &verdict.photos, view_of))
-    });
+    let accepted = found.verdict.as_ref().ok();
+    let accepted = accepted.map(|verdict| errors(scene, &verdict.solution, &verdict.photos, view_of));
     Ok(Row { asked: views.len(), accepted, attempts })
 }
 
-/// Copies a photograph; a JPEG without what it states, where its focal length is to be unknown. `to` has no extension.
-fn put(file: &Path, to: &Path, with_exif: bool) -> anyhow::Result<()> {
+/// Looks for the poses of copies of these views' photographs; with the folder of the copies, which the found scene refers to.
+/// `None` with too few photographs that can be used.
+fn found_or_few(
+    scene: &Scene,
+    set: &Set,
+    views: &[usize],
+    solver: &OpenMvg,
+    refine: bool,
+) -> anyhow::Result<Option<(Found, TempDir)>> {
+    let folder = tempfile::tempdir()?;
+    let focal = f64::from(scene.views[views[0]].camera.pinhole.focal()[0]);
+    for (place, view) in views.iter().enumerate() {
+        let file = scene.views[*view].image.as_deref().context("a photograph")?;
+        put(file, &folder.path().join(format!("{place:03}")), set.focal, focal)?;
+    }
+    let focal = (set.focal == Focal::Known).then_some(focal);
+    let options = Options { focal, seed: set.seed, every: 1, refine };
+    match find(folder.path(), &[solver], &options, &Silent) {
+        Err(PoseError::Few { .. }) => Ok(None),
+        found => Ok(Some((found?, folder))),
+    }
+}
+
+/// The view of the known scene that a photograph shows.
+fn view_of(found: &Found, views: &[usize], photo: usize) -> usize {
+    views[found.intake.photos[photo].name.parse::<usize>().unwrap_or_default()]
+}
+
+/// Copies a photograph; without what it states of itself where its focal length is to be unknown, with nothing but its focal
+/// length in pixels where it is to state that. `to` has no extension.
+fn put(file: &Path, to: &Path, stated: Focal, focal: f64) -> anyhow::Result<()> {
     let extension = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    if with_exif || extension == "png" {
-        std::fs::copy(file, to.with_extension(extension))?;
-    } else {
-        read_picture(file)?.save(to.with_extension("png"))?;
+    match stated {
+        Focal::Exif => std::fs::write(to.with_extension("jpg"), exif::jpeg(&read_picture(file)?, focal)?)?,
+        Focal::Unknown if extension != "png" => read_picture(file)?.save(to.with_extension("png"))?,
+        Focal::Known | Focal::Unknown => drop(std::fs::copy(file, to.with_extension(extension))?),
     }
     Ok(())
 }
 
 fn line(scene: &str, set: &Set, row: &Row) -> String {
-    let focal = if set.is_known { "known" } else { "unknown" };
+    let focal = set.focal.name();
     let head = format!("{scene:<18} {:>9} {:>5}  {focal:<7}", row.asked, set.seed);
     match &row.accepted {
         None => format!("{head}   refused                            {:>8.2}", row.attempts),

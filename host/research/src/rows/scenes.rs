@@ -56,7 +56,30 @@ pub(super) fn of_scenes() -> Vec<Row> {
         )
         .needs(&[FERN, DINO, CUP, CAPE, KANGAROO, DTU, HERZ, FOX, MESH, Need::Program("viewfuse-openmvg")])
         .also(&["host/pose/src", "host/pose/openmvg/src", "tests/data/room", "tests/data/toy"]),
+        row(
+            "posed_pictures",
+            "what pictures lose by poses that were found",
+            &["posed_pictures.txt"],
+            Hours::Estimated(0.5),
+            vec![print(format!("viewfuse-research posed_pictures viewfuse-openmvg{}", of_textured()))],
+        )
+        .needs(&[FERN, CUP, DTU, HERZ, FOX, Need::Program("viewfuse-openmvg")])
+        .also(&["host/pose/src", "host/pose/openmvg/src"]),
+        row(
+            "refined_poses",
+            "what refining poses by the photographs gains",
+            &["refined_poses.txt"],
+            Hours::Estimated(0.2),
+            vec![print(format!("viewfuse-research refined_poses viewfuse-openmvg{} {{DATA}}/kangaroo", of_textured()))],
+        )
+        .needs(&[FERN, CUP, DTU, HERZ, FOX, KANGAROO, Need::Program("viewfuse-openmvg")])
+        .also(&["host/pose/src", "host/pose/openmvg/src"]),
     ]
+}
+
+/// The textured scenes.
+fn of_textured() -> String {
+    ["fern", "herz_jesus_p8", "fox", "cup", "dtu_scan65"].map(|scene| format!(" {{DATA}}/{scene}")).concat()
 }
 
 /// The scenes whose poses are removed.

@@ -17,17 +17,48 @@ pub(super) struct Set {
     pub(super) count: usize,
     /// Seed, and with it the first photograph.
     pub(super) seed: u64,
-    /// Whether the focal length is given.
-    pub(super) is_known: bool,
+    /// What is said of the focal length.
+    pub(super) focal: Focal,
+}
+
+/// What is said of a focal length.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Focal {
+    /// It is given.
+    Known,
+    /// Nothing, and what the files state is taken out.
+    Unknown,
+    /// The files state it as cameras do: EXIF, in whole millimetres of a 35 mm camera.
+    Exif,
+}
+
+impl Focal {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Focal::Known => "known",
+            Focal::Unknown => "unknown",
+            Focal::Exif => "EXIF",
+        }
+    }
 }
 
 const fn known(count: usize, seed: u64) -> Set {
-    Set { count, seed, is_known: true }
+    Set { count, seed, focal: Focal::Known }
 }
 
 const fn unknown(count: usize, seed: u64) -> Set {
-    Set { count, seed, is_known: false }
+    Set { count, seed, focal: Focal::Unknown }
 }
+
+const fn exif(count: usize, seed: u64) -> Set {
+    Set { count, seed, focal: Focal::Exif }
+}
+
+/// The sets of which pictures are rendered.
+pub(super) const PICTURE_SETS: [Set; 5] = [exif(3, 1), exif(5, 1), exif(9, 1), exif(15, 1), exif(5, 2)];
+
+/// The sets whose poses are refined.
+pub(super) const REFINED_SETS: [Set; 3] = [known(3, 1), known(3, 2), known(5, 1)];
 
 /// The sets of every scene.
 pub(super) const SETS: [Set; 15] = [

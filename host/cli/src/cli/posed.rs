@@ -1,0 +1,93 @@
+//! `--pose` of commands that open a scene: where a folder has photographs and no poses, they are found on the way.
+//!
+//! The scene is written beside the photographs, and used again as long as the photographs are the same.
+
+use clap::Args;
+use std::path::{Path, PathBuf};
+use viewfuse_scene::Scene;
+
+#[derive(Args)]
+pub(crate) struct PoseOption {
+    /// Photographs without poses: find the poses first, as `viewfuse pose` does, and write them beside the folder, as
+    /// FOLDER-posed, where the next command finds them
+    #[arg(long)]
+    pose: bool,
+}
+
+impl PoseOption {
+    /// Opens a scene, or the one of the poses found where `--pose` is given and it has none; and the folder of it.
+    pub(crate) fn open(&self, scene: &Path) -> anyhow::Result<(PathBuf, Scene)> {
+        let folder = if self.pose { posed(scene)? } else { scene.to_path_buf() };
+        let scene = Scene::open(&folder)?;
+        Ok((folder, scene))
+    }
+}
+
+#[cfg(not(feature = "pose"))]
+fn posed(_: &Path) -> anyhow::Result<PathBuf> {
+    Err(missing())
+}
+
+/// The error of a build without the feature.
+#[cfg(any(test, not(feature = "pose")))]
+fn missing() -> anyhow::Error {
+    super::left_out::in_feature("option `--pose`", "pose")
+}
+
+#[cfg(feature = "pose")]
+use found::posed;
+
+#[cfg(feature = "pose")]
+mod found {
+    use crate::cli::complain;
+    use crate::cli::pose::find_with_defaults;
+    use anyhow::bail;
+    use std::ffi::OsString;
+    use std::fs;
+    use std::path::{Path, PathBuf};
+    use viewfuse_pose::is_current;
+    use viewfuse_scene::{Scene, SceneError};
+
+    pub(super) fn posed(scene: &Path) -> anyhow::Result<PathBuf> {
+        // All other errors are those of the command itself.
+        if !matches!(Scene::open(scene), Err(SceneError::BarePhotographs { .. })) {
+            return Ok(scene.to_path_buf());
+        }
+        let folder = beside(scene)?;
+        if folder.exists() {
+            if !is_current(&folder, scene)? {
+                bail!(
+                    "{}: exists already and is not of the photographs in {}; remove it, or find poses with `viewfuse pose`",
+                    folder.display(),
+                    scene.display()
+                );
+            }
+            complain(format_args!("{}: the poses found before", folder.display()));
+            return Ok(folder);
+        }
+        complain(format_args!("{}", find_with_defaults(scene, &folder)?));
+        Ok(folder)
+    }
+
+    /// `FOLDER-posed`, also where the folder is called `.`.
+    fn beside(scene: &Path) -> anyhow::Result<PathBuf> {
+        let scene = match scene.file_name() {
+            Some(_) => scene.to_path_buf(),
+            None => fs::canonicalize(scene)?,
+        };
+        let mut name = OsString::from(scene.file_name().unwrap_or_default());
+        name.push("-posed");
+        Ok(scene.with_file_name(name))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn without_the_feature_it_says_how_to_get_it() {
+        let error = super::missing().to_string();
+        for part in ["this build has no option `--pose`; ", "--features pose"] {
+            assert!(error.contains(part), "{error}");
+        }
+    }
+}

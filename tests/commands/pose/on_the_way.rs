@@ -1,0 +1,59 @@
+//! `--pose` of commands that open a scene: bare photographs become a scene on the way.
+
+use super::{bare, json, needs, posed, worst_rotation};
+use crate::BINARY;
+use libtest_mimic::Trial;
+use serde_json::Value;
+use std::fs;
+use viewfuse::scene::Scene;
+use viewfuse_tests::command::{Outcome, assert_refused, command, files_below};
+use viewfuse_tests::scenes::Folder;
+use viewfuse_tests::trials::trial;
+
+pub(super) fn trials() -> Vec<Trial> {
+    vec![
+        needs("on_the_way::from_bare_photographs_to_a_picture", from_bare_photographs_to_a_picture),
+        trial("commands::pose::on_the_way::what_is_posed_already_stays", what_is_posed_already_stays),
+        trial("commands::pose::on_the_way::another_folder_is_not_taken", another_folder_is_not_taken),
+    ]
+}
+
+fn from_bare_photographs_to_a_picture() {
+    let folder = bare(0..8);
+    let out = "--targets 3 -o out --size 160x120 --weights distance:power=2 --device cpu";
+    let outcome = Outcome::of(command(BINARY, folder.path(), &format!("render bare --pose {out}")));
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let told = "viewfuse: bare-posed: written, 8 of 8 photographs with poses";
+    assert!(outcome.stderr.lines().any(|line| line == told), "{}", outcome.stderr);
+    let record = json(&folder.path().join("out/run.json"));
+    let psnr = record["frames"][0]["psnr"].as_f64().expect("a score");
+    assert!(psnr > 21.0, "{psnr} dB");
+    assert!(worst_rotation(&Scene::open(folder.path().join("bare-posed")).expect("a scene")) < 1.5);
+    // The next command takes the poses that are there; what it prints is its own.
+    let before = files_below(&folder.path().join("bare-posed"));
+    let outcome = Outcome::of(command(BINARY, folder.path(), "inspect ./bare/ --pose --json"));
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let inspected: Value = serde_json::from_str(&outcome.stdout).expect("JSON alone");
+    assert_eq!(inspected["photograph_count"], 8, "{inspected}");
+    assert!(outcome.stderr.contains("bare-posed: the poses found before"), "{}", outcome.stderr);
+    assert_eq!(files_below(&folder.path().join("bare-posed")), before);
+    // Of other photographs they are not taken.
+    fs::remove_file(folder.path().join("bare/007.jpg")).expect("a photograph");
+    let parts = ["bare-posed: exists already and is not of the photographs in bare", "remove it"];
+    assert_refused(BINARY, folder.path(), "view bare --pose --no-browser", &parts);
+}
+
+fn what_is_posed_already_stays() {
+    let toy = viewfuse_tests::command::toy();
+    let before = files_below(toy.path());
+    posed(command(BINARY, toy.path(), "inspect toy --pose"));
+    assert_eq!(files_below(toy.path()), before);
+    // Errors of other kinds are the command's own.
+    assert_refused(BINARY, toy.path(), "inspect nowhere --pose", &["nowhere"]);
+}
+
+fn another_folder_is_not_taken() {
+    let folder: Folder = bare(0..3);
+    folder.write("bare-posed/notes.txt", "mine");
+    assert_refused(BINARY, folder.path(), "inspect bare --pose", &["bare-posed: exists already"]);
+}
