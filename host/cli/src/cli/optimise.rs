@@ -17,7 +17,7 @@ use viewfuse_device::Device;
 use viewfuse_device::choice::{AnyDevice, Chosen};
 use viewfuse_field::AnyField;
 use viewfuse_field::gaussians::{GivenGaussians, MAX_COUNT, MAX_ITERATIONS, Optimiser, Recipe, behind, scene_of};
-use viewfuse_field::point_cloud::{CloudOptions, point_cloud};
+use viewfuse_field::point_cloud::point_cloud;
 use viewfuse_field::render::{RenderOptions, Stage, open_album};
 use viewfuse_job::files::check_writable;
 use viewfuse_job::progress::{Progress, Silent};
@@ -32,8 +32,6 @@ use viewfuse_weighting::{Weighting, WeightingSpec, grammar};
 
 /// Iterations between two scores, and between two files on the way.
 const SCORED: u32 = 40;
-/// Most sources whose points count without a second view that confirms them: so few leave too few that are.
-const MAX_UNCONFIRMED: usize = 3;
 /// Iterations with the weights of `--towards`.
 const TOWARDS: u32 = 60;
 
@@ -187,9 +185,7 @@ impl Job<'_> {
         let album = open_album(self.scene, shown, renderer.as_ref(), &self.options, progress)?;
         let mut stage = Stage::prepare(self.scene, &album, &self.sources, renderer.as_ref(), &self.options, progress)?;
         progress.stage("finding surfaces", 1..3, 10);
-        let own = CloudOptions::default();
-        let least_views = if self.sources.len() <= MAX_UNCONFIRMED { 1 } else { own.least_views };
-        let points = point_cloud(&mut stage, &self.weighting, CloudOptions { least_views }, &Silent)?;
+        let points = point_cloud(&mut stage, &self.weighting, Recipe::cloud(self.sources.len()), &Silent)?;
         let own = Recipe { seed: self.arguments.seed, ..Recipe::default() };
         let recipe = own.with(self.arguments.iterations, self.arguments.count);
         let Some(mut optimiser) = Optimiser::new(device, &stage.images, &points, recipe)? else {

@@ -1,9 +1,14 @@
 //! The settings of an optimisation. What was measured of them is in `host/research/results/gaussians.md`.
 
+use crate::point_cloud::CloudOptions;
+
 /// Most Gaussians that a person can ask for.
 pub const MAX_COUNT: u32 = 2_000_000;
 /// Most iterations at a size that a person can ask for.
 pub const MAX_ITERATIONS: u32 = 100_000;
+
+/// Most sources whose points count without a second view that confirms them: so few leave too few that are.
+const MAX_UNCONFIRMED: usize = 3;
 
 /// Settings of an optimisation. Lengths are in footprints: the size of a level's pixel at the median depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,6 +74,12 @@ impl Default for Recipe {
 }
 
 impl Recipe {
+    /// The cloud of so many sources that the optimisation begins with.
+    pub fn cloud(source_count: usize) -> CloudOptions {
+        let own = CloudOptions::default();
+        if source_count <= MAX_UNCONFIRMED { CloudOptions { least_views: 1 } } else { own }
+    }
+
     /// The recipe with so many iterations at each level that has some, and at most so many Gaussians, whatever the sources' size.
     pub fn with(mut self, iterations: Option<u32>, count: Option<u32>) -> Recipe {
         if let Some(iterations) = iterations {

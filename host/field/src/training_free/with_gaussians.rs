@@ -5,7 +5,7 @@
 //! sweep's: what is left out of them is measured against a picture without Gaussians.
 
 use crate::gaussians::{Optimised, Optimiser, Recipe, Splatter};
-use crate::point_cloud::{CloudOptions, cloud_of};
+use crate::point_cloud::cloud_of;
 use crate::{
     DepthMap, Effort, Efforts, Encoding, Encodings, FieldError, Geometry, Prepared, Record, Rendered, Request, Setting,
     Surfaces, Tunable, Tuned, Weighted,
@@ -97,7 +97,8 @@ impl<'a, D: Device> WithGaussians<'a, D> {
             self.encode(view, quiet)?;
         }
         let maps = self.sweep.geometry().map_or(Ok(Vec::new()), Geometry::source_depths)?;
-        let points = cloud_of(&maps, &self.images, &self.relevance, CloudOptions::default(), quiet)?;
+        let cloud = Recipe::cloud(self.images.images.len());
+        let points = cloud_of(&maps, &self.images, &self.relevance, cloud, quiet)?;
         let scene = match Optimiser::new(self.device, &self.images, &points, self.recipe)? {
             Some(mut optimiser) => {
                 optimiser.run(quiet)?;
