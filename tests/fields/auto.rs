@@ -118,13 +118,17 @@ fn pictures_are_mixed_where_that_is_not_worse() -> Result<(), Box<dyn Error>> {
         // The best of all that was tried is not always what was chosen before: gains within the noise do not count.
         None => assert!(mixed.psnr < single, "{} against {single}", mixed.psnr),
         Some(mixture) => {
-            assert_eq!((mixture.parts.len(), mixture.constants.len(), frames[0].shares.len()), (3, 2, 3));
+            // Three of the plane sweep, and the Gaussians.
+            assert_eq!((mixture.parts.len(), mixture.constants.len(), frames[0].shares.len()), (4, 3, 4));
+            let settings = mixture.parts.iter().flatten();
+            let of_gaussians = settings.filter(|setting| setting.name == "gaussians" && setting.value > 0.0);
+            assert_eq!(of_gaussians.count(), 1, "{:?}", mixture.parts);
             assert!(mixed.psnr > single - 0.2, "{} against {single}", mixed.psnr);
             assert!((frames[0].shares.iter().sum::<f32>() - 1.0).abs() < 1.0e-4, "{:?}", frames[0].shares);
             // What is mixed is the pictures under the settings of the parts.
             let field = TrainingFree::default();
             let renderer = On { device: &Cpu, field: &field };
-            let mut levels = [Vec::new(), Vec::new(), Vec::new()];
+            let mut levels = vec![Vec::new(); mixture.parts.len()];
             for (settings, levels) in mixture.parts.iter().zip(&mut levels) {
                 let given = RenderOptions { settings: settings.clone(), ..options() };
                 render(&scene, &middle(&scene), &chosen.weighting, &renderer, &given, &Silent, |_, frame| {

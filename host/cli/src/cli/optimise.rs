@@ -220,7 +220,7 @@ impl Job<'_> {
             optimiser.advance()?;
             progress.step();
             let done = optimiser.done();
-            if done % SCORED != 0 && done != of {
+            if !done.is_multiple_of(SCORED) && done != of {
                 continue;
             }
             let gaussians = optimiser.optimised().gaussians;
