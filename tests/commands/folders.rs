@@ -14,6 +14,7 @@ viewfuse_tests::trials![
     a_journal_that_was_cut_anywhere_is_continued,
     two_runs_do_not_mix_in_one_folder,
     an_earlier_run_is_replaced_as_a_whole_or_not_at_all,
+    what_is_found_of_the_sources_is_kept_where_asked,
 ];
 
 const RENDER: &str =
@@ -161,4 +162,22 @@ fn an_earlier_run_is_replaced_as_a_whole_or_not_at_all() {
     done(folder.path(), &format!("{} --replace", RENDER.replace("--targets 20", "--targets 21")));
     assert_eq!(fs::read_to_string(folder.path().join("elsewhere.png")).expect("a file"), "mine");
     assert_eq!(fs::read_to_string(folder.path().join("out/notes.txt")).expect("a file"), "mine");
+}
+
+/// `--cache` without `--model`: the default field has options, too.
+fn what_is_found_of_the_sources_is_kept_where_asked() {
+    let folder = Folder::new();
+    let scene = viewfuse_tests::places::data("room");
+    let render = |output: &str, more: &str| {
+        let arguments = "--targets 002 --sources 003..005 --size 48x36 --weights mean --no-sheets --device cpu";
+        done(folder.path(), &format!("render {} {arguments} {more} -o {output}", scene.display()));
+        fs::read(folder.path().join(output).join("002.png")).expect("a picture")
+    };
+    let plain = render("plain", "");
+    let first = render("first", "--cache kept");
+    let kept = files_below(&folder.path().join("kept"));
+    assert!(kept.len() >= 3, "{kept:?}");
+    let second = render("second", "--cache kept");
+    assert!(plain == first && first == second, "another picture");
+    assert_eq!(files_below(&folder.path().join("kept")), kept);
 }

@@ -18,6 +18,7 @@ viewfuse_tests::trials![
     ctrl_c_keeps_what_there_is,
     after_a_kill_it_goes_on_from_the_file,
     its_files_are_rendered,
+    options_of_the_field_are_those_of_the_command,
     what_it_refuses,
     hostile_files_are_errors_of_every_command,
     a_page_holds_what_the_file_holds,
@@ -135,6 +136,24 @@ fn its_files_are_rendered() {
     assert_eq!(pictures.count(), 5);
     let record = fs::read_to_string(folder.path().join("orbit/run.json")).expect("a record");
     assert!(record.contains("\"gaussians\""), "{record}");
+}
+
+/// `--model gaussians` optimises on the way.
+fn options_of_the_field_are_those_of_the_command() {
+    let folder = toy();
+    let render = |options: &str, output: &str| {
+        let arguments = "render toy --targets 20 --size 32x32 --weights mean --no-sheets --device cpu";
+        done(folder.path(), &format!("{arguments} {options} -o {output}"));
+        fs::read(folder.path().join(output).join("000020.png")).expect("a picture")
+    };
+    let few = render("--model gaussians --gaussian-iterations 4", "few");
+    assert!(few != render("--model gaussians --gaussian-iterations 8", "more"), "iterations change nothing");
+    let count = "--model gaussians --gaussian-iterations 4 --gaussian-count 300";
+    assert!(few != render(count, "count"), "the number changes nothing");
+    let wrong = "render toy --targets 20 --model gaussians --gaussian-count 0 -o out";
+    assert_wrong_arguments(BINARY, folder.path(), wrong, &["--gaussian-count"]);
+    let without = "render toy --targets 20 --gaussian-count 300 -o out";
+    assert_wrong_arguments(BINARY, folder.path(), without, &["--gaussian-count cannot be used"]);
 }
 
 fn what_it_refuses() {
