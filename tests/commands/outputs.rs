@@ -166,7 +166,7 @@ fn what_a_kill_left_is_removed() {
     busy.lock().expect("a lock");
     done(folder.path(), &format!("{RENDER} -o out"));
     assert!(path.exists());
-    drop(busy);
+    busy.unlock().expect("unlocked");
     done(folder.path(), &format!("{RENDER} -o out"));
     assert!(!path.exists());
 }

@@ -94,16 +94,7 @@ pub fn blend(
 ) -> Blended {
     let groups = block.group_count as usize;
     let here = pixel_costs(block, costs, at);
-    let mut least = f32::MAX;
-    let mut group = 0;
-    while group < groups {
-        let mut plane = 0;
-        while plane < PLANES {
-            least = min(here[group][plane], least);
-            plane += 1;
-        }
-        group += 1;
-    }
+    let least = least_cost(&here, groups);
     let mut colour = [0.0; 3];
     let (mut seen_share, mut all_share) = (0.0, 0.0);
     let mut disparity_sum = 0.0;
@@ -168,6 +159,22 @@ pub fn blend(
         / (1.0 + exp(min((least - 0.12) * 50.0, 80.0)));
     let scale = inverse * opacity;
     Blended { colour: [colour[0] * scale, colour[1] * scale, colour[2] * scale, opacity], depth, confidence }
+}
+
+/// The least cost of the planes in the first so many groups.
+#[inline(always)]
+fn least_cost(costs: &[Planes; MAX_GROUPS], groups: usize) -> f32 {
+    let mut least = f32::MAX;
+    let mut group = 0;
+    while group < groups {
+        let mut plane = 0;
+        while plane < PLANES {
+            least = min(costs[group][plane], least);
+            plane += 1;
+        }
+        group += 1;
+    }
+    least
 }
 
 /// The costs of all planes at an image coordinate of the target: bilinear in the volume.
