@@ -5,6 +5,7 @@
 //! geometry      how far a camera is from its sources
 //! leave_out     sources rendered from the others
 //! regions       the mixture of pictures under several settings
+//! calibration   the errors that pixels of a confidence have
 //! detail        the detail that coarse pictures lack
 //! expectation   from these scores to a target's
 //! ```
@@ -14,20 +15,23 @@
 //! noise. At last, pictures under several settings are mixed by region, where that is not worse. With too few sources to
 //! leave one out, everything stays at its default.
 
+mod calibration;
 mod detail;
 mod expectation;
 mod geometry;
 mod leave_out;
 mod regions;
 
-pub use expectation::{Basis, Expected, TERMS};
+pub use calibration::{Calibration, Group, POOR};
+pub use expectation::{Basis, Expected, PixelErrors, TERMS};
 pub use geometry::Standing;
 pub use leave_out::{MAX_LEFT_OUT, MAX_NEIGHBOURS, SIDE};
 
 use crate::render::{Finished, Frame, RenderError, RenderOptions, Stage, render_chosen};
 use crate::{Mixture, Renderer, Setting, Tunable};
+use expectation::decibels;
 use geometry::Measure;
-use leave_out::{Outcome, Trials, coarse, mean};
+use leave_out::{Outcome, Trials, coarse};
 use regions::Mixed;
 use serde::Serialize;
 use viewfuse_core::pose::Pose;
@@ -101,6 +105,8 @@ pub struct Chosen {
     pub left_out: Vec<LeftOutSource>,
     /// The data for a target's expected score; `None` if nothing could be left out.
     pub basis: Option<Basis>,
+    /// The errors that pixels of a confidence have; `None` if nothing could be left out, and for fields without confidences.
+    pub calibration: Option<Calibration>,
     measure: Measure,
     poses: Vec<Pose>,
 }
@@ -131,10 +137,10 @@ impl Chosen {
         let basis = self.basis?;
         let middles: Vec<Pose> = self.poses.iter().enumerate().filter_map(|(own, _)| self.middle(own)).collect();
         let standings = middles.iter().map(|pose| self.measure.standing(pose, self.poses.iter()));
-        let all: Vec<Expected> = standings.map(|standing| basis.expected(standing, basis.confidence)).collect();
+        let all: Vec<Expected> = standings.map(|standing| basis.expected(standing, basis.calibrated)).collect();
         let mean = |value: &dyn Fn(&Expected) -> f64| all.iter().map(value).sum::<f64>() / all.len() as f64;
         let interval = [0, 1].map(|end| mean(&|own: &Expected| own.interval[end]));
-        (!all.is_empty()).then(|| Expected { psnr: mean(&|own| own.psnr), interval })
+        (!all.is_empty()).then(|| Expected { psnr: mean(&|own| own.psnr), interval, pixels: None })
     }
 
     /// The pose half-way between a source and the one nearest to it.
@@ -147,9 +153,20 @@ impl Chosen {
         Pose::look_at(centre, centre + ahead, -(own.down_world() + other.down_world())).ok()
     }
 
+    /// The score of a picture by the calibration of its confidences, decibels; `None` without one.
+    pub fn calibrated(&self, frame: &Frame) -> Option<f64> {
+        self.calibration.as_ref()?.mean_square(frame.confidences.iter().copied()).map(decibels)
+    }
+
     /// The expected score of a target's picture; `None` if nothing could be left out.
     pub fn expected(&self, frame: &Frame) -> Option<Expected> {
-        self.basis.map(|basis| basis.expected(self.standing(frame), mean(&frame.confidences)))
+        let calibrated = self.calibrated(frame);
+        let expected = self.basis?.expected(self.standing(frame), calibrated);
+        let pixels = self.calibration.as_ref().zip(calibrated).map(|(calibration, calibrated)| {
+            let scale = 10.0_f64.powf((calibrated - expected.psnr) / 20.0) as f32;
+            PixelErrors { scale, poor: calibration.poor(&frame.confidences, scale) }
+        });
+        Some(Expected { pixels, ..expected })
     }
 }
 
@@ -200,6 +217,7 @@ fn choose_of(
         candidates: Vec::new(),
         left_out: Vec::new(),
         basis: None,
+        calibration: None,
         measure: Measure::of(&cameras),
         poses: cameras.iter().map(|camera| camera.pose).collect(),
     };
@@ -238,11 +256,13 @@ fn choose_of(
     }
     chosen.candidates = search.candidates;
     let side = coarse.size.map_or(SIDE, |[width, height]| width.max(height));
-    chosen.basis = Some(Basis::of(&best, detail::lost_detail(&stage.images.images, side)));
+    chosen.calibration = Calibration::of(best.iter().flat_map(|outcome| outcome.samples.iter().copied()).collect());
+    let detail = detail::lost_detail(&stage.images.images, side);
+    chosen.basis = Some(Basis::of(&best, chosen.calibration.as_ref(), detail));
     chosen.left_out = best
         .iter()
         .zip(trials.names())
-        .map(|(&Outcome { psnr, standing, confidence, copy }, source)| LeftOutSource {
+        .map(|(&Outcome { psnr, standing, confidence, copy, .. }, source)| LeftOutSource {
             source: source.to_owned(),
             psnr,
             copy_psnr: copy,
@@ -336,7 +356,7 @@ mod tests {
 
     fn outcomes(scores: &[f64]) -> Vec<Outcome> {
         let standing = Standing { gap: 0.1, outside: 0.5 };
-        let of = |&psnr: &f64| Outcome { psnr, confidence: None, standing, copy: 10.0 };
+        let of = |&psnr: &f64| Outcome { psnr, confidence: None, samples: Vec::new(), standing, copy: 10.0 };
         scores.iter().map(of).collect()
     }
 

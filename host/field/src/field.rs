@@ -311,6 +311,9 @@ pub enum Encoding {
     All,
     /// Each when a target first gives it a weight. Views without a weight do not contribute to a picture.
     Used,
+    /// As `Used`, and where something may be left out, only so many views of greatest weight contribute to a picture: views of less
+    /// weight add more errors than they show. Views of equal weight stay together.
+    Greatest(usize),
 }
 
 /// A picture to render.
@@ -320,7 +323,7 @@ pub struct Request<'a> {
     pub camera: &'a Camera,
     /// The weights of all sources; they sum to 1.
     pub weights: &'a SourceWeights,
-    /// The contributing views, in ascending order: with [`Encoding::Used`] those with a weight, otherwise all.
+    /// The contributing views, in ascending order: all with [`Encoding::All`], otherwise those with a weight.
     pub views: &'a [usize],
     /// Early termination: the transmittance below which samples are left out; no channel changes by more than that.
     pub early_termination: f32,

@@ -5,11 +5,13 @@
 //! stage     sources on a device, from which targets are rendered
 //! frame     the result
 //! seen      how many photographs show what it shows
+//! most_views  the weight of sources that are more than a field uses
 //! error     errors
 //! ```
 
 mod error;
 mod frame;
+mod most_views;
 mod options;
 mod seen;
 mod stage;

@@ -104,7 +104,7 @@ impl<'a> Session<'a> {
         }
         match self.prepared.encoding() {
             Encoding::All => self.encode_all(progress),
-            Encoding::Used => Ok(()),
+            Encoding::Used | Encoding::Greatest(_) => Ok(()),
         }
     }
 
@@ -200,7 +200,7 @@ impl<'a> Session<'a> {
     /// The record of the work so far.
     pub(crate) fn record(&self) -> Record {
         let mut record = self.prepared.record();
-        let skips_unused = self.prepared.encoding() == Encoding::Used;
+        let skips_unused = self.prepared.encoding() != Encoding::All;
         if !skips_unused && self.is_weighted {
             return record;
         }

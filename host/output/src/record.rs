@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 use viewfuse_device::{KernelTime, Transfers};
-use viewfuse_field::auto::{Candidate, Chosen, Expected, LeftOutSource};
+use viewfuse_field::auto::{Calibration, Candidate, Chosen, Expected, LeftOutSource};
 use viewfuse_field::budget::Kept;
 use viewfuse_field::render::{Frame, RenderOptions, Seen, StageCosts};
 use viewfuse_field::{Denoising, LeftOut, Mixture, Setting};
@@ -106,12 +106,15 @@ pub struct ChosenRecord {
     pub candidates: Vec<Candidate>,
     /// The sources that were left out, each rendered coarsely from the others with what was chosen.
     pub left_out: Vec<LeftOutSource>,
+    /// What confidences mean: the root mean square error, as a share of a colour's range, that pixels of a confidence have in
+    /// those pictures; null for fields without confidences. In a frame it is this times `expected.pixels.scale`.
+    pub calibration: Option<Calibration>,
 }
 
 impl From<Chosen> for ChosenRecord {
     fn from(chosen: Chosen) -> ChosenRecord {
-        let Chosen { settings, mixture, candidates, left_out, .. } = chosen;
-        ChosenRecord { settings, mixture, candidates, left_out }
+        let Chosen { settings, mixture, candidates, left_out, calibration, .. } = chosen;
+        ChosenRecord { settings, mixture, candidates, left_out, calibration }
     }
 }
 

@@ -113,7 +113,7 @@ pub(crate) fn to_python(py: Python<'_>, scene: &Scene, sources: &[usize], finish
         seen: seen.map(|seen| array(py, [height, width], seen.into_raw())).transpose()?,
         psnr,
         ssim,
-        expected: expected.map(|Expected { psnr, interval: [low, high] }| (psnr, low, high)),
+        expected: expected.map(|Expected { psnr, interval: [low, high], .. }| (psnr, low, high)),
         seconds: time.as_secs_f64(),
     })
 }

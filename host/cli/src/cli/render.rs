@@ -21,7 +21,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 use viewfuse_device::choice::Chosen;
 use viewfuse_field::AnyField;
-use viewfuse_field::auto::{self, Candidate, Expected};
+use viewfuse_field::auto::{self, Candidate, Expected, PixelErrors};
 use viewfuse_field::budget::{Estimate, Kept};
 use viewfuse_field::gaussians::GivenGaussians;
 use viewfuse_field::render::{Frame, Seen, render};
@@ -41,6 +41,8 @@ use viewfuse_weighting::{Weighting, WeightingChoice};
 
 /// From which share on a picture that few photographs show is said to be one.
 const MIN_FEW: f32 = 0.2;
+/// Share of pixels that are expected to be poor from which on a person is told.
+const MIN_POOR: f32 = 0.1;
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
@@ -277,7 +279,7 @@ fn print(record: &RunRecord, folder: &Path) -> std::io::Result<()> {
 
 /// What was chosen for the scene, and what it gained.
 fn choice(chosen: &ChosenRecord, weighting: &str) -> String {
-    let ChosenRecord { settings, mixture, candidates, left_out } = chosen;
+    let ChosenRecord { settings, mixture, candidates, left_out, .. } = chosen;
     if left_out.is_empty() {
         return format!("chosen: {weighting}, the default: too few sources to leave one out");
     }
@@ -307,8 +309,12 @@ fn summary(frame: &FrameRecord, sources: &[String], folder: &Path) -> String {
         (Some(psnr), None) => format!("  PSNR {psnr:.2} dB"),
         _ => String::new(),
     };
-    let expected = frame.expected.map_or_else(String::new, |Expected { psnr, interval: [low, high] }| {
-        format!("  expected PSNR {psnr:.1} dB (80 %: {low:.1} to {high:.1})")
+    let expected = frame.expected.map_or_else(String::new, |Expected { psnr, interval: [low, high], pixels }| {
+        let poor =
+            pixels.filter(|pixels| pixels.poor >= MIN_POOR).map_or_else(String::new, |PixelErrors { poor, .. }| {
+                format!(", {:.0} % of it off by more than a tenth of the range", 100.0 * poor)
+            });
+        format!("  expected PSNR {psnr:.1} dB (80 %: {low:.1} to {high:.1}){poor}")
     });
     let left_out = match frame.left_out.len() {
         0 => String::new(),

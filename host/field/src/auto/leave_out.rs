@@ -1,5 +1,6 @@
 //! Held-out sources, rendered coarsely from the other sources: an estimate of a field's quality without the truth.
 
+use super::calibration::Sample;
 use super::geometry::{Measure, Standing};
 use crate::Setting;
 use crate::budget::Bound;
@@ -8,7 +9,7 @@ use crate::renderer::Renderer;
 use crate::scores::psnr_of_seen;
 use crate::session::Judge;
 use image::imageops::{self, FilterType};
-use image::{GrayImage, RgbImage};
+use image::{GrayImage, Rgb, RgbImage};
 use std::borrow::Cow;
 use std::sync::Arc;
 use viewfuse_core::Vec3;
@@ -51,12 +52,14 @@ struct Trial<'a> {
 }
 
 /// The result of a source that was left out.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Outcome {
     /// Peak signal to noise ratio, decibels.
     pub(super) psnr: f64,
     /// Mean confidence of its pixels; `None` if the field does not estimate it.
     pub(super) confidence: Option<f64>,
+    /// The pixels that the source shows; empty if the field estimates no confidence.
+    pub(super) samples: Vec<Sample>,
     /// Its geometry among the others.
     pub(super) standing: Standing,
     /// The score of a copy of the nearest of the others.
@@ -169,7 +172,7 @@ impl<'a> Trials<'a> {
         progress: &dyn Progress,
     ) -> Result<Vec<Outcome>, RenderError> {
         let frames = self.frames(weighting, settings, progress)?;
-        let outcome = |(index, frame): (usize, &Frame)| self.outcome(index, &frame.picture, mean(&frame.confidences));
+        let outcome = |(index, frame): (usize, &Frame)| self.outcome(index, &frame.picture, &frame.confidences);
         Ok(frames.iter().enumerate().map(outcome).collect())
     }
 
@@ -200,11 +203,19 @@ impl<'a> Trials<'a> {
         self.trials.iter().map(|trial| (&trial.truth, trial.seen.as_ref()))
     }
 
-    /// The result of a picture of a source that is left out, with the mean confidence of its pixels.
-    pub(super) fn outcome(&self, index: usize, picture: &RgbImage, confidence: Option<f64>) -> Outcome {
+    /// The result of a picture of a source that is left out, with the confidences of its pixels.
+    pub(super) fn outcome(&self, index: usize, picture: &RgbImage, confidences: &[f32]) -> Outcome {
         let Trial { truth, seen, standing, copy, .. } = &self.trials[index];
         let psnr = psnr_of_seen(picture, truth, seen.as_ref()).min(MAX_PSNR);
-        Outcome { psnr, confidence, standing: *standing, copy: *copy }
+        let square = |(own, truth): (&Rgb<u8>, &Rgb<u8>)| {
+            let of = |channel: usize| (f32::from(own.0[channel]) - f32::from(truth.0[channel])) / 255.0;
+            (0..3).map(|channel| of(channel).powi(2)).sum::<f32>() / 3.0
+        };
+        let samples = confidences.iter().zip(picture.pixels().zip(truth.pixels()));
+        let samples = samples.map(|(&confidence, pair)| Sample { confidence, square: square(pair) });
+        let is_seen = |index: usize| seen.as_ref().is_none_or(|seen| seen.as_raw()[index] > 0);
+        let samples = samples.enumerate().filter(|(index, _)| is_seen(*index)).map(|(_, sample)| sample).collect();
+        Outcome { psnr, confidence: mean(confidences), samples, standing: *standing, copy: *copy }
     }
 }
 

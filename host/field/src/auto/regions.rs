@@ -5,7 +5,7 @@
 //! like the others': it stays out where the mixture without it is better by more than the loss that a mixture may have. A source's
 //! score is that with constants that were fitted to the other ones.
 
-use super::leave_out::{Outcome, Trials, mean};
+use super::leave_out::{Outcome, Trials};
 use super::{MAX_LOSS, mean_score};
 use crate::mixture::{Mixture, term_count, terms};
 use crate::render::{Frame, RenderError};
@@ -98,7 +98,7 @@ fn fitted(trials: &Trials<'_>, examples: &mut [Example], parts: Vec<Vec<Setting>
         let mixture = Mixture { parts: parts.clone(), constants: solved(others, count) };
         let (rendered, _) = mixture.mixed(&example.parts);
         let picture = to_rgb8(&rendered.colours, [rendered.width, rendered.height]);
-        outcomes.push(trials.outcome(index, &picture, mean(&rendered.confidences)));
+        outcomes.push(trials.outcome(index, &picture, &rendered.confidences));
     }
     Mixed { mixture: Mixture { constants: solved(sums.iter(), count), parts }, outcomes }
 }

@@ -1,10 +1,13 @@
 //! Sources on a device, from which targets are rendered.
 
+use super::most_views::weight_beyond;
 use super::seen::seen;
 use super::{Frame, RenderError, RenderOptions, Truth, working_side};
 use crate::budget::{Controller, View};
 use crate::session::Session;
-use crate::{DepthMap, Effort, FieldError, Geometry, Mixture, Record, Rendered, Renderer, Setting, Surfaces, Tunable};
+use crate::{
+    DepthMap, Effort, Encoding, FieldError, Geometry, Mixture, Record, Rendered, Renderer, Setting, Surfaces, Tunable,
+};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::Camera;
@@ -313,7 +316,7 @@ impl<'a> Stage<'a> {
     ) -> Result<Frame, RenderError> {
         let start = Instant::now();
         let weights = weighting.weigh(&self.sources, &self.unit.pose(&target.camera.pose));
-        let omission = weights.without_least(self.options.leave_out);
+        let omission = weights.without_least(self.left_out_total(&weights));
         let early_termination = self.options.early_termination;
         let (rendered, kept, encode) = match &mut self.controller {
             Some(controller) => {
@@ -354,6 +357,16 @@ impl<'a> Stage<'a> {
             encode,
             kept,
         })
+    }
+
+    /// The total weight of the sources that may be left out of a picture: that of the options, or of all that are beyond the number
+    /// that the field uses. Where nothing may be left out, it uses all.
+    fn left_out_total(&self, weights: &SourceWeights) -> f32 {
+        let asked = self.options.leave_out;
+        match self.session.prepared.encoding() {
+            Encoding::Greatest(count) if asked > 0.0 => asked.max(weight_beyond(weights, count)),
+            _ => asked,
+        }
     }
 
     /// Width and height of the picture that is rendered at a camera.

@@ -23,8 +23,8 @@ use super::exposure;
 use super::space::Space;
 use crate::row::{Origin, Row};
 use crate::{
-    About, AnyField, DepthMap, Efforts, Field, FieldError, Geometry, Prepared, Rendered, Request, Surfaces, Tuned,
-    Weighted,
+    About, AnyField, DepthMap, Efforts, Encoding, Field, FieldError, Geometry, Prepared, Rendered, Request, Surfaces,
+    Tuned, Weighted,
 };
 pub use kept::Cache;
 use kept::{Kept, Key};
@@ -50,6 +50,10 @@ const DEFAULT: Sweep = Sweep {
     dissent_share: 0.0625,
     temperature: TEMPERATURE,
 };
+
+/// Most views that contribute to a picture. Of 49 views of fox (288x512, `distance:power=2`, one target) all have 29.21 dB, the 20
+/// of greatest weight 29.71, 12 have 30.12 and 8 have 30.46, in 23.7, 16.1, 13.8 and 12.8 CPU seconds.
+const MAX_VIEWS: usize = 12;
 
 /// Settings of the sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -326,6 +330,10 @@ impl<D: Device> Views<'_, D> {
 }
 
 impl<D: Device> Prepared for Views<'_, D> {
+    fn encoding(&self) -> Encoding {
+        Encoding::Greatest(MAX_VIEWS)
+    }
+
     fn encode(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
         self.find(view, progress)
     }

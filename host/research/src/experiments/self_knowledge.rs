@@ -164,12 +164,13 @@ fn rendered(
         let is_inside = (expected.interval[0]..=expected.interval[1]).contains(&truth.psnr);
         summary.targets.push((expected.psnr, truth.psnr, is_inside));
         if let Some(basis) = &chosen.basis {
-            let confidence = (!frame.confidences.is_empty()).then_some(f64::from(confidence));
-            let terms = basis.terms(chosen.standing(&frame), confidence);
+            let terms = basis.terms(chosen.standing(&frame), chosen.calibrated(&frame));
             summary.rows.push(Row { scene: scene.path.display().to_string(), terms, above: truth.psnr - basis.psnr });
         }
+        let calibrated = chosen.calibrated(&frame);
+        let terms = chosen.basis.map(|basis| basis.terms(chosen.standing(&frame), calibrated));
         views.push(json!({
-            "target": frame.target.name, "standing": chosen.standing(&frame), "confidence": confidence,
+            "terms": terms, "target": frame.target.name, "standing": chosen.standing(&frame), "confidence": confidence,
             "expected": expected, "psnr": truth.psnr,
         }));
     }

@@ -65,7 +65,7 @@ impl Quality {
             most.source,
             mean(&|own| own.copy_psnr)
         ))?;
-        let Expected { psnr, interval: [low, high] } = expected;
+        let Expected { psnr, interval: [low, high], .. } = expected;
         say(format_args!(
             "expected   PSNR {psnr:.1} dB half-way between neighbours (80 %: {low:.1} to {high:.1}), {}; measured in {:.1} s",
             in_words(psnr),
