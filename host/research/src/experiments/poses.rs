@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release -p viewfuse-research -- poses FILE SOLVER COUNTS SCENE...`
 //!
-//! `SOLVER` is the file of `viewfuse-openmvg`, or `pycolmap=` and a Python interpreter that has pycolmap; `COUNTS` are numbers of
+//! `SOLVER` is `viewfuse-openmvg` or its file, or `pycolmap=` and a Python interpreter that has pycolmap; `COUNTS` are numbers of
 //! photographs with commas (3,5,8), a scene is a folder. A row is a set of photographs of one scene, about 12 degrees apart. Rows that
 //! `FILE` has already are not made again. Errors are of the poses that were accepted:
 //!
@@ -36,7 +36,7 @@ const TITLE: &str = "scene           photographs  seed  focal    accepted  rotat
 
 pub(crate) fn run(arguments: &[String]) -> anyhow::Result<()> {
     let [file, solver, counts, scenes @ ..] = arguments else { bail!("usage: poses FILE SOLVER COUNTS SCENE...") };
-    let solver = solver_of(solver)?;
+    let solver = solver_of(solver);
     let counts: Vec<usize> = counts.split(',').map(str::parse).collect::<Result<_, _>>().context("COUNTS")?;
     let mut rows = Rows::open(file, TITLE)?;
     for folder in scenes {
@@ -52,15 +52,11 @@ pub(crate) fn run(arguments: &[String]) -> anyhow::Result<()> {
 }
 
 /// The solver of this name.
-fn solver_of(text: &str) -> anyhow::Result<Box<dyn Solver>> {
+fn solver_of(text: &str) -> Box<dyn Solver> {
     if let Some(python) = text.strip_prefix("pycolmap=") {
-        return Ok(Box::new(PyColmap { python: PathBuf::from(python) }));
+        return Box::new(PyColmap { python: PathBuf::from(python) });
     }
-    let program = PathBuf::from(text);
-    if !program.is_file() {
-        bail!("{text}: no such program");
-    }
-    Ok(Box::new(OpenMvg { program }))
+    Box::new(OpenMvg { program: PathBuf::from(text) })
 }
 
 /// What became of a set.

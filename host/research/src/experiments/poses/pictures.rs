@@ -5,7 +5,8 @@
 //! As `poses`, on other sets. Of the accepted photographs two or three are left out and rendered from the other accepted ones with
 //! the weighting `auto` at 208 pixels, over the whole photographs: once at the scene's own poses, once at those that were found.
 //! Both have the same photographs and the points that were found with the poses, moved to the scene's own poses by the similarity
-//! of the cameras: a person who has poses has their points, but the files of some scenes state none.
+//! of the cameras, and no bounds of depth beside them: a person who has poses has their points, but the files of some scenes state
+//! bounds in place of points, or nothing.
 //!
 //! ```text
 //! accepted   photographs with an accepted pose, of those in the set
@@ -42,7 +43,7 @@ const TITLE: &str =
 
 pub(crate) fn run(arguments: &[String]) -> anyhow::Result<()> {
     let [file, solver, scenes @ ..] = arguments else { bail!("usage: posed_pictures FILE SOLVER SCENE...") };
-    let solver = solver_of(solver)?;
+    let solver = solver_of(solver);
     let mut rows = Rows::open(file, TITLE)?;
     for folder in scenes {
         let scene = Scene::open(folder)?;
@@ -80,13 +81,14 @@ fn one(scene: &Scene, set: &Set, solver: &dyn Solver) -> anyhow::Result<String> 
     ))
 }
 
-/// The accepted scene with its photographs, without masks, at their known poses.
+/// The accepted scene with its photographs, without masks and bounds of depth, at their known poses.
 fn known_scene(scene: &Scene, found: &Found, verdict: &Verdict, views: &[usize]) -> Scene {
     let taken: Vec<usize> = verdict.photos.iter().map(|photo| view_of(found, views, *photo)).collect();
     let own = |(view, found): (&usize, &viewfuse_scene::View)| viewfuse_scene::View {
         name: found.name.clone(),
         image: found.image.clone(),
         mask: None,
+        near_far: None,
         ..scene.views[*view].clone()
     };
     let mut known =

@@ -19,7 +19,7 @@ use viewfuse_scene::Scene;
 
 pub(crate) fn run(arguments: &[String]) -> anyhow::Result<()> {
     let [solver, scenes @ ..] = arguments else { bail!("usage: refined_poses SOLVER SCENE...") };
-    let solver = solver_of(solver)?;
+    let solver = solver_of(solver);
     println!("                                                  rotation        centres         left-out score");
     println!("scene         photographs  seed focal   accepted  solver refined  solver refined  solver refined");
     let (mut accepted, mut kept, mut rotations, mut centres) = (0, 0, 0, 0);
