@@ -4,6 +4,7 @@
 
 mod colmap;
 mod on_the_way;
+mod stopped;
 
 use super::BINARY;
 use image::{DynamicImage, ImageFormat, RgbImage, imageops};
@@ -47,6 +48,7 @@ pub(crate) fn trials() -> Vec<Trial> {
         needs("eight_photographs_to_a_picture", eight_photographs_to_a_picture),
         needs("what_does_not_belong_is_left_out_by_name", what_does_not_belong_is_left_out_by_name),
         needs("sizes_and_orientations_may_differ", sizes_and_orientations_may_differ),
+        needs("a_step_leaves_few_enough", a_step_leaves_few_enough),
         needs("photographs_of_nothing_in_common", photographs_of_nothing_in_common),
         needs("ctrl_c_leaves_nothing", ctrl_c_leaves_nothing),
         trial("commands::pose::formats_that_are_not_read", formats_that_are_not_read),
@@ -54,7 +56,7 @@ pub(crate) fn trials() -> Vec<Trial> {
         trial("commands::pose::without_the_program", without_the_program),
         trial("commands::pose::bare_photographs_say_how", bare_photographs_say_how),
     ];
-    own.into_iter().chain(colmap::trials()).chain(on_the_way::trials()).collect()
+    own.into_iter().chain(colmap::trials()).chain(on_the_way::trials()).chain(stopped::trials()).collect()
 }
 
 /// The program, if there is one.
@@ -214,6 +216,22 @@ fn sizes_and_orientations_may_differ() {
     assert_eq!((turned.width(), turned.height()), (320, 240), "upright");
     assert!(scene.views.len() >= 5, "{said}");
     assert!(worst_rotation(&scene) < 2.0, "{said}");
+}
+
+fn a_step_leaves_few_enough() {
+    // As many as a person has of a video, eight of them different.
+    let folder = Folder::new();
+    for number in 0..300 {
+        folder.write(&format!("many/{number}.jpg"), with_exif(&room(number % 8), &[(FILM, ROOM_FILM)]));
+    }
+    let refused = Outcome::of(command(BINARY, folder.path(), "pose many -o posed"));
+    assert_eq!(refused.code, Some(1), "{}", refused.stderr);
+    let step = refused.stderr.split("take one in ").nth(1).and_then(|rest| rest.split(';').next());
+    let step: usize = step.and_then(|step| step.parse().ok()).unwrap_or_else(|| panic!("{}", refused.stderr));
+    let said = posed(command(BINARY, folder.path(), &format!("pose many -o posed --every {step}")));
+    assert!(said.starts_with(&format!("registered 8 of {} photographs\n", 300usize.div_ceil(step))), "{said}");
+    assert!(said.contains("9.jpg: the same picture as "), "{said}");
+    assert_eq!(Scene::open(folder.path().join("posed")).expect("a scene").views.len(), 8);
 }
 
 fn photographs_of_nothing_in_common() {

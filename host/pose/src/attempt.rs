@@ -41,7 +41,7 @@ pub struct Tried {
     pub points: usize,
     /// What the points tell.
     pub support: Option<Support>,
-    /// Seconds that it took.
+    /// Seconds that it took; of an answer that was kept, to read it.
     pub seconds: f64,
     /// Why it is not a candidate; `None` if it is.
     pub refused: Option<String>,

@@ -9,7 +9,7 @@ use crate::colmap_folder::{ColmapFolder, FolderCamera};
 use crate::process::{Ended, run};
 use crate::solution::{Features, Job, Solution, Solver, SolverError};
 use std::ffi::OsStr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use viewfuse_job::progress::Progress;
 
@@ -38,9 +38,13 @@ impl Solver for Colmap {
         &[Features::Sift, Features::DspSift]
     }
 
+    fn identity(&self, progress: &dyn Progress) -> Option<String> {
+        self.version(tempfile::tempdir().ok()?.path(), progress).ok()
+    }
+
     fn solve(&self, job: &Job, progress: &dyn Progress) -> Result<Solution, SolverError> {
         let folder = ColmapFolder::of(job).map_err(|error| self.broken(error.to_string()))?;
-        let version = self.version(&folder, progress)?;
+        let version = self.version(folder.path(), progress)?;
         let at = |name: &str| folder.path().join(name).display().to_string();
         let [database, images, sparse] = ["database.db", "images", "sparse"].map(at);
         progress.stage("features", 0..1, 3);
@@ -112,20 +116,15 @@ impl Colmap {
     }
 
     /// Runs it with these words.
-    fn run(
-        &self,
-        folder: &ColmapFolder,
-        words: &[impl AsRef<OsStr>],
-        progress: &dyn Progress,
-    ) -> Result<Ended, SolverError> {
+    fn run(&self, folder: &Path, words: &[impl AsRef<OsStr>], progress: &dyn Progress) -> Result<Ended, SolverError> {
         let mut command = Command::new(&self.program);
         // It has a graphical interface, which asks for a display.
         command.args(words).env("QT_QPA_PLATFORM", "offscreen");
-        run(&mut command, NAME, &folder.path().join("log.txt"), progress)
+        run(&mut command, NAME, &folder.join("log.txt"), progress)
     }
 
     /// `COLMAP 3.8`.
-    fn version(&self, folder: &ColmapFolder, progress: &dyn Progress) -> Result<String, SolverError> {
+    fn version(&self, folder: &Path, progress: &dyn Progress) -> Result<String, SolverError> {
         let said = self.run(folder, &["-h"], progress)?.said;
         let words: Vec<&str> = said.split_whitespace().collect();
         let at =
@@ -142,7 +141,7 @@ impl Colmap {
         options: Vec<StepOption>,
         progress: &dyn Progress,
     ) -> Result<Ended, SolverError> {
-        let help = self.run(folder, &[step, "-h"], progress)?.said;
+        let help = self.run(folder.path(), &[step, "-h"], progress)?.said;
         let offered: Vec<&str> = help.split_whitespace().filter_map(|word| word.strip_prefix("--")).collect();
         let mut words = vec![step.to_owned()];
         for (names, value) in options {
@@ -151,7 +150,7 @@ impl Colmap {
                 words.extend([format!("--{name}"), value]);
             }
         }
-        let ended = self.run(folder, &words, progress)?;
+        let ended = self.run(folder.path(), &words, progress)?;
         if ended.status.success() {
             return Ok(ended);
         }

@@ -104,7 +104,7 @@ pub enum IntakeError {
         way: String,
     },
     /// More than are matched.
-    #[error("{}: {count} photographs, more than {MAX_PHOTOGRAPHS}: every pair is matched, so take every {step}th of them", folder.display())]
+    #[error("{}: {count} photographs, more than {MAX_PHOTOGRAPHS}: every pair is matched, so take one in {step}", folder.display())]
     Many {
         /// The folder.
         folder: PathBuf,

@@ -17,6 +17,7 @@
 //! colmap_folder  the folder in which COLMAP works, and the model that it leaves
 //! colmap         the person's own COLMAP, as a process: Colmap
 //! pycolmap       the person's own pycolmap, as a process: PyColmap
+//! kept           answers of a solver, kept until the scene is written: Kept
 //! posed          a solution as a scene
 //! agreement      rotations of two solutions between the same photographs
 //! support        parallax and the shape of the points: Support
@@ -39,6 +40,7 @@ mod exif;
 mod find;
 mod focal;
 mod intake;
+mod kept;
 mod left_out;
 mod openmvg;
 mod posed;
@@ -57,6 +59,7 @@ pub use exif::Exif;
 pub use find::{Found, Options, PoseError, find};
 pub use focal::{CameraGroup, Cameras, FocalSource};
 pub use intake::{Intake, IntakeError, MAX_PHOTOGRAPHS, Photo, Unusable, is_photograph};
+pub use kept::Kept;
 pub use left_out::LeftOut;
 pub use openmvg::OpenMvg;
 pub use pycolmap::PyColmap;

@@ -7,6 +7,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::sync::mpsc::{RecvTimeoutError, channel};
+use viewfuse_job::digest::sha256_of;
 use viewfuse_job::progress::Progress;
 
 /// Most bytes of an answer: what is longer is not one.
@@ -38,6 +39,10 @@ impl Solver for OpenMvg {
 
     fn features(&self) -> &'static [Features] {
         &[Features::Alp, Features::Sift]
+    }
+
+    fn identity(&self, _: &dyn Progress) -> Option<String> {
+        sha256_of(&self.program).ok()
     }
 
     fn solve(&self, job: &Job, progress: &dyn Progress) -> Result<Solution, SolverError> {

@@ -46,6 +46,14 @@ impl Solver for PyColmap {
         &[Features::Sift, Features::DspSift]
     }
 
+    fn identity(&self, progress: &dyn Progress) -> Option<String> {
+        let folder = tempfile::tempdir().ok()?;
+        let mut command = Command::new(&self.python);
+        command.arg("-c").arg("import pycolmap; print(pycolmap.__version__)");
+        let ended = run(&mut command, NAME, &folder.path().join("log.txt"), progress).ok()?;
+        ended.status.success().then(|| ended.last_line().to_owned())
+    }
+
     fn solve(&self, job: &Job, progress: &dyn Progress) -> Result<Solution, SolverError> {
         let broken = |problem: String| SolverError::Broken { program: self.python.clone(), problem };
         let folder = ColmapFolder::of(job).map_err(|error| broken(error.to_string()))?;

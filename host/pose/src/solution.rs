@@ -65,7 +65,7 @@ pub struct JobPhotograph {
 }
 
 /// What a solver found. Image coordinates are of the job's photographs: the top left pixel's centre is at (0.5, 0.5).
-#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Solution {
     /// The solver and its version.
     pub solver: String,
@@ -81,7 +81,7 @@ pub struct Solution {
 }
 
 /// A camera as it was refined.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SolvedCamera {
     /// Focal length in pixels.
     pub focal: f64,
@@ -92,7 +92,7 @@ pub struct SolvedCamera {
 }
 
 /// A photograph with or without a pose.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SolvedPhotograph {
     /// World to camera, rows of `[R|t]`, axes x right, y down, z forward; `None` without a pose.
     pub camera_from_world: Option<[[f64; 4]; 3]>,
@@ -128,7 +128,7 @@ impl SolvedPhotograph {
 }
 
 /// A surface point.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SolvedPoint {
     /// World coordinates.
     pub position: [f64; 3],
@@ -139,7 +139,7 @@ pub struct SolvedPoint {
 }
 
 /// A pair of photographs.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SolvedPair {
     /// Their indices.
     pub photographs: [usize; 2],
@@ -231,6 +231,12 @@ pub trait Solver: Sync {
 
     /// The kinds of features that it has.
     fn features(&self) -> &'static [Features];
+
+    /// What tells the program that is asked from others, whose answers could differ: a version or a digest. `None` if that cannot be
+    /// had: then answers are not kept for a run that goes on.
+    fn identity(&self, _progress: &dyn Progress) -> Option<String> {
+        None
+    }
 
     /// Works on a job. The same job has the same answer, byte for byte, on one machine, as far as the program that it runs allows.
     ///

@@ -97,13 +97,13 @@ fn with_colmap() -> Folder {
 }
 
 #[cfg(unix)]
-fn executable(path: &Path) {
+pub(super) fn executable(path: &Path) {
     use std::os::unix::fs::PermissionsExt;
     fs::set_permissions(path, fs::Permissions::from_mode(0o755)).expect("permissions");
 }
 
 #[cfg(not(unix))]
-fn executable(_: &Path) {}
+pub(super) fn executable(_: &Path) {}
 
 fn colmap(folder: &Folder) -> (&'static str, PathBuf) {
     ("VIEWFUSE_COLMAP", folder.path().join("bin/colmap"))

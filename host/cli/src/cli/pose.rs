@@ -5,16 +5,16 @@ mod solvers;
 use super::outputs::keep_folder_apart;
 use super::terminal::Terminal;
 use super::{on_threads, say};
-use anyhow::bail;
+use anyhow::{Context, bail};
 use clap::Args;
 use image::DynamicImage;
 use solvers::{From, solvers};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use viewfuse_job::progress::Progress;
+use viewfuse_job::progress::{Interrupted, Progress};
 use viewfuse_job::shell::quoted;
 use viewfuse_output::camera_map::camera_map;
-use viewfuse_pose::{FocalSource, Found, Options, Record, Refusal, Solver, Verdict, find, write};
+use viewfuse_pose::{FocalSource, Found, Kept, Options, Record, Refusal, Solver, Verdict, find, write};
 use viewfuse_scene::encode_png;
 use viewfuse_scene::inspect::inspect;
 use viewfuse_scene::photographs::BackgroundChoice;
@@ -27,7 +27,9 @@ use viewfuse_scene::write::Layout;
     viewfuse pose photos/ --from openmvg,colmap -o posed\n      with your own COLMAP as a second opinion\n\n\
     Poses are found several times, with other features and, where the focal length is unknown, other guesses of it. What is\n\
     written is what two attempts agree on, and what passes this: each photograph, left out and rendered from the others, is met\n\
-    at its pose, better than by copies of its neighbours, and not two degrees beside it. If nothing passes, nothing is written.")]
+    at its pose, better than by copies of its neighbours, and not two degrees beside it. If nothing passes, nothing is written.\n\n\
+    The same command goes on with a run that was stopped or killed: attempts that were finished lie in a hidden folder beside the\n\
+    output (.posed.attempts) until the command ends by itself.")]
 pub(crate) struct Arguments {
     /// The folder of the photographs: JPEG, PNG, WebP
     photographs: PathBuf,
@@ -94,16 +96,35 @@ pub(crate) fn find_with_defaults(photographs: &Path, output: &Path) -> anyhow::R
     Ok(format!("{}: written, {registered} of {all} photographs with poses", output.display()))
 }
 
-/// Finds poses and writes the scene; the verdict is an accepted one.
+/// Finds poses and writes the scene; the verdict is an accepted one. Finished attempts of a run that is stopped are kept beside the
+/// output for the next one.
 fn found(
     photographs: &Path,
     from: &[Box<dyn Solver>],
     options: &Options,
-    (layout, output): (Layout, &Path),
+    to: (Layout, &Path),
 ) -> anyhow::Result<Found> {
     let from: Vec<&dyn Solver> = from.iter().map(AsRef::as_ref).collect();
+    let Some(folder) = Kept::folder_beside(to.1) else { return written(photographs, &from, options, to) };
+    let kept: Vec<Kept<'_>> = from.iter().map(|solver| Kept::new(*solver, &folder)).collect();
+    let from: Vec<&dyn Solver> = kept.iter().map(|own| own as &dyn Solver).collect();
+    let found = written(photographs, &from, options, to);
+    let is_stopped = |error: &anyhow::Error| error.chain().any(|cause| cause.is::<Interrupted>());
+    if !found.as_ref().is_err_and(is_stopped) {
+        Kept::remove(&folder).with_context(|| folder.display().to_string())?;
+    }
+    found
+}
+
+/// As [`found`], and nothing is kept.
+fn written(
+    photographs: &Path,
+    from: &[&dyn Solver],
+    options: &Options,
+    (layout, output): (Layout, &Path),
+) -> anyhow::Result<Found> {
     let progress = Terminal::new("reading the photographs");
-    let found = find(photographs, &from, options, &progress)?;
+    let found = find(photographs, from, options, &progress)?;
     let verdict = match &found.verdict {
         Ok(verdict) => verdict,
         Err(refusal) => {

@@ -1,9 +1,10 @@
 //! Poses of bare photographs, on scenes whose poses are known: they are removed, found again, and compared.
 //!
-//! `cargo run --release -p viewfuse-research -- poses PROGRAM SCENE...`
+//! `cargo run --release -p viewfuse-research -- poses FILE SOLVER COUNTS SCENE...`
 //!
-//! `PROGRAM` is `viewfuse-openmvg`, a scene is a folder. A row is a set of photographs of one scene, about 12 degrees apart. Errors are
-//! of the poses that were accepted:
+//! `SOLVER` is `viewfuse-openmvg` or its file, or `pycolmap=` and a Python interpreter that has pycolmap; `COUNTS` are numbers of
+//! photographs with commas (3,5,8), a scene is a folder. A row is a set of photographs of one scene, about 12 degrees apart. Rows that
+//! `FILE` has already are not made again. Errors are of the poses that were accepted:
 //!
 //! ```text
 //! focal      known: the scene's own is given; unknown: nothing is said, and the files' EXIF is taken out
@@ -17,39 +18,49 @@
 mod exif;
 pub(super) mod pictures;
 pub(super) mod refined;
+mod rows;
 mod sets;
 mod truth;
 
 use anyhow::{Context, bail};
+use rows::{Rows, numbers};
 use sets::{Focal, SETS, Set, neighbours};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use truth::{Errors, errors};
 use viewfuse_job::progress::Silent;
-use viewfuse_pose::{Found, OpenMvg, Options, PoseError, find};
+use viewfuse_pose::{Found, OpenMvg, Options, PoseError, PyColmap, Solver, find};
 use viewfuse_scene::{Scene, read_picture};
 
+const TITLE: &str = "scene           photographs  seed  focal    accepted  rotation   worst  centres  attempts";
+
 pub(crate) fn run(arguments: &[String]) -> anyhow::Result<()> {
-    let [program, scenes @ ..] = arguments else { bail!("usage: poses PROGRAM SCENE...") };
-    let solver = OpenMvg { program: PathBuf::from(program) };
-    println!("scene           photographs  seed  focal    accepted  rotation   worst  centres  attempts");
-    let mut totals = Totals::default();
+    let [file, solver, counts, scenes @ ..] = arguments else { bail!("usage: poses FILE SOLVER COUNTS SCENE...") };
+    let solver = solver_of(solver);
+    let counts: Vec<usize> = counts.split(',').map(str::parse).collect::<Result<_, _>>().context("COUNTS")?;
+    let mut rows = Rows::open(file, TITLE)?;
     for folder in scenes {
         let scene = Scene::open(folder)?;
-        for set in SETS.iter().filter(|set| set.count <= scene.views.len()) {
-            let row = one(&scene, set, &solver).with_context(|| format!("{folder}: {set:?}"))?;
-            println!("{}", line(&scene.name(), set, &row));
-            totals.add(&row);
+        for set in SETS.iter().filter(|set| set.count <= scene.views.len() && counts.contains(&set.count)) {
+            rows.row(&head(&scene.name(), set), || {
+                Ok(one(&scene, set, solver.as_ref()).with_context(|| format!("{folder}: {set:?}"))?.to_string())
+            })?;
         }
     }
-    println!("{totals}");
-    Ok(())
+    let summary = Totals::of(rows.all()).to_string();
+    rows.finish(&summary)
+}
+
+/// The solver of this name.
+fn solver_of(text: &str) -> Box<dyn Solver> {
+    if let Some(python) = text.strip_prefix("pycolmap=") {
+        return Box::new(PyColmap { python: PathBuf::from(python) });
+    }
+    Box::new(OpenMvg { program: PathBuf::from(text) })
 }
 
 /// What became of a set.
 struct Row {
-    /// Photographs in it.
-    asked: usize,
     /// Of the accepted poses; `None` if nothing was accepted.
     accepted: Option<Errors>,
     /// The greatest median rotation error of the other attempts.
@@ -57,10 +68,10 @@ struct Row {
 }
 
 /// Removes the poses of a set and finds them again.
-fn one(scene: &Scene, set: &Set, solver: &OpenMvg) -> anyhow::Result<Row> {
+fn one(scene: &Scene, set: &Set, solver: &dyn Solver) -> anyhow::Result<Row> {
     let views = neighbours(scene, set);
     let Some((found, _)) = found_or_few(scene, set, &views, solver, Options::default().refine)? else {
-        return Ok(Row { asked: views.len(), accepted: None, attempts: 0.0 });
+        return Ok(Row { accepted: None, attempts: 0.0 });
     };
     let view_of = |photo: usize| view_of(&found, &views, photo);
     let accepted_attempt = found.verdict.as_ref().ok().map(|verdict| verdict.attempt);
@@ -73,7 +84,7 @@ fn one(scene: &Scene, set: &Set, solver: &OpenMvg) -> anyhow::Result<Row> {
     }
     let accepted = found.verdict.as_ref().ok();
     let accepted = accepted.map(|verdict| errors(scene, &verdict.solution, &verdict.photos, view_of));
-    Ok(Row { asked: views.len(), accepted, attempts })
+    Ok(Row { accepted, attempts })
 }
 
 /// Looks for the poses of copies of these views' photographs; with the folder of the copies, which the found scene refers to.
@@ -82,7 +93,7 @@ fn found_or_few(
     scene: &Scene,
     set: &Set,
     views: &[usize],
-    solver: &OpenMvg,
+    solver: &dyn Solver,
     refine: bool,
 ) -> anyhow::Result<Option<(Found, TempDir)>> {
     let folder = tempfile::tempdir()?;
@@ -116,15 +127,21 @@ fn put(file: &Path, to: &Path, stated: Focal, focal: f64) -> anyhow::Result<()> 
     Ok(())
 }
 
-fn line(scene: &str, set: &Set, row: &Row) -> String {
-    let focal = set.focal.name();
-    let head = format!("{scene:<18} {:>9} {:>5}  {focal:<7}", row.asked, set.seed);
-    match &row.accepted {
-        None => format!("{head}   refused                            {:>8.2}", row.attempts),
-        Some(own) => format!(
-            "{head}  {:>8}  {:>8.2}  {:>6.2}  {:>7.1}  {:>8.2}",
-            own.count, own.rotation, own.worst, own.centres, row.attempts
-        ),
+/// What a set's row begins with.
+fn head(scene: &str, set: &Set) -> String {
+    format!("{scene:<18} {:>9} {:>5}  {:<7}", set.count, set.seed, set.focal.name())
+}
+
+impl std::fmt::Display for Row {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match &self.accepted {
+            None => write!(f, " refused                            {:>8.2}", self.attempts),
+            Some(own) => write!(
+                f,
+                "{:>8}  {:>8.2}  {:>6.2}  {:>7.1}  {:>8.2}",
+                own.count, own.rotation, own.worst, own.centres, self.attempts
+            ),
+        }
     }
 }
 
@@ -142,15 +159,23 @@ struct Totals {
 }
 
 impl Totals {
-    fn add(&mut self, row: &Row) {
-        self.sets += 1;
-        self.asked += row.asked;
-        self.with_wrong_attempts += usize::from(row.attempts > WRONG);
-        if let Some(own) = &row.accepted {
-            self.accepted_sets += 1;
-            self.accepted += own.count;
-            self.wrong += usize::from(own.rotation > WRONG);
+    /// Of rows as they are written.
+    fn of(rows: &[String]) -> Totals {
+        let mut totals = Totals::default();
+        for row in rows {
+            totals.sets += 1;
+            totals.asked += row.split_whitespace().nth(1).and_then(|count| count.parse::<usize>().ok()).unwrap_or(0);
+            let numbers = numbers(row);
+            totals.with_wrong_attempts += usize::from(numbers.last().is_some_and(|attempts| *attempts > WRONG));
+            if let [count, rotation, ..] = numbers[..]
+                && !row.contains("refused")
+            {
+                totals.accepted_sets += 1;
+                totals.accepted += count as usize;
+                totals.wrong += usize::from(rotation > WRONG);
+            }
         }
+        totals
     }
 }
 
@@ -159,7 +184,7 @@ impl std::fmt::Display for Totals {
         let Totals { sets, accepted_sets, asked, accepted, wrong, with_wrong_attempts } = self;
         write!(
             f,
-            "\n{sets} sets: {accepted_sets} accepted, {} refused; {accepted} of {asked} photographs; accepted and wrong by more than \
+            "{sets} sets: {accepted_sets} accepted, {} refused; {accepted} of {asked} photographs; accepted and wrong by more than \
              {WRONG} degrees: {wrong}; sets with an attempt that wrong: {with_wrong_attempts}",
             sets - accepted_sets
         )

@@ -52,16 +52,25 @@ pub(super) fn of_scenes() -> Vec<Row> {
             "poses of bare photographs beside the known ones",
             &["poses.txt"],
             Hours::Estimated(0.4),
-            vec![print(format!("viewfuse-research poses viewfuse-openmvg{}", of_posed()))],
+            appended("poses viewfuse-openmvg 3,5,8", &of_posed(), "poses.txt"),
         )
         .needs(&[FERN, DINO, CUP, CAPE, KANGAROO, DTU, HERZ, FOX, MESH, Need::Program("viewfuse-openmvg")])
         .also(&["host/pose/src", "host/pose/openmvg/src", "tests/data/room", "tests/data/toy"]),
+        row(
+            "poses_pycolmap",
+            "the same by pycolmap, where features are few",
+            &["poses_pycolmap.txt"],
+            Hours::Estimated(0.5),
+            appended("poses pycolmap={PYTHON} 5,8", &of_few_features(), "poses_pycolmap.txt"),
+        )
+        .needs(&[DINO, CAPE, MESH, Need::Python("pycolmap")])
+        .also(&["host/pose/src", "tests/data/toy"]),
         row(
             "posed_pictures",
             "what pictures lose by poses that were found",
             &["posed_pictures.txt"],
             Hours::Estimated(0.5),
-            vec![print(format!("viewfuse-research posed_pictures viewfuse-openmvg{}", of_textured()))],
+            appended("posed_pictures viewfuse-openmvg", &of_textured(), "posed_pictures.txt"),
         )
         .needs(&[FERN, CUP, DTU, HERZ, FOX, Need::Program("viewfuse-openmvg")])
         .also(&["host/pose/src", "host/pose/openmvg/src"]),
@@ -75,6 +84,18 @@ pub(super) fn of_scenes() -> Vec<Row> {
         .needs(&[FERN, CUP, DTU, HERZ, FOX, KANGAROO, Need::Program("viewfuse-openmvg")])
         .also(&["host/pose/src", "host/pose/openmvg/src"]),
     ]
+}
+
+/// Steps of a program that appends rows to a file, which stands behind the program's name, and goes on with what is there.
+fn appended(program: &str, scenes: &str, file: &'static str) -> Vec<Step> {
+    let (name, arguments) = program.split_once(' ').unwrap_or((program, ""));
+    let at = format!("{{WORK}}/{file}");
+    vec![work(format!("viewfuse-research {name} {at} {arguments}{scenes}")), Step::Keep(at, file)]
+}
+
+/// The scenes whose photographs have few features.
+fn of_few_features() -> String {
+    " {DATA}/dino {DATA}/gold_cape tests/data/toy {DATA}/torcs_cars/baja-bug".to_owned()
 }
 
 /// The textured scenes.

@@ -1,6 +1,6 @@
 //! What refining poses by the photographs themselves gains.
 //!
-//! `cargo run --release -p viewfuse-research -- refined_poses PROGRAM SCENE...`
+//! `cargo run --release -p viewfuse-research -- refined_poses SOLVER SCENE...`
 //!
 //! As `poses`, on other sets. Errors are of the accepted photographs, by the solver and after the refinement; where that is not
 //! kept, as by the solver.
@@ -13,15 +13,13 @@
 
 use super::sets::{REFINED_SETS, neighbours};
 use super::truth::errors;
-use super::{found_or_few, view_of};
+use super::{found_or_few, solver_of, view_of};
 use anyhow::{Context, bail};
-use std::path::PathBuf;
-use viewfuse_pose::OpenMvg;
 use viewfuse_scene::Scene;
 
 pub(crate) fn run(arguments: &[String]) -> anyhow::Result<()> {
-    let [program, scenes @ ..] = arguments else { bail!("usage: refined_poses PROGRAM SCENE...") };
-    let solver = OpenMvg { program: PathBuf::from(program) };
+    let [solver, scenes @ ..] = arguments else { bail!("usage: refined_poses SOLVER SCENE...") };
+    let solver = solver_of(solver);
     println!("                                                  rotation        centres         left-out score");
     println!("scene         photographs  seed focal   accepted  solver refined  solver refined  solver refined");
     let (mut accepted, mut kept, mut rotations, mut centres) = (0, 0, 0, 0);
@@ -30,8 +28,8 @@ pub(crate) fn run(arguments: &[String]) -> anyhow::Result<()> {
         for set in REFINED_SETS.iter().filter(|set| set.count <= scene.views.len()) {
             let views = neighbours(&scene, set);
             let head = format!("{:<15} {:>9} {:>5} {:<7}", scene.name(), views.len(), set.seed, set.focal.name());
-            let found =
-                found_or_few(&scene, set, &views, &solver, true).with_context(|| format!("{folder}: {set:?}"))?;
+            let found = found_or_few(&scene, set, &views, solver.as_ref(), true)
+                .with_context(|| format!("{folder}: {set:?}"))?;
             let Some((found, verdict)) = found.as_ref().and_then(|(own, _)| Some((own, own.verdict.as_ref().ok()?)))
             else {
                 println!("{head}  refused");

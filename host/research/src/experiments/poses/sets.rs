@@ -55,7 +55,7 @@ const fn exif(count: usize, seed: u64) -> Set {
 }
 
 /// The sets of which pictures are rendered.
-pub(super) const PICTURE_SETS: [Set; 5] = [exif(3, 1), exif(5, 1), exif(9, 1), exif(15, 1), exif(5, 2)];
+pub(super) const PICTURE_SETS: [Set; 6] = [exif(3, 1), exif(5, 1), exif(9, 1), exif(15, 1), exif(3, 2), exif(5, 2)];
 
 /// The sets whose poses are refined.
 pub(super) const REFINED_SETS: [Set; 3] = [known(3, 1), known(3, 2), known(5, 1)];

@@ -1,6 +1,6 @@
 //! Poses that were found, beside those that are known.
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3, Vec3};
 use viewfuse_core::pose::Pose;
 use viewfuse_pose::Solution;
 use viewfuse_scene::Scene;
@@ -48,6 +48,31 @@ fn degrees(rotation: DMat3) -> f64 {
     2.0 * DQuat::from_mat3(&rotation).normalize().w.abs().min(1.0).acos().to_degrees()
 }
 
+/// The similarity that moves points of a scene with these poses to one with those: the mean turn between them, and the scale and way
+/// of least squares between their centres.
+pub(super) fn similarity(found: &[Pose], known: &[Pose]) -> impl Fn(Vec3) -> Vec3 + use<> {
+    let turn = mean(found.iter().zip(known).map(|(a, b)| camera_from_world(b).transpose() * camera_from_world(a)));
+    let centres = |poses: &[Pose]| poses.iter().map(|pose| pose.centre_world().as_dvec3()).collect::<Vec<_>>();
+    let (from, to) = (centred(centres(found)), centred(centres(known)));
+    let scale = scale(&from.1.iter().map(|own| turn * *own).collect::<Vec<_>>(), &to.1);
+    move |point: Vec3| (to.0 + scale * (turn * (point.as_dvec3() - from.0))).as_vec3()
+}
+
+/// The mean of points, and the points without it.
+fn centred(points: Vec<DVec3>) -> (DVec3, Vec<DVec3>) {
+    let mean = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
+    (mean, points.into_iter().map(|point| point - mean).collect())
+}
+
+fn dots(a: &[DVec3], b: &[DVec3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
+}
+
+/// The scale of least squares from points to others, both without their means.
+fn scale(from: &[DVec3], to: &[DVec3]) -> f64 {
+    dots(from, to) / dots(from, from).max(f64::MIN_POSITIVE)
+}
+
 /// The mean of rotations that are near to one another.
 fn mean(rotations: impl Iterator<Item = DMat3>) -> DMat3 {
     let mut sum: Option<DQuat> = None;
@@ -60,15 +85,26 @@ fn mean(rotations: impl Iterator<Item = DMat3>) -> DMat3 {
 /// Root mean square distance of points from known ones, turned by a rotation, scaled and moved by least squares, as a share of the
 /// known ones' distance from their mean.
 fn misfit(found: &[DVec3], known: &[DVec3], rotation: DMat3) -> f64 {
-    let count = known.len().max(1) as f64;
-    let centred = |points: Vec<DVec3>| {
-        let mean = points.iter().sum::<DVec3>() / count;
-        points.into_iter().map(move |point| point - mean).collect::<Vec<_>>()
-    };
-    let found = centred(found.iter().map(|point| rotation * *point).collect());
-    let known = centred(known.to_vec());
-    let of = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum::<f64>();
-    let scale = of(&found, &known) / of(&found, &found).max(f64::MIN_POSITIVE);
+    let found = centred(found.iter().map(|point| rotation * *point).collect()).1;
+    let known = centred(known.to_vec()).1;
+    let scale = scale(&found, &known);
     let rest: Vec<DVec3> = found.iter().zip(&known).map(|(found, known)| scale * *found - *known).collect();
-    (of(&rest, &rest) / of(&known, &known).max(f64::MIN_POSITIVE)).sqrt()
+    (dots(&rest, &rest) / dots(&known, &known).max(f64::MIN_POSITIVE)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_that_was_turned_scaled_and_moved_is_moved_back() {
+        let eyes = [Vec3::new(0.0, 0.0, 4.0), Vec3::new(1.0, 0.5, 3.5), Vec3::new(-1.0, 1.0, 3.0)];
+        let known = eyes.map(|eye| Pose::look_at(eye, Vec3::ZERO, Vec3::Y).expect("a pose"));
+        let turn = glam::Quat::from_rotation_x(0.7) * glam::Quat::from_rotation_z(0.4);
+        let away = |point: Vec3| 0.3 * (turn * point) + Vec3::new(2.0, -1.0, 0.5);
+        let found = eyes.map(|eye| Pose::look_at(away(eye), away(Vec3::ZERO), turn * Vec3::Y).expect("a pose"));
+        let back = similarity(&found, &known);
+        let point = Vec3::new(0.3, -0.2, 0.9);
+        assert!((back(away(point)) - point).length() < 1.0e-5, "{}", back(away(point)));
+    }
 }

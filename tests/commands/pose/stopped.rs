@@ -1,0 +1,98 @@
+//! Runs that are killed or interrupted go on behind the attempts that they had finished.
+
+use super::{bare, json, needs, posed, program};
+use crate::BINARY;
+use libtest_mimic::Trial;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use viewfuse_tests::command::{command, files_below, interrupt, spawn};
+use viewfuse_tests::patience::{end, wait_while_running};
+use viewfuse_tests::scenes::Folder;
+
+pub(super) fn trials() -> Vec<Trial> {
+    match cfg!(unix) {
+        true => vec![
+            needs("stopped::a_killed_run_goes_on", a_killed_run_goes_on),
+            needs("stopped::an_interrupted_run_goes_on", an_interrupted_run_goes_on),
+        ],
+        false => Vec::new(),
+    }
+}
+
+/// Photographs of the room and a program that counts how often it is asked.
+fn counted() -> Folder {
+    let folder = bare(0..4);
+    let real = fs::canonicalize(program().expect("a program")).expect("a path");
+    let script =
+        format!("#!/bin/sh\necho asked >> '{}/asked'\nexec '{}' \"$@\"\n", folder.path().display(), real.display());
+    folder.write("openmvg", script);
+    super::colmap::executable(&folder.path().join("openmvg"));
+    folder
+}
+
+fn pose(folder: &Folder, output: &str) -> Command {
+    let mut command = command(BINARY, folder.path(), &format!("pose bare -o {output} --seed 2"));
+    command.env("VIEWFUSE_OPENMVG", folder.path().join("openmvg"));
+    command
+}
+
+/// How often the program was asked.
+fn asked(folder: &Folder) -> usize {
+    fs::read_to_string(folder.path().join("asked")).unwrap_or_default().lines().count()
+}
+
+/// The answers that are kept for `posed`.
+fn kept(folder: &Folder) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder.path().join(".posed.attempts")).into_iter().flatten().flatten();
+    entries.map(|entry| entry.path()).filter(|path| path.extension().is_some_and(|own| own == "json")).collect()
+}
+
+/// The first run has left nothing but finished attempts; the second one makes the others, and what it writes is what a run writes
+/// that nobody stopped.
+#[track_caller]
+fn goes_on(folder: &Folder) {
+    assert!(!folder.path().join("posed").exists(), "no half of a scene");
+    let (finished, before) = (kept(folder).len(), asked(folder));
+    assert!(finished >= 1, "an attempt was kept");
+    posed(pose(folder, "posed"));
+    let all = json(&folder.path().join("posed/pose.json"))["attempts"].as_array().expect("a list").len();
+    assert_eq!(asked(folder) - before, all - finished, "only what was missing");
+    assert!(!folder.path().join(".posed.attempts").exists(), "nothing is kept behind the end");
+    posed(pose(folder, "whole"));
+    let (posed, whole) = (folder.path().join("posed"), folder.path().join("whole"));
+    for (path, _) in files_below(&posed).into_iter().filter(|(path, _)| path.is_file()) {
+        let other = whole.join(path.strip_prefix(&posed).expect("inside"));
+        if path.ends_with("pose.json") {
+            assert_eq!(timeless(&path), timeless(&other));
+        } else {
+            assert_eq!(fs::read(&path).expect("a file"), fs::read(&other).expect("a file"), "{}", path.display());
+        }
+    }
+}
+
+/// The record without the seconds.
+fn timeless(path: &Path) -> serde_json::Value {
+    let mut record = json(path);
+    for attempt in record["attempts"].as_array_mut().expect("a list") {
+        attempt["seconds"] = 0.into();
+    }
+    record
+}
+
+fn a_killed_run_goes_on() {
+    let folder = counted();
+    let mut child = spawn(pose(&folder, "posed"));
+    wait_while_running(&mut child, || !kept(&folder).is_empty());
+    child.kill().expect("a process to kill");
+    end(&mut child).expect("an end");
+    goes_on(&folder);
+}
+
+fn an_interrupted_run_goes_on() {
+    let folder = counted();
+    let mut child = spawn(pose(&folder, "posed"));
+    wait_while_running(&mut child, || !kept(&folder).is_empty());
+    interrupt(child, "-INT");
+    goes_on(&folder);
+}
