@@ -2,6 +2,7 @@
 
 mod auto;
 mod budget;
+mod gaussians;
 mod genvs;
 mod pixelnerf;
 mod plane_sweep;

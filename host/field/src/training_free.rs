@@ -5,7 +5,7 @@
 //! sweep    any sources: planes through the frusta of sources and target
 //! space    near and far bounds, for the planes
 //! exposure gains that equalise the sources' exposure
-//! with_gaussians  the sweep's pictures with those of Gaussians
+//! with_gaussians  pictures of the hull or the sweep with those of Gaussians
 //! gaussians  the field of Gaussians alone
 //! presets  settings to compare
 //! ```
@@ -41,7 +41,7 @@ pub struct TrainingFree {
     pub hull: hull::Hull,
     /// Settings for other sources.
     pub sweep: Sweep,
-    /// The optimisation of the Gaussians that pictures of other sources may be mixed with.
+    /// The optimisation of the Gaussians whose pictures may be mixed with these.
     pub recipe: Recipe,
     /// Side of the sources as a share of the pictures', above 0: smaller sources take less time to match.
     pub source_share: f32,
@@ -105,7 +105,8 @@ impl Field for TrainingFree {
         progress: &dyn Progress,
     ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
         if sources.has_silhouettes {
-            Ok(Box::new(self.hull.views(device, sources, progress)?))
+            let hull = Box::new(self.hull.views(device, sources, progress)?);
+            Ok(Box::new(WithGaussians::new(device, hull, sources, self.recipe, false)))
         } else {
             let sweep = self.sweep.prepare_kept(device, sources, self.cache.as_ref(), progress)?;
             Ok(Box::new(WithGaussians::new(device, sweep, sources, self.recipe, false)))

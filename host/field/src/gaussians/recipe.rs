@@ -1,6 +1,7 @@
 //! The settings of an optimisation. What was measured of them is in `host/research/results/gaussians.md`.
 
 use crate::point_cloud::CloudOptions;
+use viewfuse_scene::photographs::SourceImages;
 
 /// Most Gaussians that a person can ask for.
 pub const MAX_COUNT: u32 = 2_000_000;
@@ -78,6 +79,32 @@ impl Recipe {
     pub fn cloud(source_count: usize) -> CloudOptions {
         let own = CloudOptions::default();
         if source_count <= MAX_UNCONFIRMED { CloudOptions { least_views: 1 } } else { own }
+    }
+
+    /// The recipe for pictures that are mixed with the field's own. Where there are silhouettes the hull's pictures have the
+    /// detail and a ragged outline: the Gaussians begin on surfaces alone and are few and large, opaque only where that gains, and
+    /// the outline has twice the weight. Alone they would be too soft.
+    pub fn mixed_with(self, images: &SourceImages) -> Recipe {
+        if !images.has_silhouettes {
+            return self;
+        }
+        Recipe {
+            random_count: 0,
+            split_scale: f32::INFINITY,
+            opacity_penalty: 0.4,
+            structure_share: 0.0,
+            silhouette_share: 1.0,
+            ..self
+        }
+    }
+
+    /// The recipe with shares of the finest level's side, for sources of this longest side, and of the iterations.
+    pub fn reduced(mut self, side_share: f32, iteration_share: f32, source_side: u32) -> Recipe {
+        self.side = ((self.side.min(source_side) as f32 * side_share).round() as u32).max(1);
+        for own in self.iterations.iter_mut().filter(|own| **own > 0) {
+            *own = ((*own as f32 * iteration_share).round() as u32).max(1);
+        }
+        self
     }
 
     /// The recipe with so many iterations at each level that has some, and at most so many Gaussians, whatever the sources' size.

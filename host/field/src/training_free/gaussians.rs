@@ -6,10 +6,32 @@ use super::with_gaussians::WithGaussians;
 use crate::gaussians::{MAX_COUNT, MAX_ITERATIONS, Recipe};
 use crate::options::{FieldOptions, Flag, FlagAbout, OpenError, count, flags};
 use crate::row::{Origin, Row};
-use crate::{About, AnyField, Field, FieldError, Prepared};
+use crate::{About, AnyField, Effort, Field, FieldError, Prepared};
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
+
+/// Shares of the finest level's side, which the number of Gaussians follows, and of the iterations, with the error and the work
+/// that are typical of them (`host/research/results/gaussians.md`).
+const EFFORTS: [(f32, f32, f32, f32); 3] = [(0.25, 1.0, 0.1, 0.43), (0.5, 1.0, 0.06, 0.56), (1.0, 0.5, 0.037, 0.7)];
+
+/// The efforts of this recipe for sources of this longest side.
+pub(super) fn efforts(recipe: &Recipe, source_side: u32) -> Vec<Effort> {
+    let named = |(index, (_, _, error, work)): (usize, (f32, f32, f32, f32))| {
+        let Recipe { side, iterations, .. } = at_effort(recipe, index, source_side);
+        let count: u32 = iterations.iter().sum();
+        Effort::new(format!("{count} iterations, sources at {side} pixels at last"), error, work)
+    };
+    EFFORTS.into_iter().enumerate().map(named).chain([Effort::exact()]).collect()
+}
+
+/// The recipe at an effort.
+pub(super) fn at_effort(recipe: &Recipe, effort: usize, source_side: u32) -> Recipe {
+    match EFFORTS.get(effort) {
+        Some(&(side, iterations, ..)) => recipe.reduced(side, iterations, source_side),
+        None => *recipe,
+    }
+}
 
 /// Pictures of Gaussians that are optimised for the sources. Nothing is learned but the scene itself.
 #[derive(Clone, Debug, Default)]

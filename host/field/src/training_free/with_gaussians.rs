@@ -1,23 +1,26 @@
-//! Pictures of the plane sweep mixed with those of Gaussians, and the Gaussians alone.
+//! Pictures of the hull or of the plane sweep mixed with those of Gaussians, and the Gaussians alone.
 //!
-//! The Gaussians are optimised for the sources when a picture first needs them, from the depths that the sweep found: once for a
-//! weighting. They are one of the pictures that are mixed by region. With a bound on the time or on the error the pictures are the
-//! sweep's: what is left out of them is measured against a picture without Gaussians.
+//! The Gaussians are optimised for the sources when a picture first needs them, from the depths that the sweep or the hull found:
+//! once for a weighting and an effort. They are one of the pictures that are mixed by region. With a bound on the time or on the error
+//! these pictures have no Gaussians: what is left out of them is measured against a picture without. Pictures of the Gaussians alone
+//! have efforts of their own: fewer iterations, at a smaller size, with fewer Gaussians.
 
+use super::gaussians::{at_effort, efforts};
 use crate::gaussians::{Optimised, Optimiser, Recipe, Splatter};
 use crate::point_cloud::cloud_of;
 use crate::{
     DepthMap, Effort, Efforts, Encoding, Encodings, FieldError, Geometry, Prepared, Record, Rendered, Request, Setting,
     Surfaces, Tunable, Tuned, Weighted,
 };
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use viewfuse_device::Device;
 use viewfuse_job::progress::{Progress, Quiet};
 use viewfuse_kernels::rows::GaussianBlock;
-use viewfuse_scene::photographs::SourceImages;
+use viewfuse_scene::photographs::{SourceImages, longest_side};
 use viewfuse_weighting::sources::SourceWeights;
 
-/// The setting under which a picture is that of the Gaussians: 1 for them, 0 for the sweep.
+/// The setting under which a picture is that of the Gaussians: 1 for them, 0 for the sweep or the hull.
 const GAUSSIANS: &str = "gaussians";
 /// Opacity below which a pixel has no depth.
 const MIN_OPACITY: f32 = 0.5;
@@ -35,11 +38,13 @@ struct Scene<D: Device> {
     gains: Vec<[f32; 3]>,
 }
 
-/// The sweep's views, and the Gaussians of the same sources.
+/// The views of the sweep or of the hull, and the Gaussians of the same sources.
 pub(super) struct WithGaussians<'a, D: Device> {
     device: &'a D,
-    sweep: Box<dyn Prepared + 'a>,
+    depths: Box<dyn Prepared + 'a>,
     images: Arc<SourceImages>,
+    /// Their longest side.
+    source_side: u32,
     recipe: Recipe,
     /// Whether all pictures are those of the Gaussians, of all sources.
     is_alone: bool,
@@ -47,48 +52,57 @@ pub(super) struct WithGaussians<'a, D: Device> {
     is_splatted: bool,
     encoded: Vec<bool>,
     relevance: Vec<SourceWeights>,
-    /// The sweep's efforts.
+    /// The efforts of the pictures: of the optimisation, or of the views that the Gaussians are mixed with.
     efforts: Vec<Effort>,
-    /// The sweep's scalars.
+    /// The current one.
+    effort: usize,
+    /// Their scalars.
     tunables: &'static [Tunable],
-    /// Whether the exact picture is made.
-    is_exact: bool,
-    /// The Gaussians of the current weighting, when they are needed; none where the sources have too few surfaces.
-    scene: Option<Option<Scene<D>>>,
+    /// The Gaussians of the current weighting by their effort, when they are needed; none where the sources have too few surfaces.
+    scenes: BTreeMap<usize, Option<Scene<D>>>,
 }
 
 impl<'a, D: Device> WithGaussians<'a, D> {
     pub(super) fn new(
         device: &'a D,
-        mut sweep: Box<dyn Prepared + 'a>,
+        mut depths: Box<dyn Prepared + 'a>,
         sources: &SourceImages,
         recipe: Recipe,
         is_alone: bool,
     ) -> WithGaussians<'a, D> {
-        let efforts = sweep.efforts().map_or_else(Vec::new, |efforts| efforts.list());
-        let tunables = sweep.tuned().map_or(&[][..], |tuned| tuned.tunables());
+        let source_side = sources.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
+        let efforts = match is_alone {
+            true => efforts(&recipe, source_side),
+            false => depths.efforts().map_or_else(Vec::new, |efforts| efforts.list()),
+        };
+        let tunables = depths.tuned().map_or(&[][..], |tuned| tuned.tunables());
         let encoded = vec![false; sources.images.len()];
         let images = Arc::new(sources.clone());
-        let (relevance, scene) = (Vec::new(), None);
         WithGaussians {
             device,
-            sweep,
+            depths,
             images,
-            recipe,
+            source_side,
+            recipe: if is_alone { recipe } else { recipe.mixed_with(sources) },
             is_alone,
             is_splatted: is_alone,
             encoded,
-            relevance,
+            relevance: Vec::new(),
+            effort: efforts.len().saturating_sub(1),
             efforts,
             tunables,
-            is_exact: true,
-            scene,
+            scenes: BTreeMap::new(),
         }
     }
 
-    /// Optimises the Gaussians, if they are not there yet.
+    /// Whether nothing is left out.
+    fn is_exact(&self) -> bool {
+        self.effort + 1 >= self.efforts.len()
+    }
+
+    /// Optimises the Gaussians of the current effort, if they are not there yet.
     fn prepare_scene(&mut self, progress: &dyn Progress) -> Result<(), FieldError> {
-        if self.scene.is_some() {
+        if self.scenes.contains_key(&self.effort) {
             return Ok(());
         }
         let quiet = &Quiet(progress);
@@ -96,10 +110,14 @@ impl<'a, D: Device> WithGaussians<'a, D> {
             progress.check()?;
             self.encode(view, quiet)?;
         }
-        let maps = self.sweep.geometry().map_or(Ok(Vec::new()), Geometry::source_depths)?;
+        let maps = self.depths.geometry().map_or(Ok(Vec::new()), Geometry::source_depths)?;
         let cloud = Recipe::cloud(self.images.images.len());
         let points = cloud_of(&maps, &self.images, &self.relevance, cloud, quiet)?;
-        let scene = match Optimiser::new(self.device, &self.images, &points, self.recipe)? {
+        let recipe = match self.is_alone {
+            true => at_effort(&self.recipe, self.effort, self.source_side),
+            false => self.recipe,
+        };
+        let scene = match Optimiser::new(self.device, &self.images, &points, recipe)? {
             Some(mut optimiser) => {
                 optimiser.run(quiet)?;
                 let Optimised { gaussians, near, background, gains } = optimiser.optimised();
@@ -108,17 +126,18 @@ impl<'a, D: Device> WithGaussians<'a, D> {
             }
             None => None,
         };
-        self.scene = Some(scene);
+        self.scenes.insert(self.effort, scene);
         Ok(())
     }
 
     /// The Gaussians from a target; `None` if there are none.
     fn splatted(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Option<Rendered>, FieldError> {
         self.prepare_scene(progress)?;
-        let Some(Some(Scene { gaussians, count, near, background, gains })) = &self.scene else { return Ok(None) };
+        let scene = self.scenes.get(&self.effort).and_then(Option::as_ref);
+        let Some(Scene { gaussians, count, near, background, gains }) = scene else { return Ok(None) };
         let splatter = Splatter { device: self.device, near: *near, background: *background };
         let mut splatted = splatter.rendered(gaussians, *count, &request.camera.block(0), MIN_OPACITY)?;
-        // As bright as the sources that count for this target, as the sweep's picture is.
+        // As bright as the sources that count for this target, as the other pictures are.
         let weights: Vec<(usize, f32)> = request.views.iter().copied().zip(request.view_weights()).collect();
         let gain = common_gain(gains, &weights);
         for colour in &mut splatted.colours {
@@ -139,12 +158,12 @@ fn common_gain(gains: &[[f32; 3]], weights: &[(usize, f32)]) -> [f32; 3] {
 
 impl<D: Device> Prepared for WithGaussians<'_, D> {
     fn encoding(&self) -> Encoding {
-        if self.is_alone { Encoding::All } else { self.sweep.encoding() }
+        if self.is_alone { Encoding::All } else { self.depths.encoding() }
     }
 
     fn encode(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
         if !self.encoded[view] {
-            self.sweep.encode(view, progress)?;
+            self.depths.encode(view, progress)?;
             self.encoded[view] = true;
         }
         Ok(())
@@ -152,16 +171,16 @@ impl<D: Device> Prepared for WithGaussians<'_, D> {
 
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
         if self.is_splatted
-            && self.is_exact
+            && (self.is_alone || self.is_exact())
             && let Some(splatted) = self.splatted(request, progress)?
         {
             return Ok(splatted);
         }
-        self.sweep.render(request, progress)
+        self.depths.render(request, progress)
     }
 
     fn record(&self) -> Record {
-        self.sweep.record()
+        self.depths.record()
     }
 
     fn weighted(&mut self) -> Option<&mut dyn Weighted> {
@@ -169,7 +188,7 @@ impl<D: Device> Prepared for WithGaussians<'_, D> {
     }
 
     fn efforts(&mut self) -> Option<&mut dyn Efforts> {
-        if self.is_alone || self.efforts.is_empty() { None } else { Some(self) }
+        if self.efforts.is_empty() { None } else { Some(self) }
     }
 
     fn tuned(&mut self) -> Option<&mut dyn Tuned> {
@@ -185,8 +204,8 @@ impl<D: Device> Weighted for WithGaussians<'_, D> {
     fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
         self.encoded.fill(false);
         self.relevance = relevance.to_vec();
-        self.scene = None;
-        self.sweep.weighted().map_or(Ok(()), |weighted| weighted.weigh(relevance))
+        self.scenes.clear();
+        self.depths.weighted().map_or(Ok(()), |weighted| weighted.weigh(relevance))
     }
 }
 
@@ -196,19 +215,24 @@ impl<D: Device> Efforts for WithGaussians<'_, D> {
     }
 
     fn set(&mut self, effort: usize) -> Result<Encodings, FieldError> {
-        self.is_exact = effort + 1 >= self.efforts.len();
-        let Some(efforts) = self.sweep.efforts() else { return Ok(Encodings::Kept) };
+        self.effort = effort;
+        if self.is_alone {
+            // The surfaces that the Gaussians begin with are the same.
+            return Ok(Encodings::Kept);
+        }
+        let Some(efforts) = self.depths.efforts() else { return Ok(Encodings::Kept) };
         let encodings = efforts.set(effort)?;
         if encodings == Encodings::Dropped {
             self.encoded.fill(false);
-            self.scene = None;
+            self.scenes.clear();
         }
         Ok(encodings)
     }
 
     fn set_trial(&mut self) {
         self.recipe.iterations = self.recipe.iterations.map(|count| count / TRIAL_DIVISOR);
-        if let Some(efforts) = self.sweep.efforts() {
+        self.scenes.clear();
+        if let Some(efforts) = self.depths.efforts() {
             efforts.set_trial();
         }
     }
@@ -221,14 +245,14 @@ impl<D: Device> Tuned for WithGaussians<'_, D> {
 
     fn tune(&mut self, settings: &[Setting]) {
         self.is_splatted = self.is_alone || settings.iter().any(|own| own.name == GAUSSIANS && own.value > 0.0);
-        if let Some(tuned) = self.sweep.tuned() {
+        if let Some(tuned) = self.depths.tuned() {
             tuned.tune(settings);
         }
     }
 
-    /// The sweep's, and that of the Gaussians alone: their errors are the least like the others'.
+    /// The sweep's, or the hull's one picture, and that of the Gaussians alone: their errors are the least like the others'.
     fn parts(&mut self, chosen: &[Setting]) -> Vec<Vec<Setting>> {
-        let mut parts = self.sweep.tuned().map_or_else(Vec::new, |tuned| tuned.parts(chosen));
+        let mut parts = self.depths.tuned().map_or_else(|| vec![chosen.to_vec()], |tuned| tuned.parts(chosen));
         parts.push(chosen.iter().copied().chain([Setting { name: GAUSSIANS, value: 1.0 }]).collect());
         parts
     }
@@ -236,10 +260,10 @@ impl<D: Device> Tuned for WithGaussians<'_, D> {
 
 impl<D: Device> Geometry for WithGaussians<'_, D> {
     fn surfaces(&self) -> Surfaces {
-        self.sweep.geometry().map_or_else(Surfaces::default, Geometry::surfaces)
+        self.depths.geometry().map_or_else(Surfaces::default, Geometry::surfaces)
     }
 
     fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError> {
-        self.sweep.geometry().map_or(Ok(Vec::new()), Geometry::source_depths)
+        self.depths.geometry().map_or(Ok(Vec::new()), Geometry::source_depths)
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release -p viewfuse-research -- efforts FOLDER SOURCES TARGETS [MODEL]`
 //!
-//! SOURCES and TARGETS are lists of views as the command takes them, MODEL is a checkpoint or the name of a test network. Errors are root mean squares over the targets, times
+//! SOURCES and TARGETS are lists of views as the command takes them, MODEL is a checkpoint, or the name of a training-free field or of a test network. Errors are root mean squares over the targets, times
 //! the least of three rounds, sources' encodings included.
 
 use anyhow::Context;
@@ -12,7 +12,7 @@ use viewfuse_device::cpu::Cpu;
 use viewfuse_field::AnyField;
 use viewfuse_field::options::FieldOptions;
 use viewfuse_field::render::{RenderOptions, Stage, open_album};
-use viewfuse_field::row::Row;
+use viewfuse_field::row::{Origin, Row};
 use viewfuse_field::rows::{self, ROWS};
 use viewfuse_job::progress::Silent;
 use viewfuse_nn::checkpoint::Checkpoint;
@@ -28,7 +28,10 @@ pub(crate) fn run(arguments: &[String]) -> anyhow::Result<()> {
     };
     let scene = Scene::open(Path::new(folder))?;
     let field = match model.first() {
-        Some(name) => rows::open(checkpoint(name)?, &FieldOptions::default())?,
+        Some(name) => match rows::named(name).map(|row| row.origin) {
+            Some(Origin::TrainingFree { open }) => open(&FieldOptions::default())?,
+            _ => rows::open(checkpoint(name)?, &FieldOptions::default())?,
+        },
         None => AnyField::default(),
     };
     let selection =

@@ -68,6 +68,9 @@ fn rows(job: &Job<'_>) -> anyhow::Result<()> {
         change(&mut recipe);
         row(job, words, job.points, recipe)?;
     }
+    if job.images.has_silhouettes {
+        row(job, "as mixed with the field's pictures", job.points, Recipe::default().mixed_with(job.images))?;
+    }
     row(job, "start: points of one view", job.all_points, Recipe::default())
 }
 

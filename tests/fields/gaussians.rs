@@ -1,0 +1,123 @@
+//! The field of Gaussians alone and as a part of other pictures, on the CPU.
+
+use std::time::Duration;
+use viewfuse::device::choice::AnyDevice;
+use viewfuse::device::cpu::Cpu;
+use viewfuse::field::auto;
+use viewfuse::field::budget::Bound;
+use viewfuse::field::gaussians::Recipe;
+use viewfuse::field::render::{Frame, RenderOptions, Stage, open_album};
+use viewfuse::field::training_free::{Gaussians, TrainingFree};
+use viewfuse::field::{AnyField, Renderer};
+use viewfuse::job::progress::Silent;
+use viewfuse::scene::Scene;
+use viewfuse::scene::few_shot::{FewShot, Selection};
+use viewfuse::weighting::Weighting;
+use viewfuse_tests::places;
+
+const DEVICE: AnyDevice = AnyDevice::Cpu(Cpu);
+
+fn toy() -> Scene {
+    Scene::open(places::data("toy")).expect("a scene")
+}
+
+fn job(scene: &Scene, sources: &str) -> FewShot {
+    let selection =
+        Selection { targets: Some("21".to_owned()), sources: Some(sources.to_owned()), ..Selection::default() };
+    selection.resolve(scene, 2).expect("views")
+}
+
+/// Calls `visit` with the views of the sample scene, prepared by a field.
+fn with_stage<T>(
+    field: AnyField,
+    sources: &str,
+    options: &RenderOptions,
+    visit: impl FnOnce(&mut Stage<'_>, &FewShot, &dyn Renderer) -> T,
+) -> T {
+    let scene = toy();
+    let job = job(&scene, sources);
+    let renderer = field.on(&DEVICE);
+    let shown = job.sources.iter().copied().chain(job.targets.iter().filter_map(|target| target.truth));
+    let album = open_album(&scene, shown, renderer.as_ref(), options, &Silent).expect("photographs");
+    let mut stage = Stage::prepare(&scene, &album, &job.sources, renderer.as_ref(), options, &Silent).expect("a stage");
+    visit(&mut stage, &job, renderer.as_ref())
+}
+
+/// With few iterations.
+fn hasty() -> AnyField {
+    AnyField::new(Gaussians {
+        recipe: Recipe { iterations: [0, 24, 16, 16], ..Recipe::default() },
+        ..Gaussians::default()
+    })
+}
+
+fn difference(a: &Frame, b: &Frame) -> f32 {
+    let square = |(a, b): (&[f32; 4], &[f32; 4])| (0..3).map(|channel| (a[channel] - b[channel]).powi(2)).sum::<f32>();
+    (a.colours.iter().zip(&b.colours).map(square).sum::<f32>() / (3 * a.colours.len()) as f32).sqrt()
+}
+
+#[test]
+fn cheaper_efforts_are_farther_from_the_exact_picture() {
+    let weighting = Weighting::open("distance:power=2").expect("a scheme");
+    with_stage(AnyField::new(Gaussians::default()), "0..19/2", &RenderOptions::default(), |stage, job, _| {
+        let efforts = stage.efforts().to_vec();
+        assert_eq!(efforts.last().map(|effort| effort.typical_error), Some(0.0));
+        assert!(efforts.len() > 2 && efforts.is_sorted_by(|a, b| a.typical_share < b.typical_share));
+        assert!(efforts.is_sorted_by(|a, b| a.typical_error > b.typical_error));
+        let frame = |stage: &mut Stage<'_>, effort: usize| {
+            stage.set_effort(effort, &Silent).expect("an effort");
+            stage.weigh(&weighting, &Silent).expect("weights");
+            stage.frame(&weighting, &job.targets[0], &Silent).expect("a frame")
+        };
+        let last = efforts.len() - 1;
+        let exact = frame(stage, last);
+        let errors: Vec<f32> = (0..last).map(|effort| difference(&frame(stage, effort), &exact)).collect();
+        println!("{errors:?}");
+        assert!(errors.iter().all(|error| *error > 1.0e-3), "an effort leaves nothing out: {errors:?}");
+        assert!(errors[0] > errors[last - 1], "the cheapest is no farther than the dearest: {errors:?}");
+        assert_eq!(frame(stage, last).colours, exact.colours, "the exact picture after others");
+        // Efforts are listed with what they do.
+        assert!(
+            efforts[0].name.contains("240 iterations") && efforts[0].name.contains("32 pixels"),
+            "{}",
+            efforts[0].name
+        );
+    });
+}
+
+#[test]
+fn a_bound_chooses_an_effort_and_says_so() {
+    let weighting = Weighting::open("distance:power=2").expect("a scheme");
+    let kept = |bound: Bound| {
+        let options = RenderOptions { bound: Some(bound), ..RenderOptions::default() };
+        with_stage(hasty(), "0..19/2", &options, |stage, job, _| {
+            stage.weigh(&weighting, &Silent).expect("weights");
+            let frame = stage.frame(&weighting, &job.targets[0], &Silent).expect("a frame");
+            frame.kept.expect("a record of the bound")
+        })
+    };
+    let hurried = kept(Bound::Time(Duration::from_nanos(1)));
+    assert!(hurried.effort.contains("iterations") && !hurried.is_kept, "{hurried:?}");
+    let patient = kept(Bound::Time(Duration::from_secs(86_400)));
+    assert!(patient.effort == "exact" && patient.is_kept, "{patient:?}");
+    let sharp = kept(Bound::Error(1.0e-5));
+    assert!(sharp.effort == "exact" && sharp.is_kept, "{sharp:?}");
+}
+
+/// Few photographs of an object: its sources that are left out are better with Gaussians; of many, the hull alone is.
+#[test]
+fn the_hull_is_mixed_with_gaussians_where_sources_that_are_left_out_gain() {
+    let options =
+        RenderOptions { background: viewfuse::scene::photographs::BackgroundChoice::Auto, ..RenderOptions::default() };
+    let parts = |sources: &str| {
+        with_stage(AnyField::new(TrainingFree::default()), sources, &options, |stage, _, renderer| {
+            assert!(stage.images.has_silhouettes);
+            let chosen = auto::choose(stage, renderer, &options, &Silent).expect("a choice");
+            let mixed = chosen.candidates.last().expect("candidates").settings.last().map(|setting| setting.value);
+            assert_eq!(mixed, Some(2.0), "a mixture was tried: {:?}", chosen.candidates);
+            chosen.mixture.map(|mixture| mixture.parts.len())
+        })
+    };
+    assert_eq!(parts("0..19/4"), Some(2));
+    assert_eq!(parts("0..19"), None);
+}
