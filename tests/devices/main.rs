@@ -9,6 +9,7 @@ mod candidate;
 mod child;
 mod expectations;
 mod forms;
+mod gaussians;
 mod genvs;
 mod layers;
 mod limits;
@@ -63,6 +64,7 @@ fn main() -> ExitCode {
         limits::TESTS,
         expectations::TESTS,
         forms::TESTS,
+        gaussians::TESTS,
     ]
     .concat()
     .into_iter()

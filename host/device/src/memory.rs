@@ -61,6 +61,11 @@ pub trait Memory {
     /// finer.
     fn busy_elements(&self) -> usize;
 
+    /// Whether the kernels run on the host's processor, as those of a software driver do.
+    fn is_software(&self) -> bool {
+        true
+    }
+
     /// Waits until all dispatched work is done, so that its time can be measured.
     ///
     /// # Errors

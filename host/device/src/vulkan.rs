@@ -10,13 +10,14 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use viewfuse_job::files::{read_at_most, write_whole};
 use viewfuse_kernels::rows::*;
 use viewfuse_kernels::{elements, for_each_kernel};
-use viewfuse_vulkan::{Adapter, Buffer, Gpu, GpuOptions, Instance, Tally, VulkanError};
+use viewfuse_vulkan::{Adapter, AdapterKind, Buffer, Gpu, GpuOptions, Instance, Tally, VulkanError};
 
 /// A Vulkan device. Calls return when their work is recorded; it is submitted when a download waits for it, or when there is
 /// enough of it.
 pub struct Vulkan {
     gpu: Gpu,
     transfers: Mutex<Transfers>,
+    is_software: bool,
     /// Where it remembers what it measured and compiled.
     memory: Option<PathBuf>,
 }
@@ -32,7 +33,8 @@ impl Vulkan {
     /// # Errors
     /// [`VulkanError`].
     pub fn open(instance: &Arc<Instance>, adapter: &Adapter, options: &GpuOptions) -> Result<Vulkan, VulkanError> {
-        Ok(Vulkan { gpu: Gpu::open(instance, adapter, options)?, transfers: Mutex::default(), memory: None })
+        let (gpu, is_software) = (Gpu::open(instance, adapter, options)?, adapter.kind == AdapterKind::Software);
+        Ok(Vulkan { gpu, transfers: Mutex::default(), is_software, memory: None })
     }
 
     /// As [`Vulkan::open`], with a folder where the device remembers compiled pipelines and which forms of its kernels were
@@ -110,6 +112,10 @@ impl Memory for Vulkan {
 
     fn busy_elements(&self) -> usize {
         BUSY_ELEMENTS
+    }
+
+    fn is_software(&self) -> bool {
+        self.is_software
     }
 
     fn finish(&self) -> Result<(), DeviceError> {

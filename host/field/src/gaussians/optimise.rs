@@ -13,6 +13,7 @@ use std::sync::Arc;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::random::uniform;
 use viewfuse_device::Device;
+use viewfuse_device::cpu::Cpu;
 use viewfuse_device::parallel::map;
 use viewfuse_job::progress::Progress;
 use viewfuse_kernels::gaussians::adam::adam_step;
@@ -35,6 +36,33 @@ pub struct Optimised {
     pub background: [f32; 3],
     /// How much brighter each source is than the Gaussians: red, green, blue.
     pub gains: Vec<[f32; 3]>,
+}
+
+/// All iterations of a recipe: on the device, or, where that is a software driver, by the CPU's own loops, which take a part of its time. Mesa's
+/// llvmpipe, besides, ends the loops of an invocation after 65,535 iterations, so that the derivatives of tiles with some 250
+/// splats or more are wrong there. `None` if there are too few points.
+///
+/// # Errors
+/// [`FieldError`].
+pub fn optimised<D: Device>(
+    device: &D,
+    images: &SourceImages,
+    points: &[CloudPoint],
+    recipe: Recipe,
+    progress: &dyn Progress,
+) -> Result<Option<Optimised>, FieldError> {
+    fn all<D: Device>(
+        optimiser: Option<Optimiser<'_, D>>,
+        progress: &dyn Progress,
+    ) -> Result<Option<Optimised>, FieldError> {
+        let Some(mut optimiser) = optimiser else { return Ok(None) };
+        optimiser.run(progress)?;
+        Ok(Some(optimiser.optimised()))
+    }
+    match device.is_software() {
+        true => all(Optimiser::new(&Cpu, images, points, recipe)?, progress),
+        false => all(Optimiser::new(device, images, points, recipe)?, progress),
+    }
 }
 
 /// A source's gain and the moments of its derivative.

@@ -6,7 +6,7 @@
 //! have efforts of their own: fewer iterations, at a smaller size, with fewer Gaussians.
 
 use super::gaussians::{at_effort, efforts};
-use crate::gaussians::{Optimised, Optimiser, Recipe, Splatter};
+use crate::gaussians::{Optimised, Recipe, Splatter, optimised};
 use crate::point_cloud::cloud_of;
 use crate::{
     DepthMap, Effort, Efforts, Encoding, Encodings, FieldError, Geometry, Prepared, Record, Rendered, Request, Setting,
@@ -117,10 +117,8 @@ impl<'a, D: Device> WithGaussians<'a, D> {
             true => at_effort(&self.recipe, self.effort, self.source_side),
             false => self.recipe,
         };
-        let scene = match Optimiser::new(self.device, &self.images, &points, recipe)? {
-            Some(mut optimiser) => {
-                optimiser.run(quiet)?;
-                let Optimised { gaussians, near, background, gains } = optimiser.optimised();
+        let scene = match optimised(self.device, &self.images, &points, recipe, quiet)? {
+            Some(Optimised { gaussians, near, background, gains }) => {
                 let count = gaussians.len();
                 Some(Scene { gaussians: self.device.upload(&gaussians)?, count, near, background, gains })
             }

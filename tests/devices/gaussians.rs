@@ -1,0 +1,156 @@
+//! Gaussians of the sample scene on each device: derivatives, and pictures of a scene that is optimised.
+
+use crate::candidate::{Candidate, Test};
+use libtest_mimic::Failed;
+use std::sync::OnceLock;
+use viewfuse::device::choice::AnyDevice;
+use viewfuse::device::cpu::Cpu;
+use viewfuse::device::{Device, Memory};
+use viewfuse::field::AnyField;
+use viewfuse::field::gaussians::{Optimised, Recipe, Splatter, Tiles, optimised};
+use viewfuse::field::point_cloud::{CloudPoint, point_cloud};
+use viewfuse::field::render::{RenderOptions, Stage, open_album};
+use viewfuse::job::progress::Silent;
+use viewfuse::scene::Scene;
+use viewfuse::scene::few_shot::Selection;
+use viewfuse::scene::photographs::{SourceImages, to_rgb8};
+use viewfuse::weighting::Weighting;
+use viewfuse_core::camera::CameraBlock;
+use viewfuse_kernels::gaussians::{SplatBlock, TileBlock};
+use viewfuse_kernels::rows::GaussianBlock;
+use viewfuse_tests::places::data;
+use viewfuse_vulkan::GpuOptions;
+
+pub(crate) const TESTS: &[Test] = &[
+    Test::new("derivatives_of_a_scene_are_the_cpus", derivatives_are_the_cpus),
+    Test::new("a_scene_is_as_good_as_the_cpus", a_scene_is_as_good),
+];
+
+/// Most splats of a tile: fewer than those whose loops Mesa's llvmpipe ends (`viewfuse_field::gaussians::optimised`).
+const MAX_LISTED: u32 = 100;
+/// Largest difference of derivatives, as a share of the norm of all: sums of at most 64 pixels and some 50 splats, in another order and
+/// with other last digits of the exponential, differ by some 1e-5.
+const MAX_DIFFERENCE: f64 = 1.0e-3;
+/// Largest difference of scores, decibels: on another device the last digits differ, and the steps make them grow.
+const MAX_LOSS: f64 = 0.5;
+
+/// A short one.
+fn recipe() -> Recipe {
+    Recipe { iterations: [0, 24, 16, 16], ..Recipe::default() }
+}
+
+/// Photographs of the sample scene, and points on its surfaces.
+fn start() -> &'static (SourceImages, Vec<CloudPoint>) {
+    static START: OnceLock<(SourceImages, Vec<CloudPoint>)> = OnceLock::new();
+    START.get_or_init(|| {
+        let scene = Scene::open(data("toy")).expect("a scene");
+        let selection = Selection { sources: Some("0..19/2".to_owned()), ..Selection::default() };
+        let sources = selection.sources_without(&scene, &[], 2).expect("sources");
+        let (field, device, options) = (AnyField::default(), AnyDevice::Cpu(Cpu), RenderOptions::default());
+        let renderer = field.on(&device);
+        let album = open_album(&scene, sources.clone(), renderer.as_ref(), &options, &Silent).expect("photographs");
+        let stage = Stage::prepare(&scene, &album, &sources, renderer.as_ref(), &options, &Silent);
+        let mut stage = stage.expect("a stage");
+        let weighting = Weighting::open("distance:power=2").expect("a scheme");
+        let points = point_cloud(&mut stage, &weighting, Recipe::cloud(sources.len()), &Silent).expect("points");
+        (stage.images.as_ref().clone(), points)
+    })
+}
+
+/// A scene of Gaussians that a device optimised.
+fn scene<D: Device>(device: &D) -> Optimised {
+    let (images, points) = start();
+    optimised(device, images, points, recipe(), &Silent).expect("steps").expect("enough points")
+}
+
+/// The CPU's.
+fn cpus_scene() -> &'static Optimised {
+    static SCENE: OnceLock<Optimised> = OnceLock::new();
+    SCENE.get_or_init(|| scene(&Cpu))
+}
+
+/// The first source's camera.
+fn camera() -> CameraBlock {
+    start().0.images[0].camera.block(0)
+}
+
+/// The longest list of splats of a tile.
+fn longest_list(own: &Optimised) -> u32 {
+    let (camera, gaussian_count) = (camera(), own.gaussians.len() as u32);
+    let block = SplatBlock { camera, near: own.near, gaussian_count, padding: [0; 2] };
+    let mut splats = Cpu.zeros(own.gaussians.len()).expect("memory");
+    Cpu.project_gaussians(&block, &own.gaussians, &mut splats).expect("splats");
+    let lists = Tiles::of(&TileBlock::new(camera.width, camera.height, own.background), &splats);
+    lists.starts.windows(2).map(|part| part[1] - part[0]).max().unwrap_or(0)
+}
+
+/// Every so many Gaussians of the CPU's scene, so that no list is too long.
+fn thinned() -> Optimised {
+    let all = cpus_scene();
+    let every =
+        |step: usize| Optimised { gaussians: all.gaussians.iter().copied().step_by(step).collect(), ..all.clone() };
+    (1..all.gaussians.len()).map(every).find(|own| longest_list(own) <= MAX_LISTED).expect("a step")
+}
+
+/// Derivatives by the Gaussians of a loss whose derivatives by the first source's pixels have all signs.
+fn derivatives<D: Device>(device: &D, own: &Optimised) -> Vec<GaussianBlock> {
+    let splatter = Splatter { device, near: own.near, background: own.background };
+    let camera = camera();
+    let uploaded = device.upload(&own.gaussians).expect("Gaussians");
+    let picture = splatter.picture(&uploaded, own.gaussians.len(), &camera).expect("a picture");
+    let by = |index: usize| [0, 1, 2, 3].map(|channel| ((index * 7 + channel * 5) % 11) as f32 / 5.0 - 1.0);
+    let by_pixels: Vec<[f32; 4]> = (0..(camera.width * camera.height) as usize).map(by).collect();
+    splatter.gradients(&uploaded, &picture, &by_pixels).expect("derivatives").0
+}
+
+fn derivatives_are_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
+    let device = candidate.vulkan(&GpuOptions::default())?;
+    let own = thinned();
+    let (cpu, ours) = (derivatives(&Cpu, &own), derivatives(&device, &own));
+    let groups: [(&str, fn(&GaussianBlock) -> Vec<f32>); 5] = [
+        ("position", |own| own.position.to_vec()),
+        ("opacity", |own| vec![own.opacity]),
+        ("scales", |own| own.log_scales.to_vec()),
+        ("rotation", |own| own.rotation.to_vec()),
+        ("colour", |own| own.colour.to_vec()),
+    ];
+    let norm = |values: &[f32]| values.iter().map(|value| f64::from(*value).powi(2)).sum::<f64>().sqrt();
+    for (name, of) in groups {
+        let [a, b] = [&cpu, &ours].map(|all| all.iter().flat_map(of).collect::<Vec<f32>>());
+        let apart: Vec<f32> = a.iter().zip(&b).map(|(a, b)| a - b).collect();
+        let (difference, all) = (norm(&apart), norm(&a));
+        assert!(
+            all > 0.0 && difference <= MAX_DIFFERENCE * all,
+            "{name}: {difference:e} of {all:e}, {} Gaussians",
+            own.gaussians.len()
+        );
+    }
+    Ok(())
+}
+
+/// The PSNR of the Gaussians at the sources, decibels.
+fn score(own: &Optimised) -> f64 {
+    let images = &start().0;
+    let splatter = Splatter { device: &Cpu, near: own.near, background: own.background };
+    let of = |index: usize| {
+        let camera = images.images[index].camera.block(0);
+        let rendered = splatter.rendered(&own.gaussians, own.gaussians.len(), &camera, 0.5).expect("a picture");
+        let picture = to_rgb8(&rendered.colours, [rendered.width, rendered.height]);
+        let truth = images.picture(index);
+        let pairs = picture.as_raw().iter().zip(truth.as_raw());
+        let square: f64 = pairs.map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2)).sum();
+        -10.0 * (square / (255.0_f64.powi(2) * picture.as_raw().len() as f64)).log10()
+    };
+    (0..images.images.len()).map(of).sum::<f64>() / images.images.len() as f64
+}
+
+fn a_scene_is_as_good(candidate: &Candidate) -> Result<(), Failed> {
+    let device = candidate.vulkan(&GpuOptions::default())?;
+    let ours = scene(&device);
+    if device.is_software() {
+        assert_eq!(&ours, cpus_scene(), "by the CPU's own loops");
+    }
+    let (own, cpus) = (score(&ours), score(cpus_scene()));
+    assert!(own > 15.0 && own > cpus - MAX_LOSS, "{own} dB, on the CPU {cpus} dB");
+    Ok(())
+}
