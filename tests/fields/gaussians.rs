@@ -118,6 +118,7 @@ fn the_hull_is_mixed_with_gaussians_where_sources_that_are_left_out_gain() {
             chosen.mixture.map(|mixture| mixture.parts.len())
         })
     };
-    assert_eq!(parts("0..19/4"), Some(2));
+    assert_eq!(parts("0..19/5"), Some(2));
+    assert_eq!(parts("0..19/4"), None, "the source nearest to the others loses");
     assert_eq!(parts("0..19"), None);
 }
