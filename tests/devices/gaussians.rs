@@ -103,11 +103,14 @@ fn derivatives<D: Device>(device: &D, own: &Optimised) -> Vec<GaussianBlock> {
     splatter.gradients(&uploaded, &picture, &by_pixels).expect("derivatives").0
 }
 
+/// Some of a Gaussian's parameters.
+type Part = fn(&GaussianBlock) -> Vec<f32>;
+
 fn derivatives_are_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
     let device = candidate.vulkan(&GpuOptions::default())?;
     let own = thinned();
     let (cpu, ours) = (derivatives(&Cpu, &own), derivatives(&device, &own));
-    let groups: [(&str, fn(&GaussianBlock) -> Vec<f32>); 5] = [
+    let groups: [(&str, Part); 5] = [
         ("position", |own| own.position.to_vec()),
         ("opacity", |own| vec![own.opacity]),
         ("scales", |own| own.log_scales.to_vec()),
