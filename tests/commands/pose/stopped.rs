@@ -20,26 +20,28 @@ pub(super) fn trials() -> Vec<Trial> {
     }
 }
 
-/// Photographs of the room and a program that counts how often it is asked.
+/// Photographs of the room and a program that counts how often it is asked, in a file of the run's own: what a killed run has started
+/// may still count.
 fn counted() -> Folder {
     let folder = bare(0..4);
     let real = fs::canonicalize(program().expect("a program")).expect("a path");
-    let script =
-        format!("#!/bin/sh\necho asked >> '{}/asked'\nexec '{}' \"$@\"\n", folder.path().display(), real.display());
+    let script = format!("#!/bin/sh\necho asked >> \"$ASKED\"\nexec '{}' \"$@\"\n", real.display());
     folder.write("openmvg", script);
     super::colmap::executable(&folder.path().join("openmvg"));
     folder
 }
 
-fn pose(folder: &Folder, output: &str) -> Command {
+/// `run` names the run.
+fn pose(folder: &Folder, run: &str, output: &str) -> Command {
     let mut command = command(BINARY, folder.path(), &format!("pose bare -o {output} --seed 2"));
+    command.env("ASKED", folder.path().join(format!("asked-{run}")));
     command.env("VIEWFUSE_OPENMVG", folder.path().join("openmvg"));
     command
 }
 
-/// How often the program was asked.
-fn asked(folder: &Folder) -> usize {
-    fs::read_to_string(folder.path().join("asked")).unwrap_or_default().lines().count()
+/// How often a run asked the program.
+fn asked(folder: &Folder, run: &str) -> usize {
+    fs::read_to_string(folder.path().join(format!("asked-{run}"))).unwrap_or_default().lines().count()
 }
 
 /// The answers that are kept for `posed`.
@@ -53,13 +55,13 @@ fn kept(folder: &Folder) -> Vec<PathBuf> {
 #[track_caller]
 fn goes_on(folder: &Folder) {
     assert!(!folder.path().join("posed").exists(), "no half of a scene");
-    let (finished, before) = (kept(folder).len(), asked(folder));
+    let finished = kept(folder).len();
     assert!(finished >= 1, "an attempt was kept");
-    posed(pose(folder, "posed"));
+    posed(pose(folder, "second", "posed"));
     let all = json(&folder.path().join("posed/pose.json"))["attempts"].as_array().expect("a list").len();
-    assert_eq!(asked(folder) - before, all - finished, "only what was missing");
+    assert_eq!(asked(folder, "second"), all - finished, "only what was missing");
     assert!(!folder.path().join(".posed.attempts").exists(), "nothing is kept behind the end");
-    posed(pose(folder, "whole"));
+    posed(pose(folder, "whole", "whole"));
     let (posed, whole) = (folder.path().join("posed"), folder.path().join("whole"));
     for (path, _) in files_below(&posed).into_iter().filter(|(path, _)| path.is_file()) {
         let other = whole.join(path.strip_prefix(&posed).expect("inside"));
@@ -82,7 +84,7 @@ fn timeless(path: &Path) -> serde_json::Value {
 
 fn a_killed_run_goes_on() {
     let folder = counted();
-    let mut child = spawn(pose(&folder, "posed"));
+    let mut child = spawn(pose(&folder, "first", "posed"));
     wait_while_running(&mut child, || !kept(&folder).is_empty());
     child.kill().expect("a process to kill");
     end(&mut child).expect("an end");
@@ -91,7 +93,7 @@ fn a_killed_run_goes_on() {
 
 fn an_interrupted_run_goes_on() {
     let folder = counted();
-    let mut child = spawn(pose(&folder, "posed"));
+    let mut child = spawn(pose(&folder, "first", "posed"));
     wait_while_running(&mut child, || !kept(&folder).is_empty());
     interrupt(child, "-INT");
     goes_on(&folder);
