@@ -137,7 +137,7 @@ impl Chosen {
         let basis = self.basis?;
         let middles: Vec<Pose> = self.poses.iter().enumerate().filter_map(|(own, _)| self.middle(own)).collect();
         let standings = middles.iter().map(|pose| self.measure.standing(pose, self.poses.iter()));
-        let all: Vec<Expected> = standings.map(|standing| basis.expected(standing, basis.calibrated)).collect();
+        let all: Vec<Expected> = standings.map(|standing| basis.expected(standing, basis.calibrated, None)).collect();
         let mean = |value: &dyn Fn(&Expected) -> f64| all.iter().map(value).sum::<f64>() / all.len() as f64;
         let interval = [0, 1].map(|end| mean(&|own: &Expected| own.interval[end]));
         (!all.is_empty()).then(|| Expected { psnr: mean(&|own| own.psnr), interval, pixels: None })
@@ -161,7 +161,7 @@ impl Chosen {
     /// The expected score of a target's picture; `None` if nothing could be left out.
     pub fn expected(&self, frame: &Frame) -> Option<Expected> {
         let calibrated = self.calibrated(frame);
-        let expected = self.basis?.expected(self.standing(frame), calibrated);
+        let expected = self.basis?.expected(self.standing(frame), calibrated, frame.seen);
         let pixels = self.calibration.as_ref().zip(calibrated).map(|(calibration, calibrated)| {
             let scale = 10.0_f64.powf((calibrated - expected.psnr) / 20.0) as f32;
             PixelErrors { scale, poor: calibration.poor(&frame.confidences, scale) }
@@ -259,7 +259,7 @@ fn choose_of(
     let side = coarse.size.map_or(SIDE, |[width, height]| width.max(height));
     chosen.calibration = Calibration::of(best.iter().flat_map(|outcome| outcome.samples.iter().copied()).collect());
     let detail = detail::lost_detail(&stage.images.images, side);
-    chosen.basis = Some(Basis::of(&best, chosen.calibration.as_ref(), detail));
+    chosen.basis = Some(Basis::of(&best, chosen.calibration.as_ref(), detail, stage.images.has_silhouettes));
     chosen.left_out = best
         .iter()
         .zip(trials.names())

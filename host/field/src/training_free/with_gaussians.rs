@@ -20,8 +20,10 @@ use viewfuse_kernels::rows::GaussianBlock;
 use viewfuse_scene::photographs::{SourceImages, longest_side};
 use viewfuse_weighting::sources::SourceWeights;
 
-/// The setting under which a picture is that of the Gaussians: 1 for them, 0 for the sweep or the hull.
+/// The setting that says what a picture shows: 0 for the sweep or the hull, [`FILLED`], 1 for the Gaussians.
 const GAUSSIANS: &str = "gaussians";
+/// The hull, filled by the Gaussians where they are more opaque.
+const FILLED: f32 = 0.5;
 /// Opacity below which a pixel has no depth.
 const MIN_OPACITY: f32 = 0.5;
 
@@ -48,8 +50,8 @@ pub(super) struct WithGaussians<'a, D: Device> {
     recipe: Recipe,
     /// Whether all pictures are those of the Gaussians, of all sources.
     is_alone: bool,
-    /// Whether this picture is.
-    is_splatted: bool,
+    /// What this picture shows: the value of [`GAUSSIANS`].
+    shown: f32,
     encoded: Vec<bool>,
     relevance: Vec<SourceWeights>,
     /// The efforts of the pictures: of the optimisation, or of the views that the Gaussians are mixed with.
@@ -85,7 +87,7 @@ impl<'a, D: Device> WithGaussians<'a, D> {
             source_side,
             recipe: if is_alone { recipe } else { recipe.mixed_with(sources) },
             is_alone,
-            is_splatted: is_alone,
+            shown: if is_alone { 1.0 } else { 0.0 },
             encoded,
             relevance: Vec::new(),
             effort: efforts.len().saturating_sub(1),
@@ -145,6 +147,19 @@ impl<'a, D: Device> WithGaussians<'a, D> {
     }
 }
 
+/// Raises the opacity of a picture over a background to that of another one, by the other one's colours: what wrong depths carve out
+/// of a hull, at its outline most, is filled.
+fn fill(picture: &mut Rendered, from: &Rendered, background: [f32; 3]) {
+    for (own, other) in picture.colours.iter_mut().zip(&from.colours) {
+        let missing = other[3] - own[3];
+        if missing > 0.0 {
+            let share = missing / other[3];
+            (0..3).for_each(|channel| own[channel] += share * (other[channel] - background[channel]));
+            own[3] = other[3];
+        }
+    }
+}
+
 /// The weighted geometric mean of the views' gains.
 fn common_gain(gains: &[[f32; 3]], weights: &[(usize, f32)]) -> [f32; 3] {
     let sum: f32 = weights.iter().map(|(_, weight)| weight).sum();
@@ -168,13 +183,17 @@ impl<D: Device> Prepared for WithGaussians<'_, D> {
     }
 
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
-        if self.is_splatted
-            && (self.is_alone || self.is_exact())
-            && let Some(splatted) = self.splatted(request, progress)?
-        {
-            return Ok(splatted);
+        let has_gaussians = self.shown > 0.0 && (self.is_alone || self.is_exact());
+        let splatted = if has_gaussians { self.splatted(request, progress)? } else { None };
+        match splatted {
+            Some(splatted) if self.shown == FILLED => {
+                let mut filled = self.depths.render(request, progress)?;
+                fill(&mut filled, &splatted, self.images.background);
+                Ok(filled)
+            }
+            Some(splatted) => Ok(splatted),
+            None => self.depths.render(request, progress),
         }
-        self.depths.render(request, progress)
     }
 
     fn record(&self) -> Record {
@@ -242,16 +261,19 @@ impl<D: Device> Tuned for WithGaussians<'_, D> {
     }
 
     fn tune(&mut self, settings: &[Setting]) {
-        self.is_splatted = self.is_alone || settings.iter().any(|own| own.name == GAUSSIANS && own.value > 0.0);
+        if !self.is_alone {
+            self.shown = settings.iter().find(|own| own.name == GAUSSIANS).map_or(0.0, |own| own.value);
+        }
         if let Some(tuned) = self.depths.tuned() {
             tuned.tune(settings);
         }
     }
 
-    /// The sweep's, or the hull's one picture, and that of the Gaussians alone: their errors are the least like the others'.
+    /// The sweep's, or the hull's one picture, filled, and that of the Gaussians alone: their errors are the least like the others'.
     fn parts(&mut self, chosen: &[Setting]) -> Vec<Vec<Setting>> {
-        let mut parts = self.depths.tuned().map_or_else(|| vec![chosen.to_vec()], |tuned| tuned.parts(chosen));
-        parts.push(chosen.iter().copied().chain([Setting { name: GAUSSIANS, value: 1.0 }]).collect());
+        let with = |value: f32| chosen.iter().copied().chain([Setting { name: GAUSSIANS, value }]).collect();
+        let mut parts = self.depths.tuned().map_or_else(|| vec![with(FILLED)], |tuned| tuned.parts(chosen));
+        parts.push(with(1.0));
         parts
     }
 }
@@ -263,5 +285,24 @@ impl<D: Device> Geometry for WithGaussians<'_, D> {
 
     fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError> {
         self.depths.geometry().map_or(Ok(Vec::new()), Geometry::source_depths)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_more_opaque_picture_fills_what_is_missing() {
+        let picture = |colours: Vec<[f32; 4]>| {
+            let (width, height) = (colours.len() as u32, 1);
+            Rendered { colours, depths: Vec::new(), confidences: Vec::new(), width, height }
+        };
+        // Black on white: carved out, half there, and more opaque than the other, which is red.
+        let black = |opacity: f32| [1.0 - opacity, 1.0 - opacity, 1.0 - opacity, opacity];
+        let red = |opacity: f32| [1.0, 1.0 - opacity, 1.0 - opacity, opacity];
+        let mut own = picture(vec![black(0.0), black(0.5), black(1.0), black(0.0)]);
+        fill(&mut own, &picture(vec![red(0.75), red(1.0), red(0.5), red(0.0)]), [1.0; 3]);
+        assert_eq!(own.colours, [red(0.75), [0.5, 0.0, 0.0, 1.0], black(1.0), black(0.0)]);
     }
 }

@@ -164,14 +164,14 @@ fn rendered(
         let is_inside = (expected.interval[0]..=expected.interval[1]).contains(&truth.psnr);
         summary.targets.push((expected.psnr, truth.psnr, is_inside));
         if let Some(basis) = &chosen.basis {
-            let terms = basis.terms(chosen.standing(&frame), chosen.calibrated(&frame));
+            let terms = basis.terms(chosen.standing(&frame), chosen.calibrated(&frame), frame.seen);
             summary.rows.push(Row { scene: scene.path.display().to_string(), terms, above: truth.psnr - basis.psnr });
         }
         let calibrated = chosen.calibrated(&frame);
-        let terms = chosen.basis.map(|basis| basis.terms(chosen.standing(&frame), calibrated));
+        let terms = chosen.basis.map(|basis| basis.terms(chosen.standing(&frame), calibrated, frame.seen));
         views.push(json!({
             "terms": terms, "target": frame.target.name, "standing": chosen.standing(&frame), "confidence": confidence,
-            "expected": expected, "psnr": truth.psnr,
+            "expected": expected, "psnr": truth.psnr, "seen_by": frame.seen,
         }));
     }
     Ok(views)
