@@ -249,7 +249,7 @@ fn choose_of(
         }
     }
     let parts = if is_mixed { search.trials.parts(&chosen.settings) } else { Vec::new() };
-    if let Some(Mixed { mixture, outcomes }) = search.mixed(&chosen.weighting, &chosen.settings, parts)?
+    if let Some(Mixed { mixture, outcomes, .. }) = search.mixed(&chosen.weighting, &chosen.settings, parts)?
         && mean_score(&outcomes) > mean_score(&best) - MAX_LOSS
         && !(stage.images.has_silhouettes && loses_where_nearest(&outcomes, &best))
     {
