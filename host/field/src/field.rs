@@ -257,6 +257,27 @@ pub struct DepthMap {
     pub confidences: Vec<f32>,
 }
 
+/// A view does not show what lies behind its own surface by more than this share of the depth.
+const MAX_BEHIND: f32 = 0.05;
+/// Confidence from which on a view's surface hides something.
+const MIN_CONFIDENCE: f32 = 0.5;
+
+impl DepthMap {
+    /// Whether the view shows a point, world coordinates: it lies in the image, and not behind a surface that can be relied on. Maps without
+    /// confidences are taken to be sure.
+    pub(crate) fn shows(&self, point: Vec3) -> bool {
+        let there = self.camera.project(point);
+        let hides = |at: usize| {
+            self.confidences.get(at).is_none_or(|confidence| *confidence > MIN_CONFIDENCE)
+                && self
+                    .depths
+                    .get(at)
+                    .is_some_and(|surface| *surface > 0.0 && there.depth > surface * (1.0 + MAX_BEHIND))
+        };
+        there.in_image && !hides(self.camera.texel_at(there.x, there.y))
+    }
+}
+
 /// Requirements and properties of a field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct About {

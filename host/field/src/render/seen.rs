@@ -6,11 +6,6 @@ use viewfuse_core::camera::Camera;
 
 /// Points of a picture that are looked at, along its longer side.
 const POINTS: u32 = 64;
-/// A photograph does not show what lies behind its own surface by more than this share of the depth.
-const MAX_BEHIND: f32 = 0.05;
-/// Confidence from which on a photograph's surface hides something.
-const MIN_CONFIDENCE: f32 = 0.5;
-
 /// Shares of a picture's surfaces, in `[0, 1]`, by the depths that the field found: an estimate, as good as these.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Seen {
@@ -34,20 +29,7 @@ pub(super) fn seen(camera: &Camera, [width, height]: [u32; 2], depths: &[f32], m
             let depth = depths[(row * width + column) as usize];
             if depth > 0.0 {
                 let point = camera.centre_world() + camera.towards(column as f32 + 0.5, row as f32 + 0.5) * depth;
-                let shows = |map: &&DepthMap| {
-                    let there = map.camera.project(point);
-                    let at = || map.camera.texel_at(there.x, there.y);
-                    // A field that tells no confidence is sure.
-                    let hides = |at: usize| {
-                        map.confidences.get(at).is_none_or(|confidence| *confidence > MIN_CONFIDENCE)
-                            && map
-                                .depths
-                                .get(at)
-                                .is_some_and(|surface| *surface > 0.0 && there.depth > surface * (1.0 + MAX_BEHIND))
-                    };
-                    there.in_image && !hides(at())
-                };
-                match maps.iter().filter(shows).take(2).count() {
+                match maps.iter().filter(|map| map.shows(point)).take(2).count() {
                     0 => none += 1,
                     1 => one += 1,
                     _ => {}

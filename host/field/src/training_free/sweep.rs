@@ -6,12 +6,14 @@
 //! sources     the sources' disparities: found, found again by what they say of one another, kept
 //! search      surface points of a scene whose files do not tell its depths
 //! kept        what was found of the sources, in a folder between runs
+//! holes       surfaces that no source shows
 //! unseen      parts of a picture that its photograph does not show
 //! scalars     the scalars that are chosen for a scene, and the pictures that are mixed
 //! efforts     coarser comparisons, from the cheapest to the exact one
 //! ```
 
 mod efforts;
+mod holes;
 mod kept;
 mod matching;
 mod scalars;
@@ -364,7 +366,13 @@ impl<D: Device> Prepared for Views<'_, D> {
             (0..3).for_each(|channel| colour[channel] += behind * self.background[channel]);
         }
         let (depths, confidences) = (device.download(&depths)?, device.download(&confidences)?);
-        Ok(Rendered { colours, depths, confidences, width, height })
+        let mut rendered = Rendered { colours, depths, confidences, width, height };
+        if !self.has_silhouettes {
+            let maps = self.source_depths()?;
+            let used: Vec<DepthMap> = request.views.iter().map(|view| maps[*view].clone()).collect();
+            holes::fill(&mut rendered, &block.target, &used);
+        }
+        Ok(rendered)
     }
 
     fn weighted(&mut self) -> Option<&mut dyn Weighted> {
