@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::render::{RenderOptions, Stage, render_all};
-use viewfuse::field::training_free::{Cache, TrainingFree};
-use viewfuse::field::{On, Rendered};
+use viewfuse::field::training_free::{Cache, Sweep, TrainingFree};
+use viewfuse::field::{DepthMap, On, Rendered};
 use viewfuse::job::digest::sha256;
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
@@ -128,6 +128,69 @@ fn exposures_are_made_equal() {
     let error = inner_error(&rendered.colours, &photograph(target, 1.0).texels, 72);
     println!("root mean square error {error}");
     assert!(error < 0.03, "{error}");
+}
+
+/// The sources' depth maps with this share of geometric consistency.
+fn depths_with(consistency_share: f32, sources: &SourceImages) -> Vec<DepthMap> {
+    let sweep = Sweep { consistency_share, ..Sweep::default() };
+    let field = TrainingFree { sweep, ..TrainingFree::default() };
+    let renderer = On { device: &Cpu, field: &field };
+    let options = RenderOptions::default();
+    let mut stage = Stage::of_sources(Arc::new(sources.clone()), &renderer, &options, &Silent).expect("a stage");
+    stage.weigh_by(&relevance(sources.images.len()), &Silent).expect("a weighting");
+    stage.encode_all(&Silent).expect("depths");
+    stage.source_depths().expect("depths")
+}
+
+#[test]
+fn two_other_views_confirm_a_depth() {
+    let sources = wall([1.0; 3]);
+    let [none, half, all] = [0.0, 0.5, 1.0].map(|share| depths_with(share, &sources));
+    let mut confirmed = Vec::new();
+    for (view, image) in sources.images.iter().enumerate() {
+        assert_eq!(none[view].depths, all[view].depths, "the depths stay");
+        for pixel in 0..72 * 54 {
+            let [own, mixed, consistent] = [&none, &half, &all].map(|maps| maps[view].confidences[pixel]);
+            assert!((mixed - 0.5 * (own + consistent)).abs() < 1.0e-6, "{own} {mixed} {consistent}");
+            // One view gives at most 0.65, two 1 - 0.35 * 0.35.
+            assert!((0.0..0.8776).contains(&consistent), "{consistent}");
+            let ray = image.camera.ray((pixel % 72) as f32 + 0.5, (pixel / 72) as f32 + 0.5);
+            let depth = none[view].depths[pixel] / ray.direction_world.dot(image.camera.pose.forward_world());
+            let point = ray.at(depth);
+            let others = sources.images.iter().enumerate().filter(|(other, _)| *other != view);
+            match others.filter(|(_, other)| other.camera.project(point).in_image).count() {
+                0 => assert_eq!(consistent, 0.0, "no other view has {point}"),
+                1 => assert!(consistent < 0.6501, "{consistent}"),
+                _ if (point.z - WALL).abs() < 0.02 * WALL => confirmed.push(consistent),
+                _ => {}
+            }
+        }
+    }
+    confirmed.sort_by(f32::total_cmp);
+    let median = confirmed[confirmed.len() / 2];
+    println!("{} points on the wall, median consistency {median}", confirmed.len());
+    assert!(confirmed.len() > 3000 && median > 0.85, "{} {median}", confirmed.len());
+}
+
+#[test]
+fn what_is_painted_otherwise_in_one_view_is_not_confirmed_by_it() {
+    let mut sources = wall([1.0; 3]);
+    let mean = |map: &DepthMap| map.confidences.iter().sum::<f32>() / map.confidences.len() as f32;
+    let agreeing = depths_with(1.0, &sources).iter().map(mean).collect::<Vec<_>>();
+    // The third photograph is upside down: its disparities are wrong, and the others confirm one another alone.
+    sources.images[2].texels.reverse();
+    let maps = depths_with(1.0, &sources);
+    println!("mean consistency {agreeing:?}, with a wrong photograph {:?}", maps.iter().map(mean).collect::<Vec<_>>());
+    assert!(mean(&maps[2]) < 0.6 * agreeing[2]);
+    (0..2).for_each(|view| assert!(mean(&maps[view]) < agreeing[view]));
+}
+
+#[test]
+fn two_sources_are_not_confirmed() {
+    let mut sources = wall([1.0; 3]);
+    sources.images.pop();
+    let [none, all] = [0.0, 1.0].map(|share| depths_with(share, &sources));
+    none.iter().zip(&all).for_each(|(none, all)| assert_eq!(none.confidences, all.confidences));
 }
 
 /// A source of which neither the weights nor a used source's neighbours know anything, whatever it shows.

@@ -4,6 +4,7 @@
 //! ```text
 //! matching    costs of the planes in a frustum
 //! sources     the sources' disparities: found, found again by what they say of one another, kept
+//! consistency how far the sources' disparities confirm one another; their gains
 //! search      surface points of a scene whose files do not tell its depths
 //! kept        what was found of the sources, in a folder between runs
 //! holes       surfaces that no source shows
@@ -12,6 +13,7 @@
 //! efforts     coarser comparisons, from the cheapest to the exact one
 //! ```
 
+mod consistency;
 mod efforts;
 mod holes;
 mod kept;
@@ -28,6 +30,7 @@ use crate::{
     About, AnyField, DepthMap, Efforts, Encoding, Field, FieldError, Geometry, Prepared, Rendered, Request, Surfaces,
     Tuned, Weighted,
 };
+use consistency::Assessed;
 pub use kept::Cache;
 use kept::{Kept, Key};
 use matching::{Images, Matching, Range};
@@ -50,6 +53,7 @@ const DEFAULT: Sweep = Sweep {
     front_share: 0.1,
     second_share: 0.0,
     dissent_share: 0.0625,
+    consistency_share: 0.5,
     temperature: TEMPERATURE,
 };
 
@@ -76,6 +80,8 @@ pub struct Sweep {
     pub second_share: f32,
     /// Cost of contradicting the sources' own disparities.
     pub dissent_share: f32,
+    /// Share of the confidence of a source's disparity that is its geometric consistency with two others; 0 for none.
+    pub consistency_share: f32,
     /// Temperature of the softmax over planes.
     pub temperature: f32,
 }
@@ -116,8 +122,8 @@ pub(super) struct Views<'a, D: Device> {
     found: Vec<(usize, Vec<[f32; 2]>)>,
     /// ... and those on the device that are to be kept.
     unkept: Vec<(usize, Key)>,
-    /// The gains estimated from some views under the current weighting, these views, and whether by the second disparities.
-    gains: Option<(Vec<usize>, bool, Vec<[f32; 4]>)>,
+    /// Confidences and gains from some views under the current weighting.
+    assessed: Option<Assessed<D>>,
 }
 
 /// Disparities and confidences of some views, found the second time.
@@ -186,7 +192,7 @@ impl Sweep {
             relevance: Vec::new(),
             space,
             texels,
-            gains: None,
+            assessed: None,
             kept,
             found: Vec::new(),
             unkept: Vec::new(),
@@ -286,31 +292,18 @@ impl<D: Device> Views<'_, D> {
         Range::new(self.space.disparities(camera), self.settings.plane_count)
     }
 
-    /// Estimates the gains from these views alone: a picture does not depend on sources that its weights leave out.
-    fn estimate_gains(&mut self, views: &[usize]) -> Result<(), FieldError> {
-        let by_second = self.settings.second_share > 0.0;
-        if self.gains.as_ref().is_none_or(|(own, second, _)| own != views || *second != by_second) {
-            let maps = self.device.download(self.maps())?;
-            let step = |view: usize| if views.contains(&view) { self.steps[view] } else { 0.0 };
-            let steps: Vec<f32> = (0..self.steps.len()).map(step).collect();
-            let gains = exposure::gains(&self.matched.cameras, &self.texels, &maps, &steps);
-            self.gains = Some((views.to_vec(), by_second, gains));
-        }
-        Ok(())
-    }
-
     /// The costs of a target's planes, and what its pixels are blended from.
     fn volume(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Volume<D>, FieldError> {
         let &Request { camera: target, views, .. } = request;
         self.exchange(progress)?;
         self.settle(views, progress)?;
-        self.estimate_gains(views)?;
+        self.assess(views)?;
         let (small_width, small_height) = reduced_size(target, self.settings.match_side);
         let pinhole = target.pinhole.resized(small_width, small_height).map_err(FieldError::unsuitable)?;
         let camera = Camera { pinhole, ..*target }.block(0);
         let weights: Vec<(usize, f32)> = views.iter().copied().zip(request.view_weights()).collect();
         let range = self.range(&camera);
-        let (maps, gains) = (&self.matched.cameras, self.gains.as_ref().map(|(_, _, gains)| &gains[..]));
+        let (maps, gains) = (&self.matched.cameras, self.assessed.as_ref().map(|own| &own.gains[..]));
         let matched = swept(maps, maps, &weights, Some(&self.steps), gains);
         let matching = self.settings.matching(self.device, self.has_silhouettes);
         let frustum = matching.frustum(camera, range, &matched);
@@ -399,7 +392,7 @@ impl<D: Device> Weighted for Views<'_, D> {
         self.settled = None;
         self.found.clear();
         self.unkept.clear();
-        self.gains = None;
+        self.assessed = None;
         Ok(())
     }
 }
@@ -410,7 +403,9 @@ impl<D: Device> Geometry for Views<'_, D> {
     }
 
     fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError> {
-        let maps = self.device.download(self.maps())?;
+        let mut maps = self.device.download(self.found())?;
+        let encoded: Vec<usize> = (0..self.steps.len()).filter(|view| self.steps[*view] > 0.0).collect();
+        self.confirm(&encoded, &mut maps);
         let map = |(camera, step): (&CameraBlock, &f32)| {
             let own = maps[camera.first_texel as usize..].iter().take((camera.width * camera.height) as usize);
             // Below half a step a disparity is that of the farthest plane: it bounds nothing.

@@ -66,7 +66,7 @@ impl<D: Device> Efforts for Views<'_, D> {
         self.settled = None;
         self.found.clear();
         self.unkept.clear();
-        self.gains = None;
+        self.assessed = None;
         Ok(Encodings::Dropped)
     }
 

@@ -10,8 +10,13 @@ use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
 use viewfuse_kernels::plane_sweep::{MAX_MATCHED, Planes};
 
 impl<D: Device> Views<'_, D> {
-    /// The sources' disparities and confidences.
+    /// The sources' disparities and confidences, with what the current views say of one another if it is known.
     pub(super) fn maps(&self) -> &D::Buffer<[f32; 2]> {
+        self.assessed.as_ref().map_or_else(|| self.found(), |own| &own.maps)
+    }
+
+    /// The sources' disparities and confidences, each from the costs of its planes alone.
+    pub(super) fn found(&self) -> &D::Buffer<[f32; 2]> {
         let is_settled = self.settings.second_share > 0.0;
         let settled = self.settled.as_ref().filter(|_| is_settled);
         settled.map_or(&self.disparities, |settled| &settled.maps)
@@ -42,7 +47,7 @@ impl<D: Device> Views<'_, D> {
                 let costs = self.source_costs(&frustum, &swept, &own, settings, progress)?;
                 self.device.pick_disparity(&frustum, &costs, &mut maps)?;
                 voters[view] = Some(others);
-                self.gains = None;
+                self.assessed = None;
             }
         }
         self.settled = Some(Settled { settings, voters, maps });
@@ -50,7 +55,7 @@ impl<D: Device> Views<'_, D> {
     }
 
     /// The other views with their weights for a source, the greatest first.
-    fn others(&self, view: usize) -> Vec<(usize, f32)> {
+    pub(super) fn others(&self, view: usize) -> Vec<(usize, f32)> {
         let relevance = &self.relevance[view];
         let others = (0..self.matched.cameras.len()).filter(|other| *other != view);
         let mut weights: Vec<(usize, f32)> = others.map(|other| (other, relevance.get(other as u32))).collect();
@@ -107,6 +112,7 @@ impl<D: Device> Views<'_, D> {
     /// Finds a source's disparities, or takes those that were kept.
     pub(super) fn find(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
         self.settled = None;
+        self.assessed = None;
         let (frustum, swept) = self.source_frustum(view, self.settings);
         self.steps[view] = frustum.disparity_step;
         let key = self.kept.as_ref().map(|kept| kept.of_source(&self.settings, &frustum, &swept, &self.texels));
