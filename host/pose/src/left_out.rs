@@ -21,7 +21,7 @@ use viewfuse_evaluate::baseline::plane::plane_depth;
 use viewfuse_evaluate::baseline::{Baseline, Shot};
 use viewfuse_field::On;
 use viewfuse_field::render::{RenderError, RenderOptions, Stage};
-use viewfuse_field::training_free::TrainingFree;
+use viewfuse_field::training_free::{Sweep, TrainingFree};
 use viewfuse_job::progress::{Progress, Quiet};
 use viewfuse_scene::Scene;
 use viewfuse_scene::photographs::{Album, BackgroundChoice, SourceImage, SourceImages, scaled_size};
@@ -157,7 +157,7 @@ impl<'a> Photographs<'a> {
         });
         let truth = Truth::of(&self.all, view);
         let (renderer, options) = (
-            On { device: &Cpu, field: &TrainingFree::default() },
+            On { device: &Cpu, field: &field() },
             RenderOptions { background: BackgroundChoice::None, ..RenderOptions::default() },
         );
         let mut stage = Stage::of_images(&self.scene, self.album, &neighbours, images, &renderer, &options, progress)?;
@@ -317,4 +317,11 @@ impl Truth {
         let error: f64 = differences.iter().map(|own| own * own).sum();
         if differences.is_empty() { 0.0 } else { (-10.0 * (error / differences.len() as f64).log10()).min(MAX_SCORE) }
     }
+}
+
+/// The field that renders a view from the others: each source's depths count as they are, as a pose that is a little off should be felt,
+/// not its photograph doubted.
+fn field() -> TrainingFree {
+    let sweep = Sweep { consistency_share: 0.0, ..Sweep::default() };
+    TrainingFree { sweep, ..TrainingFree::default() }
 }
