@@ -6,7 +6,7 @@
 //! have efforts of their own: the first iterations of the same optimisation, which a dearer effort goes on from.
 
 use super::gaussians::stops;
-use crate::gaussians::{Optimisation, Optimised, Recipe, Splatter, optimisation};
+use crate::gaussians::{Optimisation, Optimised, Recipe, Residuals, Splatter, optimisation};
 use crate::point_cloud::cloud_of;
 use crate::{
     DepthMap, Effort, Efforts, Encoding, Encodings, FieldError, Geometry, Prepared, Record, Rendered, Request, Setting,
@@ -36,6 +36,7 @@ struct Scene<D: Device> {
     background: [f32; 3],
     /// How much brighter each source is than they are: red, green, blue.
     gains: Vec<[f32; 3]>,
+    residuals: Residuals,
 }
 
 /// The views of the sweep or of the hull, and the Gaussians of the same sources.
@@ -125,7 +126,9 @@ impl<'a, D: Device> WithGaussians<'a, D> {
                 }
                 ran?;
                 let count = gaussians.len();
-                Some(Scene { gaussians: self.device.upload(&gaussians)?, count, near, background, gains })
+                let residuals = Residuals::new(gains.len());
+                let gaussians = self.device.upload(&gaussians)?;
+                Some(Scene { gaussians, count, near, background, gains, residuals })
             }
             None => None,
         };
@@ -155,8 +158,8 @@ impl<'a, D: Device> WithGaussians<'a, D> {
     /// The Gaussians from a target; `None` if there are none.
     fn splatted(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Option<Rendered>, FieldError> {
         self.prepare_scene(progress)?;
-        let scene = self.scenes.get(&self.effort).and_then(Option::as_ref);
-        let Some(Scene { gaussians, count, near, background, gains }) = scene else { return Ok(None) };
+        let scene = self.scenes.get_mut(&self.effort).and_then(Option::as_mut);
+        let Some(Scene { gaussians, count, near, background, gains, residuals }) = scene else { return Ok(None) };
         let splatter = Splatter { device: self.device, near: *near, background: *background };
         let mut splatted = splatter.rendered(gaussians, *count, &request.camera.block(0), MIN_OPACITY)?;
         // As bright as the sources that count for this target, as the other pictures are.
@@ -165,6 +168,11 @@ impl<'a, D: Device> WithGaussians<'a, D> {
         for colour in &mut splatted.colours {
             (0..3).for_each(|channel| colour[channel] = (colour[channel] * gain[channel]).clamp(0.0, 1.0));
         }
+        for (view, _) in weights.iter().filter(|(_, weight)| *weight > 0.0) {
+            let source = (&*self.images, gains[*view]);
+            residuals.find(*view, &splatter, (gaussians, *count), source, MIN_OPACITY)?;
+        }
+        residuals.add(&request.camera.block(0), &weights, &mut splatted);
         Ok(Some(splatted))
     }
 }
