@@ -78,7 +78,7 @@ fn cheaper_efforts_are_farther_from_the_exact_picture() {
         assert_eq!(frame(stage, last).colours, exact.colours, "the exact picture after others");
         // Efforts are listed with what they do.
         assert!(
-            efforts[0].name.contains("240 iterations") && efforts[0].name.contains("32 pixels"),
+            efforts[0].name.contains("100 iterations") && efforts[0].name.contains("32 pixels"),
             "{}",
             efforts[0].name
         );
@@ -102,6 +102,32 @@ fn a_bound_chooses_an_effort_and_says_so() {
     assert!(patient.effort == "exact" && patient.is_kept, "{patient:?}");
     let sharp = kept(Bound::Error(1.0e-5));
     assert!(sharp.effort == "exact" && sharp.is_kept, "{sharp:?}");
+}
+
+/// A cheaper picture is compared with one that goes on from it: neither is made for nothing.
+#[test]
+fn a_bound_on_the_error_is_kept_with_fewer_iterations() {
+    let weighting = Weighting::open("distance:power=2").expect("a scheme");
+    let frame = |most: f32| {
+        let options = RenderOptions { bound: Some(Bound::Error(most)), ..RenderOptions::default() };
+        with_stage(AnyField::new(Gaussians::default()), "0..19/2", &options, |stage, job, _| {
+            stage.weigh(&weighting, &Silent).expect("weights");
+            let first = stage.frame(&weighting, &job.targets[0], &Silent).expect("a frame");
+            let second = stage.frame(&weighting, &job.targets[0], &Silent).expect("a frame");
+            (first, second)
+        })
+    };
+    let (exact, _) = frame(1.0e-5);
+    for most in [0.05, 0.15] {
+        let (first, second) = frame(most);
+        for own in [&first, &second] {
+            let kept = own.kept.as_ref().expect("a record of the bound");
+            let error = difference(own, &exact);
+            println!("{most}: {error} {kept:?}");
+            assert!(kept.effort.contains("iterations") && kept.is_kept, "{kept:?}");
+            assert!(error > 1.0e-4 && error <= most, "{error} of {most}: {kept:?}");
+        }
+    }
 }
 
 /// Few photographs of an object: its sources that are left out are better with Gaussians; of many, the hull alone is.

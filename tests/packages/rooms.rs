@@ -143,7 +143,7 @@ fn a_library_that_is_not_tested_inside_has_no_tests_inside() {
 #[test]
 fn no_path_leads_out_of_the_repository() {
     let beside = concat!("../", "shared");
-    let comparisons = ["", "_genvs", "_training"].map(|of| format!("tests/compare_pytorch{of}"));
+    let comparisons = ["", "_gaussians", "_genvs", "_training"].map(|of| format!("tests/compare_pytorch{of}"));
     let scripts = ["tests/run", ".ci/run"].map(str::to_owned).into_iter().chain(comparisons);
     let mut paths: Vec<PathBuf> = scripts.map(|file| repository().join(file)).collect();
     for extension in ["rs", "toml", "md", "c", "h", "py"] {

@@ -119,6 +119,12 @@ pub trait Efforts {
     /// [`FieldError`].
     fn set(&mut self, effort: usize) -> Result<Encodings, FieldError>;
 
+    /// Whether an effort goes on from where a cheaper one ended: both together take the time of the dearer one. The same for the
+    /// life of the prepared views.
+    fn goes_on(&self) -> bool {
+        false
+    }
+
     /// Renders what follows with the effort of trials: pictures that are only compared with one another, and may have less
     /// resolution where that changes the comparison little. Before views are encoded.
     fn set_trial(&mut self) {}

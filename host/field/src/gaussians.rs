@@ -3,6 +3,7 @@
 //! ```text
 //! tiles      a picture's tiles, and which splats each shows
 //! picture    pictures and derivatives on a device
+//! residuals  what they leave of the photographs, carried to a target
 //! recipe     the settings, chosen by measurement
 //! level      the source views at the sizes of the pyramid
 //! loss       how far a picture is from a photograph, and its derivative
@@ -26,11 +27,13 @@ mod optimise;
 mod particles;
 mod picture;
 mod recipe;
+mod residuals;
 mod start;
 mod tiles;
 
 pub use given::{GivenGaussians, behind, scene_of};
-pub use optimise::{Optimised, Optimiser, optimised};
+pub use optimise::{Optimisation, Optimised, Optimiser, optimisation, optimised};
 pub use picture::{Splatted, Splatter};
 pub use recipe::{MAX_COUNT, MAX_ITERATIONS, Recipe};
+pub use residuals::Residuals;
 pub use tiles::Tiles;

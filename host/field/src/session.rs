@@ -35,6 +35,8 @@ pub(crate) struct Session<'a> {
     /// The field's efforts; none for a field with one way to render.
     pub(crate) efforts: Vec<Effort>,
     pub(crate) judge: Judge,
+    /// Whether an effort goes on from where a cheaper one ended.
+    pub(crate) goes_on: bool,
     pub(crate) tunables: &'static [Tunable],
     effort: Option<usize>,
     settings: Vec<Setting>,
@@ -57,6 +59,7 @@ impl<'a> Session<'a> {
             Some(Check::Comparison) | None => Judge::Comparison,
         };
         let efforts = prepared.efforts().map_or_else(Vec::new, |efforts| efforts.list());
+        let goes_on = prepared.efforts().is_some_and(|efforts| efforts.goes_on());
         let tunables = prepared.tuned().map_or(&[][..], |tuned| tuned.tunables());
         let (is_weighted, encoded) = (prepared.weighted().is_some(), vec![false; sources.images.len()]);
         Ok(Session {
@@ -67,6 +70,7 @@ impl<'a> Session<'a> {
             relevance: None,
             efforts,
             judge,
+            goes_on,
             tunables,
             effort: None,
             settings: Vec::new(),

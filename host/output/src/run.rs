@@ -17,6 +17,7 @@ use crate::video::{VideoError, VideoFormat, write_video};
 use image::{DynamicImage, ImageBuffer, Luma, RgbImage};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 use viewfuse_field::Renderer;
 use viewfuse_field::auto::Chosen;
@@ -65,6 +66,8 @@ pub struct RunWriter {
     space: SceneFrame,
     weighting: String,
     source_names: Vec<String>,
+    /// The photographs, once a contact sheet has shown them: those of all frames are the same.
+    source_pictures: Vec<Arc<RgbImage>>,
     coverage: Coverage,
     frames: Vec<FrameRecord>,
     size: [u32; 2],
@@ -109,6 +112,7 @@ impl RunWriter {
             space: scene.frame,
             weighting: weighting.to_string(),
             source_names: source_names(scene, job),
+            source_pictures: Vec::new(),
             coverage: Coverage::of(&job.source_cameras(scene)),
             frames: Vec::new(),
             size: [0, 0],
@@ -198,7 +202,10 @@ impl RunWriter {
                 remove_if_there(&path)?;
             }
         }
-        let sheet = self.outputs.sheet.then(|| DynamicImage::ImageRgb8(self.sheet(sources, frame)));
+        if self.outputs.sheet && self.source_pictures.is_empty() {
+            self.source_pictures = (0..sources.images.len()).map(|source| Arc::new(sources.picture(source))).collect();
+        }
+        let sheet = self.outputs.sheet.then(|| DynamicImage::ImageRgb8(self.sheet(frame)));
         let confidences = confidence_map(frame).map(DynamicImage::ImageLuma8);
         for (what, picture) in [("confidence", confidences), ("sheet", sheet)] {
             let file = format!("{name}_{what}.png");
@@ -311,17 +318,18 @@ impl RunWriter {
     }
 
     /// The contact sheet of a frame.
-    fn sheet(&self, sources: &SourceImages, frame: &Frame) -> RgbImage {
+    fn sheet(&self, frame: &Frame) -> RgbImage {
         let (width, height) = frame.picture.dimensions();
-        let source = |(index, name): (usize, &String)| SheetSource {
+        let named = self.source_names.iter().zip(&self.source_pictures).enumerate();
+        let source = |(index, (name, picture)): (usize, (&String, &Arc<RgbImage>))| SheetSource {
             name: name.clone(),
             weight: frame.omission.weights.get(index as u32),
-            picture: sources.picture(index),
+            picture: Arc::clone(picture),
         };
         let empty_as_nan: Vec<f32> = frame.depths.iter().map(|z| if *z > 0.0 { *z } else { f32::NAN }).collect();
         Sheet {
             title: format!("{}  target {}  weights {}", self.scene_name, frame.target.name, self.weighting),
-            sources: self.source_names.iter().enumerate().map(source).collect(),
+            sources: named.map(source).collect(),
             prediction: frame.picture.clone(),
             depth: (!frame.depths.is_empty()).then(|| depth_picture(&empty_as_nan, width, height)),
             truth: frame.truth.as_ref().map(|truth| (truth.picture.clone(), truth.psnr, truth.ssim)),

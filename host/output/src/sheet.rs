@@ -5,6 +5,7 @@
 
 use crate::canvas::{BLUE, CHARACTER_WIDTH, Canvas, GREY, INK, LINE_HEIGHT, PAPER};
 use image::{Rgb, RgbImage, imageops};
+use std::sync::Arc;
 
 /// One source on the sheet.
 pub struct SheetSource {
@@ -13,7 +14,7 @@ pub struct SheetSource {
     /// Its weight; 0 for a view that was left out.
     pub weight: f32,
     /// Its photograph at working size.
-    pub picture: RgbImage,
+    pub picture: Arc<RgbImage>,
 }
 
 /// The content of a sheet.

@@ -20,7 +20,8 @@ const ROUNDS: usize = 3;
 const EXPECTED_DRAWS: usize = 8;
 /// Pictures that keep another picture's choice have this much more error at most.
 const OTHER_PICTURES: f64 = 1.3;
-/// The most work of two pictures that are compared, as a share of the exact one's: where the comparison fails, it was for nothing.
+/// The most work of two pictures that are compared, as a share of the exact one's: where the comparison fails, it was for nothing, unless
+/// an effort goes on from where a cheaper one ended.
 const MAX_COMPARED: f32 = 0.7;
 /// A picture whose error is below the bound by this factor lets the next one begin with less effort.
 const FAR_LESS: f64 = 1.6;
@@ -150,7 +151,7 @@ impl Controller {
     }
 
     /// For fields that tell no errors and whose pixels cannot be computed alone: compares pictures of two efforts. Another effort
-    /// encodes the sources of such fields again, so the first comparison chooses for the whole run.
+    /// encodes the sources of such fields again or optimises further, so the first comparison chooses for the whole run.
     fn by_comparison(
         &mut self,
         search: &mut Search<'_, '_>,
@@ -167,7 +168,7 @@ impl Controller {
         let mut effort = self.expected.cheapest_within(most).clamp(1.min(exact), exact);
         let mut below = self.expected.below(effort);
         let work: f32 = [below, effort].iter().map(|effort| self.expected.efforts[*effort].typical_share).sum();
-        if effort == exact || work > MAX_COMPARED {
+        if effort == exact || (work > MAX_COMPARED && !search.session.goes_on) {
             let rendered = self.picture(search, exact, termination, progress)?;
             self.compared = Some((exact, Estimate::EXACT));
             return Ok((rendered, exact, Estimate::EXACT));

@@ -38,9 +38,43 @@ pub struct Optimised {
     pub gains: Vec<[f32; 3]>,
 }
 
-/// All iterations of a recipe: on the device, or, where that is a software driver, by the CPU's own loops, which take a part of its time. Mesa's
-/// llvmpipe, besides, ends the loops of an invocation after 65,535 iterations, so that the derivatives of tiles with some 250
-/// splats or more are wrong there. `None` if there are too few points.
+/// An optimisation, on whatever device makes its steps.
+pub trait Optimisation {
+    /// How many iterations are done.
+    fn done(&self) -> u32;
+
+    /// The iterations up to this number of them, as far as the recipe has so many; none if so many are done.
+    ///
+    /// # Errors
+    /// [`FieldError`]; after one the Gaussians so far are still there.
+    fn run_to(&mut self, iteration: u32, progress: &dyn Progress) -> Result<(), FieldError>;
+
+    /// The Gaussians so far.
+    fn optimised(&self) -> Optimised;
+}
+
+/// An optimisation at its beginning: on the device, or, where that is a software driver, by the CPU's own loops, which take a part of its
+/// time. Mesa's llvmpipe, besides, ends the loops of an invocation after 65,535 iterations, so that the derivatives of tiles with
+/// some 250 splats or more are wrong there. `None` if there are too few points.
+///
+/// # Errors
+/// [`FieldError`].
+pub fn optimisation<'d, D: Device>(
+    device: &'d D,
+    images: &SourceImages,
+    points: &[CloudPoint],
+    recipe: Recipe,
+) -> Result<Option<Box<dyn Optimisation + 'd>>, FieldError> {
+    fn boxed<'d, D: Device>(optimiser: Option<Optimiser<'d, D>>) -> Option<Box<dyn Optimisation + 'd>> {
+        optimiser.map(|optimiser| Box::new(optimiser) as Box<dyn Optimisation + 'd>)
+    }
+    match device.is_software() {
+        true => Ok(boxed(Optimiser::new(&Cpu, images, points, recipe)?)),
+        false => Ok(boxed(Optimiser::new(device, images, points, recipe)?)),
+    }
+}
+
+/// All iterations of a recipe, on the device that [`optimisation`] takes. `None` if there are too few points.
 ///
 /// # Errors
 /// [`FieldError`].
@@ -51,17 +85,29 @@ pub fn optimised<D: Device>(
     recipe: Recipe,
     progress: &dyn Progress,
 ) -> Result<Option<Optimised>, FieldError> {
-    fn all<D: Device>(
-        optimiser: Option<Optimiser<'_, D>>,
-        progress: &dyn Progress,
-    ) -> Result<Option<Optimised>, FieldError> {
-        let Some(mut optimiser) = optimiser else { return Ok(None) };
-        optimiser.run(progress)?;
-        Ok(Some(optimiser.optimised()))
+    let Some(mut optimisation) = optimisation(device, images, points, recipe)? else { return Ok(None) };
+    optimisation.run_to(u32::MAX, progress)?;
+    Ok(Some(optimisation.optimised()))
+}
+
+impl<D: Device> Optimisation for Optimiser<'_, D> {
+    fn done(&self) -> u32 {
+        self.iteration
     }
-    match device.is_software() {
-        true => all(Optimiser::new(&Cpu, images, points, recipe)?, progress),
-        false => all(Optimiser::new(device, images, points, recipe)?, progress),
+
+    fn run_to(&mut self, iteration: u32, progress: &dyn Progress) -> Result<(), FieldError> {
+        let end = iteration.min(self.iteration_count());
+        progress.expect(end.saturating_sub(self.iteration) as usize);
+        while self.iteration < end {
+            progress.check()?;
+            self.iterate()?;
+            progress.step();
+        }
+        Ok(())
+    }
+
+    fn optimised(&self) -> Optimised {
+        Optimiser::optimised(self)
     }
 }
 
@@ -195,13 +241,7 @@ impl<'d, D: Device> Optimiser<'d, D> {
     /// # Errors
     /// [`FieldError`]; after one the Gaussians so far are still there.
     pub fn run(&mut self, progress: &dyn Progress) -> Result<(), FieldError> {
-        progress.expect((self.iteration_count() - self.iteration) as usize);
-        while self.iteration < self.iteration_count() {
-            progress.check()?;
-            self.iterate()?;
-            progress.step();
-        }
-        Ok(())
+        self.run_to(u32::MAX, progress)
     }
 
     /// One iteration; nothing once all are done.

@@ -98,15 +98,6 @@ impl Recipe {
         }
     }
 
-    /// The recipe with shares of the finest level's side, for sources of this longest side, and of the iterations.
-    pub fn reduced(mut self, side_share: f32, iteration_share: f32, source_side: u32) -> Recipe {
-        self.side = ((self.side.min(source_side) as f32 * side_share).round() as u32).max(1);
-        for own in self.iterations.iter_mut().filter(|own| **own > 0) {
-            *own = ((*own as f32 * iteration_share).round() as u32).max(1);
-        }
-        self
-    }
-
     /// The recipe with so many iterations at each level that has some, and at most so many Gaussians, whatever the sources' size.
     pub fn with(mut self, iterations: Option<u32>, count: Option<u32>) -> Recipe {
         if let Some(iterations) = iterations {

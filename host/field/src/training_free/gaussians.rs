@@ -11,26 +11,37 @@ use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
 
-/// Shares of the finest level's side, which the number of Gaussians follows, and of the iterations, with the error and the work
-/// that are typical of them (`host/research/results/gaussians.md`).
-const EFFORTS: [(f32, f32, f32, f32); 3] = [(0.25, 1.0, 0.1, 0.43), (0.5, 1.0, 0.06, 0.56), (1.0, 0.5, 0.037, 0.7)];
+/// The error and the share of the optimisation's time that are typical of its first iterations: those at a quarter of the finest
+/// level's size, those at a half too, and half of those at the finest level too (`host/research/results/gaussians.md`).
+const EFFORTS: [(f32, f32); 3] = [(0.09, 0.31), (0.045, 0.56), (0.012, 0.75)];
 
-/// The efforts of this recipe for sources of this longest side.
-pub(super) fn efforts(recipe: &Recipe, source_side: u32) -> Vec<Effort> {
-    let named = |(index, (_, _, error, work)): (usize, (f32, f32, f32, f32))| {
-        let Recipe { side, iterations, .. } = at_effort(recipe, index, source_side);
-        let count: u32 = iterations.iter().sum();
-        Effort::new(format!("{count} iterations, sources at {side} pixels at last"), error, work)
-    };
-    EFFORTS.into_iter().enumerate().map(named).chain([Effort::exact()]).collect()
+/// An effort, and how many iterations it ends after.
+pub(super) struct Stop {
+    pub(super) effort: Effort,
+    pub(super) iteration: u32,
 }
 
-/// The recipe at an effort.
-pub(super) fn at_effort(recipe: &Recipe, effort: usize, source_side: u32) -> Recipe {
-    match EFFORTS.get(effort) {
-        Some(&(side, iterations, ..)) => recipe.reduced(side, iterations, source_side),
-        None => *recipe,
+/// The efforts of this recipe for sources of this longest side, the exact one last: each goes on from where the one before ended.
+/// Those that would end with another one, as where there are few iterations, are left out.
+pub(super) fn stops(recipe: &Recipe, source_side: u32) -> Vec<Stop> {
+    let [eighth, quarter, half, whole] = recipe.iterations;
+    let side = recipe.side.min(source_side);
+    let ends = [
+        (eighth + quarter, side / 4),
+        (eighth + quarter + half, side / 2),
+        (eighth + quarter + half + whole / 2, side),
+    ];
+    let all = recipe.iterations.iter().sum();
+    let mut stops: Vec<Stop> = Vec::new();
+    for ((iteration, side), (error, share)) in ends.into_iter().zip(EFFORTS) {
+        let before = stops.last().map_or(0, |stop| stop.iteration);
+        if iteration > before && iteration < all {
+            let name = format!("{iteration} iterations, sources at {side} pixels at last");
+            stops.push(Stop { effort: Effort::new(name, error, share), iteration });
+        }
     }
+    stops.push(Stop { effort: Effort::exact(), iteration: all });
+    stops
 }
 
 /// Pictures of Gaussians that are optimised for the sources. Nothing is learned but the scene itself.

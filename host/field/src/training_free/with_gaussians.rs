@@ -3,10 +3,10 @@
 //! The Gaussians are optimised for the sources when a picture first needs them, from the depths that the sweep or the hull found:
 //! once for a weighting and an effort. They are one of the pictures that are mixed by region. With a bound on the time or on the error
 //! these pictures have no Gaussians: what is left out of them is measured against a picture without. Pictures of the Gaussians alone
-//! have efforts of their own: fewer iterations, at a smaller size, with fewer Gaussians.
+//! have efforts of their own: the first iterations of the same optimisation, which a dearer effort goes on from.
 
-use super::gaussians::{at_effort, efforts};
-use crate::gaussians::{Optimised, Recipe, Splatter, optimised};
+use super::gaussians::stops;
+use crate::gaussians::{Optimisation, Optimised, Recipe, Residuals, Splatter, optimisation};
 use crate::point_cloud::cloud_of;
 use crate::{
     DepthMap, Effort, Efforts, Encoding, Encodings, FieldError, Geometry, Prepared, Record, Rendered, Request, Setting,
@@ -38,6 +38,7 @@ struct Scene<D: Device> {
     background: [f32; 3],
     /// How much brighter each source is than they are: red, green, blue.
     gains: Vec<[f32; 3]>,
+    residuals: Residuals,
 }
 
 /// The views of the sweep or of the hull, and the Gaussians of the same sources.
@@ -45,8 +46,6 @@ pub(super) struct WithGaussians<'a, D: Device> {
     device: &'a D,
     depths: Box<dyn Prepared + 'a>,
     images: Arc<SourceImages>,
-    /// Their longest side.
-    source_side: u32,
     recipe: Recipe,
     /// Whether all pictures are those of the Gaussians, of all sources.
     is_alone: bool,
@@ -56,12 +55,16 @@ pub(super) struct WithGaussians<'a, D: Device> {
     relevance: Vec<SourceWeights>,
     /// The efforts of the pictures: of the optimisation, or of the views that the Gaussians are mixed with.
     efforts: Vec<Effort>,
+    /// How many iterations each effort of the optimisation has; all have all where the efforts are not its own.
+    iterations: Vec<u32>,
     /// The current one.
     effort: usize,
     /// Their scalars.
     tunables: &'static [Tunable],
     /// The Gaussians of the current weighting by their effort, when they are needed; none where the sources have too few surfaces.
     scenes: BTreeMap<usize, Option<Scene<D>>>,
+    /// The optimisation for the current weighting, as far as it went, where a dearer effort may go on from there.
+    optimisation: Option<Box<dyn Optimisation + 'a>>,
 }
 
 impl<'a, D: Device> WithGaussians<'a, D> {
@@ -73,8 +76,10 @@ impl<'a, D: Device> WithGaussians<'a, D> {
         is_alone: bool,
     ) -> WithGaussians<'a, D> {
         let source_side = sources.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
+        let stops = if is_alone { stops(&recipe, source_side) } else { Vec::new() };
+        let iterations = stops.iter().map(|stop| stop.iteration).collect();
         let efforts = match is_alone {
-            true => efforts(&recipe, source_side),
+            true => stops.into_iter().map(|stop| stop.effort).collect(),
             false => depths.efforts().map_or_else(Vec::new, |efforts| efforts.list()),
         };
         let tunables = depths.tuned().map_or(&[][..], |tuned| tuned.tunables());
@@ -84,7 +89,6 @@ impl<'a, D: Device> WithGaussians<'a, D> {
             device,
             depths,
             images,
-            source_side,
             recipe: if is_alone { recipe } else { recipe.mixed_with(sources) },
             is_alone,
             shown: if is_alone { 1.0 } else { 0.0 },
@@ -92,8 +96,10 @@ impl<'a, D: Device> WithGaussians<'a, D> {
             relevance: Vec::new(),
             effort: efforts.len().saturating_sub(1),
             efforts,
+            iterations,
             tunables,
             scenes: BTreeMap::new(),
+            optimisation: None,
         }
     }
 
@@ -107,6 +113,33 @@ impl<'a, D: Device> WithGaussians<'a, D> {
         if self.scenes.contains_key(&self.effort) {
             return Ok(());
         }
+        let end = self.iterations.get(self.effort).copied().unwrap_or(u32::MAX);
+        let kept = self.optimisation.take().filter(|own| own.done() <= end);
+        let begun = match kept {
+            Some(own) => Some(own),
+            None => self.begin(progress)?,
+        };
+        let scene = match begun {
+            Some(mut own) => {
+                let ran = own.run_to(end, &Quiet(progress));
+                let Optimised { gaussians, near, background, gains } = own.optimised();
+                if !self.is_exact() {
+                    self.optimisation = Some(own);
+                }
+                ran?;
+                let count = gaussians.len();
+                let residuals = Residuals::new(gains.len());
+                let gaussians = self.device.upload(&gaussians)?;
+                Some(Scene { gaussians, count, near, background, gains, residuals })
+            }
+            None => None,
+        };
+        self.scenes.insert(self.effort, scene);
+        Ok(())
+    }
+
+    /// The optimisation at its beginning, from the sources' surfaces; `None` where there are too few.
+    fn begin(&mut self, progress: &dyn Progress) -> Result<Option<Box<dyn Optimisation + 'a>>, FieldError> {
         let quiet = &Quiet(progress);
         for view in 0..self.encoded.len() {
             progress.check()?;
@@ -115,26 +148,20 @@ impl<'a, D: Device> WithGaussians<'a, D> {
         let maps = self.depths.geometry().map_or(Ok(Vec::new()), Geometry::source_depths)?;
         let cloud = Recipe::cloud(self.images.images.len());
         let points = cloud_of(&maps, &self.images, &self.relevance, cloud, quiet)?;
-        let recipe = match self.is_alone {
-            true => at_effort(&self.recipe, self.effort, self.source_side),
-            false => self.recipe,
-        };
-        let scene = match optimised(self.device, &self.images, &points, recipe, quiet)? {
-            Some(Optimised { gaussians, near, background, gains }) => {
-                let count = gaussians.len();
-                Some(Scene { gaussians: self.device.upload(&gaussians)?, count, near, background, gains })
-            }
-            None => None,
-        };
-        self.scenes.insert(self.effort, scene);
-        Ok(())
+        optimisation(self.device, &self.images, &points, self.recipe)
+    }
+
+    /// Forgets the Gaussians.
+    fn forget(&mut self) {
+        self.scenes.clear();
+        self.optimisation = None;
     }
 
     /// The Gaussians from a target; `None` if there are none.
     fn splatted(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Option<Rendered>, FieldError> {
         self.prepare_scene(progress)?;
-        let scene = self.scenes.get(&self.effort).and_then(Option::as_ref);
-        let Some(Scene { gaussians, count, near, background, gains }) = scene else { return Ok(None) };
+        let scene = self.scenes.get_mut(&self.effort).and_then(Option::as_mut);
+        let Some(Scene { gaussians, count, near, background, gains, residuals }) = scene else { return Ok(None) };
         let splatter = Splatter { device: self.device, near: *near, background: *background };
         let mut splatted = splatter.rendered(gaussians, *count, &request.camera.block(0), MIN_OPACITY)?;
         // As bright as the sources that count for this target, as the other pictures are.
@@ -143,6 +170,11 @@ impl<'a, D: Device> WithGaussians<'a, D> {
         for colour in &mut splatted.colours {
             (0..3).for_each(|channel| colour[channel] = (colour[channel] * gain[channel]).clamp(0.0, 1.0));
         }
+        for (view, _) in weights.iter().filter(|(_, weight)| *weight > 0.0) {
+            let source = (&*self.images, gains[*view]);
+            residuals.find(*view, &splatter, (gaussians, *count), source, MIN_OPACITY)?;
+        }
+        residuals.add(&request.camera.block(0), &weights, &mut splatted);
         Ok(Some(splatted))
     }
 }
@@ -221,7 +253,7 @@ impl<D: Device> Weighted for WithGaussians<'_, D> {
     fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
         self.encoded.fill(false);
         self.relevance = relevance.to_vec();
-        self.scenes.clear();
+        self.forget();
         self.depths.weighted().map_or(Ok(()), |weighted| weighted.weigh(relevance))
     }
 }
@@ -241,14 +273,20 @@ impl<D: Device> Efforts for WithGaussians<'_, D> {
         let encodings = efforts.set(effort)?;
         if encodings == Encodings::Dropped {
             self.encoded.fill(false);
-            self.scenes.clear();
+            self.forget();
         }
         Ok(encodings)
     }
 
+    /// The Gaussians are optimised further for a dearer effort. Views of the sweep or of the hull are made again for another one.
+    fn goes_on(&self) -> bool {
+        self.is_alone
+    }
+
     fn set_trial(&mut self) {
         self.recipe.iterations = self.recipe.iterations.map(|count| count / TRIAL_DIVISOR);
-        self.scenes.clear();
+        self.iterations.iter_mut().for_each(|count| *count /= TRIAL_DIVISOR);
+        self.forget();
         if let Some(efforts) = self.depths.efforts() {
             efforts.set_trial();
         }

@@ -58,6 +58,7 @@ pub(super) fn of_speed() -> Vec<Row> {
                      --sources 2,9,17 --target 6 --size 64 --rays 512 --only max-error --python {{PYTHON}}"
                 )),
                 print("tests/compare_pytorch_genvs --python {PYTHON}"),
+                print("tests/compare_pytorch_gaussians --repeat 3 --python {PYTHON}"),
                 print("tests/compare_pytorch_training --threads 1 --steps 16 --repeat 2 --python {PYTHON}"),
             ],
         )
