@@ -36,6 +36,8 @@ pub(crate) struct Visit<'a> {
     pub(crate) blended: &'a [usize],
     /// The field's own picture, not rounded: red, green, blue over the background, and opacity.
     pub(crate) colours: &'a [[f32; 4]],
+    /// The picture's confidences; 0 where no source shows the surface, and the colours around it fill it.
+    pub(crate) confidences: &'a [f32],
     /// The photograph and the field's scores.
     pub(crate) truth: &'a Truth,
     /// Whether alpha is a silhouette.
@@ -100,6 +102,7 @@ pub(crate) fn visit(
             blended: &planes.sources(&images.images),
             planes: &planes,
             colours: &frame.colours,
+            confidences: &frame.confidences,
             truth: frame.truth.as_ref().context("no photograph to compare with")?,
             has_silhouettes: images.has_silhouettes,
             background: images.background,

@@ -111,7 +111,10 @@ impl Candidates {
             }
         }
         let field: Vec<[f32; 3]> = field.iter().map(|own| [0, 1, 2].map(|channel| own[channel] / own[3])).collect();
-        for (pixel, (own, of_field)) in field.iter().zip(visit.colours).enumerate() {
+        // Filled holes are not a blend of planes.
+        let is_blended = |pixel: &usize| visit.confidences.get(*pixel).is_some_and(|confidence| *confidence > 0.0);
+        for pixel in (0..count).filter(is_blended) {
+            let (own, of_field) = (field[pixel], visit.colours[pixel]);
             let differs = |channel: usize| !((own[channel] - of_field[channel]).abs() <= MAX_DIFFERENCE);
             ensure!(!(0..3).any(differs), "{scene}: pixel {pixel}: {own:?} is not the field's {of_field:?}");
         }
