@@ -2,7 +2,6 @@
 //! alone: some of them are left out, one at a time, and rendered coarsely from the others.
 //!
 //! ```text
-//! geometry      how far a camera is from its sources
 //! leave_out     sources rendered from the others
 //! regions       the mixture of pictures under several settings
 //! calibration   the errors that pixels of a confidence have
@@ -18,19 +17,18 @@
 mod calibration;
 mod detail;
 mod expectation;
-mod geometry;
 mod leave_out;
 mod regions;
 
 pub use calibration::{Calibration, Group, POOR};
 pub use expectation::{Basis, Expected, PixelErrors, TERMS};
-pub use geometry::Standing;
 pub use leave_out::{MAX_LEFT_OUT, MAX_NEIGHBOURS, SIDE};
 
 use crate::render::{Finished, Frame, RenderError, RenderOptions, Stage, render_chosen};
+use crate::standing::Measure;
+pub use crate::standing::Standing;
 use crate::{Mixture, Renderer, Setting, Tunable};
 use expectation::decibels;
-use geometry::Measure;
 use leave_out::{Outcome, Trials, coarse};
 use regions::Mixed;
 use serde::Serialize;

@@ -7,6 +7,7 @@
 //! field             the traits of a field: it prepares, encodes and renders
 //! renderer          a field on a device, with types erased
 //! any               a field of any kind
+//! standing          how far a camera is from its sources
 //! mixture           pictures under several settings, mixed by region
 //! session           when views are encoded
 //! scores            PSNR and SSIM of what a photograph shows
@@ -48,6 +49,7 @@ pub mod row;
 pub mod rows;
 pub mod scores;
 mod session;
+mod standing;
 pub mod training_free;
 
 pub use any::AnyField;

@@ -2,10 +2,12 @@
 
 use super::error::FieldError;
 use super::field::{Check, Effort, Encoding, Encodings, Prepared, Rendered, Request, Setting, Tunable};
-use super::mixture::Mixture;
+use super::mixture::{Mixture, share_at};
 use super::record::{Record, VIEWS};
 use super::renderer::Renderer;
+use super::standing::Measure;
 use viewfuse_core::camera::Camera;
+use viewfuse_core::pose::Pose;
 use viewfuse_core::weights::Weights;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
@@ -41,6 +43,8 @@ pub(crate) struct Session<'a> {
     effort: Option<usize>,
     settings: Vec<Setting>,
     mixture: Option<Mixture>,
+    /// Where the sources of an object with silhouettes are; `None` for whole photographs.
+    around: Option<(Measure, Vec<Pose>)>,
     /// The mean share of each part in the last picture; empty without a mixture.
     pub(crate) shares: Vec<f32>,
 }
@@ -61,6 +65,8 @@ impl<'a> Session<'a> {
         let efforts = prepared.efforts().map_or_else(Vec::new, |efforts| efforts.list());
         let goes_on = prepared.efforts().is_some_and(|efforts| efforts.goes_on());
         let tunables = prepared.tuned().map_or(&[][..], |tuned| tuned.tunables());
+        let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
+        let around = || (Measure::of(&cameras), cameras.iter().map(|camera| camera.pose).collect());
         let (is_weighted, encoded) = (prepared.weighted().is_some(), vec![false; sources.images.len()]);
         Ok(Session {
             renderer,
@@ -75,6 +81,7 @@ impl<'a> Session<'a> {
             effort: None,
             settings: Vec::new(),
             mixture: None,
+            around: sources.has_silhouettes.then(around),
             shares: Vec::new(),
         })
     }
@@ -152,7 +159,13 @@ impl<'a> Session<'a> {
         self.encode(weights, progress)?;
         let views = &self.views(weights);
         let request = Request { camera, weights, views, early_termination };
-        let Some(mixture) = self.mixture.clone() else { return self.prepared.render(&request, progress) };
+        let share = self
+            .around
+            .as_ref()
+            .map_or(1.0, |(measure, poses)| share_at(measure.standing(&camera.pose, poses.iter()).gap));
+        self.shares.clear();
+        let mixture = self.mixture.clone().filter(|_| share > 0.0);
+        let Some(mixture) = mixture else { return self.prepared.render(&request, progress) };
         let mut parts = Vec::with_capacity(mixture.parts.len());
         for settings in &mixture.parts {
             self.set(settings);
@@ -160,8 +173,11 @@ impl<'a> Session<'a> {
         }
         self.set(&self.settings.clone());
         let (mixed, shares) = mixture.mixed(&parts);
-        self.shares = shares;
-        Ok(mixed)
+        self.shares = shares.into_iter().map(|own| share * own).collect();
+        if share == 1.0 {
+            return Ok(mixed);
+        }
+        Ok(Mixture::between(self.prepared.render(&request, progress)?, mixed, share))
     }
 
     /// Renders what follows with one of the efforts. Views that this effort needs otherwise are encoded again.

@@ -210,7 +210,8 @@ pub struct FrameRecord {
     /// What share of its surfaces few photographs show, by the depths that the field found; null for fields without depths.
     #[serde(default)]
     pub seen_by: Option<Seen>,
-    /// Mean share of each part of the mixture in the picture; empty without one.
+    /// Mean share of each part of the mixture in the picture, the rest that of the picture under the chosen settings; empty without a
+    /// mixture.
     #[serde(default)]
     pub shares: Vec<f32>,
     /// Sum of their weights: a bound on the change of a fusion of all views by leaving them out, as a share of the range

@@ -10,9 +10,9 @@
 //! for objects with silhouettes, 0 for whole photographs.
 
 use super::calibration::Calibration;
-use super::geometry::Standing;
 use super::leave_out::Outcome;
 use crate::render::Seen;
+use crate::standing::Standing;
 use serde::{Deserialize, Serialize};
 
 /// `c0` to `c6`: ridge regression over 72 targets of 27 selections of 3 to 10 sources, of 11 scenes (kangaroo, cup, herz_jesus_p8, fern,

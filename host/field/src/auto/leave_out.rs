@@ -1,13 +1,13 @@
 //! Held-out sources, rendered coarsely from the other sources: an estimate of a field's quality without the truth.
 
 use super::calibration::Sample;
-use super::geometry::{Measure, Standing};
 use crate::Setting;
 use crate::budget::Bound;
 use crate::render::{Frame, RenderError, RenderOptions, SceneSources, Stage};
 use crate::renderer::Renderer;
 use crate::scores::psnr_of_seen;
 use crate::session::Judge;
+use crate::standing::{Measure, Standing};
 use image::imageops::{self, FilterType};
 use image::{GrayImage, Rgb, RgbImage};
 use std::borrow::Cow;

@@ -23,19 +23,19 @@ pub struct Standing {
 
 /// The unit of distances.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Measure {
+pub(crate) struct Measure {
     /// Distance from the cameras to what they look at, world units.
     distance: f64,
 }
 
 impl Measure {
     /// From the cameras of all sources.
-    pub(super) fn of(cameras: &[Camera]) -> Measure {
+    pub(crate) fn of(cameras: &[Camera]) -> Measure {
         Measure { distance: f64::from(Rig::of(cameras).distance).max(1.0e-12) }
     }
 
     /// The geometry of a camera among its sources.
-    pub(super) fn standing<'a>(&self, camera: &Pose, sources: impl Iterator<Item = &'a Pose>) -> Standing {
+    pub(crate) fn standing<'a>(&self, camera: &Pose, sources: impl Iterator<Item = &'a Pose>) -> Standing {
         let (mut sum, mut offset, mut length) = (0.0, DVec3::ZERO, 0.0);
         for source in sources {
             let towards = (source.centre_world() - camera.centre_world()).as_dvec3() / self.distance;
