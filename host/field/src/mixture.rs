@@ -24,12 +24,13 @@ const DISPARITY_SHARE: f32 = 0.1;
 /// ... and at most so many times.
 const MAX_DIFFERENCE: f32 = 2.0;
 
-/// Up to this gap to its sources ([`Standing`](crate::auto::Standing)) a target of an object with silhouettes is not mixed...
-const NEAR_GAP: f64 = 0.3;
-/// ... and from this one on it is mixed alone. Hull and Gaussians gained at gaps from 0.41 on (gold_cape and dino, 8 targets and 2, 0.5
-/// to 5 dB each), lost 0.8 and 1.4 dB at 0.17, and 0.3 dB as a mean at 0.35 (dino, 16 targets): near sources, the hull's depths are right
-/// where those of left-out sources are not.
+/// Up to this gap to its sources ([`Standing`](crate::auto::Standing)) a target of an object with silhouettes is mixed by half...
+const NEAR_GAP: f64 = 0.35;
+/// ... and from this one on in full: near its sources the hull's own depths can be right where those of left-out sources are not
+/// (`host/research/results/gaussians.md`).
 const FAR_GAP: f64 = 0.4;
+/// The share of the mixture in the picture of a near target, the rest that of the picture under the chosen settings.
+const NEAR_SHARE: f64 = 0.5;
 
 /// Settings under which a target is rendered, and how the pictures are mixed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -114,7 +115,8 @@ impl Mixture {
 
 /// The share of a mixture in the picture of an object with silhouettes, for a target with this gap to its sources.
 pub(crate) fn share_at(gap: f64) -> f32 {
-    ((gap - NEAR_GAP) / (FAR_GAP - NEAR_GAP)).clamp(0.0, 1.0) as f32
+    let far = ((gap - NEAR_GAP) / (FAR_GAP - NEAR_GAP)).clamp(0.0, 1.0);
+    (NEAR_SHARE + (1.0 - NEAR_SHARE) * far) as f32
 }
 
 /// The terms `x` of all pixels, `[pixel][term]`.
@@ -223,9 +225,9 @@ mod tests {
     }
 
     #[test]
-    fn near_targets_of_objects_are_not_mixed() {
-        assert_eq!([0.1, 0.3, 0.4, 2.0].map(share_at), [0.0, 0.0, 1.0, 1.0]);
-        assert!(near(share_at(0.35), 0.5));
+    fn near_targets_of_objects_are_mixed_by_half() {
+        assert_eq!([0.1, 0.35, 0.4, 2.0].map(share_at), [0.5, 0.5, 1.0, 1.0]);
+        assert!(near(share_at(0.375), 0.75));
         let own = Mixture::between(flat(0.2, 0.3, 1.0), flat(0.6, 0.3, 2.0), 0.25);
         assert!(own.colours.iter().all(|colour| near(colour[0], 0.3)));
         assert_eq!(own.depths, [1.0; 24], "the depth of the picture with the greater share");

@@ -164,8 +164,7 @@ impl<'a> Session<'a> {
             .as_ref()
             .map_or(1.0, |(measure, poses)| share_at(measure.standing(&camera.pose, poses.iter()).gap));
         self.shares.clear();
-        let mixture = self.mixture.clone().filter(|_| share > 0.0);
-        let Some(mixture) = mixture else { return self.prepared.render(&request, progress) };
+        let Some(mixture) = self.mixture.clone() else { return self.prepared.render(&request, progress) };
         let mut parts = Vec::with_capacity(mixture.parts.len());
         for settings in &mixture.parts {
             self.set(settings);
