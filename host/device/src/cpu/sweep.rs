@@ -25,6 +25,14 @@ struct Places {
     in_image: Planes,
 }
 
+impl Places {
+    /// Whether the view's map says anything about the group: tracks leave an image for good, often before they reach it.
+    #[inline(always)]
+    fn are_any_in_image(&self) -> bool {
+        self.in_image.iter().fold(false, |any, in_image| any | (*in_image > 0.0))
+    }
+}
+
 /// What is shared by all groups of a frustum.
 struct Comparison<'a> {
     block: &'a FrustumBlock,
@@ -113,6 +121,10 @@ impl Comparison<'_> {
         (sums.hull, sums.dissent, sums.informed) = ([1.0; PLANES], [0.0; PLANES], [0.0; PLANES]);
         for (slot, (view, track)) in self.views.iter().zip(tracks).enumerate() {
             let places = places(track, &planes);
+            if !places.are_any_in_image() {
+                sums.add_unseen(slot, self.block.has_silhouettes != 0);
+                continue;
+            }
             self.add_colours(view, slot, &places, sums);
             if view.disparity_step > 0.0 {
                 self.add_dissent(view, &planes, &places, sums);
@@ -205,6 +217,16 @@ impl Sums {
             hull: none,
             dissent: none,
             informed: none,
+        }
+    }
+
+    /// A view outside whose image all points lie.
+    #[inline(always)]
+    fn add_unseen(&mut self, slot: usize, has_silhouettes: bool) {
+        self.colours[slot] = [[0.0; PLANES]; 3];
+        self.grey[slot] = [UNSEEN; PLANES];
+        if has_silhouettes {
+            self.hull = [0.0; PLANES];
         }
     }
 }
@@ -331,6 +353,9 @@ impl WithSimd for Opaque<'_> {
                 for group in 0..groups.len() {
                     let planes = planes(block, group);
                     let places = places(&track, &planes);
+                    if !places.are_any_in_image() {
+                        continue;
+                    }
                     let (surfaces, confidences) = surfaces(view, disparities, &places);
                     for plane in 0..PLANES {
                         let disparity = planes[plane] / places.depth_ratio[plane];
