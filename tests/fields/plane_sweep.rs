@@ -83,12 +83,24 @@ fn picture(sources: &SourceImages, target: &Camera) -> Rendered {
 }
 
 fn picture_of(field: &TrainingFree, sources: &SourceImages, target: &Camera) -> Rendered {
-    let count = sources.images.len();
+    let weights = Weights::mean(sources.images.len() as u32);
+    on_stage(field, sources, |stage| stage.picture(target, &weights, 0.0, &Silent).expect("a picture"))
+}
+
+/// The depths of the sources, before any picture.
+fn depths_of(field: &TrainingFree, sources: &SourceImages) -> Vec<DepthMap> {
+    on_stage(field, sources, |stage| {
+        stage.encode_all(&Silent).expect("encoded sources");
+        stage.source_depths().expect("depths")
+    })
+}
+
+fn on_stage<T>(field: &TrainingFree, sources: &SourceImages, act: impl FnOnce(&mut Stage<'_>) -> T) -> T {
     let renderer = On { device: &Cpu, field };
     let options = RenderOptions::default();
     let mut stage = Stage::of_sources(Arc::new(sources.clone()), &renderer, &options, &Silent).expect("a stage");
-    stage.weigh_by(&relevance(count), &Silent).expect("a weighting");
-    stage.picture(target, &Weights::mean(count as u32), 0.0, &Silent).expect("a picture")
+    stage.weigh_by(&relevance(sources.images.len()), &Silent).expect("a weighting");
+    act(&mut stage)
 }
 
 /// Root mean square difference of the colours away from the border.
@@ -339,6 +351,7 @@ fn what_is_kept_of_the_sources_is_used_and_gives_the_same_picture() {
     assert_eq!(files.len(), 4, "{files:?}");
     assert_eq!(picture_of(&field, &sources, &target), expected, "all is kept");
     assert_eq!(kept_files(&kept), files, "and nothing is new");
+    assert_eq!(depths_of(&field, &sources), depths_of(&TrainingFree::default(), &sources), "before a picture, too");
     // Other surfaces in a file that is whole: another picture, so it is used.
     let (path, bytes) = files.iter().find(|(_, bytes)| bytes.len() == 64 + 8 * 72 * 54).expect("disparities");
     let other = vec![0x3f; bytes.len() - 64];

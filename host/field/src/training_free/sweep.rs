@@ -404,6 +404,7 @@ impl<D: Device> Geometry for Views<'_, D> {
 
     fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError> {
         let mut maps = self.device.download(self.found())?;
+        self.add_kept(&mut maps);
         let encoded: Vec<usize> = (0..self.steps.len()).filter(|view| self.steps[*view] > 0.0).collect();
         self.confirm(&encoded, &mut maps);
         let map = |(camera, step): (&CameraBlock, &f32)| {

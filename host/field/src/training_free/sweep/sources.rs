@@ -3,6 +3,7 @@
 
 use super::{Settled, Sweep, Views, swept};
 use crate::FieldError;
+use std::ops::Range;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
@@ -95,18 +96,27 @@ impl<D: Device> Views<'_, D> {
             return Ok(());
         }
         let mut maps = self.device.download(&self.disparities)?;
-        let place = |view: usize| {
-            let CameraBlock { first_texel, width, height, .. } = self.matched.cameras[view];
-            first_texel as usize..(first_texel + width * height) as usize
-        };
-        for (view, key) in self.unkept.drain(..) {
-            kept.write(&key, &maps[place(view)], progress);
+        self.add_kept(&mut maps);
+        for (view, key) in &self.unkept {
+            kept.write(key, &maps[self.place(*view)], progress);
         }
+        self.unkept.clear();
         if !self.found.is_empty() {
-            self.found.drain(..).for_each(|(view, found)| maps[place(view)].copy_from_slice(&found));
+            self.found.clear();
             self.disparities = self.device.upload(&maps)?;
         }
         Ok(())
+    }
+
+    /// Adds the disparities that were kept and are not on the device yet to those of the device.
+    pub(super) fn add_kept(&self, maps: &mut [[f32; 2]]) {
+        self.found.iter().for_each(|(view, found)| maps[self.place(*view)].copy_from_slice(found));
+    }
+
+    /// Where a view's map lies among all.
+    fn place(&self, view: usize) -> Range<usize> {
+        let CameraBlock { first_texel, width, height, .. } = self.matched.cameras[view];
+        first_texel as usize..(first_texel + width * height) as usize
     }
 
     /// Finds a source's disparities, or takes those that were kept.
