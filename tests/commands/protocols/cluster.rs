@@ -120,15 +120,15 @@ impl Workspace {
         processes.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).filter(own).collect()
     }
 
-    /// Kills one worker as soon as there is one.
+    /// Kills one worker as soon as there is one: one that ends between being seen and the signal is not it.
     fn kill_one(&self, is_over: &mut dyn FnMut() -> bool) -> bool {
-        let mut worker = None;
-        wait_until("no worker appeared", || {
-            worker = self.workers().first().copied();
-            worker.is_some() || is_over()
-        });
         let kill = |worker: u32| Command::new("kill").args(["-KILL", &worker.to_string()]).status();
-        worker.is_some_and(|worker| kill(worker).is_ok_and(|status| status.success()))
+        let mut is_killed = false;
+        wait_until("no worker appeared", || {
+            is_killed = self.workers().into_iter().any(|worker| kill(worker).is_ok_and(|status| status.success()));
+            is_killed || is_over()
+        });
+        is_killed
     }
 }
 
