@@ -147,7 +147,9 @@ fn results() -> PathBuf {
 }
 
 /// The table of the results with this heading is this one, to a fifth: another compiler gives a few instructions more or
-/// less. The code (every third number) is as small as it says only where Rust's library is compiled for size as well.
+/// less. The code (every third number) is as small as it says only where Rust's library is compiled for size as well, and
+/// that of one call to half or twice: which function holds what was inlined differs between builds of the same sources (836
+/// and 1404 bytes were seen for the stratified depths), the whole program by 2 %.
 fn the_results_say_so(heading: &str, rows: &[Row], library_is_small: bool) -> Result<(), Failed> {
     let table = markdown(heading, rows);
     println!("\n{table}");
@@ -163,12 +165,14 @@ fn the_results_say_so(heading: &str, rows: &[Row], library_is_small: bool) -> Re
     for (line, (title, numbers)) in lines.into_iter().zip(rows) {
         let said: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
         assert_eq!((said[0], said.len()), (title.as_str(), 1 + numbers.len()), "{line}");
+        let is_call = numbers.first().is_some_and(Option::is_some);
         for (place, (said, measured)) in said[1..].iter().zip(numbers).enumerate() {
-            let is_close = match (said.parse::<u64>().ok(), measured) {
-                (Some(said), Some(measured)) => {
-                    said.abs_diff(*measured) <= measured / 5 || (place % 3 == 2 && !library_is_small)
-                }
-                (said, measured) => said == *measured,
+            let is_close = match (said.parse::<u64>().ok(), *measured) {
+                (Some(said), Some(measured)) if place % 3 != 2 => said.abs_diff(measured) <= measured / 5,
+                (Some(_), Some(_)) if !library_is_small => true,
+                (Some(said), Some(measured)) if is_call => (measured.div_ceil(2)..=2 * measured).contains(&said),
+                (Some(said), Some(measured)) => said.abs_diff(measured) <= measured / 5,
+                (said, measured) => said == measured,
             };
             assert!(is_close, "{line}: measured {numbers:?}");
         }
