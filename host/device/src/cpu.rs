@@ -4,6 +4,7 @@
 //! own, faster loops, and the body in `viewfuse-kernels` is the definition that it is tested against; where it says
 //! `looped`, such a function has the loop over the body or its parts.
 
+mod blend;
 mod census;
 mod fusion;
 mod group_norm;
@@ -15,6 +16,7 @@ mod network;
 mod points;
 mod scratch;
 mod sweep;
+mod tracks;
 mod volumes;
 mod winograd;
 
@@ -23,6 +25,7 @@ use super::kernels::{Device, LayerShape};
 use super::memory::{Element, KernelTime, Memory};
 use crate::argument;
 use crate::parallel::{Rest, for_each_piece};
+use blend::*;
 use bytemuck::{Pod, cast_slice_mut};
 use census::*;
 use fusion::*;

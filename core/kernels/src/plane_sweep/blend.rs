@@ -95,11 +95,7 @@ pub fn blend(
     let groups = block.group_count as usize;
     let here = pixel_costs(block, costs, at);
     let least = least_cost(&here, groups);
-    let mut colour = [0.0; 3];
-    let (mut seen_share, mut all_share) = (0.0, 0.0);
-    let mut disparity_sum = 0.0;
-    let mut hull_max = 0.0;
-    let mut seen_weight = 0.0;
+    let mut sums = BlendSums::NONE;
     let mut group = 0;
     while group < groups {
         let mut plane = 0;
@@ -107,7 +103,7 @@ pub fn blend(
             let excess = (here[group][plane] - least) * block.sharpness;
             if excess <= CUTOFF {
                 let share = exp(-excess);
-                let disparity = block.far_disparity + (group * PLANES + plane) as f32 * block.disparity_step;
+                let disparity = block.disparity(group * PLANES + plane);
                 let mut sum = [0.0; 3];
                 let mut weight = 0.0;
                 let mut hull = 1.0;
@@ -122,7 +118,7 @@ pub fn blend(
                     if seen.in_image {
                         part +=
                             view.weight * visibility(view, disparities, seen.x, seen.y, disparity / seen.depth_ratio);
-                        seen_weight += share * view.weight;
+                        sums.seen_weight += share * view.weight;
                     }
                     if block.has_silhouettes != 0 {
                         hull *= if seen.in_image { texel[3] } else { 0.0 };
@@ -135,35 +131,75 @@ pub fn blend(
                     weight += part * texel[3];
                     index += 1;
                 }
-                let inverse = share / max(weight, 1.0e-12);
-                let mut channel = 0;
-                while channel < 3 {
-                    colour[channel] += sum[channel] * inverse;
-                    channel += 1;
-                }
-                hull_max = max(hull, hull_max);
-                disparity_sum += share * disparity;
-                all_share += share;
-                seen_share += share * min(weight, 1.0);
+                sums.add(share, disparity, &sum, weight, hull);
             }
             plane += 1;
         }
         group += 1;
     }
-    let inverse = 1.0 / all_share;
-    let opacity =
-        if block.has_silhouettes != 0 { hull_max / (1.0 + exp(min((least - 0.25) * (1.0 / 0.03), 80.0))) } else { 1.0 };
-    let disparity = disparity_sum * inverse;
-    let depth = if opacity < 0.5 { 0.0 } else { 1.0 / max(disparity, 1.0e-6) };
-    let confidence = min(seen_weight * inverse, 1.0) * min(seen_share * inverse, 1.0)
-        / (1.0 + exp(min((least - 0.12) * 50.0, 80.0)));
-    let scale = inverse * opacity;
-    Blended { colour: [colour[0] * scale, colour[1] * scale, colour[2] * scale, opacity], depth, confidence }
+    sums.pixel(block, least)
+}
+
+/// Sums over the planes of a pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct BlendSums {
+    colour: [f32; 3],
+    all_share: f32,
+    seen_share: f32,
+    disparity: f32,
+    hull_max: f32,
+    /// The weights of the views whose images the points lie in, times the planes' shares: added by the caller.
+    pub seen_weight: f32,
+}
+
+impl BlendSums {
+    /// Of no planes.
+    pub const NONE: BlendSums = BlendSums {
+        colour: [0.0; 3],
+        all_share: 0.0,
+        seen_share: 0.0,
+        disparity: 0.0,
+        hull_max: 0.0,
+        seen_weight: 0.0,
+    };
+
+    /// Adds a plane, of which the views' colours, their weights and their product of alphas are known.
+    #[inline(always)]
+    pub fn add(&mut self, share: f32, disparity: f32, sum: &[f32; 3], weight: f32, hull: f32) {
+        let inverse = share / max(weight, 1.0e-12);
+        let mut channel = 0;
+        while channel < 3 {
+            self.colour[channel] += sum[channel] * inverse;
+            channel += 1;
+        }
+        self.hull_max = max(hull, self.hull_max);
+        self.disparity += share * disparity;
+        self.all_share += share;
+        self.seen_share += share * min(weight, 1.0);
+    }
+
+    /// The pixel, whose best plane has the cost `least`.
+    #[inline(always)]
+    pub fn pixel(&self, block: &BlendBlock, least: f32) -> Blended {
+        let inverse = 1.0 / self.all_share;
+        let opacity = if block.has_silhouettes != 0 {
+            self.hull_max / (1.0 + exp(min((least - 0.25) * (1.0 / 0.03), 80.0)))
+        } else {
+            1.0
+        };
+        let disparity = self.disparity * inverse;
+        let depth = if opacity < 0.5 { 0.0 } else { 1.0 / max(disparity, 1.0e-6) };
+        let confidence = min(self.seen_weight * inverse, 1.0) * min(self.seen_share * inverse, 1.0)
+            / (1.0 + exp(min((least - 0.12) * 50.0, 80.0)));
+        let scale = inverse * opacity;
+        let colour = [self.colour[0] * scale, self.colour[1] * scale, self.colour[2] * scale, opacity];
+        Blended { colour, depth, confidence }
+    }
 }
 
 /// The least cost of the planes in the first so many groups.
 #[inline(always)]
-fn least_cost(costs: &[Planes; MAX_GROUPS], groups: usize) -> f32 {
+pub fn least_cost(costs: &[Planes; MAX_GROUPS], groups: usize) -> f32 {
     let mut least = f32::MAX;
     let mut group = 0;
     while group < groups {
@@ -179,7 +215,7 @@ fn least_cost(costs: &[Planes; MAX_GROUPS], groups: usize) -> f32 {
 
 /// The costs of all planes at an image coordinate of the target: bilinear in the volume.
 #[inline(always)]
-fn pixel_costs(block: &BlendBlock, costs: &(impl Fetch<Planes> + ?Sized), at: [f32; 2]) -> [Planes; MAX_GROUPS] {
+pub fn pixel_costs(block: &BlendBlock, costs: &(impl Fetch<Planes> + ?Sized), at: [f32; 2]) -> [Planes; MAX_GROUPS] {
     let (width, height) = (block.volume_width, block.volume_height);
     let groups = block.group_count as usize;
     let (left, right, share_x) = split(at[0] * (width as f32 / block.target.width as f32), width);
@@ -207,6 +243,12 @@ fn pixel_costs(block: &BlendBlock, costs: &(impl Fetch<Planes> + ?Sized), at: [f
 }
 
 impl BlendBlock {
+    /// Disparity of a plane.
+    #[inline(always)]
+    pub fn disparity(&self, plane: usize) -> f32 {
+        self.far_disparity + plane as f32 * self.disparity_step
+    }
+
     /// The shape of its volume of costs.
     pub fn volume(&self) -> CostBlock {
         CostBlock { width: self.volume_width, height: self.volume_height, group_count: self.group_count, padding: 0 }

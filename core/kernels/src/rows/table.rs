@@ -428,7 +428,7 @@ macro_rules! for_each_kernel {
             /// Pixels blended from planes, for some rows of a target: `colours[row][column]` (red, green, blue, opacity),
             /// `pixel_depths[row][column]` and `confidences[row][column]`. An element is a pixel of the target.
             BlendPlanes blend_planes(block: BlendBlock; first_row, row_count)
-            for pixel in [first_row * block.target.width..(first_row + row_count) * block.target.width; 64 a core], wide {
+            for pixel in [first_row * block.target.width..(first_row + row_count) * block.target.width; 64 a core], twin {
                 read views: SweptView as vectors,
                 paged texels: [f32; 4] as vectors,
                 read disparities: [f32; 2] as vectors,

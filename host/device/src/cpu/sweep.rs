@@ -6,6 +6,7 @@
     reason = "loops over the planes of a group index several arrays, and become vectors"
 )]
 
+use super::tracks::{Corners, Points, image, map, whole};
 use crate::parallel::for_each_row;
 use pulp::{Arch, Simd, WithSimd};
 use std::sync::Mutex;
@@ -15,23 +16,6 @@ use viewfuse_kernels::plane_sweep::front::{FREE_PLANES, opacity_of};
 use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView, Track};
 use viewfuse_kernels::plane_sweep::{MAX_GROUPS, MAX_MATCHED, PLANES, Planes};
 use viewfuse_kernels::visual_hull::fade;
-
-/// Where a group's points lie in a view.
-struct Places {
-    x: Planes,
-    y: Planes,
-    depth_ratio: Planes,
-    /// 1 where the point is in the image, 0 elsewhere.
-    in_image: Planes,
-}
-
-impl Places {
-    /// Whether the view's map says anything about the group: tracks leave an image for good, often before they reach it.
-    #[inline(always)]
-    fn are_any_in_image(&self) -> bool {
-        self.in_image.iter().fold(false, |any, in_image| any | (*in_image > 0.0))
-    }
-}
 
 /// What is shared by all groups of a frustum.
 struct Comparison<'a> {
@@ -120,14 +104,14 @@ impl Comparison<'_> {
         let planes = planes(self.block, group);
         (sums.hull, sums.dissent, sums.informed) = ([1.0; PLANES], [0.0; PLANES], [0.0; PLANES]);
         for (slot, (view, track)) in self.views.iter().zip(tracks).enumerate() {
-            let places = places(track, &planes);
-            if !places.are_any_in_image() {
+            let points = Points::new(track, &planes);
+            if !points.are_any_in_image() {
                 sums.add_unseen(slot, self.block.has_silhouettes != 0);
                 continue;
             }
-            self.add_colours(view, slot, &places, sums);
+            self.add_colours(view, slot, &points, sums);
             if view.disparity_step > 0.0 {
-                self.add_dissent(view, &planes, &places, sums);
+                self.add_dissent(view, &planes, &points, sums);
             }
         }
         let [difference, weight, dissent, hull] = evidence else { return };
@@ -140,8 +124,8 @@ impl Comparison<'_> {
 
     /// A view's colours and grey, and its part of the hull.
     #[inline(always)]
-    fn add_colours(&self, view: &SweptView, slot: usize, places: &Places, sums: &mut Sums) {
-        let looked = look_up(view, self.texels, places);
+    fn add_colours(&self, view: &SweptView, slot: usize, points: &Points<PLANES>, sums: &mut Sums) {
+        let looked = look_up(view, self.texels, points);
         let mut alpha = [0.0; PLANES];
         for plane in 0..PLANES {
             alpha[plane] = looked[plane][3];
@@ -176,14 +160,14 @@ impl Comparison<'_> {
 
     /// How far the points contradict a view's own disparities.
     #[inline(always)]
-    fn add_dissent(&self, view: &SweptView, planes: &Planes, places: &Places, sums: &mut Sums) {
-        let (surfaces, confidences) = surfaces(view, self.disparities, places);
+    fn add_dissent(&self, view: &SweptView, planes: &Planes, points: &Points<PLANES>, sums: &mut Sums) {
+        let (surfaces, confidences) = surfaces(view, self.disparities, points);
         for plane in 0..PLANES {
-            let disparity = planes[plane] / places.depth_ratio[plane];
+            let disparity = planes[plane] / points.depth_ratio[plane];
             let behind = planes_behind(surfaces[plane], disparity, 2.0 * view.disparity_step);
             let doubt = 1.0 - fade(0.707_106_77 * behind);
             sums.dissent[plane] += view.weight * confidences[plane] * doubt;
-            sums.informed[plane] += view.weight * places.in_image[plane];
+            sums.informed[plane] += view.weight * points.in_image[plane];
         }
     }
 
@@ -231,49 +215,15 @@ impl Sums {
     }
 }
 
-/// The points of these disparities.
-#[inline(always)]
-fn places(track: &Track, planes: &Planes) -> Places {
-    let mut places = Places { x: [0.0; PLANES], y: [0.0; PLANES], depth_ratio: [0.0; PLANES], in_image: [0.0; PLANES] };
-    for plane in 0..PLANES {
-        let seen = track.at(planes[plane]);
-        places.x[plane] = seen.x;
-        places.y[plane] = seen.y;
-        places.depth_ratio[plane] = seen.depth_ratio;
-        places.in_image[plane] = if seen.in_image { 1.0 } else { 0.0 };
-    }
-    places
-}
-
 /// Bilinear look-ups of a group's points in a view, as `viewfuse_core::lookup::bilinear`; zeros outside its image.
 #[inline(always)]
-fn look_up(view: &SweptView, texels: &[[f32; 4]], places: &Places) -> [[f32; 4]; PLANES] {
-    let (width, height) = (view.camera.width as i32, view.camera.height as i32);
-    let (last_column, last_row) = (width - 1, height - 1);
-    let mut upper = [0; PLANES];
-    let mut right = [0; PLANES];
-    let mut down = [0; PLANES];
-    let mut share_x = [0.0; PLANES];
-    let mut share_y = [0.0; PLANES];
-    for plane in 0..PLANES {
-        let x = clamp(places.x[plane] - 0.5, 0.0, last_column as f32);
-        let y = clamp(places.y[plane] - 0.5, 0.0, last_row as f32);
-        let (column, row) = (whole(x), whole(y));
-        upper[plane] = row * width + column;
-        right[plane] = if column < last_column { 1 } else { 0 };
-        down[plane] = if row < last_row { width } else { 0 };
-        share_x[plane] = x - column as f32;
-        share_y[plane] = y - row as f32;
-    }
-    let image = &texels[view.camera.first_texel as usize..][..(width * height) as usize];
+fn look_up(view: &SweptView, texels: &[[f32; 4]], points: &Points<PLANES>) -> [[f32; 4]; PLANES] {
+    let image = image(view, texels);
+    let corners = Corners::new(&points.x, &points.y, view.camera.width, view.camera.height);
     let mut looked = [[0.0; 4]; PLANES];
     for plane in 0..PLANES {
-        if places.in_image[plane] > 0.0 {
-            let at = upper[plane] as usize;
-            let (right, down) = (right[plane] as usize, down[plane] as usize);
-            let above = mix(&image[at], &image[at + right], share_x[plane]);
-            let below = mix(&image[at + down], &image[at + down + right], share_x[plane]);
-            looked[plane] = mix(&above, &below, share_y[plane]);
+        if points.in_image[plane] > 0.0 {
+            looked[plane] = corners.mixed(image, plane);
         }
     }
     looked
@@ -281,40 +231,24 @@ fn look_up(view: &SweptView, texels: &[[f32; 4]], places: &Places) -> [[f32; 4];
 
 /// Disparity and confidence of the surfaces that a view's own map has there; zeros outside its image.
 #[inline(always)]
-fn surfaces(view: &SweptView, disparities: &[[f32; 2]], places: &Places) -> (Planes, Planes) {
+fn surfaces(view: &SweptView, disparities: &[[f32; 2]], points: &Points<PLANES>) -> (Planes, Planes) {
     let (last_column, last_row) = (view.camera.width as f32 - 1.0, view.camera.height as f32 - 1.0);
     let mut at = [0; PLANES];
     for plane in 0..PLANES {
         // Points outside the image may lie anywhere.
-        let column = whole(clamp(places.x[plane], 0.0, last_column));
-        let row = whole(clamp(places.y[plane], 0.0, last_row));
+        let column = whole(clamp(points.x[plane], 0.0, last_column));
+        let row = whole(clamp(points.y[plane], 0.0, last_row));
         at[plane] = row * view.map_width as i32 + column;
     }
-    let map = &disparities[view.first_disparity as usize..][..(view.map_width * view.map_height) as usize];
+    let map = map(view, disparities);
     let (mut surfaces, mut confidences) = ([0.0; PLANES], [0.0; PLANES]);
     for plane in 0..PLANES {
         [surfaces[plane], confidences[plane]] = map[at[plane] as usize];
     }
     for plane in 0..PLANES {
-        confidences[plane] *= places.in_image[plane];
+        confidences[plane] *= points.in_image[plane];
     }
     (surfaces, confidences)
-}
-
-/// The whole part of a coordinate in an image, from 0 to 2^22. A cast, which saturates and knows NaN, would leave the vectors and
-/// convert one number after the other: that took a third of the time of [`plane_opacity`].
-#[inline(always)]
-fn whole(at: f32) -> i32 {
-    // From here on floats are 1 apart: a sum is rounded to a whole number, and its bits count up from these.
-    const WHOLE: f32 = 8_388_608.0;
-    let nearest = at + WHOLE;
-    let above = nearest - WHOLE > at;
-    nearest.to_bits() as i32 - WHOLE.to_bits() as i32 - i32::from(above)
-}
-
-#[inline(always)]
-fn mix(a: &[f32; 4], b: &[f32; 4], share: f32) -> [f32; 4] {
-    std::array::from_fn(|channel| a[channel] + (b[channel] - a[channel]) * share)
 }
 
 pub(super) fn plane_opacity(
@@ -352,13 +286,13 @@ impl WithSimd for Opaque<'_> {
                 let track = block.track(&view.camera, pixel as u32);
                 for group in 0..groups.len() {
                     let planes = planes(block, group);
-                    let places = places(&track, &planes);
-                    if !places.are_any_in_image() {
+                    let points = Points::new(&track, &planes);
+                    if !points.are_any_in_image() {
                         continue;
                     }
-                    let (surfaces, confidences) = surfaces(view, disparities, &places);
+                    let (surfaces, confidences) = surfaces(view, disparities, &points);
                     for plane in 0..PLANES {
-                        let disparity = planes[plane] / places.depth_ratio[plane];
+                        let disparity = planes[plane] / points.depth_ratio[plane];
                         let behind = planes_behind(surfaces[plane], disparity, view.disparity_step);
                         support[group][plane] += confidences[plane] * fade(0.707_106_77 * behind);
                         let free = max(-behind - FREE_PLANES, 0.0);
