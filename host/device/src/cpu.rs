@@ -60,7 +60,8 @@ impl Memory for Cpu {
     }
 
     fn zeros<T: Element>(&self, count: usize) -> Result<Vec<T>, DeviceError> {
-        Ok(vec![T::default(); count])
+        // Zeroed by the allocator, which has zeroed pages for large ones: `vec![T::default()]` writes them.
+        Ok(bytemuck::zeroed_vec(count))
     }
 
     fn most_elements<T: Element>(&self) -> usize {

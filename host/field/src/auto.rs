@@ -69,7 +69,7 @@ pub struct Candidate {
     pub settings: Vec<Setting>,
     /// Mean score of the sources that were left out, decibels.
     pub psnr: f64,
-    /// The score of each.
+    /// The score of each; of the first ones alone where so many of them do not gain that the median cannot.
     pub scores: Vec<f64>,
 }
 
@@ -227,10 +227,10 @@ fn choose_of(
     let others: usize = tunables.iter().map(|tunable| tunable.others.len()).sum();
     progress.expect(trials.len() * (1 + schemes.len() + others));
     let mut search = Search { trials: &mut trials, candidates: Vec::new(), progress };
-    let mut best = search.outcomes(&chosen.weighting, &[])?;
+    let mut best = search.outcomes(&chosen.weighting, &[], &[])?;
     let replaced = best.clone();
     for weighting in schemes {
-        let outcomes = search.outcomes(&weighting, &[])?;
+        let outcomes = search.outcomes(&weighting, &[], &replaced)?;
         if is_better(&outcomes, &best, &replaced) {
             (best, chosen.weighting) = (outcomes, weighting);
         }
@@ -240,7 +240,7 @@ fn choose_of(
         for &value in tunable.others {
             let mut settings = kept.clone();
             settings.push(Setting { name: tunable.name, value });
-            let outcomes = search.outcomes(&chosen.weighting, &settings)?;
+            let outcomes = search.outcomes(&chosen.weighting, &settings, &before)?;
             if is_better(&outcomes, &best, &before) {
                 (best, chosen.settings) = (outcomes, settings);
             }
@@ -283,8 +283,22 @@ struct Search<'t, 'a> {
 }
 
 impl Search<'_, '_> {
-    fn outcomes(&mut self, weighting: &Weighting, settings: &[Setting]) -> Result<Vec<Outcome>, RenderError> {
-        let outcomes = self.trials.outcomes(weighting, settings, self.progress)?;
+    /// The results of a candidate on the sources that are left out, up to the one that decides that it is not better than what it would
+    /// replace: see [`is_lost`].
+    fn outcomes(
+        &mut self,
+        weighting: &Weighting,
+        settings: &[Setting],
+        replaced: &[Outcome],
+    ) -> Result<Vec<Outcome>, RenderError> {
+        let mut outcomes = Vec::new();
+        for source in 0..self.trials.len() {
+            if is_lost(&outcomes, replaced) {
+                self.progress.step();
+            } else {
+                outcomes.extend(self.trials.outcomes(source..source + 1, weighting, settings, self.progress)?);
+            }
+        }
         let scores: Vec<f64> = outcomes.iter().map(|outcome| outcome.psnr).collect();
         let psnr = mean_score(&outcomes);
         self.candidates.push(Candidate { weighting: weighting.to_string(), settings: settings.to_vec(), psnr, scores });
@@ -312,9 +326,18 @@ impl Search<'_, '_> {
     }
 }
 
+/// Whether more than half of the sources gain too little for [`is_better`]'s median, by the first ones' results.
+fn is_lost(first: &[Outcome], replaced: &[Outcome]) -> bool {
+    let gains_little = |(replaced, own): (&Outcome, &Outcome)| own.psnr - replaced.psnr <= 0.5 * MIN_GAIN;
+    replaced.iter().zip(first).map(gains_little).filter(|little| *little).count() > replaced.len() / 2
+}
+
 /// Whether a candidate beats the best one so far, and the one it replaces by more than the noise: in the mean, and by half
-/// of that in the median, so that one source alone does not decide.
+/// of that in the median, so that one source alone does not decide. One that was given up does not.
 fn is_better(candidate: &[Outcome], best: &[Outcome], replaced: &[Outcome]) -> bool {
+    if is_lost(candidate, replaced) {
+        return false;
+    }
     let mut gains: Vec<f64> = candidate.iter().zip(replaced).map(|(own, other)| own.psnr - other.psnr).collect();
     gains.sort_by(f64::total_cmp);
     let middle = gains.len() / 2;
@@ -376,6 +399,20 @@ mod tests {
         assert!(loses_where_nearest(&at([22.0, 25.0]), &at([17.0, 26.0])));
         assert!(!loses_where_nearest(&at([16.0, 26.0]), &at([17.0, 26.0])));
         assert!(!loses_where_nearest(&[], &[]));
+    }
+
+    #[test]
+    fn a_candidate_is_lost_as_soon_as_the_median_is() {
+        let replaced = outcomes(&[17.0, 15.0, 14.0, 16.0]);
+        assert!(!is_lost(&outcomes(&[16.0, 14.9]), &replaced), "the other two may gain more");
+        assert!(is_lost(&outcomes(&[16.0, 14.9, 14.04]), &replaced), "three of four");
+        assert!(!is_lost(&outcomes(&[16.0, 15.1, 14.0]), &replaced), "one gains");
+        assert!(!is_lost(&replaced, &[]), "the first candidate");
+        // Whatever the last one had gained.
+        for last in [16.0, 60.0] {
+            assert!(!is_better(&outcomes(&[16.0, 14.9, 14.04, last]), &replaced, &replaced));
+        }
+        assert!(!is_better(&outcomes(&[16.0, 14.9, 14.04]), &replaced, &replaced), "given up");
     }
 
     #[test]

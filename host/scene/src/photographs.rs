@@ -343,19 +343,24 @@ impl<'a> Album<'a> {
             height,
             error,
         })?;
-        let mut premultiplied = matte::premultiplied(&photograph, border, backdrop);
-        if let Some(seen) = photograph.seen.as_ref().filter(|_| border.is_none() && !must_show) {
-            for (texel, _) in premultiplied.iter_mut().zip(seen.pixels()).filter(|(_, seen)| seen[0] == 0) {
-                *texel = [0.0; 4];
+        let own_size = photograph.pixels.dimensions().into();
+        let texels = if border.is_none() && !must_show {
+            let pixels = photograph.pixels.as_raw().as_chunks::<4>().0;
+            let seen = photograph.seen.as_ref().map(|seen| seen.as_raw());
+            let texel = |at: usize| match seen {
+                Some(seen) if seen[at] == 0 => [0.0; 4],
+                _ => matte::premultiplied_by_alpha(pixels[at]),
+            };
+            resample::area_average_of(texel, own_size, [width, height])
+        } else {
+            let premultiplied = matte::premultiplied(&photograph, border, backdrop);
+            let opaque = premultiplied.iter().filter(|texel| texel[3] > 0.5).count();
+            if must_show && (opaque == 0 || (opaque == premultiplied.len() && !photograph.has_alpha)) {
+                let path = image.as_ref().map_or_else(|| name.clone(), |path| path.display().to_string());
+                return Err(PhotographsError::NoSilhouette { path, colour: backdrop.to_string() });
             }
-        }
-        let opaque = premultiplied.iter().filter(|texel| texel[3] > 0.5).count();
-        if must_show && (opaque == 0 || (opaque == premultiplied.len() && !photograph.has_alpha)) {
-            let path = image.as_ref().map_or_else(|| name.clone(), |path| path.display().to_string());
-            return Err(PhotographsError::NoSilhouette { path, colour: backdrop.to_string() });
-        }
-        let (own_width, own_height) = photograph.pixels.dimensions();
-        let texels = resample::area_average(&premultiplied, [own_width, own_height], [width, height]);
+            resample::area_average(&premultiplied, own_size, [width, height])
+        };
         Ok(SourceImage { camera: Camera { pinhole, ..*camera }, texels })
     }
 }

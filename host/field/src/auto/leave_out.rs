@@ -11,6 +11,7 @@ use crate::standing::{Measure, Standing};
 use image::imageops::{self, FilterType};
 use image::{GrayImage, Rgb, RgbImage};
 use std::borrow::Cow;
+use std::ops::Range;
 use std::sync::Arc;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::PinholeError;
@@ -164,16 +165,17 @@ impl<'a> Trials<'a> {
         self.trials.iter().map(|trial| trial.target.name.as_str())
     }
 
-    /// Renders each source that is left out with this weighting and these settings.
+    /// Renders these of the sources that are left out with this weighting and these settings.
     pub(super) fn outcomes(
         &mut self,
+        which: Range<usize>,
         weighting: &Weighting,
         settings: &[Setting],
         progress: &dyn Progress,
     ) -> Result<Vec<Outcome>, RenderError> {
-        let frames = self.frames(weighting, settings, progress)?;
+        let frames = self.frames(which.clone(), weighting, settings, progress)?;
         let outcome = |(index, frame): (usize, &Frame)| self.outcome(index, &frame.picture, &frame.confidences);
-        Ok(frames.iter().enumerate().map(outcome).collect())
+        Ok(which.zip(&frames).map(outcome).collect())
     }
 
     /// The settings whose pictures are worth mixing where these were chosen.
@@ -181,15 +183,16 @@ impl<'a> Trials<'a> {
         self.trials.first_mut().map_or_else(Vec::new, |trial| trial.stage.parts(chosen))
     }
 
-    /// The pictures of the sources that are left out.
+    /// The pictures of these of the sources that are left out.
     pub(super) fn frames(
         &mut self,
+        which: Range<usize>,
         weighting: &Weighting,
         settings: &[Setting],
         progress: &dyn Progress,
     ) -> Result<Vec<Frame>, RenderError> {
-        let mut frames = Vec::with_capacity(self.trials.len());
-        for Trial { stage, target, .. } in &mut self.trials {
+        let mut frames = Vec::with_capacity(which.len());
+        for Trial { stage, target, .. } in &mut self.trials[which] {
             progress.check().map_err(stopped)?;
             stage.tune(settings, None);
             frames.push(stage.frame(weighting, target, &Quiet(progress))?);

@@ -26,6 +26,8 @@ const SOURCE_WEIGHT: f64 = 300.0;
 /// Least mean share of the last of three pictures or more. Two targets of fox (288x512, 49 sources): the Gaussians have shares of 0.05 and
 /// 0.06, left-out sources gain nothing by them, and with them it takes twice the time.
 const MIN_LAST_SHARE: f32 = 0.1;
+/// The same of the first [`MIN_SOURCES`] sources, before the last picture is made for the others.
+const MIN_FIRST_SHARE: f32 = 0.5 * MIN_LAST_SHARE;
 
 /// A mixture with the scores that it has on the sources that were left out.
 pub(super) struct Mixed {
@@ -58,10 +60,6 @@ pub(super) fn mixed(
     if parts.len() < 2 || trials.len() < MIN_SOURCES {
         return Ok(None);
     }
-    let mut frames: Vec<Vec<Frame>> = Vec::with_capacity(parts.len());
-    for settings in &parts {
-        frames.push(trials.frames(weighting, settings, progress)?);
-    }
     let mut examples: Vec<Example> = trials
         .truths()
         .map(|(truth, seen)| Example {
@@ -74,26 +72,37 @@ pub(super) fn mixed(
             truth: truth.clone(),
         })
         .collect();
-    for of_part in frames {
-        for (example, frame) in examples.iter_mut().zip(of_part) {
-            let (width, height) = frame.picture.dimensions();
-            let Frame { colours, depths, confidences, .. } = frame;
-            example.parts.push(Rendered { colours, depths, confidences, width, height });
-        }
+    let count = examples.len();
+    let cheap = if parts.len() < 3 { parts.len() } else { parts.len() - 1 };
+    for settings in &parts[..cheap] {
+        add(&mut examples, trials.frames(0..count, weighting, settings, progress)?);
     }
-    let all = fitted(trials, &mut examples, parts.clone());
-    if parts.len() < 3 {
-        return Ok(Some(all));
+    let without_last = fitted(trials, &mut examples, &parts[..cheap]);
+    let Some(last) = parts.get(cheap) else { return Ok(Some(without_last)) };
+    // The last picture is the dearest one: a few sources say whether it has a share at all.
+    add(&mut examples, trials.frames(0..MIN_SOURCES, weighting, last, progress)?);
+    if fitted(trials, &mut examples[..MIN_SOURCES], &parts).last_share < MIN_FIRST_SHARE {
+        (MIN_SOURCES..count).for_each(|_| progress.step());
+        return Ok(Some(without_last));
     }
-    examples.iter_mut().for_each(|example| drop(example.parts.pop()));
-    let without_last = fitted(trials, &mut examples, parts[..parts.len() - 1].to_vec());
+    add(&mut examples[MIN_SOURCES..], trials.frames(MIN_SOURCES..count, weighting, last, progress)?);
+    let all = fitted(trials, &mut examples, &parts);
     let is_worth_it =
         mean_score(&all.outcomes) > mean_score(&without_last.outcomes) - MAX_LOSS && all.last_share >= MIN_LAST_SHARE;
     Ok(Some(if is_worth_it { all } else { without_last }))
 }
 
+/// Adds another picture of each example.
+fn add(examples: &mut [Example], frames: Vec<Frame>) {
+    for (example, frame) in examples.iter_mut().zip(frames) {
+        let (width, height) = frame.picture.dimensions();
+        let Frame { colours, depths, confidences, .. } = frame;
+        example.parts.push(Rendered { colours, depths, confidences, width, height });
+    }
+}
+
 /// The mixture of the examples' pictures.
-fn fitted(trials: &Trials<'_>, examples: &mut [Example], parts: Vec<Vec<Setting>>) -> Mixed {
+fn fitted(trials: &Trials<'_>, examples: &mut [Example], parts: &[Vec<Setting>]) -> Mixed {
     for example in &mut *examples {
         example.terms = terms(&example.parts);
     }
@@ -103,13 +112,14 @@ fn fitted(trials: &Trials<'_>, examples: &mut [Example], parts: Vec<Vec<Setting>
     let mut last_share = 0.0;
     for (index, example) in examples.iter().enumerate() {
         let others = sums.iter().enumerate().filter(|(other, _)| *other != index).map(|(_, sums)| sums);
-        let mixture = Mixture { parts: parts.clone(), constants: solved(others, count) };
+        let mixture = Mixture { parts: parts.to_vec(), constants: solved(others, count) };
         let (rendered, shares) = mixture.mixed(&example.parts);
         last_share += shares.last().copied().unwrap_or(0.0) / examples.len() as f32;
         let picture = to_rgb8(&rendered.colours, [rendered.width, rendered.height]);
         outcomes.push(trials.outcome(index, &picture, &rendered.confidences));
     }
-    Mixed { mixture: Mixture { constants: solved(sums.iter(), count), parts }, outcomes, last_share }
+    let mixture = Mixture { constants: solved(sums.iter(), count), parts: parts.to_vec() };
+    Mixed { mixture, outcomes, last_share }
 }
 
 /// The normal equations of a source's errors, over the mean square error of the plain mean.

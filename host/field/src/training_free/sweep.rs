@@ -40,7 +40,7 @@ use viewfuse_job::progress::Progress;
 use viewfuse_kernels::plane_sweep::Planes;
 use viewfuse_kernels::plane_sweep::blend::BlendBlock;
 use viewfuse_kernels::plane_sweep::disparity::TEMPERATURE;
-use viewfuse_kernels::plane_sweep::frustum::SweptView;
+use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
 use viewfuse_scene::photographs::{SourceImage, SourceImages, reduced_size};
 use viewfuse_weighting::sources::SourceWeights;
 
@@ -124,6 +124,17 @@ pub(super) struct Views<'a, D: Device> {
     unkept: Vec<(usize, Key)>,
     /// Confidences and gains from some views under the current weighting.
     assessed: Option<Assessed<D>>,
+    /// What the last picture's planes have been compared to, for another one under other settings.
+    compared: Option<Compared<D>>,
+}
+
+/// What views show on a target's planes, with the current maps: the same for all settings but one.
+struct Compared<D: Device> {
+    /// With the setting that it is for, the cost of contradicting the maps.
+    frustum: FrustumBlock,
+    views: Vec<SweptView>,
+    /// As of [`Matching::compared`].
+    costs: D::Buffer<Planes>,
 }
 
 /// Disparities and confidences of some views, found the second time.
@@ -193,6 +204,7 @@ impl Sweep {
             space,
             texels,
             assessed: None,
+            compared: None,
             kept,
             found: Vec::new(),
             unkept: Vec::new(),
@@ -307,7 +319,15 @@ impl<D: Device> Views<'_, D> {
         let matched = swept(maps, maps, &weights, Some(&self.steps), gains);
         let matching = self.settings.matching(self.device, self.has_silhouettes);
         let frustum = matching.frustum(camera, range, &matched);
-        let costs = matching.costs(frustum, &matched, &matched, &self.matched.texels, self.maps(), progress)?;
+        let known = self.compared.take().filter(|own| own.frustum == frustum && own.views == matched);
+        let compared = match known {
+            Some(own) => own,
+            None => {
+                let costs = matching.compared(&frustum, &matched, &self.matched.texels, self.maps(), progress)?;
+                Compared { frustum, views: matched, costs }
+            }
+        };
+        let costs = matching.costs(frustum, &compared.costs, &compared.views, self.maps())?;
         let views = swept(&self.pictures.cameras, maps, &weights, Some(&self.steps), gains);
         let block = BlendBlock {
             target: target.block(0),
@@ -320,7 +340,21 @@ impl<D: Device> Views<'_, D> {
             sharpness: 1.0 / self.settings.temperature,
             has_silhouettes: u32::from(self.has_silhouettes),
         };
+        self.compared = Some(compared);
         Ok(Volume { block, views, costs })
+    }
+
+    /// A view's depths, of the disparities of all views.
+    fn depth_map(&self, view: usize, maps: &[[f32; 2]]) -> DepthMap {
+        let (camera, step) = (self.matched.cameras[view], self.steps[view]);
+        let own = maps[camera.first_texel as usize..].iter().take((camera.width * camera.height) as usize);
+        // Below half a step a disparity is that of the farthest plane: it bounds nothing.
+        let depth = |disparity: f32| if step > 0.0 && disparity > 0.5 * step { 1.0 / disparity } else { 0.0 };
+        DepthMap {
+            camera: CameraBlock { first_texel: 0, ..camera },
+            depths: own.clone().map(|[disparity, _]| depth(*disparity)).collect(),
+            confidences: own.map(|[_, confidence]| *confidence).collect(),
+        }
     }
 }
 
@@ -361,8 +395,8 @@ impl<D: Device> Prepared for Views<'_, D> {
         let (depths, confidences) = (device.download(&depths)?, device.download(&confidences)?);
         let mut rendered = Rendered { colours, depths, confidences, width, height };
         if !self.has_silhouettes {
-            let maps = self.source_depths()?;
-            let used: Vec<DepthMap> = request.views.iter().map(|view| maps[*view].clone()).collect();
+            let maps = self.device.download(self.maps())?;
+            let used: Vec<DepthMap> = request.views.iter().map(|view| self.depth_map(*view, &maps)).collect();
             holes::fill(&mut rendered, &block.target, &used);
         }
         Ok(rendered)
@@ -393,6 +427,7 @@ impl<D: Device> Weighted for Views<'_, D> {
         self.found.clear();
         self.unkept.clear();
         self.assessed = None;
+        self.compared = None;
         Ok(())
     }
 }
@@ -407,16 +442,6 @@ impl<D: Device> Geometry for Views<'_, D> {
         self.add_kept(&mut maps);
         let encoded: Vec<usize> = (0..self.steps.len()).filter(|view| self.steps[*view] > 0.0).collect();
         self.confirm(&encoded, &mut maps);
-        let map = |(camera, step): (&CameraBlock, &f32)| {
-            let own = maps[camera.first_texel as usize..].iter().take((camera.width * camera.height) as usize);
-            // Below half a step a disparity is that of the farthest plane: it bounds nothing.
-            let depth = |disparity: f32| if *step > 0.0 && disparity > 0.5 * step { 1.0 / disparity } else { 0.0 };
-            DepthMap {
-                camera: CameraBlock { first_texel: 0, ..*camera },
-                depths: own.clone().map(|[disparity, _]| depth(*disparity)).collect(),
-                confidences: own.map(|[_, confidence]| *confidence).collect(),
-            }
-        };
-        Ok(self.matched.cameras.iter().zip(&self.steps).map(map).collect())
+        Ok((0..self.steps.len()).map(|view| self.depth_map(view, &maps)).collect())
     }
 }

@@ -142,15 +142,7 @@ impl fmt::Display for Backdrop {
 /// alpha channel says what is background.
 pub(super) fn premultiplied(photograph: &Photograph, border: Option<&Border>, backdrop: &Backdrop) -> Vec<[f32; 4]> {
     let Some(border) = border else {
-        return photograph
-            .pixels
-            .pixels()
-            .map(|pixel| {
-                let alpha = f32::from(pixel[3]) / 255.0;
-                let [r, g, b] = colour_of(pixel).map(|value| value * alpha);
-                [r, g, b, alpha]
-            })
-            .collect();
+        return photograph.pixels.pixels().map(|pixel| premultiplied_by_alpha(pixel.0)).collect();
     };
     let behind = if backdrop.from_border { border.colour } else { backdrop.colour };
     let alphas = silhouette(photograph, behind, backdrop.threshold);
@@ -164,6 +156,12 @@ pub(super) fn premultiplied(photograph: &Photograph, border: Option<&Border>, ba
             [r, g, b, alpha]
         })
         .collect()
+}
+
+/// A pixel as premultiplied RGBA.
+pub(super) fn premultiplied_by_alpha(pixel: [u8; 4]) -> [f32; 4] {
+    let [r, g, b, alpha] = pixel.map(|level| f32::from(level) / 255.0);
+    [r * alpha, g * alpha, b * alpha, alpha]
 }
 
 /// The photograph over a background, alpha 1 everywhere.

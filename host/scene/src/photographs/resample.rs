@@ -75,19 +75,28 @@ fn add_weighted(line: &mut [f32], source: &[u8], share: f32) {
 
 /// `[row][column]` of `size` = `[width, height]` from an image of `own_size`. Enlarging repeats the nearest pixels.
 pub(super) fn area_average(texels: &[[f32; 4]], own_size: [u32; 2], size: [u32; 2]) -> Vec<[f32; 4]> {
+    area_average_of(|texel| texels[texel], own_size, size)
+}
+
+/// As [`area_average`], of texels that are made when they are needed: by their index, row by row.
+pub(super) fn area_average_of(
+    texel: impl Fn(usize) -> [f32; 4] + Sync,
+    own_size: [u32; 2],
+    size: [u32; 2],
+) -> Vec<[f32; 4]> {
     if own_size == size {
-        return texels.to_vec();
+        return (0..(size[0] * size[1]) as usize).map(texel).collect();
     }
     let columns = spans(own_size[0], size[0]);
     let rows = spans(own_size[1], size[1]);
     let own_width = own_size[0] as usize;
     let mut averaged = vec![[0.0; 4]; (size[0] * size[1]) as usize];
     averaged.par_chunks_mut(size[0] as usize).zip(&rows).for_each(|(output, row)| {
-        for (texel, column) in output.iter_mut().zip(&columns) {
+        for (mean, column) in output.iter_mut().zip(&columns) {
             for (y, share_y) in row {
                 for (x, share_x) in column {
                     let share = share_x * share_y;
-                    for (sum, value) in texel.iter_mut().zip(texels[y * own_width + x]) {
+                    for (sum, value) in mean.iter_mut().zip(texel(y * own_width + x)) {
                         *sum += share * value;
                     }
                 }

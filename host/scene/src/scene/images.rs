@@ -8,6 +8,7 @@ use std::fs::File;
 use std::io::{BufRead, Cursor, Read, Seek};
 use std::path::Path;
 
+use image::buffer::ConvertBuffer;
 use image::codecs::png::PngEncoder;
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, ImageResult, Limits};
@@ -165,7 +166,11 @@ pub(super) fn decode(path: &Path, size: [u32; 2]) -> Result<(Photograph, Turn), 
         });
     }
     let has_channel = decoded.color().has_alpha();
-    let pixels = decoded.into_rgba8();
+    let pixels = match decoded {
+        // Pixel by pixel; `into_rgba8` goes through the conversion of colour spaces, which takes ten times as long.
+        DynamicImage::ImageRgb8(own) => own.convert(),
+        other => other.into_rgba8(),
+    };
     // SRN's photographs have an alpha channel that is 255 everywhere: it is ignored.
     let has_alpha = has_channel && pixels.pixels().any(|pixel| pixel[3] < u8::MAX);
     Ok((Photograph { pixels, has_alpha, seen: None }, turn))

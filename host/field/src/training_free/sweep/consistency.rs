@@ -44,6 +44,7 @@ impl<D: Device> Views<'_, D> {
             let steps: Vec<f32> = (0..self.steps.len()).map(step).collect();
             let gains = exposure::gains(&self.matched.cameras, &self.texels, &maps, &steps);
             let maps = self.device.upload(&maps)?;
+            self.compared = None;
             self.assessed = Some(Assessed { views: views.to_vec(), by_second, gains, maps });
         }
         Ok(())

@@ -141,7 +141,8 @@ fn probe<D: Device>(device: &D, progress: &dyn Progress) -> Result<String, Field
     let swept = swept(&images.cameras, &images.cameras, &[(1, 1.0), (0, 0.5), (2, 0.25)], None, None);
     let frustum = matching.frustum(images.cameras[1], Range::new([0.1, 2.0], PLANES as u32), &swept);
     let mut maps = device.zeros::<[f32; 2]>(images.cameras.len() * (width * height) as usize)?;
-    let costs = matching.costs(frustum, &swept, &[], &images.texels, &maps, progress)?;
+    let compared = matching.compared(&frustum, &swept, &images.texels, &maps, progress)?;
+    let costs = matching.costs(frustum, &compared, &[], &maps)?;
     device.pick_disparity(&frustum, &costs, &mut maps)?;
     Ok(sha256(cast_slice(&device.download(&maps)?)))
 }

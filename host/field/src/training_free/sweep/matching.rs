@@ -84,25 +84,22 @@ impl<D: Device> Matching<'_, D> {
         }
     }
 
-    /// The costs of all planes in a frustum: `costs[row][column][group]`. `texels` are those of the views' cameras, `maps`
-    /// their disparities and confidences; the maps of `voters`, of which the first [`MAX_MATCHED`] count, say which planes are
-    /// opaque.
-    pub(super) fn costs(
+    /// Compares `swept` on all planes of a frustum: costs and how far the silhouettes contain the points, `[row][column][group][2]`.
+    /// `texels` are those of the views' cameras, `maps` their disparities and confidences.
+    pub(super) fn compared(
         &self,
-        whole: FrustumBlock,
+        whole: &FrustumBlock,
         swept: &[SweptView],
-        voters: &[SweptView],
         texels: &D::Buffer<[f32; 4]>,
         maps: &D::Buffer<[f32; 2]>,
         progress: &dyn Progress,
     ) -> Result<D::Buffer<Planes>, FieldError> {
         let device = self.device;
-        let FrustumBlock { camera: CameraBlock { width, height, .. }, group_count, .. } = whole;
+        let FrustumBlock { camera: CameraBlock { width, height, .. }, group_count, .. } = *whole;
         let matched = &swept[..whole.view_count as usize];
         let row_len = (width * group_count) as usize;
-        let volume = row_len * height as usize;
         let (views, pairs) = (device.upload(matched)?, device.upload(&pairs(swept))?);
-        let mut costs = device.zeros::<Planes>(2 * volume)?;
+        let mut costs = device.zeros::<Planes>(2 * row_len * height as usize)?;
         let band_rows = BAND_ROWS.min(height);
         let rows = (band_rows + REACH).min(height) as usize;
         let mut grey = device.zeros::<Planes>(rows * row_len * matched.len())?;
@@ -111,14 +108,28 @@ impl<D: Device> Matching<'_, D> {
             progress.check()?;
             let halo = first.min(REACH);
             let kept = band_rows.min(height - first);
-            let band = FrustumBlock { first_row: first - halo, row_count: halo + kept, ..whole };
+            let band = FrustumBlock { first_row: first - halo, row_count: halo + kept, ..*whole };
             device.compare_views(&band, &views, &pairs, texels, maps, &mut grey, &mut evidence)?;
             device.census_cost(&band, halo, kept, &pairs, &grey, &evidence, &mut costs)?;
         }
+        Ok(costs)
+    }
+
+    /// The costs of all planes in a frustum: `costs[row][column][group]`, from what [`Matching::compared`] found. `maps` are the
+    /// disparities and confidences of the views; those of `voters`, of which the first [`MAX_MATCHED`] count, say which planes are opaque.
+    pub(super) fn costs(
+        &self,
+        whole: FrustumBlock,
+        compared: &D::Buffer<Planes>,
+        voters: &[SweptView],
+        maps: &D::Buffer<[f32; 2]>,
+    ) -> Result<D::Buffer<Planes>, FieldError> {
+        let device = self.device;
+        let FrustumBlock { camera: CameraBlock { width, height, .. }, group_count, .. } = whole;
+        let volume = (width * group_count * height) as usize;
         let window = WindowBlock::new(&whole, self.near_cost);
         let mut sums = device.zeros::<Planes>(6 * volume)?;
-        device.row_sums(&window, &costs, &mut sums)?;
-        drop(costs);
+        device.row_sums(&window, compared, &mut sums)?;
         let mut means = device.zeros::<Planes>(volume)?;
         device.window_cost(&window, &sums, &mut means)?;
         drop(sums);

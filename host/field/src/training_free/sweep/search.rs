@@ -72,7 +72,8 @@ impl<D: Device> Matching<'_, D> {
             weights.push((view, 1.0));
             let swept = swept(&small.cameras, &small.cameras, &weights, None, None);
             let frustum = self.frustum(small.cameras[view], range, &swept);
-            let costs = self.costs(frustum, &swept, &[], &small.texels, &maps, progress)?;
+            let compared = self.compared(&frustum, &swept, &small.texels, &maps, progress)?;
+            let costs = self.costs(frustum, &compared, &[], &maps)?;
             device.pick_disparity(&frustum, &costs, &mut maps)?;
         }
         let maps = device.download(&maps)?;

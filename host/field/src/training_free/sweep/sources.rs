@@ -29,7 +29,13 @@ impl<D: Device> Views<'_, D> {
         if self.settings.second_share <= 0.0 {
             return Ok(());
         }
-        let settings = Sweep { front_share: self.settings.second_share, ..self.settings };
+        // A source's own planes contradict no maps, and the temperature is the picture's: with them the same maps are found.
+        let settings = Sweep {
+            front_share: self.settings.second_share,
+            dissent_share: self.defaults.dissent_share,
+            temperature: self.defaults.temperature,
+            ..self.settings
+        };
         let Settled { mut voters, mut maps, .. } = match self.settled.take().filter(|own| own.settings == settings) {
             Some(settled) => settled,
             None => {
@@ -86,7 +92,8 @@ impl<D: Device> Views<'_, D> {
         progress: &dyn Progress,
     ) -> Result<D::Buffer<Planes>, FieldError> {
         let matching = settings.matching(self.device, self.has_silhouettes);
-        matching.costs(*frustum, swept, voters, &self.matched.texels, &self.disparities, progress)
+        let compared = matching.compared(frustum, swept, &self.matched.texels, &self.disparities, progress)?;
+        matching.costs(*frustum, &compared, voters, &self.disparities)
     }
 
     /// Brings what was kept to the device, and keeps what is new on it: once for all sources that were encoded since.
