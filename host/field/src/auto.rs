@@ -229,9 +229,11 @@ fn choose_of(
     let mut search = Search { trials: &mut trials, candidates: Vec::new(), progress };
     let mut best = search.outcomes(&chosen.weighting, &[], &[])?;
     let replaced = best.clone();
+    let has_silhouettes = stage.images.has_silhouettes;
+    let is_for_targets = |outcomes: &[Outcome]| !has_silhouettes || gain_where_nearest(outcomes, &replaced) > MIN_GAIN;
     for weighting in schemes {
         let outcomes = search.outcomes(&weighting, &[], &replaced)?;
-        if is_better(&outcomes, &best, &replaced) {
+        if is_better(&outcomes, &best, &replaced) && is_for_targets(&outcomes) {
             (best, chosen.weighting) = (outcomes, weighting);
         }
     }
@@ -249,7 +251,7 @@ fn choose_of(
     let parts = if is_mixed { search.trials.parts(&chosen.settings) } else { Vec::new() };
     if let Some(Mixed { mixture, outcomes, .. }) = search.mixed(&chosen.weighting, &chosen.settings, parts)?
         && mean_score(&outcomes) > mean_score(&best) - MAX_LOSS
-        && !(stage.images.has_silhouettes && loses_where_nearest(&outcomes, &best))
+        && !(has_silhouettes && gain_where_nearest(&outcomes, &best) < -MAX_LOSS)
     {
         (best, chosen.mixture) = (outcomes, Some(mixture));
     }
@@ -257,7 +259,7 @@ fn choose_of(
     let side = coarse.size.map_or(SIDE, |[width, height]| width.max(height));
     chosen.calibration = Calibration::of(best.iter().flat_map(|outcome| outcome.samples.iter().copied()).collect());
     let detail = detail::lost_detail(&stage.images.images, side);
-    chosen.basis = Some(Basis::of(&best, chosen.calibration.as_ref(), detail, stage.images.has_silhouettes));
+    chosen.basis = Some(Basis::of(&best, chosen.calibration.as_ref(), detail, has_silhouettes));
     chosen.left_out = best
         .iter()
         .zip(trials.names())
@@ -347,12 +349,14 @@ fn is_better(candidate: &[Outcome], best: &[Outcome], replaced: &[Outcome]) -> b
         && median > 0.5 * MIN_GAIN
 }
 
-/// Whether the left-out source that is nearest to the others loses by a mixture. Targets are nearer to their sources than sources that
-/// are left out: a mixture with Gaussians that gains far from the sources and loses near them (the sample scene from five sources: 0.45 dB
-/// gained by the mean, 0.41 dB lost at the target) is not for them.
-fn loses_where_nearest(mixed: &[Outcome], best: &[Outcome]) -> bool {
-    let nearest = best.iter().zip(mixed).min_by(|(a, _), (b, _)| a.standing.gap.total_cmp(&b.standing.gap));
-    nearest.is_some_and(|(own, mixed)| mixed.psnr < own.psnr - MAX_LOSS)
+/// What the left-out source that is nearest to the others gains, decibels; the same number of both. Targets are nearer to their sources than
+/// sources that are left out, and of objects with silhouettes what gains far from the sources may lose near them. Schemes: over 16 sets
+/// of sources of seven objects (128 pixels) 0.56 dB on average, 7.3 for eight of dino's sixteen photographs in a ring, whose left-out ones
+/// are twice as far from the others as the targets. Whole photographs do not: 11 sets would lose 0.12 dB by it. Mixtures with Gaussians:
+/// the sample scene from five sources, 0.45 dB gained by the mean, 0.41 dB lost at the target.
+fn gain_where_nearest(candidate: &[Outcome], replaced: &[Outcome]) -> f64 {
+    let nearest = replaced.iter().zip(candidate).min_by(|(a, _), (b, _)| a.standing.gap.total_cmp(&b.standing.gap));
+    nearest.map_or(0.0, |(replaced, own)| own.psnr - replaced.psnr)
 }
 
 /// Mean score, decibels.
@@ -391,14 +395,14 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_source_says_whether_a_mixture_loses() {
+    fn the_nearest_source_says_what_is_gained_near_the_sources() {
         let at = |scores: [f64; 2]| -> Vec<Outcome> {
             let of = |(outcome, gap)| Outcome { standing: Standing { gap, outside: 0.5 }, ..outcome };
             outcomes(&scores).into_iter().zip([0.5, 0.4]).map(of).collect()
         };
-        assert!(loses_where_nearest(&at([22.0, 25.0]), &at([17.0, 26.0])));
-        assert!(!loses_where_nearest(&at([16.0, 26.0]), &at([17.0, 26.0])));
-        assert!(!loses_where_nearest(&[], &[]));
+        assert_eq!(gain_where_nearest(&at([22.0, 25.0]), &at([17.0, 26.0])), -1.0);
+        assert_eq!(gain_where_nearest(&at([16.0, 26.5]), &at([17.0, 26.0])), 0.5);
+        assert_eq!(gain_where_nearest(&[], &[]), 0.0);
     }
 
     #[test]
