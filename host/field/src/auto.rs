@@ -68,8 +68,8 @@ pub struct Candidate {
     pub weighting: String,
     /// The field's scalars that are not at their defaults.
     pub settings: Vec<Setting>,
-    /// Mean score of the sources that were left out, decibels.
-    pub psnr: f64,
+    /// Mean score of the sources that were left out, decibels; null if it was given up before the last of them.
+    pub psnr: Option<f64>,
     /// The score of each; of the first ones alone where so many of these do not gain that the median cannot.
     pub scores: Vec<f64>,
 }
@@ -303,7 +303,7 @@ impl Search<'_, '_> {
             }
         }
         let scores: Vec<f64> = outcomes.iter().map(|outcome| outcome.psnr).collect();
-        let psnr = mean_score(&outcomes);
+        let psnr = (outcomes.len() == self.trials.len()).then(|| mean_score(&outcomes));
         self.candidates.push(Candidate { weighting: weighting.to_string(), settings: settings.to_vec(), psnr, scores });
         Ok(outcomes)
     }
@@ -322,7 +322,7 @@ impl Search<'_, '_> {
             let mut settings = chosen.to_vec();
             settings.push(Setting { name: MIXED, value: count as f32 });
             let scores = outcomes.iter().map(|outcome| outcome.psnr).collect();
-            let psnr = mean_score(outcomes);
+            let psnr = Some(mean_score(outcomes));
             self.candidates.push(Candidate { weighting: weighting.to_string(), settings, psnr, scores });
         }
         Ok(mixed)

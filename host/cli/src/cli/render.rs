@@ -289,8 +289,8 @@ fn choice(chosen: &ChosenRecord, weighting: &str) -> String {
         Some(_) => candidates.last(),
         None => candidates.iter().find(|candidate| of(candidate)),
     };
-    let own = own.map_or(0.0, |candidate| candidate.psnr);
-    let gain = own - candidates.first().map_or(own, |first| first.psnr);
+    let own = own.and_then(|candidate| candidate.psnr).unwrap_or(0.0);
+    let gain = own - candidates.first().and_then(|first| first.psnr).unwrap_or(own);
     let with = match mixture {
         Some(mixture) => format!(", {} pictures under different settings mixed by region", mixture.parts.len()),
         None if settings.is_empty() => String::new(),
