@@ -261,21 +261,23 @@ fn choose_of(
     chosen.calibration = Calibration::of(best.iter().flat_map(|outcome| outcome.samples.iter().copied()).collect());
     let detail = detail::lost_detail(&stage.images.images, side);
     chosen.basis = Some(Basis::of(&best, chosen.calibration.as_ref(), detail, has_silhouettes));
-    chosen.left_out = best
-        .iter()
-        .zip(trials.names())
-        .map(|(&Outcome { psnr, standing, confidence, copy, .. }, source)| LeftOutSource {
-            source: source.to_owned(),
-            psnr,
-            copy_psnr: copy,
-            standing,
-            confidence,
-        })
-        .collect();
+    chosen.left_out = left_out(&best, &trials);
     if let (Some(warning), Some(of)) = (chosen.copy_warning(), stage.scene()) {
         progress.warn(&format!("{}: {warning}", of.scene.path.display()));
     }
     Ok(chosen)
+}
+
+/// The sources that were left out, with their results.
+fn left_out(outcomes: &[Outcome], trials: &Trials<'_>) -> Vec<LeftOutSource> {
+    let of = |(&Outcome { psnr, standing, confidence, copy, .. }, source): (&Outcome, &str)| LeftOutSource {
+        source: source.to_owned(),
+        psnr,
+        copy_psnr: copy,
+        standing,
+        confidence,
+    };
+    outcomes.iter().zip(trials.names()).map(of).collect()
 }
 
 /// The candidates and their results.
