@@ -7,6 +7,7 @@
 //! consistency how far the sources' disparities confirm one another; their gains
 //! search      surface points of a scene whose files do not tell its depths
 //! kept        what was found of the sources, in a folder between runs
+//! scratch     memory that is used again
 //! holes       surfaces that no source shows
 //! unseen      parts of a picture that its photograph does not show
 //! scalars     the scalars that are chosen for a scene, and the pictures that are mixed
@@ -19,6 +20,7 @@ mod holes;
 mod kept;
 mod matching;
 mod scalars;
+mod scratch;
 mod search;
 mod sources;
 mod unseen;
@@ -34,6 +36,8 @@ use consistency::Assessed;
 pub use kept::Cache;
 use kept::{Kept, Key};
 use matching::{Images, Matching, Range};
+use scratch::Scratch;
+use sources::SourceMeans;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
@@ -127,6 +131,9 @@ pub(super) struct Views<'a, D: Device> {
     assessed: Option<Assessed<D>>,
     /// What the last picture's planes have been compared to, for another one under other settings.
     compared: Option<Compared<D>>,
+    /// The means of sources' planes, for their second disparities: those that were found last.
+    means: Vec<SourceMeans<D>>,
+    scratch: Scratch<D>,
 }
 
 /// What views show on a target's planes, with the current maps: the same for all settings but one.
@@ -206,6 +213,8 @@ impl Sweep {
             texels,
             assessed: None,
             compared: None,
+            means: Vec::new(),
+            scratch: Scratch::default(),
             kept,
             found: Vec::new(),
             unkept: Vec::new(),
@@ -320,15 +329,19 @@ impl<D: Device> Views<'_, D> {
         let matched = swept(maps, maps, &weights, Some(&self.steps), gains);
         let matching = self.settings.matching(self.device, self.has_silhouettes);
         let frustum = matching.frustum(camera, range, &matched);
+        let mut scratch = std::mem::take(&mut self.scratch);
         let known = self.compared.take().filter(|own| own.frustum == frustum && own.views == matched);
         let compared = match known {
             Some(own) => own,
             None => {
-                let costs = matching.compared(&frustum, &matched, &self.matched.texels, self.maps(), progress)?;
+                let costs =
+                    matching.compared(&frustum, &matched, &self.matched.texels, self.maps(), &mut scratch, progress)?;
                 Compared { frustum, views: matched, costs }
             }
         };
-        let costs = matching.costs(frustum, &compared.costs, &compared.views, self.maps())?;
+        let means = matching.means(&frustum, &compared.costs, &mut scratch)?;
+        let costs = matching.costs(frustum, &means, &compared.views, self.maps(), &mut scratch)?;
+        self.scratch = scratch;
         let views = swept(&self.pictures.cameras, maps, &weights, Some(&self.steps), gains);
         let block = BlendBlock {
             target: target.block(0),
@@ -429,6 +442,7 @@ impl<D: Device> Weighted for Views<'_, D> {
         self.unkept.clear();
         self.assessed = None;
         self.compared = None;
+        self.means.clear();
         Ok(())
     }
 }

@@ -67,6 +67,8 @@ impl<D: Device> Efforts for Views<'_, D> {
         self.found.clear();
         self.unkept.clear();
         self.assessed = None;
+        self.compared = None;
+        self.means.clear();
         Ok(Encodings::Dropped)
     }
 

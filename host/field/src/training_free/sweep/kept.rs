@@ -7,6 +7,7 @@
 //! damaged, or not of this program, is not used.
 
 use super::matching::{Images, Matching, Range};
+use super::scratch::Scratch;
 use super::{Sweep, swept};
 use crate::FieldError;
 use bytemuck::{AnyBitPattern, NoUninit, bytes_of, cast_slice, pod_collect_to_vec};
@@ -141,8 +142,10 @@ fn probe<D: Device>(device: &D, progress: &dyn Progress) -> Result<String, Field
     let swept = swept(&images.cameras, &images.cameras, &[(1, 1.0), (0, 0.5), (2, 0.25)], None, None);
     let frustum = matching.frustum(images.cameras[1], Range::new([0.1, 2.0], PLANES as u32), &swept);
     let mut maps = device.zeros::<[f32; 2]>(images.cameras.len() * (width * height) as usize)?;
-    let compared = matching.compared(&frustum, &swept, &images.texels, &maps, progress)?;
-    let costs = matching.costs(frustum, &compared, &[], &maps)?;
+    let mut scratch = Scratch::default();
+    let compared = matching.compared(&frustum, &swept, &images.texels, &maps, &mut scratch, progress)?;
+    let means = matching.means(&frustum, &compared, &mut scratch)?;
+    let costs = matching.costs(frustum, &means, &[], &maps, &mut scratch)?;
     device.pick_disparity(&frustum, &costs, &mut maps)?;
     Ok(sha256(cast_slice(&device.download(&maps)?)))
 }

@@ -1,5 +1,6 @@
 //! The costs of the planes in a camera's frustum, from the views that are compared on them.
 
+use super::scratch::Scratch;
 use crate::FieldError;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::Device;
@@ -92,6 +93,7 @@ impl<D: Device> Matching<'_, D> {
         swept: &[SweptView],
         texels: &D::Buffer<[f32; 4]>,
         maps: &D::Buffer<[f32; 2]>,
+        scratch: &mut Scratch<D>,
         progress: &dyn Progress,
     ) -> Result<D::Buffer<Planes>, FieldError> {
         let device = self.device;
@@ -102,53 +104,71 @@ impl<D: Device> Matching<'_, D> {
         let mut costs = device.zeros::<Planes>(2 * row_len * height as usize)?;
         let band_rows = BAND_ROWS.min(height);
         let rows = (band_rows + REACH).min(height) as usize;
-        let mut grey = device.zeros::<Planes>(rows * row_len * matched.len())?;
-        let mut evidence = device.zeros::<Planes>(4 * rows * row_len)?;
+        let grey = scratch.grey.of_len(device, rows * row_len * matched.len())?;
+        let evidence = scratch.evidence.of_len(device, 4 * rows * row_len)?;
         for first in (0..height).step_by(band_rows as usize) {
             progress.check()?;
             let halo = first.min(REACH);
             let kept = band_rows.min(height - first);
             let band = FrustumBlock { first_row: first - halo, row_count: halo + kept, ..*whole };
-            device.compare_views(&band, &views, &pairs, texels, maps, &mut grey, &mut evidence)?;
-            device.census_cost(&band, halo, kept, &pairs, &grey, &evidence, &mut costs)?;
+            device.compare_views(&band, &views, &pairs, texels, maps, grey, evidence)?;
+            device.census_cost(&band, halo, kept, &pairs, grey, evidence, &mut costs)?;
         }
         Ok(costs)
     }
 
-    /// The costs of all planes in a frustum: `costs[row][column][group]`, from what [`Matching::compared`] found. `maps` are the
-    /// disparities and confidences of the views; those of `voters`, of which the first [`MAX_MATCHED`] count, say which planes are opaque.
+    /// The means over windows of what [`Matching::compared`] found: `means[row][column][group]`.
+    pub(super) fn means(
+        &self,
+        whole: &FrustumBlock,
+        compared: &D::Buffer<Planes>,
+        scratch: &mut Scratch<D>,
+    ) -> Result<D::Buffer<Planes>, FieldError> {
+        let window = WindowBlock::new(whole, self.near_cost);
+        let volume = volume(whole);
+        let sums = scratch.sums.of_len(self.device, 6 * volume)?;
+        self.device.row_sums(&window, compared, sums)?;
+        let mut means = self.device.zeros::<Planes>(volume)?;
+        self.device.window_cost(&window, sums, &mut means)?;
+        Ok(means)
+    }
+
+    /// The costs of all planes in a frustum: `costs[row][column][group]`, from [`Matching::means`]. `maps` are the disparities and
+    /// confidences of the views; those of `voters`, of which the first [`MAX_MATCHED`] count, say which planes are opaque.
     pub(super) fn costs(
         &self,
         whole: FrustumBlock,
-        compared: &D::Buffer<Planes>,
+        means: &D::Buffer<Planes>,
         voters: &[SweptView],
         maps: &D::Buffer<[f32; 2]>,
+        scratch: &mut Scratch<D>,
     ) -> Result<D::Buffer<Planes>, FieldError> {
         let device = self.device;
         let FrustumBlock { camera: CameraBlock { width, height, .. }, group_count, .. } = whole;
-        let volume = (width * group_count * height) as usize;
-        let window = WindowBlock::new(&whole, self.near_cost);
-        let mut sums = device.zeros::<Planes>(6 * volume)?;
-        device.row_sums(&window, compared, &mut sums)?;
-        let mut means = device.zeros::<Planes>(volume)?;
-        device.window_cost(&window, &sums, &mut means)?;
-        drop(sums);
+        let volume = volume(&whole);
+        let mut preferred = None;
         let voters = &voters[..voters.len().min(MAX_MATCHED)];
         if self.front_share > 0.0 && voters.iter().any(|view| view.disparity_step > 0.0) {
-            let mut opacities = device.zeros::<Planes>(volume)?;
+            let opacities = scratch.opacities.of_len(device, volume)?;
             let frustum = FrustumBlock { view_count: voters.len() as u32, ..whole };
-            device.plane_opacity(&frustum, &device.upload(voters)?, maps, &mut opacities)?;
+            device.plane_opacity(&frustum, &device.upload(voters)?, maps, opacities)?;
             let block = FrontBlock { width, height, group_count, front_share: self.front_share };
-            let mut preferred = device.zeros::<Planes>(volume)?;
-            device.front_cost(&block, &opacities, &means, &mut preferred)?;
-            means = preferred;
+            let costs = scratch.costs.of_len(device, volume)?;
+            device.front_cost(&block, opacities, means, costs)?;
+            preferred = Some(&*costs);
         }
         let block = CostBlock { width, height, group_count, padding: 0 };
-        let mut paths = device.zeros::<Planes>(DIRECTIONS as usize * volume)?;
-        device.follow_paths(&block, &means, &mut paths)?;
-        device.join_paths(&block, &paths, &mut means)?;
-        Ok(means)
+        let paths = scratch.paths.of_len(device, DIRECTIONS as usize * volume)?;
+        device.follow_paths(&block, preferred.unwrap_or(means), paths)?;
+        let mut costs = device.zeros::<Planes>(volume)?;
+        device.join_paths(&block, paths, &mut costs)?;
+        Ok(costs)
     }
+}
+
+/// Groups of planes of all pixels.
+fn volume(whole: &FrustumBlock) -> usize {
+    (whole.camera.width * whole.camera.height * whole.group_count) as usize
 }
 
 /// The pairs that are compared, of the greatest products of weights.

@@ -2,6 +2,7 @@
 
 use super::kept::Kept;
 use super::matching::{Images, Matching, Range};
+use super::scratch::Scratch;
 use super::swept;
 use crate::FieldError;
 use crate::training_free::space::{Space, first_guess};
@@ -57,6 +58,7 @@ impl<D: Device> Matching<'_, D> {
         let range = Range::new(first_guess(&cameras), PLANE_COUNT);
         let mut maps = device.zeros(images.iter().map(|image| image.texels.len()).sum())?;
         let chosen = spread(&centres, MAX_SWEPT);
+        let mut scratch = Scratch::default();
         for &view in &chosen {
             progress.check()?;
             let mut near: Vec<(usize, f32)> = (0..cameras.len())
@@ -72,8 +74,9 @@ impl<D: Device> Matching<'_, D> {
             weights.push((view, 1.0));
             let swept = swept(&small.cameras, &small.cameras, &weights, None, None);
             let frustum = self.frustum(small.cameras[view], range, &swept);
-            let compared = self.compared(&frustum, &swept, &small.texels, &maps, progress)?;
-            let costs = self.costs(frustum, &compared, &[], &maps)?;
+            let compared = self.compared(&frustum, &swept, &small.texels, &maps, &mut scratch, progress)?;
+            let means = self.means(&frustum, &compared, &mut scratch)?;
+            let costs = self.costs(frustum, &means, &[], &maps, &mut scratch)?;
             device.pick_disparity(&frustum, &costs, &mut maps)?;
         }
         let maps = device.download(&maps)?;

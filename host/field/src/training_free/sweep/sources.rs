@@ -10,6 +10,26 @@ use viewfuse_job::progress::Progress;
 use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
 use viewfuse_kernels::plane_sweep::{MAX_MATCHED, Planes};
 
+/// Most bytes of the means that are kept: those of eight sources of 256x256 pixels and 64 planes.
+const MAX_BYTES: usize = 128 << 20;
+
+/// The means of a source's planes, which other views' disparities do not change.
+pub(super) struct SourceMeans<D: Device> {
+    frustum: FrustumBlock,
+    /// The views that were compared.
+    views: Vec<SweptView>,
+    near_cost: f32,
+    /// As of [`Matching::means`](super::matching::Matching::means).
+    means: D::Buffer<Planes>,
+}
+
+impl<D: Device> SourceMeans<D> {
+    fn bytes(&self) -> usize {
+        let FrustumBlock { camera: CameraBlock { width, height, .. }, group_count, .. } = self.frustum;
+        (width * height * group_count) as usize * size_of::<Planes>()
+    }
+}
+
 impl<D: Device> Views<'_, D> {
     /// The sources' disparities and confidences, with what the current views say of one another if it is known.
     pub(super) fn maps(&self) -> &D::Buffer<[f32; 2]> {
@@ -51,7 +71,7 @@ impl<D: Device> Views<'_, D> {
                 let cameras = &self.matched.cameras;
                 let own = swept(cameras, cameras, &others, Some(&self.steps), None);
                 let (frustum, swept) = self.source_frustum(view, settings);
-                let costs = self.source_costs(&frustum, &swept, &own, settings, progress)?;
+                let costs = self.source_costs(frustum, swept, &own, settings, progress)?;
                 self.device.pick_disparity(&frustum, &costs, &mut maps)?;
                 voters[view] = Some(others);
                 self.assessed = None;
@@ -82,18 +102,35 @@ impl<D: Device> Views<'_, D> {
         (matching.frustum(camera, self.range(&camera), &swept), swept)
     }
 
-    /// The costs of a source's planes.
+    /// The costs of a source's planes. Their means are kept, and taken if they were.
     fn source_costs(
-        &self,
-        frustum: &FrustumBlock,
-        swept: &[SweptView],
+        &mut self,
+        frustum: FrustumBlock,
+        views: Vec<SweptView>,
         voters: &[SweptView],
         settings: Sweep,
         progress: &dyn Progress,
     ) -> Result<D::Buffer<Planes>, FieldError> {
         let matching = settings.matching(self.device, self.has_silhouettes);
-        let compared = matching.compared(frustum, swept, &self.matched.texels, &self.disparities, progress)?;
-        matching.costs(*frustum, &compared, voters, &self.disparities)
+        let mut scratch = std::mem::take(&mut self.scratch);
+        let is_same =
+            |own: &SourceMeans<D>| own.frustum == frustum && own.views == views && own.near_cost == settings.near_cost;
+        let own = match self.means.iter().position(is_same) {
+            Some(known) => self.means.remove(known),
+            None => {
+                let (texels, maps) = (&self.matched.texels, &self.disparities);
+                let compared = matching.compared(&frustum, &views, texels, maps, &mut scratch, progress)?;
+                let means = matching.means(&frustum, &compared, &mut scratch)?;
+                SourceMeans { frustum, views, near_cost: settings.near_cost, means }
+            }
+        };
+        let costs = matching.costs(frustum, &own.means, voters, &self.disparities, &mut scratch)?;
+        self.scratch = scratch;
+        self.means.push(own);
+        while self.means.iter().map(SourceMeans::bytes).sum::<usize>() > MAX_BYTES {
+            self.means.remove(0);
+        }
+        Ok(costs)
     }
 
     /// Brings what was kept to the device, and keeps what is new on it: once for all sources that were encoded since.
@@ -130,16 +167,17 @@ impl<D: Device> Views<'_, D> {
     pub(super) fn find(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
         self.settled = None;
         self.assessed = None;
-        let (frustum, swept) = self.source_frustum(view, self.settings);
+        let settings = Sweep { dissent_share: self.defaults.dissent_share, ..self.settings };
+        let (frustum, swept) = self.source_frustum(view, settings);
         self.steps[view] = frustum.disparity_step;
-        let key = self.kept.as_ref().map(|kept| kept.of_source(&self.settings, &frustum, &swept, &self.texels));
+        let key = self.kept.as_ref().map(|kept| kept.of_source(&settings, &frustum, &swept, &self.texels));
         let len = (frustum.camera.width * frustum.camera.height) as usize;
         let found = self.kept.as_ref().zip(key.as_ref()).and_then(|(kept, key)| kept.read(key, len));
         if let Some(found) = found.filter(|found| found.len() == len) {
             self.found.push((view, found));
             return Ok(());
         }
-        let costs = self.source_costs(&frustum, &swept, &[], self.settings, progress)?;
+        let costs = self.source_costs(frustum, swept, &[], settings, progress)?;
         self.device.pick_disparity(&frustum, &costs, &mut self.disparities)?;
         self.unkept.extend(key.map(|key| (view, key)));
         Ok(())
