@@ -373,3 +373,24 @@ fn what_is_kept_of_the_sources_is_used_and_gives_the_same_picture() {
     assert_eq!(picture_of(&field, &others, &target), picture(&others, &target));
     assert_eq!(kept_files(&kept).len(), 8);
 }
+
+#[test]
+fn second_disparities_are_the_same_bits_whether_the_first_comparison_is_kept_or_made_again() {
+    let folder = Folder::new();
+    let sweep = Sweep { second_share: 0.03, ..Sweep::default() };
+    let fresh = TrainingFree { sweep, ..TrainingFree::default() };
+    let cache = Some(Cache::open(&folder.path().join("kept")).expect("a cache"));
+    let cached = TrainingFree { cache, ..fresh.clone() };
+    let (sources, target) = (wall([1.0; 3]), camera(Vec3::ZERO, 72, 54));
+    let expected = picture_of(&fresh, &sources, &target);
+    assert_ne!(picture(&sources, &target), expected, "second disparities change the picture");
+    assert_eq!(picture_of(&cached, &sources, &target), expected, "nothing is kept yet");
+    // The first disparities are read, so nothing was compared for them.
+    assert_eq!(picture_of(&cached, &sources, &target), expected, "compared again");
+    // The second picture of a stage has what the first one kept.
+    let weights = Weights::mean(sources.images.len() as u32);
+    let twice = on_stage(&fresh, &sources, |stage| {
+        [(); 2].map(|()| stage.picture(&target, &weights, 0.0, &Silent).expect("a picture"))
+    });
+    assert_eq!(twice, [expected.clone(), expected]);
+}

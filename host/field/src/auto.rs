@@ -455,6 +455,15 @@ mod tests {
     }
 
     #[test]
+    fn the_leader_is_the_error_s_square_root_and_its_median_counts() {
+        assert_eq!(Weighting::from(schemes()[LEADER]).to_string(), "error:alpha=0.5");
+        let first = outcomes(&[20.0, 21.0, 22.0]);
+        assert_eq!(median_gain(&outcomes(&[19.0, 20.75, 30.0]), &first), -0.25);
+        assert_eq!(median_gain(&outcomes(&[19.0, 20.5]), &first), -0.75, "given up after two");
+        assert_eq!(median_gain(&[], &first), 0.0);
+    }
+
+    #[test]
     fn one_source_alone_does_not_decide() {
         let first = outcomes(&[16.6, 14.5, 14.1]);
         assert!(!is_better(&outcomes(&[17.3, 14.5, 14.1]), &first, &first), "one of three gains");
