@@ -1,6 +1,6 @@
 //! Entry points, run as the functions that they are on the host: they unpack their arguments, look whether their element
-//! exists, and store in the right place what core computes. Bits, not tolerances. Kernels that compute tiles wait for one
-//! another at barriers and cannot run so: their cases of parity cover them.
+//! exists, and store in the right place what core computes. Bits, not tolerances. Kernels whose invocations wait for
+//! one another at barriers cannot run so: their cases of parity cover them.
 
 mod limits;
 mod lists;

@@ -176,7 +176,7 @@ impl Breaches<'_> {
         });
         self.look_at_buffers(kernel, name, &buffers);
         self.look_at_accesses(name, &functions);
-        self.look_at_sharing(kernel.is_tiled() && !form.needs_subgroups(), name, &shared, &functions);
+        self.look_at_sharing(kernel.has_barriers(form), name, &shared, &functions);
         self.look_at_subgroups(name, &functions);
     }
 
@@ -250,7 +250,7 @@ impl Breaches<'_> {
         });
     }
 
-    /// Tiles are computed in memory that the workgroup really shares; other kernels have none, and wait for nobody.
+    /// Tiles, and elements that a workgroup computes together, are computed in memory that the workgroup really shares; other kernels have none, and wait for nobody.
     fn look_at_sharing(&mut self, is_sharing: bool, name: &str, shared: &[Word], functions: &[&Function]) {
         let bytes: usize = shared.iter().map(|variable| self.declarations.variable_bytes(*variable)).sum();
         self.unless((bytes > 0) == is_sharing && bytes <= SHARED_BYTES, || {

@@ -65,7 +65,10 @@ impl Gpu {
                     let form = gpu.form(state, &job, &Class::new(kernel, shape))?;
                     (form, 0..form.elements(shape.row_count, shape.column_count))
                 }
-                None => (Form::Single, elements.clone()),
+                None => {
+                    let own = kernel.invocations();
+                    (Form::Single, elements.start * own..elements.end * own)
+                }
             };
             let count = u64::from(elements.end - elements.start);
             let dispatches = gpu.record_in_pieces(state, &job, form, of_form, count)?;

@@ -4,7 +4,8 @@
 //! through slices, or through [`Fetch`](viewfuse_core::fetch::Fetch) where a device has them in pages or loads vectors, and
 //! writes through [`Store`](crate::store::Store), at the index that the row's documentation says. Devices call it: the CPU in
 //! a loop ([`for_each_kernel`](crate::for_each_kernel) makes both), a GPU for each invocation. That of a tiled kernel
-//! hands the two matrices and what happens to a sum to the device's tiles.
+//! hands the two matrices and what happens to a sum to the device's tiles. Where a workgroup computes an element together, the function of
+//! an invocation is in [`together`].
 
 mod gaussians;
 mod layers;
@@ -14,6 +15,7 @@ mod plane_sweep;
 mod points;
 mod rays;
 mod tiled;
+pub mod together;
 mod visual_hull;
 mod volumes;
 mod weighting;

@@ -4,8 +4,8 @@
 //! nearest first; the host sorts and lists them between the two dispatches. Stages, each a data-parallel kernel:
 //!
 //! ```text
-//! lanes               eight pixels of a row, and a splat's opacity there  Lanes, SplatLanes
-//! blend               pixels from the splats of their tile                blend_row
+//! lanes               pixels of a row, and a splat's opacity there        Lanes, SplatLanes
+//! blend               pixels from the splats of their tile                BlendedLanes
 //! blend_gradient      derivatives of a tile's pixels by its splats        TileGradient
 //! footprint           a Gaussian's ellipse, with what its derivatives need   Footprint
 //! project_gradient    ... and of the splats by their Gaussians            project_gradient
@@ -76,6 +76,34 @@ impl TileBlock {
     #[inline]
     pub fn tile_count(&self) -> u32 {
         self.tile_columns * self.height.div_ceil(SPLAT_TILE as u32)
+    }
+
+    /// The tile of a pixel.
+    #[inline]
+    pub fn tile_of(&self, column: u32, row: u32) -> u32 {
+        row / SPLAT_TILE as u32 * self.tile_columns + column / SPLAT_TILE as u32
+    }
+
+    /// A tile's first pixel: column and row.
+    #[inline]
+    pub fn first_of(&self, tile: u32) -> [u32; 2] {
+        [tile % self.tile_columns * SPLAT_TILE as u32, tile / self.tile_columns * SPLAT_TILE as u32]
+    }
+
+    /// Column and row of a pixel that is counted tile by tile, row by row in each, whole tiles at the borders, too; `None` outside of the
+    /// picture.
+    #[inline]
+    pub fn pixel_of_tiles(&self, pixel: u32) -> Option<[u32; 2]> {
+        const SIDE: u32 = SPLAT_TILE as u32;
+        let ([column, row], own) = (self.first_of(pixel / (SIDE * SIDE)), pixel % (SIDE * SIDE));
+        let (column, row) = (column + own % SIDE, row + own / SIDE);
+        if column < self.width && row < self.height { Some([column, row]) } else { None }
+    }
+
+    /// How many pixels its tiles have, whole ones at the borders, too.
+    #[inline]
+    pub fn pixels_of_tiles(&self) -> u32 {
+        self.tile_count() * (SPLAT_TILE * SPLAT_TILE) as u32
     }
 
     /// How many parts of rows: each is a tile's part of a row of pixels.

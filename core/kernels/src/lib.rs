@@ -7,6 +7,7 @@
 //! ```text
 //! store             writing elements by index                       Store
 //! pages             buffers in several pages                        Pages, PagesMut
+//! workgroup         memory and barrier of a workgroup               Workgroup
 //! compact           which elements a mask marks, as a list         marked_in_run, run_offsets, list_run
 //! finite            where the first NaN or infinity is             first_non_finite
 //! sample_mask       which samples can be left out                  is_sampled
@@ -15,7 +16,7 @@
 //! genvs             volumes of features become a feature image     VolumePlace, weigh_features, denoiser_input
 //! visual_hull       the training-free field inside silhouettes     matched depth, signed distance, density and colour
 //! plane_sweep       the training-free field for any scene          evidence, census, paths, disparity, blend
-//! gaussians         Gaussians of a scene: pictures and derivatives    blend_row, TileGradient, project_gradient
+//! gaussians         Gaussians of a scene: pictures and derivatives    BlendedLanes, TileGradient, project_gradient
 //! limits            what a device can do at most                   chained, copied, looked_up
 //! bodies            the kernels: a function of one element each
 //! rows              the list of kernels, one row each              Kernel, for_each_kernel
@@ -39,3 +40,4 @@ pub mod rows;
 pub mod sample_mask;
 pub mod store;
 pub mod visual_hull;
+pub mod workgroup;

@@ -27,6 +27,7 @@
 //! | `twin` | the CPU runs a faster form of its own (`host/device/src/cpu/`); the body is the definition that it is tested against |
 //! | `looped` | the CPU's loop over the body is written by hand there: what elements write is not in their order |
 //! | `serial` | elements write where others do: the CPU runs them one after the other |
+//! | `together` | on a GPU a workgroup computes an element, by the function of the kernel's name in [`bodies::together`](crate::bodies::together); the body is its definition, and what the CPU calls. All arrays that it reads are `filled` |
 //! | `wide` | the CPU's loop is compiled for the widest vectors of the machine, too |
 //! | `definition` | no production code calls it: it defines what the host computes with the functions of `viewfuse-core` |
 //! | `measured` | no production code calls it: it measures what a device can do at most |

@@ -15,6 +15,7 @@ mod matrices;
 mod network;
 mod points;
 mod scratch;
+mod splats;
 mod sweep;
 mod tracks;
 mod volumes;
@@ -36,6 +37,7 @@ use matrices::*;
 use network::*;
 use points::*;
 use pulp::Arch;
+use splats::*;
 use sweep::*;
 use viewfuse_kernels::bodies;
 use viewfuse_kernels::for_each_kernel;
@@ -109,6 +111,7 @@ macro_rules! compute {
     ({ looped $($mark:ident)* } $method:ident [$($block:ident)?] [$($count:ident)*] [$($array:tt)*] $elements:tt) => {
         by_hand!($method [$($block)? $($count)*] [$($array)*])
     };
+    ({ together $($mark:ident)* } $($row:tt)*) => { compute!({ $($mark)* } $($row)*) };
     ({ serial } $method:ident $block:tt $counts:tt $arrays:tt $elements:tt) => {
         serial!($method $block $arrays $elements)
     };

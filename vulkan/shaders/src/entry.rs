@@ -12,10 +12,10 @@ macro_rules! entries {
         counts $counts:tt
         arrays { $({ $kind:ident $array:ident: $Host:ty, as { $($entry:tt)? } $($how:tt)* })+ }
         elements { $($elements:tt)* }
-        $($rest:tt)*
+        marks { $($mark:ident)* }
     })+) => {
         $(entry! {
-            { [$($doc)*] $method { $($block)* } { $($elements)* } }
+            { [$($doc)*] $method { $($block)* } { $($elements)* } { $($mark)* } }
             [] [] []
             [$({ $kind $array: $Host $(, $entry)? })+]
             [0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23]
@@ -28,23 +28,36 @@ macro_rules! entries {
 macro_rules! entry {
     // Of tiled kernels all arrays are read and written without a panic.
     (
-        { $doc:tt $method:ident $block:tt { tiles $shape:tt } } [$($parameters:tt)*] [] [$($arguments:tt)*]
+        { $doc:tt $method:ident $block:tt { tiles $shape:tt } $marks:tt } [$($parameters:tt)*] [] [$($arguments:tt)*]
         [{ write $array:ident: $Host:ty } $($more:tt)*] [$binding:literal $($bindings:literal)*]
     ) => {
         entry! {
-            { $doc $method $block { tiles $shape } }
+            { $doc $method $block { tiles $shape } $marks }
             [$($parameters)* #[spirv(storage_buffer, descriptor_set = 0, binding = $binding)] $array: &mut [$Host],]
             [] [$($arguments)* Unchecked($array),] [$($more)*] [$($bindings)*]
         }
     };
     (
-        { $doc:tt $method:ident $block:tt { tiles $shape:tt } } [$($parameters:tt)*] [] [$($arguments:tt)*]
+        { $doc:tt $method:ident $block:tt { tiles $shape:tt } $marks:tt } [$($parameters:tt)*] [] [$($arguments:tt)*]
         [{ $kind:ident $array:ident: $Host:ty } $($more:tt)*] [$binding:literal $($bindings:literal)*]
     ) => {
         entry! {
-            { $doc $method $block { tiles $shape } }
+            { $doc $method $block { tiles $shape } $marks }
             [$($parameters)* #[spirv(storage_buffer, descriptor_set = 0, binding = $binding)] $array: &[$Host],]
             [] [$($arguments)* Endless($array),] [$($more)*] [$($bindings)*]
+        }
+    };
+    // Nor of those that a workgroup computes together.
+    (
+        { $doc:tt $method:ident $block:tt $elements:tt { together $($mark:ident)* } } [$($parameters:tt)*] [] [$($arguments:tt)*]
+        [{ $kind:ident $array:ident: $Host:ty $(, $entry:tt)? } $($more:tt)*] [$binding:literal $($bindings:literal)*]
+    ) => {
+        entry! {
+            { $doc $method $block $elements { together $($mark)* } }
+            [$($parameters)*
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $binding)] $array: bound!($kind $Host $(, $entry)?),
+            ]
+            [] [$($arguments)* unchecked!($kind $array $(, $entry)?),] [$($more)*] [$($bindings)*]
         }
     };
     // Pages.
@@ -97,7 +110,23 @@ macro_rules! entry {
     };
     // The functions.
     (
-        { [$($doc:tt)*] $method:ident {} { for $($elements:tt)* } }
+        { [$($doc:tt)*] $method:ident { $block:ident: $Block:ty } { for $($elements:tt)* } { together $($mark:ident)* } }
+        [$($parameters:tt)*] [] [$($arguments:tt)*] [] $bindings:tt
+    ) => {
+        $($doc)*
+        #[spirv(compute(threads(64)))]
+        #[allow(clippy::too_many_arguments)]
+        pub fn $method(
+            #[spirv(global_invocation_id)] id: UVec3,
+            #[spirv(push_constant)] push: &Push<$Block>,
+            $($parameters)*
+            #[spirv(workgroup)] shared: &mut [f32; shared_numbers!($method)],
+        ) {
+            bodies::together::$method(&push.parameters, $($arguments)* Together(shared), push.piece.first + id.x);
+        }
+    };
+    (
+        { [$($doc:tt)*] $method:ident {} { for $($elements:tt)* } { $($mark:ident)* } }
         [$($parameters:tt)*] [] [$($arguments:tt)*] [] $bindings:tt
     ) => {
         $($doc)*
@@ -113,7 +142,7 @@ macro_rules! entry {
         }
     };
     (
-        { [$($doc:tt)*] $method:ident { $block:ident: $Block:ty } { for $($elements:tt)* } }
+        { [$($doc:tt)*] $method:ident { $block:ident: $Block:ty } { for $($elements:tt)* } { $($mark:ident)* } }
         [$($parameters:tt)*] [] [$($arguments:tt)*] [] $bindings:tt
     ) => {
         $($doc)*
@@ -130,7 +159,7 @@ macro_rules! entry {
         }
     };
     (
-        { [$($doc:tt)*] $method:ident { $block:ident: $Block:ty } { for $($elements:tt)* } }
+        { [$($doc:tt)*] $method:ident { $block:ident: $Block:ty } { for $($elements:tt)* } { $($mark:ident)* } }
         [$($parameters:tt)*] [$({ $Pages:ident [$($mut:tt)?] $array:ident $a:ident $b:ident $c:ident $d:ident })+]
         [$($arguments:tt)*] [] $bindings:tt
     ) => {
@@ -153,6 +182,7 @@ macro_rules! entry {
         {
             [$($doc:tt)*] $method:ident { $block:ident: $Block:ty }
             { tiles [$row_count:expr, $inner_count:expr, $column_count:expr] }
+            { $($mark:ident)* }
         }
         [$($parameters:tt)*] [] [$($arguments:tt)*] [] $bindings:tt
     ) => {
@@ -227,6 +257,26 @@ macro_rules! form {
             let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
             bodies::$method($block, shape, $($arguments)* $Form { $($memory),* }, push.piece.first + id.x);
         }
+    };
+}
+
+/// Numbers of the workgroup's memory that a kernel takes whose elements are computed together.
+macro_rules! shared_numbers {
+    (blend_gradient) => {
+        bodies::together::BLEND_GRADIENT_SHARED
+    };
+}
+
+/// How a body that must not panic gets a binding.
+macro_rules! unchecked {
+    (write $array:ident, vectors) => {
+        &mut VectorsMut(&mut Unchecked($array))
+    };
+    ($kind:ident $array:ident, vectors) => {
+        &Vectors(&Endless($array))
+    };
+    ($kind:ident $array:ident) => {
+        &Endless($array)
     };
 }
 

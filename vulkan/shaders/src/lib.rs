@@ -5,7 +5,7 @@
 //! Arrays that may be longer than a device can bind at once come as four pages; arrays `as vectors` are loaded and stored
 //! as vectors (`loads`). A tiled kernel has an entry point for each form of a tile: the first of the kernel's name, the
 //! others in a module of that name. What devices do otherwise than the CPU is here: matrix products are summed in workgroup
-//! memory or by subgroups (`tile`), without a panic (`unchecked`).
+//! memory or by subgroups (`tile`), and a workgroup computes an element `together`, both without a panic (`unchecked`).
 //!
 //! On the host the same entry points are plain functions, which tests call.
 #![cfg_attr(target_arch = "spirv", no_std)]
@@ -22,7 +22,7 @@ use loads::{InVectors, Vectors, VectorsMut};
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
 use tile::{Buffered, Double, Quadruple, Shared, ShortShared, Single, Subgroup};
-use unchecked::{Endless, Unchecked};
+use unchecked::{Endless, Together, Unchecked};
 use viewfuse_kernels::bodies;
 use viewfuse_kernels::for_each_kernel;
 use viewfuse_kernels::network::tile::Shape;

@@ -1,6 +1,6 @@
 //! Gaussians: projected, composited in tiles, and the derivatives of both.
 
-use crate::gaussians::blend;
+use crate::gaussians::blend::BlendedLanes;
 use crate::gaussians::blend_gradient::{SplatGradient, TileGradient};
 use crate::gaussians::project_gradient;
 use crate::gaussians::{SPLAT_TILE, SplatBlock, TileBlock};
@@ -20,7 +20,7 @@ pub fn project_gaussians(
     splats.store(at, project(&gaussians.fetch(at), &block.camera, block.near));
 }
 
-/// A tile's part of a row of pixels.
+/// A pixel, counted tile by tile.
 #[inline(always)]
 pub fn blend_splats(
     block: &TileBlock,
@@ -29,17 +29,13 @@ pub fn blend_splats(
     splats: &(impl Fetch<ProjectedGaussian> + ?Sized),
     colours: &mut (impl Store<[f32; 4]> + ?Sized),
     depths: &mut (impl Store<f32> + ?Sized),
-    part: u32,
+    pixel: u32,
 ) {
-    let row = blend::blend_row(block, starts, entries, splats, part);
-    let columns = block.columns_in(part % block.tile_columns) as usize;
-    let first = block.first_pixel(part) as usize;
-    let mut lane = 0;
-    while lane < columns {
-        let [red, green, blue] = [row.colour[0][lane], row.colour[1][lane], row.colour[2][lane]];
-        colours.store(first + lane, [red, green, blue, 1.0 - row.transmittance[lane]]);
-        depths.store(first + lane, row.depth[lane]);
-        lane += 1;
+    if let Some([column, row]) = block.pixel_of_tiles(pixel) {
+        let own = BlendedLanes::<1>::of(block, starts, entries, splats, [column, row]);
+        let at = (row * block.width + column) as usize;
+        colours.store(at, own.pixel(0));
+        depths.store(at, own.depth[0]);
     }
 }
 
@@ -60,15 +56,7 @@ pub fn blend_gradient(
     let (mut entry, end) = (starts[tile as usize], starts[tile as usize + 1]);
     let mut is_over = false;
     while entry < end {
-        let mut own = SplatGradient {
-            opacity: 0.0,
-            along: [0.0; 2],
-            padding: 0.0,
-            squares: [0.0; 3],
-            unused: 0.0,
-            colour: [0.0; 3],
-            behind: 0.0,
-        };
+        let mut own = SplatGradient::ZERO;
         if !is_over {
             own = through.next(&splats.fetch(entries[entry as usize] as usize));
             if entry % SPLAT_TILE as u32 == 0 {
@@ -95,15 +83,7 @@ pub fn project_gradients(
     gaussian: u32,
 ) {
     let at = gaussian as usize;
-    let mut all = SplatGradient {
-        opacity: 0.0,
-        along: [0.0; 2],
-        padding: 0.0,
-        squares: [0.0; 3],
-        unused: 0.0,
-        colour: [0.0; 3],
-        behind: 0.0,
-    };
+    let mut all = SplatGradient::ZERO;
     let (mut index, end) = (use_starts[at], use_starts[at + 1]);
     while index < end {
         all.add(&sums.fetch(uses[index as usize] as usize));

@@ -34,7 +34,27 @@ pub struct SplatGradient {
 
 const _: () = assert!(size_of::<SplatGradient>() == 48);
 
+/// Numbers of a [`SplatGradient`] that are no padding.
+pub const NUMBERS: usize = 9;
+
 impl SplatGradient {
+    /// Nothing said.
+    pub const ZERO: SplatGradient = SplatGradient::of([0.0; NUMBERS]);
+
+    /// These numbers, in the order of the fields.
+    #[inline(always)]
+    pub const fn of([opacity, x, y, xx, xy, yy, red, green, blue]: [f32; NUMBERS]) -> SplatGradient {
+        SplatGradient {
+            opacity,
+            along: [x, y],
+            padding: 0.0,
+            squares: [xx, xy, yy],
+            unused: 0.0,
+            colour: [red, green, blue],
+            behind: 0.0,
+        }
+    }
+
     /// Adds what another tile says.
     #[inline(always)]
     pub fn add(&mut self, other: &SplatGradient) {
@@ -50,15 +70,88 @@ impl SplatGradient {
     }
 }
 
+/// Pixels of a row that are gone through front to back.
+#[derive(Clone, Copy, Debug)]
+pub struct GradientLanes<const N: usize> {
+    /// Derivatives of the loss by red, green, blue and opacity.
+    by: [Lanes<N>; 4],
+    /// What is seen behind the splats so far.
+    transmittance: Lanes<N>,
+    /// What lies behind adds so much to the sum of weights times derivatives.
+    rest: Lanes<N>,
+}
+
+impl<const N: usize> GradientLanes<N> {
+    /// Pixels outside of the picture: no derivatives.
+    pub const OUTSIDE: GradientLanes<N> = GradientLanes { by: [[0.0; N]; 4], transmittance: [1.0; N], rest: [0.0; N] };
+
+    /// Makes a pixel that of this colour (red, green, blue, opacity), with the derivatives by these.
+    #[inline(always)]
+    pub fn set(&mut self, lane: usize, colour: [f32; 4], by: [f32; 4]) {
+        let mut channel = 0;
+        while channel < 4 {
+            self.by[channel][lane] = by[channel];
+            self.rest[lane] += by[channel] * colour[channel];
+            channel += 1;
+        }
+    }
+
+    /// Adds what the pixels, the first of which has its centre at image coordinates `x` and `y`, say of the next splat.
+    #[inline(always)]
+    pub fn add(&mut self, x: f32, y: f32, splat: &ProjectedGaussian, sums: &mut GradientSums<N>) {
+        if abs(y - splat.mean[1]) > splat.extent[1] {
+            return;
+        }
+        let seen = SplatLanes::<N>::of(splat, x, y);
+        if greatest(&seen.alpha) <= 0.0 {
+            return;
+        }
+        let (by, [red, green, blue]) = (&self.by, splat.colour);
+        let (transmittance, rest) = (&mut self.transmittance, &mut self.rest);
+        let mut lane = 0;
+        while lane < N {
+            let before = transmittance[lane];
+            let alpha = if before >= MIN_TRANSMITTANCE { seen.alpha[lane] } else { 0.0 };
+            let weight = alpha * before;
+            let share = by[0][lane] * red + by[1][lane] * green + by[2][lane] * blue + by[3][lane];
+            rest[lane] -= weight * share;
+            let by_alpha = before * share - rest[lane] / (1.0 - alpha);
+            transmittance[lane] = before - weight;
+            let p = seen.slope[lane] * alpha * by_alpha;
+            let (px, py) = (p * seen.dx[lane], p * seen.dy);
+            sums.0[0][lane] += p;
+            sums.0[1][lane] += px;
+            sums.0[2][lane] += py;
+            sums.0[3][lane] += px * seen.dx[lane];
+            sums.0[4][lane] += px * seen.dy;
+            sums.0[5][lane] += py * seen.dy;
+            sums.0[6][lane] += weight * by[0][lane];
+            sums.0[7][lane] += weight * by[1][lane];
+            sums.0[8][lane] += weight * by[2][lane];
+            lane += 1;
+        }
+    }
+
+    /// The most of what is seen behind.
+    #[inline(always)]
+    pub fn most_seen(&self) -> f32 {
+        greatest(&self.transmittance)
+    }
+}
+
+/// The nine numbers of a [`SplatGradient`] in their order, a number a pixel, of one row or summed over rows.
+#[derive(Clone, Copy, Debug)]
+pub struct GradientSums<const N: usize>(pub [Lanes<N>; NUMBERS]);
+
+impl<const N: usize> GradientSums<N> {
+    /// Nothing added yet.
+    pub const ZERO: GradientSums<N> = GradientSums([[0.0; N]; NUMBERS]);
+}
+
 /// A tile that is gone through front to back.
 #[derive(Clone, Copy, Debug)]
 pub struct TileGradient {
-    /// Derivatives of the loss by each row's red, green, blue and opacity.
-    by: [[Lanes; 4]; SPLAT_TILE],
-    /// What is seen behind the splats so far.
-    transmittance: [Lanes; SPLAT_TILE],
-    /// What lies behind adds so much to the sum of weights times derivatives.
-    rest: [Lanes; SPLAT_TILE],
+    rows: [GradientLanes<SPLAT_TILE>; SPLAT_TILE],
     first_row: u32,
     x: f32,
 }
@@ -73,28 +166,16 @@ impl TileGradient {
         gradients: &(impl Fetch<[f32; 4]> + ?Sized),
         tile: u32,
     ) -> TileGradient {
-        let tile_column = tile % block.tile_columns;
-        let first_row = tile / block.tile_columns * SPLAT_TILE as u32;
-        let mut own = TileGradient {
-            by: [[[0.0; SPLAT_TILE]; 4]; SPLAT_TILE],
-            transmittance: [[1.0; SPLAT_TILE]; SPLAT_TILE],
-            rest: [[0.0; SPLAT_TILE]; SPLAT_TILE],
-            first_row,
-            x: (tile_column * SPLAT_TILE as u32) as f32 + 0.5,
-        };
-        let columns = block.columns_in(tile_column) as usize;
+        let [first_column, first_row] = block.first_of(tile);
+        let mut own =
+            TileGradient { rows: [GradientLanes::OUTSIDE; SPLAT_TILE], first_row, x: first_column as f32 + 0.5 };
+        let columns = block.columns_in(tile % block.tile_columns) as usize;
         let mut row = 0;
         while row < SPLAT_TILE && first_row + (row as u32) < block.height {
-            let first = ((first_row + row as u32) * block.width + tile_column * SPLAT_TILE as u32) as usize;
+            let first = ((first_row + row as u32) * block.width + first_column) as usize;
             let mut lane = 0;
             while lane < columns {
-                let (colour, by) = (colours.fetch(first + lane), gradients.fetch(first + lane));
-                let mut channel = 0;
-                while channel < 4 {
-                    own.by[row][channel][lane] = by[channel];
-                    own.rest[row][lane] += by[channel] * colour[channel];
-                    channel += 1;
-                }
+                own.rows[row].set(lane, colours.fetch(first + lane), gradients.fetch(first + lane));
                 lane += 1;
             }
             row += 1;
@@ -105,16 +186,20 @@ impl TileGradient {
     /// What the pixels say of the next splat. Sums run over the rows in each column, then over the columns.
     #[inline(always)]
     pub fn next(&mut self, splat: &ProjectedGaussian) -> SplatGradient {
-        let mut sums = Sums::START;
+        let mut sums = GradientSums::<SPLAT_TILE>::ZERO;
         let mut row = 0;
         while row < SPLAT_TILE {
             let y = (self.first_row + row as u32) as f32 + 0.5;
-            if abs(y - splat.mean[1]) <= splat.extent[1] {
-                self.row(row, y, splat, &mut sums);
-            }
+            self.rows[row].add(self.x, y, splat, &mut sums);
             row += 1;
         }
-        sums.gradient()
+        let mut numbers = [0.0; NUMBERS];
+        let mut number = 0;
+        while number < NUMBERS {
+            numbers[number] = sum(&sums.0[number]);
+            number += 1;
+        }
+        SplatGradient::of(numbers)
     }
 
     /// Whether nothing behind is seen.
@@ -123,73 +208,10 @@ impl TileGradient {
         let mut most = 0.0;
         let mut row = 0;
         while row < SPLAT_TILE {
-            let own = greatest(&self.transmittance[row]);
+            let own = self.rows[row].most_seen();
             most = if own > most { own } else { most };
             row += 1;
         }
         most < MIN_TRANSMITTANCE
-    }
-
-    #[inline(always)]
-    fn row(&mut self, row: usize, y: f32, splat: &ProjectedGaussian, sums: &mut Sums) {
-        let seen = SplatLanes::of(splat, self.x, y);
-        if greatest(&seen.alpha) <= 0.0 {
-            return;
-        }
-        let (by, [red, green, blue]) = (&self.by[row], splat.colour);
-        let (transmittance, rest) = (&mut self.transmittance[row], &mut self.rest[row]);
-        let mut lane = 0;
-        while lane < SPLAT_TILE {
-            let before = transmittance[lane];
-            let alpha = if before >= MIN_TRANSMITTANCE { seen.alpha[lane] } else { 0.0 };
-            let weight = alpha * before;
-            let share = by[0][lane] * red + by[1][lane] * green + by[2][lane] * blue + by[3][lane];
-            rest[lane] -= weight * share;
-            let by_alpha = before * share - rest[lane] / (1.0 - alpha);
-            transmittance[lane] = before - weight;
-            let p = seen.slope[lane] * alpha * by_alpha;
-            let (px, py) = (p * seen.dx[lane], p * seen.dy);
-            sums.opacity[lane] += p;
-            sums.along[0][lane] += px;
-            sums.along[1][lane] += py;
-            sums.squares[0][lane] += px * seen.dx[lane];
-            sums.squares[1][lane] += px * seen.dy;
-            sums.squares[2][lane] += py * seen.dy;
-            sums.colour[0][lane] += weight * by[0][lane];
-            sums.colour[1][lane] += weight * by[1][lane];
-            sums.colour[2][lane] += weight * by[2][lane];
-            lane += 1;
-        }
-    }
-}
-
-/// The sums of a splat, a column of the tile each.
-struct Sums {
-    opacity: Lanes,
-    along: [Lanes; 2],
-    squares: [Lanes; 3],
-    colour: [Lanes; 3],
-}
-
-impl Sums {
-    const START: Sums = Sums {
-        opacity: [0.0; SPLAT_TILE],
-        along: [[0.0; SPLAT_TILE]; 2],
-        squares: [[0.0; SPLAT_TILE]; 3],
-        colour: [[0.0; SPLAT_TILE]; 3],
-    };
-
-    #[inline(always)]
-    fn gradient(&self) -> SplatGradient {
-        let Sums { opacity, along, squares, colour } = self;
-        SplatGradient {
-            opacity: sum(opacity),
-            along: [sum(&along[0]), sum(&along[1])],
-            padding: 0.0,
-            squares: [sum(&squares[0]), sum(&squares[1]), sum(&squares[2])],
-            unused: 0.0,
-            colour: [sum(&colour[0]), sum(&colour[1]), sum(&colour[2])],
-            behind: 0.0,
-        }
     }
 }

@@ -253,10 +253,17 @@ macro_rules! list {
                 }
             }
 
-            /// Whether its workgroups compute tiles together: only these kernels use workgroup memory and barriers.
+            /// Whether its workgroups compute tiles of a matrix product.
             pub const fn is_tiled(self) -> bool {
                 match self {
                     $(Kernel::$Kernel => is_tiled!($($elements)*),)+
+                }
+            }
+
+            /// Whether a workgroup computes an element together, in memory that it shares.
+            pub const fn is_together(self) -> bool {
+                match self {
+                    $(Kernel::$Kernel => crate::has_mark!(together: $($mark)*),)+
                 }
             }
 
@@ -285,6 +292,16 @@ impl Kernel {
     /// The forms that its entry points have.
     pub const fn forms(self) -> &'static [Form] {
         if self.is_tiled() { &Form::ALL } else { &[Form::Single] }
+    }
+
+    /// Whether invocations of a form of it wait for one another at barriers, and share memory.
+    pub const fn has_barriers(self, form: Form) -> bool {
+        self.is_together() || self.is_tiled() && !form.needs_subgroups()
+    }
+
+    /// How many invocations an element takes, but of a tiled kernel.
+    pub const fn invocations(self) -> u32 {
+        if self.is_together() { WORKGROUP } else { 1 }
     }
 
     /// Bytes of its push constants.

@@ -67,6 +67,7 @@ macro_rules! has_mark {
     (looped: looped $($rest:ident)*) => { true };
     (definition: definition $($rest:ident)*) => { true };
     (measured: measured $($rest:ident)*) => { true };
+    (together: together $($rest:ident)*) => { true };
     ($mark:ident:) => { false };
     ($mark:ident: $other:ident $($rest:ident)*) => { $crate::has_mark!($mark: $($rest)*) };
 }

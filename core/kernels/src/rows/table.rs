@@ -444,22 +444,22 @@ macro_rules! for_each_kernel {
             }
             /// Pixels from the splats of their tile, which the list `entries[starts[tile]..starts[tile + 1]]` numbers front to
             /// back: `colours[row][column]` (red, green, blue over the background, opacity) and `depths[row][column]`,
-            /// weighted sums. An element is a tile's part of a row of pixels.
-            BlendSplats blend_splats(block: TileBlock) for part in [0..block.part_count(); 16 a core], wide {
+            /// weighted sums. An element is a pixel, counted tile by tile; outside of the picture nothing is written.
+            BlendSplats blend_splats(block: TileBlock) for pixel in [0..block.pixels_of_tiles(); 128 a core], twin {
                 read starts: u32,
                 read entries: u32,
                 read splats: ProjectedGaussian as vectors,
-                write colours[block.first_pixel(part)]: [f32; 4] as vectors,
-                write depths[block.first_pixel(part)]: f32,
+                write colours: [f32; 4] as vectors,
+                write depths: f32,
             }
             /// What the pixels of a tile say of each splat of its list: `sums[entry]`, from the derivatives of a loss by the
             /// pixels, `gradients[row][column]` (by red, green, blue and opacity). An element is a tile.
-            BlendGradient blend_gradient(block: TileBlock) for tile in [0..block.tile_count(); 1 a core], wide {
-                read starts: u32,
-                read entries: u32,
-                read splats: ProjectedGaussian as vectors,
-                read colours: [f32; 4] as vectors,
-                read gradients: [f32; 4] as vectors,
+            BlendGradient blend_gradient(block: TileBlock) for tile in [0..block.tile_count(); 1 a core], together, wide {
+                filled starts: u32,
+                filled entries: u32,
+                filled splats: ProjectedGaussian as vectors,
+                filled colours: [f32; 4] as vectors,
+                filled gradients: [f32; 4] as vectors,
                 write sums[starts[tile as usize]]: SplatGradient as vectors,
             }
             /// Derivatives by the Gaussians' parameters, in the places of these: `gradients[gaussian]`, from the entries of the

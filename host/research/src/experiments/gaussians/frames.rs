@@ -22,7 +22,7 @@ use viewfuse_field::AnyField;
 use viewfuse_field::gaussians::{GivenGaussians, Tiles};
 use viewfuse_field::render::{RenderOptions, Stage};
 use viewfuse_job::progress::Silent;
-use viewfuse_kernels::gaussians::blend::blend_row;
+use viewfuse_kernels::gaussians::blend::BlendedLanes;
 use viewfuse_kernels::gaussians::{MIN_TRANSMITTANCE, SPLAT_TILE, SplatBlock, TileBlock};
 use viewfuse_kernels::rows::{GaussianBlock, ProjectedGaussian};
 use viewfuse_scene::Scene;
@@ -159,7 +159,8 @@ fn counted(tiles: &TileBlock, lists: &Tiles, splats: &[ProjectedGaussian]) -> (u
     let (mut rows, mut composited) = (0, 0);
     for part in 0..tiles.part_count() {
         let (row, column) = (part / tiles.tile_columns, part % tiles.tile_columns);
-        let tile = (row / SPLAT_TILE as u32 * tiles.tile_columns + column) as usize;
+        let at = [column * SPLAT_TILE as u32, row];
+        let tile = tiles.tile_of(at[0], at[1]) as usize;
         let (start, end) = (lists.starts[tile] as usize, lists.starts[tile + 1] as usize);
         let y = row as f32 + 0.5;
         let reaches = |entry: &&u32| (y - splats[**entry as usize].mean[1]).abs() <= splats[**entry as usize].extent[1];
@@ -175,11 +176,12 @@ fn counted(tiles: &TileBlock, lists: &Tiles, splats: &[ProjectedGaussian]) -> (u
 fn needed(tiles: &TileBlock, lists: &Tiles, splats: &[ProjectedGaussian], part: u32, count: usize) -> usize {
     let is_done = |entries: usize| {
         let (row, column) = (part / tiles.tile_columns, part % tiles.tile_columns);
-        let tile = (row / SPLAT_TILE as u32 * tiles.tile_columns + column) as usize;
+        let at = [column * SPLAT_TILE as u32, row];
+        let tile = tiles.tile_of(at[0], at[1]) as usize;
         let mut starts = lists.starts.clone();
         starts[tile + 1] = starts[tile] + entries as u32;
-        let left = blend_row(tiles, &starts, &lists.entries, splats, part).transmittance;
-        left.into_iter().fold(0.0, f32::max) < MIN_TRANSMITTANCE
+        let row = BlendedLanes::<SPLAT_TILE>::of(tiles, &starts, &lists.entries, splats, at);
+        row.transmittance.into_iter().fold(0.0, f32::max) < MIN_TRANSMITTANCE
     };
     if !is_done(count) {
         return count;
