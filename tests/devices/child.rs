@@ -68,7 +68,7 @@ fn do_work(work: &str, instance: &std::sync::Arc<Instance>, adapter: &Adapter) -
             let times = times_that_take(&Gpu::open(instance, adapter, &usual)?, Duration::from_millis(500))?;
             let limit = Duration::from_millis(1);
             let gpu = Gpu::open(instance, adapter, &GpuOptions { time_limit: Some(limit), closing: limit, ..usual })?;
-            match add_again(&gpu, times).and_then(|()| gpu.wait()) {
+            match add_again(&gpu, times).and_then(|_| gpu.wait()) {
                 Err(VulkanError::TimeLimit { .. }) => {}
                 outcome => return Err(format!("it was in time: {outcome:?}").into()),
             }

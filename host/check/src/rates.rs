@@ -25,6 +25,8 @@ use viewfuse_vulkan::kernel::Kernel;
 pub const DEFAULT_ROUNDS: u32 = 5;
 /// The time for which a kernel is repeated in a round.
 const MEASURED: Duration = Duration::from_millis(20);
+/// A limit's own dispatch takes at least this long, beside which sending it takes no time.
+const LEAST_OF_LIMITS: Duration = Duration::from_millis(2);
 /// Most repetitions in a round.
 const MAX_REPEATS: f64 = 500.0;
 
@@ -143,9 +145,8 @@ pub fn measure_rates<D: Device>(device: &D, rounds: u32, progress: &dyn Progress
     let rounds = rounds.max(1);
     let making =
         |kernel: &'static str| move |source: DeviceError| CheckError::Device { kernel, source: Box::new(source) };
-    let mut copy = limits::copy(device).map_err(making("copy_numbers"))?;
-    let mut chains = limits::chains(device).map_err(making("multiply_add"))?;
-    let mut look_ups = limits::look_ups(device).map_err(making("look_up_texels"))?;
+    let is_long = |work: &mut Work<'_>| Ok(once(device, work)? >= LEAST_OF_LIMITS.as_secs_f64());
+    let limits::Works { mut copy, mut chains, mut look_ups } = limits::Works::new(device, is_long)?;
     let mut works = sweeps::works(device).map_err(making("compare_views"))?;
     works.extend(networks::works(device).map_err(making("linear"))?);
     let copies = repeats(device, &mut copy)?;
@@ -228,11 +229,15 @@ fn rate<D: Device>(device: &D, work: &mut Work<'_>, repeats: u32) -> Result<f64,
     Ok(amount / seconds(device, work, repeats)?)
 }
 
+/// Seconds of one dispatch, after one for what is made at the first use.
+fn once<D: Device>(device: &D, work: &mut Work<'_>) -> Result<f64, CheckError> {
+    seconds(device, work, 1)?;
+    seconds(device, work, 1)
+}
+
 /// As many repetitions as take the time that is measured, after one for what is made at the first use.
 fn repeats<D: Device>(device: &D, work: &mut Work<'_>) -> Result<u32, CheckError> {
-    seconds(device, work, 1)?;
-    let once = seconds(device, work, 1)?;
-    Ok((MEASURED.as_secs_f64() / once.max(1.0e-9)).clamp(1.0, MAX_REPEATS) as u32)
+    Ok((MEASURED.as_secs_f64() / once(device, work)?.max(1.0e-9)).clamp(1.0, MAX_REPEATS) as u32)
 }
 
 /// The time of a dispatch, of several behind each other.
