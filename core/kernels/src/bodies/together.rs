@@ -5,28 +5,35 @@
 use crate::gaussians::blend_gradient::{GradientLanes, GradientSums, NUMBERS, SplatGradient};
 use crate::gaussians::lanes::sum;
 use crate::gaussians::{MIN_TRANSMITTANCE, SPLAT_TILE, TileBlock};
-use crate::rows::WORKGROUP;
+use crate::rows::{SHARED_BYTES, WORKGROUP};
 use crate::store::Store;
 use crate::workgroup::Workgroup;
 use viewfuse_core::fetch::Fetch;
 use viewfuse_core::gaussian::ProjectedGaussian;
 
-/// Splats between two barriers.
-const BATCH: u32 = 6;
-/// Their numbers, and what is seen behind them.
+/// Splats of which the pixels' numbers are in the workgroup's memory at a time.
+const BATCH: u32 = 5;
+/// Their numbers.
 const SUMMED: u32 = BATCH * NUMBERS as u32;
 /// From a number of all pixels to the next: odd, so that invocations that sum neighbouring ones read different banks.
 const STRIDE: usize = WORKGROUP as usize + 1;
-/// Where the sums begin.
+/// Where the sums begin: behind the numbers of the pixels, the last of which is what is seen behind the splats.
 const SUMS: usize = (SUMMED as usize + 1) * STRIDE;
+/// Splats that are fetched at a time, each by one invocation.
+const FETCHED: u32 = WORKGROUP / BATCH * BATCH;
+/// Numbers of a splat that its pixels need.
+const SPLAT_NUMBERS: usize = 10;
+/// Where the splats begin, `[number][splat]`.
+const SPLATS: usize = SUMS + SUMMED as usize + 1;
 
 /// Numbers of the workgroup's memory that [`blend_gradient`] takes.
-pub const BLEND_GRADIENT_SHARED: usize = SUMS + SUMMED as usize + 1;
+pub const BLEND_GRADIENT_SHARED: usize = SPLATS + SPLAT_NUMBERS * FETCHED as usize;
 
 const _: () = assert!(WORKGROUP as usize == SPLAT_TILE * SPLAT_TILE && SUMMED < WORKGROUP);
+const _: () = assert!(4 * BLEND_GRADIENT_SHARED <= SHARED_BYTES);
 
-/// A pixel of a tile, invocation `invocation % 64` of the tile `invocation / 64`. The pixels' numbers of some splats go to the
-/// workgroup's memory, where each sum over the pixels is one invocation's.
+/// A pixel of a tile, invocation `invocation % 64` of the tile `invocation / 64`. Splats go through the workgroup's memory, so that
+/// none is waited for alone; so do the pixels' numbers of some splats, where each sum over the pixels is one invocation's.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
 pub fn blend_gradient(
@@ -48,53 +55,105 @@ pub fn blend_gradient(
         let at = (row * block.width + column) as usize;
         pixel.set(0, colours.fetch(at), gradients.fetch(at));
     }
-    let (x, y) = (column as f32 + 0.5, row as f32 + 0.5);
+    let centre = [column as f32 + 0.5, row as f32 + 0.5];
     let (mut entry, end) = (starts.fetch(tile as usize), starts.fetch(tile as usize + 1));
     let mut is_over = false;
     // All invocations of the tile see the same here, so all come to the barriers.
     while entry < end && !is_over {
-        let mut place = 0;
-        while place < BATCH {
-            let mut said = GradientSums::<1>::ZERO;
-            if entry + place < end {
-                let splat = splats.fetch(entries.fetch((entry + place) as usize) as usize);
-                pixel.add(x, y, &splat, &mut said);
-            }
-            let mut number = 0;
-            while number < NUMBERS {
-                group.put((place as usize * NUMBERS + number) * STRIDE + own as usize, said.0[number][0]);
-                number += 1;
-            }
-            place += 1;
-        }
-        group.put(SUMMED as usize * STRIDE + own as usize, pixel.most_seen());
-        group.wait();
-        if own < SUMMED {
-            let total = sum_of_tile(&group, own as usize * STRIDE);
-            group.put(SUMS + own as usize, total);
-        } else if own == SUMMED {
-            let most = most_of_tile(&group, own as usize * STRIDE);
-            group.put(SUMS + own as usize, most);
+        let fetched = if end - entry < FETCHED { end - entry } else { FETCHED };
+        if own < fetched {
+            put_splat(&mut group, own, &splats.fetch(entries.fetch((entry + own) as usize) as usize));
         }
         group.wait();
-        if own < BATCH && entry + own < end {
-            let first = SUMS + own as usize * NUMBERS;
-            let mut numbers = [0.0; NUMBERS];
-            let mut number = 0;
-            while number < NUMBERS {
-                numbers[number] = group.get(first + number);
-                number += 1;
+        let mut first = 0;
+        while first < fetched && !is_over {
+            let count = if fetched - first < BATCH { fetched - first } else { BATCH };
+            put_numbers(&mut group, own, &mut pixel, centre, first, count);
+            group.wait();
+            if own <= SUMMED {
+                let of_pixels = own as usize * STRIDE;
+                let total = if own < SUMMED { sum_of_tile(&group, of_pixels) } else { most_of_tile(&group, of_pixels) };
+                group.put(SUMS + own as usize, total);
             }
-            sums.store((entry + own) as usize, SplatGradient::of(numbers));
+            group.wait();
+            if own < count {
+                sums.store((entry + first + own) as usize, sum_of_splat(&group, own));
+            }
+            is_over = group.get(SUMS + SUMMED as usize) < MIN_TRANSMITTANCE;
+            first += count;
         }
-        is_over = group.get(SUMS + SUMMED as usize) < MIN_TRANSMITTANCE;
-        entry += BATCH;
+        entry += first;
     }
     let mut behind = entry + own;
     while behind < end {
         sums.store(behind as usize, SplatGradient::ZERO);
         behind += WORKGROUP;
     }
+}
+
+/// Puts what pixels need of a splat.
+#[inline(always)]
+fn put_splat(group: &mut impl Workgroup, place: u32, splat: &ProjectedGaussian) {
+    let ([x, y], [xx, xy, yy], [red, green, blue]) = (splat.mean, splat.conic, splat.colour);
+    let numbers: [f32; SPLAT_NUMBERS] = [x, y, splat.extent[1], splat.opacity, xx, xy, yy, red, green, blue];
+    let mut number = 0;
+    while number < SPLAT_NUMBERS {
+        group.put(SPLATS + number * FETCHED as usize + place as usize, numbers[number]);
+        number += 1;
+    }
+}
+
+/// The splat at a place; what pixels do not need of it is 0.
+#[inline(always)]
+fn splat_at(group: &impl Workgroup, place: u32) -> ProjectedGaussian {
+    let get = |number: usize| group.get(SPLATS + number * FETCHED as usize + place as usize);
+    ProjectedGaussian {
+        mean: [get(0), get(1)],
+        depth: 0.0,
+        opacity: get(3),
+        conic: [get(4), get(5), get(6)],
+        padding: 0.0,
+        colour: [get(7), get(8), get(9)],
+        padding_colour: 0.0,
+        extent: [0.0, get(2)],
+        padding_end: [0.0; 2],
+    }
+}
+
+/// Puts what a pixel says of `count` splats from `first` on, and what is seen behind them.
+#[inline(always)]
+fn put_numbers(
+    group: &mut impl Workgroup,
+    own: u32,
+    pixel: &mut GradientLanes<1>,
+    [x, y]: [f32; 2],
+    first: u32,
+    count: u32,
+) {
+    let mut place = 0;
+    while place < count {
+        let mut said = GradientSums::<1>::ZERO;
+        pixel.add(x, y, &splat_at(group, first + place), &mut said);
+        let mut number = 0;
+        while number < NUMBERS {
+            group.put((place as usize * NUMBERS + number) * STRIDE + own as usize, said.0[number][0]);
+            number += 1;
+        }
+        place += 1;
+    }
+    group.put(SUMMED as usize * STRIDE + own as usize, pixel.most_seen());
+}
+
+/// The sums of a splat of a batch.
+#[inline(always)]
+fn sum_of_splat(group: &impl Workgroup, place: u32) -> SplatGradient {
+    let mut numbers = [0.0; NUMBERS];
+    let mut number = 0;
+    while number < NUMBERS {
+        numbers[number] = group.get(SUMS + place as usize * NUMBERS + number);
+        number += 1;
+    }
+    SplatGradient::of(numbers)
 }
 
 /// A sum over a tile's pixels: over the rows in each column, then over the columns.
