@@ -1,8 +1,9 @@
 //! The part of a module that one kernel needs.
 //!
 //! A driver works through all of a module for each pipeline that it creates: given the module of all kernels, a software
-//! driver takes 14 s of processor time for each of them. An excerpt has one entry point and the functions that it calls;
-//! types, constants and variables are those of the whole module.
+//! driver takes 14 s of processor time for each of them. An excerpt has one entry point, the functions that it calls and the
+//! variables that these use: some drivers count the workgroup memory of all that are declared. Types and constants are those of the
+//! whole module.
 
 use std::collections::{HashMap, HashSet};
 
@@ -19,6 +20,7 @@ const LAST_TYPE: u32 = 39;
 const FUNCTION: u32 = 54;
 const FUNCTION_END: u32 = 56;
 const FUNCTION_CALL: u32 = 57;
+const VARIABLE: u32 = 59;
 const DECORATE: u32 = 71;
 const MEMBER_DECORATE: u32 = 72;
 
@@ -39,12 +41,16 @@ pub(crate) fn excerpt(module: &[u32], entry_point: &str) -> Vec<u32> {
         let bytes: &[u8] = bytemuck::cast_slice(words);
         bytes.strip_prefix(entry_point.as_bytes()).is_some_and(|rest| rest.first() == Some(&0))
     };
-    let (mut entry, mut function, mut types) = (None, None, HashSet::new());
+    let (mut entry, mut interface) = (None, &[][..]);
+    let (mut function, mut types) = (None, HashSet::new());
     // Called functions, and the function that a value is computed in.
     let (mut calls, mut place) = (HashMap::<u32, Vec<u32>>::new(), HashMap::new());
+    // Variables of the module, and those that a function may use: those whose numbers are among its words.
+    let (mut variables, mut uses) = (HashSet::new(), HashMap::<u32, HashSet<u32>>::new());
     for (code, own) in instructions(module) {
         match (code, own) {
-            (ENTRY_POINT, [_, _, id, name @ ..]) if is_named(name) => entry = Some(*id),
+            (ENTRY_POINT, [_, _, id, name @ ..]) if is_named(name) => (entry, interface) = (Some(*id), name),
+            (VARIABLE, [_, _, id, ..]) if function.is_none() => drop(variables.insert(*id)),
             (FIRST_TYPE..=LAST_TYPE, [_, id, ..]) => drop(types.insert(*id)),
             (FUNCTION, [_, _, id, ..]) => function = Some(*id),
             _ => {}
@@ -58,6 +64,9 @@ pub(crate) fn excerpt(module: &[u32], entry_point: &str) -> Vec<u32> {
                 calls.entry(function).or_default().push(*called);
             }
         }
+        if let Some(function) = function {
+            uses.entry(function).or_default().extend(own.iter().filter(|word| variables.contains(word)));
+        }
         if code == FUNCTION_END {
             function = None;
         }
@@ -68,6 +77,9 @@ pub(crate) fn excerpt(module: &[u32], entry_point: &str) -> Vec<u32> {
             open.extend(calls.get(&own).into_iter().flatten());
         }
     }
+    let used = needed.iter().filter_map(|function| uses.get(function)).flatten();
+    let used: HashSet<u32> = used.chain(interface).copied().collect();
+    let is_unused = |id: &u32| variables.contains(id) && !used.contains(id);
     let mut excerpt = module.get(..HEADER).unwrap_or_default().to_vec();
     let mut is_needed = true;
     for (code, own) in instructions(module) {
@@ -77,7 +89,10 @@ pub(crate) fn excerpt(module: &[u32], entry_point: &str) -> Vec<u32> {
         let is_kept = match (code, own) {
             (NAME | MEMBER_NAME, _) => false,
             (ENTRY_POINT, [_, _, id, ..]) | (EXECUTION_MODE, [_, id, ..]) => entry == Some(*id),
-            (DECORATE | MEMBER_DECORATE, [_, id, ..]) => place.get(id).is_none_or(|place| needed.contains(place)),
+            (DECORATE | MEMBER_DECORATE, [_, id, ..]) => {
+                !is_unused(id) && place.get(id).is_none_or(|place| needed.contains(place))
+            }
+            (VARIABLE, [_, _, id, ..]) => is_needed && !is_unused(id),
             _ => is_needed,
         };
         if is_kept {
@@ -95,6 +110,8 @@ mod tests {
     use crate::pipelines::{MODULE, SUBGROUPS};
 
     const CAPABILITY: u32 = 17;
+    /// A storage class.
+    const WORKGROUP: u32 = 4;
     /// `Shader` and `VulkanMemoryModel`: Vulkan has the one, a device without the other is refused.
     const OF_ALL: [u32; 2] = [1, 5345];
     /// `GroupNonUniform`, `GroupNonUniformBallot`, `GroupNonUniformShuffle`: asked for in `subgroups::fitting_size`.
@@ -122,6 +139,21 @@ mod tests {
             }
         }
         assert!(seen >= 2 * Kernel::ALL.len());
+    }
+
+    #[test]
+    fn an_excerpt_declares_the_workgroup_memory_of_its_kernel() {
+        let module = words(MODULE);
+        for kernel in Kernel::ALL {
+            for form in kernel.forms().iter().filter(|form| !form.needs_subgroups()) {
+                let own = excerpt(&module, kernel.entry_point(*form));
+                let declared =
+                    |module| instructions(module).filter(|(code, own)| *code == VARIABLE && own[3] == WORKGROUP);
+                let shared = declared(&own).count();
+                assert_eq!(shared > 0, kernel.has_barriers(*form), "{} {}: {shared}", kernel.name(), form.name());
+                assert!(shared < declared(&module).count(), "{} {}", kernel.name(), form.name());
+            }
+        }
     }
 
     #[test]
