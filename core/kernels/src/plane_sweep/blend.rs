@@ -72,9 +72,10 @@ pub fn visibility(
     let (top, bottom, share_y) = split(to_map(y, view.camera.height, view.map_height), view.map_height);
     let first = view.first_disparity as usize;
     let (top, bottom) = (first + top * view.map_width as usize, first + bottom * view.map_width as usize);
+    let density = 0.5 / view.disparity_step;
     let at = |index: usize| {
         let [surface, confidence] = disparities.fetch(index);
-        let behind = max(planes_behind(surface, disparity, 2.0 * view.disparity_step) - 1.0, 0.0);
+        let behind = max(planes_behind(surface, disparity, density) - 1.0, 0.0);
         1.0 - confidence * (1.0 - fade(0.707_106_77 * behind))
     };
     let upper = at(top + left) * (1.0 - share_x) + at(top + right) * share_x;
@@ -116,8 +117,8 @@ pub fn blend(
                     let texel = bilinear_from(texels, first, camera.width, camera.height, seen.x, seen.y);
                     let mut part = view.weight * HIDDEN_SHARE;
                     if seen.in_image {
-                        part +=
-                            view.weight * visibility(view, disparities, seen.x, seen.y, disparity / seen.depth_ratio);
+                        let there = disparity * seen.disparity_ratio;
+                        part += view.weight * visibility(view, disparities, seen.x, seen.y, there);
                         sums.seen_weight += share * view.weight;
                     }
                     if block.has_silhouettes != 0 {

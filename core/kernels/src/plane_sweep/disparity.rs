@@ -1,7 +1,7 @@
 //! A source pixel's disparity: the plane of least cost, and its confidence.
 
 use super::frustum::FrustumBlock;
-use super::{MAX_GROUPS, PLANES, Planes};
+use super::{MAX_GROUPS, MAX_PLANES, PLANES, Planes};
 use viewfuse_core::math::{clamp, exp, max, min};
 
 /// Temperature of the softmax over planes.
@@ -15,32 +15,32 @@ pub const DOUBT_WIDTH: f32 = 0.02;
 
 /// Disparity and confidence in `[0, 1]` of a pixel, from `costs[row][column][group]`. The disparity is that of the plane of
 /// least cost, moved to the vertex of the parabola through it and its neighbours; the confidence is the share of the softmax
-/// within [`NEAR_PLANES`] of it, times a logistic step on the least cost.
+/// within [`NEAR_PLANES`] of it, times a logistic step on the least cost. Of equal costs the farthest plane's is the least. The
+/// softmax is summed over the groups for each place in a group, then over the places.
 #[inline(always)]
 pub fn pick_disparity(frustum: &FrustumBlock, costs: &[Planes], pixel: u32) -> [f32; 2] {
     let groups = frustum.group_count as usize;
     let first = pixel as usize * groups;
     let plane_count = groups * PLANES;
     let cost = |plane: usize| costs[first + plane / PLANES][plane % PLANES];
-    let (mut best, mut least) = (0, f32::MAX);
-    let mut plane = 0;
-    while plane < plane_count {
-        if cost(plane) < least {
-            least = cost(plane);
-            best = plane;
+    let least = least_cost(costs, first, groups);
+    let best = first_plane_of(costs, first, groups, least);
+    let (mut near, mut all) = ([0.0; PLANES], [0.0; PLANES]);
+    let mut group = 0;
+    while group < groups {
+        let own = &costs[first + group];
+        let mut plane = 0;
+        while plane < PLANES {
+            let share = exp((least - own[plane]) * (1.0 / TEMPERATURE));
+            let away = (group * PLANES + plane) as i32 - best as i32;
+            let is_near = (away >= -(NEAR_PLANES as i32)) & (away <= NEAR_PLANES as i32);
+            all[plane] += share;
+            near[plane] += if is_near { share } else { 0.0 };
+            plane += 1;
         }
-        plane += 1;
+        group += 1;
     }
-    let (mut near, mut all) = (0.0, 0.0);
-    let mut plane = 0;
-    while plane < plane_count {
-        let share = exp((least - cost(plane)) * (1.0 / TEMPERATURE));
-        all += share;
-        if plane + NEAR_PLANES >= best && plane <= best + NEAR_PLANES {
-            near += share;
-        }
-        plane += 1;
-    }
+    let (near, all) = (sum(&near), sum(&all));
     let mut offset = 0.0;
     if best > 0 && best + 1 < plane_count {
         let (before, after) = (cost(best - 1), cost(best + 1));
@@ -53,4 +53,62 @@ pub fn pick_disparity(frustum: &FrustumBlock, costs: &[Planes], pixel: u32) -> [
     [max(frustum.disparity(best) + offset * frustum.disparity_step, 0.0), near / all * sure]
 }
 
-const _: () = assert!(MAX_GROUPS * PLANES == super::MAX_PLANES);
+/// The least cost of a pixel's planes.
+#[inline(always)]
+fn least_cost(costs: &[Planes], first: usize, groups: usize) -> f32 {
+    let mut least = [f32::MAX; PLANES];
+    let mut group = 0;
+    while group < groups {
+        let own = &costs[first + group];
+        let mut plane = 0;
+        while plane < PLANES {
+            least[plane] = min(own[plane], least[plane]);
+            plane += 1;
+        }
+        group += 1;
+    }
+    let mut of_all = least[0];
+    let mut plane = 1;
+    while plane < PLANES {
+        of_all = min(least[plane], of_all);
+        plane += 1;
+    }
+    of_all
+}
+
+/// The first of a pixel's planes whose cost is this.
+#[inline(always)]
+fn first_plane_of(costs: &[Planes], first: usize, groups: usize, least: f32) -> usize {
+    let mut found = [MAX_PLANES as i32; PLANES];
+    let mut group = groups;
+    while group > 0 {
+        group -= 1;
+        let own = &costs[first + group];
+        let mut plane = 0;
+        while plane < PLANES {
+            found[plane] = if own[plane] == least { (group * PLANES + plane) as i32 } else { found[plane] };
+            plane += 1;
+        }
+    }
+    let mut of_all = MAX_PLANES as i32;
+    let mut plane = 0;
+    while plane < PLANES {
+        of_all = if found[plane] < of_all { found[plane] } else { of_all };
+        plane += 1;
+    }
+    // Where no cost is a number.
+    if of_all < MAX_PLANES as i32 { of_all as usize } else { 0 }
+}
+
+#[inline(always)]
+fn sum(planes: &Planes) -> f32 {
+    let mut sum = 0.0;
+    let mut plane = 0;
+    while plane < PLANES {
+        sum += planes[plane];
+        plane += 1;
+    }
+    sum
+}
+
+const _: () = assert!(MAX_GROUPS * PLANES == MAX_PLANES);

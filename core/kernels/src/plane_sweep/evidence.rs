@@ -44,11 +44,11 @@ pub struct Evidence {
     pub hull: Planes,
 }
 
-/// How far a point lies behind the surface that a view sees, in planes of the view's own sweep; negative in front of
-/// it.
+/// How far a point lies behind the surface that a view sees, in planes of which `density` fill a unit of disparity; negative in
+/// front of it.
 #[inline(always)]
-pub fn planes_behind(surface: f32, disparity: f32, step: f32) -> f32 {
-    (surface - disparity) / step
+pub fn planes_behind(surface: f32, disparity: f32, density: f32) -> f32 {
+    (surface - disparity) * density
 }
 
 /// The evidence for a group of planes at a pixel. `disparities[view's map][row][column]` are disparity and confidence;
@@ -72,6 +72,7 @@ pub fn evidence(
     while slot < frustum.view_count as usize {
         let view = &views.fetch(slot);
         let track = frustum.track(&view.camera, pixel);
+        let density = 0.5 / view.disparity_step;
         let mut plane = 0;
         while plane < PLANES {
             let disparity = frustum.disparity(group as usize * PLANES + plane);
@@ -94,7 +95,7 @@ pub fn evidence(
                 }
                 if view.disparity_step > 0.0 {
                     let [surface, confidence] = disparities.fetch(view.map_texel(seen.x, seen.y));
-                    let behind = planes_behind(surface, disparity / seen.depth_ratio, 2.0 * view.disparity_step);
+                    let behind = planes_behind(surface, disparity * seen.disparity_ratio, density);
                     let doubt = 1.0 - fade(0.707_106_77 * behind);
                     dissent[plane] += view.weight * confidence * doubt;
                     informed[plane] += view.weight;

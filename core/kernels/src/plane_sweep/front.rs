@@ -61,13 +61,14 @@ pub fn plane_opacity(
         let view = &views.fetch(slot);
         if view.disparity_step > 0.0 {
             let track = frustum.track(&view.camera, pixel);
+            let density = 1.0 / view.disparity_step;
             let mut plane = 0;
             while plane < PLANES {
                 let disparity = frustum.disparity(group as usize * PLANES + plane);
                 let seen = track.at(disparity);
                 if seen.in_image {
                     let [surface, confidence] = disparities.fetch(view.map_texel(seen.x, seen.y));
-                    let behind = planes_behind(surface, disparity / seen.depth_ratio, view.disparity_step);
+                    let behind = planes_behind(surface, disparity * seen.disparity_ratio, density);
                     support[plane] += confidence * fade(0.707_106_77 * behind);
                     let free = max(-behind - FREE_PLANES, 0.0);
                     violation[plane] += confidence * (1.0 - fade(0.707_106_77 * free));

@@ -40,7 +40,7 @@ impl FrustumBlock {
     /// Disparity of a plane.
     #[inline(always)]
     pub fn disparity(&self, plane: usize) -> f32 {
-        self.far_disparity + plane as f32 * self.disparity_step
+        self.far_disparity + plane as i32 as f32 * self.disparity_step
     }
 
     /// The track of a pixel's points in a view: `pixel` is counted row by row in the whole image.
@@ -103,8 +103,8 @@ pub struct Sight {
     pub x: f32,
     /// Image coordinate downwards, in pixels.
     pub y: f32,
-    /// The point's depth in the view over its depth in the frustum.
-    pub depth_ratio: f32,
+    /// The point's disparity in the view over its disparity in the frustum.
+    pub disparity_ratio: f32,
     /// Whether it is in front of the view and inside its image.
     pub in_image: bool,
 }
@@ -130,7 +130,8 @@ impl Track {
         let inverse = 1.0 / max(depth, MIN_DEPTH);
         let x = focal_x * ((self.far.x + self.slope.x * disparity) * inverse) + principal_x;
         let y = focal_y * ((self.far.y + self.slope.y * disparity) * inverse) + principal_y;
-        let in_image = depth > MIN_DEPTH && x >= 0.0 && y >= 0.0 && x <= self.size[0] && y <= self.size[1];
-        Sight { x, y, depth_ratio: max(depth, MIN_DEPTH), in_image }
+        // Without branches, so that a loop over planes can become vectors.
+        let in_image = (depth > MIN_DEPTH) & (x >= 0.0) & (y >= 0.0) & (x <= self.size[0]) & (y <= self.size[1]);
+        Sight { x, y, disparity_ratio: inverse, in_image }
     }
 }

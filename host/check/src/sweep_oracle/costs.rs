@@ -3,7 +3,8 @@
 use super::{BoundedPlanes, exact};
 use crate::bounded::Bounded;
 use viewfuse_kernels::plane_sweep::census::{
-    CENSUS_SHARE, COLOUR_SHARE, CONTRAST, FULL_TEXTURE, MIN_TOLD, OUTSIDE_COST, REACH,
+    CENSUS_SHARE, COLOUR_SHARE, CONTRAST, FULL_TEXTURE, GREY_STEPS, MAX_GREY, MIN_TOLD, OUTSIDE_COST, REACH,
+    WEIGHT_STEPS,
 };
 use viewfuse_kernels::plane_sweep::evidence::ViewPair;
 use viewfuse_kernels::plane_sweep::frustum::FrustumBlock;
@@ -47,24 +48,30 @@ pub fn census_cost(
         .collect();
     let mut costs = [[Bounded::ZERO; PLANES]; 2];
     for plane in 0..PLANES {
-        let grey = |view: u32, at: usize| grey[view as usize * slice + at][plane];
-        let lighter = |view: u32, there: usize| {
-            let contrast = (Bounded::from(grey(view, here)) - grey(view, there).into()) / Bounded::from(CONTRAST);
-            (grey(view, here).min(grey(view, there)) >= 0.0).then(|| contrast.clamped(-1.0, 1.0))
+        // Whole numbers, which `f64` holds exactly.
+        let grey = |view: u32, at: usize| {
+            (f64::from(grey[view as usize * slice + at][plane]) * f64::from(GREY_STEPS)).trunc().min(MAX_GREY.into())
         };
-        let (mut sum, mut count, mut texture) = (Bounded::ZERO, Bounded::ZERO, Bounded::ZERO);
+        let lighter = |view: u32, there: usize| {
+            let most = f64::from(CONTRAST);
+            let difference = (grey(view, here) - grey(view, there)).clamp(-most, most);
+            (grey(view, here).min(grey(view, there)) >= 0.0).then_some(difference)
+        };
+        let (mut sum, mut count, mut texture) = (0.0, 0.0, 0.0);
         for there in &around {
             for pair in pairs {
                 let (Some(a), Some(b)) = (lighter(pair.first, *there), lighter(pair.second, *there)) else { continue };
-                let share = Bounded::from(pair.weight);
-                sum = sum + share * (a - b).magnitude().lesser(Bounded::ONE);
-                texture = texture + share * a.magnitude().greater(b.magnitude());
-                count = count + share;
+                let share = (f64::from(pair.weight) * f64::from(WEIGHT_STEPS)).trunc();
+                sum += share * (a - b).abs().min(CONTRAST.into());
+                texture += share * a.abs().max(b.abs());
+                count += share;
             }
         }
-        let count = count.greater(1.0e-6.into());
+        // Below 2^24, so exact in `f32`.
+        let [sum, texture, count] = [sum, texture, count.max(1.0)].map(|sum: f64| Bounded::from(sum as f32));
+        let all = count * Bounded::from(CONTRAST);
         let evidence = [0, 1, 2, 3].map(|part| evidence[4 * here + part][plane]);
-        [costs[0][plane], costs[1][plane]] = cost(frustum, evidence, sum / count, texture / count);
+        [costs[0][plane], costs[1][plane]] = cost(frustum, evidence, sum / all, texture / all);
     }
     costs
 }

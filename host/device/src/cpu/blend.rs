@@ -182,10 +182,11 @@ impl Blending<'_> {
                 [surfaces[node][lane], visible[node][lane]] = nodes[node];
             }
         }
+        let density = 0.5 / view.disparity_step;
         for node in 0..4 {
             for lane in 0..LANES {
-                let disparity = disparities[lane] / points.depth_ratio[lane];
-                let behind = max(planes_behind(surfaces[node][lane], disparity, 2.0 * view.disparity_step) - 1.0, 0.0);
+                let disparity = disparities[lane] * points.disparity_ratio[lane];
+                let behind = max(planes_behind(surfaces[node][lane], disparity, density) - 1.0, 0.0);
                 visible[node][lane] = 1.0 - visible[node][lane] * (1.0 - fade(0.707_106_77 * behind));
             }
         }

@@ -1,12 +1,23 @@
-//! The census of a plane sweep, in vectors of planes. The sums are those of the body, in their order, so the results are the same
-//! bits. Most pixels are seen by all views, in all planes of a group: then no pair needs to ask who sees what.
+//! The census of a plane sweep, in 16-bit integers: a group of planes is a vector. The body's numbers are whole, and their sums exact
+//! in any order, so the results are the same bits. Here each pair sums up the window by itself, and its weight multiplies the sum.
+//! Most pixels are seen by all views, in all planes of a group: then no pair needs to ask who sees what.
 
+use super::tracks::whole;
 use crate::parallel::for_each_row;
 use pulp::{Arch, Simd, WithSimd};
-use viewfuse_kernels::plane_sweep::census::{CONTRAST, REACH, cost_of_sums};
+use viewfuse_core::math::{max, min};
+use viewfuse_kernels::plane_sweep::census::{
+    CONTRAST, GREY_STEPS, HALF_WINDOW, MAX_GREY, REACH, cost_of_sums, weight_steps,
+};
 use viewfuse_kernels::plane_sweep::evidence::ViewPair;
 use viewfuse_kernels::plane_sweep::frustum::FrustumBlock;
 use viewfuse_kernels::plane_sweep::{MAX_MATCHED, PLANES, Planes};
+
+/// A whole number of each plane of a group: a grey, a difference, or a mask whose bits are all 1 or all 0.
+type Whole = [i16; PLANES];
+
+const MOST: i16 = CONTRAST as i16;
+const ALL: i16 = -1;
 
 pub(super) fn census_cost(
     block: &FrustumBlock,
@@ -39,93 +50,156 @@ impl WithSimd for Census<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
+    fn with_simd<S: Simd>(self, _: S) {
         let Census { block, pairs, grey, evidence, row, costs } = self;
         let (width, groups) = (block.camera.width as usize, block.group_count as usize);
         let row_len = width * groups;
-        let slice = block.row_count as usize * row_len;
-        let view_count = block.view_count as usize;
         let reach = REACH as usize;
-        // Of the rows of the window's first half, the groups of planes that all views see.
+        // The rows of the window's first half.
         let first_row = row.saturating_sub(reach);
-        let seen: Vec<bool> = (first_row * row_len..(row + 1) * row_len)
-            .map(|at| (0..view_count).all(|slot| is_seen(&grey[slot * slice + at])))
-            .collect();
+        let seen = Greys::new(block, grey, first_row * row_len..(row + 1) * row_len);
+        let mut window = Window::new();
         for column in 0..width {
             // The half of the window before the pixel, as in the body.
-            let mut before = [0; 12];
+            let mut before = [0; HALF_WINDOW];
             let mut count = 0;
-            for offset in 0..12 {
+            for offset in 0..HALF_WINDOW {
                 let (x, y) = ((column + offset % 5).checked_sub(reach), (row + offset / 5).checked_sub(reach));
                 if let (Some(x), Some(y)) = (x.filter(|x| *x < width), y) {
-                    before[count] = (y * width + x) * groups;
+                    before[count] = ((y - first_row) * width + x) * groups;
                     count += 1;
                 }
             }
             for group in 0..groups {
-                let here = (row * width + column) * groups + group;
-                let mut sums = [[0.0; PLANES]; 3];
-                for first in before[..count].iter().map(|first| first + group) {
-                    let all_seen = seen[here - first_row * row_len] && seen[first - first_row * row_len];
-                    let of = |slot: usize| [&grey[slot * slice + here], &grey[slot * slice + first]];
-                    add_census(simd, pairs, view_count, of, all_seen, &mut sums);
-                }
+                let here = (row - first_row) * row_len + column * groups + group;
+                window.compare(&seen, here, before[..count].iter().map(|first| first + group));
                 let at = 2 * (column * groups + group);
-                costs[at..at + 2].copy_from_slice(&cost_of_sums(block, evidence, here, &sums));
+                let sums = window.sums(pairs, count);
+                costs[at..at + 2].copy_from_slice(&cost_of_sums(block, evidence, first_row * row_len + here, &sums));
             }
         }
     }
 }
 
-#[inline(always)]
-fn is_seen(grey: &Planes) -> bool {
-    grey.iter().fold(true, |seen, grey| seen & (*grey >= 0.0))
+/// The greys of some rows in steps, the views of a group beside each other.
+struct Greys {
+    view_count: usize,
+    steps: Vec<Whole>,
+    /// Whether all views see all planes of a group.
+    are_all_seen: Vec<bool>,
 }
 
-/// Adds the pairs' comparisons of a pixel with one of its window to `[difference, weight, contrast]`; `of` gives a view's grey at
-/// both. Where all views see both the weights need no products: 1 times 1 times a weight is the weight.
+impl Greys {
+    #[inline(always)]
+    fn new(block: &FrustumBlock, grey: &[Planes], rows: std::ops::Range<usize>) -> Greys {
+        let view_count = block.view_count as usize;
+        let slice = (block.row_count * block.camera.width * block.group_count) as usize;
+        let mut steps = Vec::with_capacity(rows.len() * view_count);
+        let mut are_all_seen = Vec::with_capacity(rows.len());
+        for at in rows {
+            let mut least = [0; PLANES];
+            for slot in 0..view_count {
+                let greys = grey[slot * slice + at].map(grey_steps);
+                for plane in 0..PLANES {
+                    least[plane] = least[plane].min(greys[plane]);
+                }
+                steps.push(greys);
+            }
+            are_all_seen.push(least.iter().fold(true, |seen, least| seen & (*least >= 0)));
+        }
+        Greys { view_count, steps, are_all_seen }
+    }
+
+    /// A group's greys, a view after the other.
+    #[inline(always)]
+    fn of(&self, at: usize) -> &[Whole] {
+        &self.steps[at * self.view_count..][..self.view_count]
+    }
+}
+
+/// A grey in steps, as the body's. Where the view does not see the point it is some negative number, which no sum takes.
 #[inline(always)]
-fn add_census<'a, S: Simd>(
-    simd: S,
-    pairs: &[ViewPair],
-    view_count: usize,
-    of: impl Fn(usize) -> [&'a Planes; 2],
-    all_seen: bool,
-    sums: &mut [Planes; 3],
-) {
-    let [difference, weight, contrast] = sums;
-    let (differences, _) = S::as_mut_simd_f32s(difference);
-    let (weights, _) = S::as_mut_simd_f32s(weight);
-    let (contrasts, _) = S::as_mut_simd_f32s(contrast);
-    let (zero, one, minus) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0), simd.splat_f32s(-1.0));
-    let scale = simd.splat_f32s(1.0 / CONTRAST);
-    for lane in 0..differences.len() {
-        let mut lighter = [zero; MAX_MATCHED];
-        let mut strength = [zero; MAX_MATCHED];
-        let mut valid = [one; MAX_MATCHED];
-        for slot in 0..view_count {
-            let [own, other] = of(slot);
-            let (own, other) = (S::as_simd_f32s(own).0[lane], S::as_simd_f32s(other).0[lane]);
-            let steps = simd.mul_f32s(simd.sub_f32s(own, other), scale);
-            lighter[slot] = simd.min_f32s(simd.max_f32s(steps, minus), one);
-            strength[slot] = simd.abs_f32s(lighter[slot]);
-            if !all_seen {
-                let both = simd.greater_than_or_equal_f32s(simd.min_f32s(own, other), zero);
-                valid[slot] = simd.select_f32s(both, one, zero);
+fn grey_steps(grey: f32) -> i16 {
+    whole(max(min(grey * GREY_STEPS, MAX_GREY), -1.0)) as i16
+}
+
+/// A pixel of each view beside those of its window's first half.
+struct Window {
+    /// How much lighter the pixel is.
+    lighter: [[Whole; HALF_WINDOW]; MAX_MATCHED],
+    /// Where the view sees both.
+    valid: [[Whole; HALF_WINDOW]; MAX_MATCHED],
+    are_all_seen: bool,
+}
+
+impl Window {
+    fn new() -> Window {
+        let none = [[[0; PLANES]; HALF_WINDOW]; MAX_MATCHED];
+        Window { lighter: none, valid: none, are_all_seen: false }
+    }
+
+    /// A group at a place, and at the places around it.
+    #[inline(always)]
+    fn compare(&mut self, greys: &Greys, here: usize, around: impl Iterator<Item = usize>) {
+        let own = greys.of(here);
+        self.are_all_seen = greys.are_all_seen[here];
+        for (index, there) in around.enumerate() {
+            self.are_all_seen &= greys.are_all_seen[there];
+            for (slot, (own, other)) in own.iter().zip(greys.of(there)).enumerate() {
+                let (lighter, valid) = (&mut self.lighter[slot][index], &mut self.valid[slot][index]);
+                for plane in 0..PLANES {
+                    lighter[plane] = (own[plane] - other[plane]).clamp(-MOST, MOST);
+                    valid[plane] = if own[plane].min(other[plane]) >= 0 { ALL } else { 0 };
+                }
             }
         }
-        let (mut sum, mut count, mut texture) = (differences[lane], weights[lane], contrasts[lane]);
+    }
+
+    /// The pairs' sums over so many places: difference, weight, contrast.
+    #[inline(always)]
+    fn sums(&self, pairs: &[ViewPair], count: usize) -> [Planes; 3] {
+        let mut sums = [[0.0; PLANES]; 3];
         for pair in pairs {
             let (a, b) = (pair.first as usize % MAX_MATCHED, pair.second as usize % MAX_MATCHED);
-            let mut seen = simd.splat_f32s(pair.weight);
-            if !all_seen {
-                seen = simd.mul_f32s(simd.mul_f32s(valid[a], valid[b]), seen);
+            let of_pair = if self.are_all_seen { self.of_seen_pair(a, b, count) } else { self.of_pair(a, b, count) };
+            let weight = weight_steps(pair) as f32;
+            for (sum, of_pair) in sums.iter_mut().zip(&of_pair) {
+                for plane in 0..PLANES {
+                    sum[plane] += weight * f32::from(of_pair[plane]);
+                }
             }
-            let apart = simd.min_f32s(simd.abs_f32s(simd.sub_f32s(lighter[a], lighter[b])), one);
-            sum = simd.add_f32s(sum, simd.mul_f32s(seen, apart));
-            count = simd.add_f32s(count, seen);
-            texture = simd.add_f32s(texture, simd.mul_f32s(seen, simd.max_f32s(strength[a], strength[b])));
         }
-        (differences[lane], weights[lane], contrasts[lane]) = (sum, count, texture);
+        sums
+    }
+
+    /// A pair's sums over so many places, without its weight.
+    #[inline(always)]
+    fn of_pair(&self, a: usize, b: usize, count: usize) -> [Whole; 3] {
+        let (mut difference, mut seen, mut contrast) = ([0; PLANES], [0; PLANES], [0; PLANES]);
+        for index in 0..count {
+            let (first, second) = (&self.lighter[a][index], &self.lighter[b][index]);
+            let (first_valid, second_valid) = (&self.valid[a][index], &self.valid[b][index]);
+            for plane in 0..PLANES {
+                let valid = first_valid[plane] & second_valid[plane];
+                difference[plane] += (first[plane] - second[plane]).abs().min(MOST) & valid;
+                seen[plane] -= valid;
+                contrast[plane] += first[plane].abs().max(second[plane].abs()) & valid;
+            }
+        }
+        [difference, seen, contrast]
+    }
+
+    /// The same where all views see all.
+    #[inline(always)]
+    fn of_seen_pair(&self, a: usize, b: usize, count: usize) -> [Whole; 3] {
+        let (mut difference, mut contrast) = ([0; PLANES], [0; PLANES]);
+        for index in 0..count {
+            let (first, second) = (&self.lighter[a][index], &self.lighter[b][index]);
+            for plane in 0..PLANES {
+                difference[plane] += (first[plane] - second[plane]).abs().min(MOST);
+                contrast[plane] += first[plane].abs().max(second[plane].abs());
+            }
+        }
+        [difference, [count as i16; PLANES], contrast]
     }
 }

@@ -162,9 +162,10 @@ impl Comparison<'_> {
     #[inline(always)]
     fn add_dissent(&self, view: &SweptView, planes: &Planes, points: &Points<PLANES>, sums: &mut Sums) {
         let (surfaces, confidences) = surfaces(view, self.disparities, points);
+        let density = 0.5 / view.disparity_step;
         for plane in 0..PLANES {
-            let disparity = planes[plane] / points.depth_ratio[plane];
-            let behind = planes_behind(surfaces[plane], disparity, 2.0 * view.disparity_step);
+            let disparity = planes[plane] * points.disparity_ratio[plane];
+            let behind = planes_behind(surfaces[plane], disparity, density);
             let doubt = 1.0 - fade(0.707_106_77 * behind);
             sums.dissent[plane] += view.weight * confidences[plane] * doubt;
             sums.informed[plane] += view.weight * points.in_image[plane];
@@ -180,8 +181,10 @@ impl Comparison<'_> {
             let (first, second) = (pair.first as usize, pair.second as usize);
             let (a, b) = (&sums.colours[first], &sums.colours[second]);
             let (grey_a, grey_b) = (&sums.grey[first], &sums.grey[second]);
+            // Read once: a load under a condition would keep the loop from becoming vectors.
+            let both_weight = pair.weight;
             for plane in 0..PLANES {
-                let seen = if min(grey_a[plane], grey_b[plane]) >= 0.0 { pair.weight } else { 0.0 };
+                let seen = if min(grey_a[plane], grey_b[plane]) >= 0.0 { both_weight } else { 0.0 };
                 let sum =
                     abs(a[0][plane] - b[0][plane]) + abs(a[1][plane] - b[1][plane]) + abs(a[2][plane] - b[2][plane]);
                 difference[plane] += seen * min(sum * (1.0 / 3.0), MAX_DIFFERENCE);
@@ -284,6 +287,7 @@ impl WithSimd for Opaque<'_> {
             let (mut support, mut violation) = ([[0.0; PLANES]; MAX_GROUPS], [[0.0; PLANES]; MAX_GROUPS]);
             for view in views.iter().filter(|view| view.disparity_step > 0.0) {
                 let track = block.track(&view.camera, pixel as u32);
+                let density = 1.0 / view.disparity_step;
                 for group in 0..groups.len() {
                     let planes = planes(block, group);
                     let points = Points::new(&track, &planes);
@@ -292,8 +296,8 @@ impl WithSimd for Opaque<'_> {
                     }
                     let (surfaces, confidences) = surfaces(view, disparities, &points);
                     for plane in 0..PLANES {
-                        let disparity = planes[plane] / points.depth_ratio[plane];
-                        let behind = planes_behind(surfaces[plane], disparity, view.disparity_step);
+                        let disparity = planes[plane] * points.disparity_ratio[plane];
+                        let behind = planes_behind(surfaces[plane], disparity, density);
                         support[group][plane] += confidences[plane] * fade(0.707_106_77 * behind);
                         let free = max(-behind - FREE_PLANES, 0.0);
                         violation[group][plane] += confidences[plane] * (1.0 - fade(0.707_106_77 * free));

@@ -9,7 +9,7 @@ use viewfuse_kernels::plane_sweep::frustum::{SweptView, Track};
 pub(super) struct Points<const N: usize> {
     pub(super) x: [f32; N],
     pub(super) y: [f32; N],
-    pub(super) depth_ratio: [f32; N],
+    pub(super) disparity_ratio: [f32; N],
     /// 1 where the point is in the image, 0 elsewhere.
     pub(super) in_image: [f32; N],
 }
@@ -18,12 +18,12 @@ impl<const N: usize> Points<N> {
     /// The points of these disparities.
     #[inline(always)]
     pub(super) fn new(track: &Track, disparities: &[f32; N]) -> Points<N> {
-        let mut points = Points { x: [0.0; N], y: [0.0; N], depth_ratio: [0.0; N], in_image: [0.0; N] };
+        let mut points = Points { x: [0.0; N], y: [0.0; N], disparity_ratio: [0.0; N], in_image: [0.0; N] };
         for plane in 0..N {
             let seen = track.at(disparities[plane]);
             points.x[plane] = seen.x;
             points.y[plane] = seen.y;
-            points.depth_ratio[plane] = seen.depth_ratio;
+            points.disparity_ratio[plane] = seen.disparity_ratio;
             points.in_image[plane] = if seen.in_image { 1.0 } else { 0.0 };
         }
         points
@@ -106,8 +106,8 @@ pub(super) fn map<'a>(view: &SweptView, disparities: &'a [[f32; 2]]) -> &'a [[f3
     &disparities[view.first_disparity as usize..][..(view.map_width * view.map_height) as usize]
 }
 
-/// The whole part of a coordinate in an image, from 0 to 2^22. A cast, which saturates and knows NaN, would leave the vectors and
-/// convert one number after the other: that took a third of the time of opacities.
+/// The whole part of a number from 0 to 2^22, such as a coordinate in an image; for -1 a negative number. A cast, which saturates and
+/// knows NaN, would leave the vectors and convert one number after the other: that took a third of the time of opacities.
 #[inline(always)]
 pub(super) fn whole(at: f32) -> i32 {
     // From here on floats are 1 apart: a sum is rounded to a whole number, and its bits count up from these.

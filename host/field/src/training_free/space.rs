@@ -70,10 +70,11 @@ fn in_frustum(points: &[Vec3], camera: &CameraBlock) -> Option<[f32; 2]> {
     if depths.len() < MIN_POINTS {
         return None;
     }
-    depths.sort_by(f32::total_cmp);
-    let at = |share: f64| depths[((depths.len() - 1) as f64 * share).round() as usize];
-    let [near, far] = [MARGINS[0] * at(PERCENTILES[0]), MARGINS[1] * at(PERCENTILES[1])];
-    Some([1.0 / far, 1.0 / near])
+    let [near, far] = PERCENTILES.map(|share| {
+        let place = ((depths.len() - 1) as f64 * share).round() as usize;
+        *depths.select_nth_unstable_by(place, f32::total_cmp).1
+    });
+    Some([1.0 / (MARGINS[1] * far), 1.0 / (MARGINS[0] * near)])
 }
 
 /// The disparities of the ball that all cameras see, around the point that they look at.

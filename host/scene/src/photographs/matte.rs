@@ -159,6 +159,7 @@ pub(super) fn premultiplied(photograph: &Photograph, border: Option<&Border>, ba
 }
 
 /// A pixel as premultiplied RGBA.
+#[inline(always)]
 pub(super) fn premultiplied_by_alpha(pixel: [u8; 4]) -> [f32; 4] {
     let [r, g, b, alpha] = pixel.map(|level| f32::from(level) / 255.0);
     [r * alpha, g * alpha, b * alpha, alpha]

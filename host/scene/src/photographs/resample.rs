@@ -3,6 +3,7 @@
 
 use crate::Photograph;
 use image::{GrayImage, Luma, Rgba, RgbaImage};
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Weight of a transparent pixel's colour beside opaque ones' 255. What a mask hides is kept: a scene can be used without its
@@ -17,33 +18,9 @@ pub(super) fn reduced(photograph: &Photograph, (width, height): (u32, u32)) -> P
     let stride = 4 * own_width as usize;
     let bytes = photograph.pixels.as_raw();
     let mut averaged = vec![[0_u8; 4]; width as usize * height as usize];
-    let new_line = || vec![0.0_f32; stride];
+    let (arch, new_line) = (Arch::new(), || vec![0.0_f32; stride]);
     averaged.par_chunks_mut(width as usize).zip(&rows).for_each_init(new_line, |line, (output, row)| {
-        // Vertically first, in whole lines, then horizontally: most of the work is one loop over bytes.
-        line.fill(0.0);
-        for (y, share) in row {
-            let source = &bytes[y * stride..(y + 1) * stride];
-            if photograph.has_alpha {
-                add_weighted(line, source, *share);
-            } else {
-                line.iter_mut().zip(source).for_each(|(sum, byte)| *sum += share * f32::from(*byte));
-            }
-        }
-        for (pixel, column) in output.iter_mut().zip(&columns) {
-            let mut sums = [0.0_f32; 4];
-            for (x, share) in column {
-                sums.iter_mut().zip(&line[4 * x..]).for_each(|(sum, value)| *sum += share * value);
-            }
-            let level = |value: f32| (value + 0.5) as u8;
-            let [r, g, b, weight] = sums;
-            *pixel = match photograph.has_alpha {
-                false => [level(r), level(g), level(b), u8::MAX],
-                true => {
-                    let alpha = level(weight - TRANSPARENT_WEIGHT);
-                    [level(r / weight), level(g / weight), level(b / weight), alpha]
-                }
-            };
-        }
+        arch.dispatch(Reduced { bytes, has_alpha: photograph.has_alpha, row, columns: &columns, line, output });
     });
     let at = |x: u32, y: u32| averaged[(y * width + x) as usize];
     let pixels = RgbaImage::from_fn(width, height, |x, y| Rgba(at(x, y)));
@@ -62,7 +39,60 @@ pub(super) fn seen(own: &GrayImage, (width, height): (u32, u32)) -> GrayImage {
     GrayImage::from_fn(width, height, |x, y| Luma([if is_seen(x, y) { u8::MAX } else { 0 }]))
 }
 
+/// A line of a photograph at a smaller size.
+struct Reduced<'a> {
+    bytes: &'a [u8],
+    has_alpha: bool,
+    row: &'a [(usize, f32)],
+    columns: &'a [Vec<(usize, f32)>],
+    /// The mean of the lines that it covers, at full width.
+    line: &'a mut [f32],
+    output: &'a mut [[u8; 4]],
+}
+
+impl WithSimd for Reduced<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Reduced { bytes, has_alpha, row, columns, line, output } = self;
+        let stride = line.len();
+        // Vertically first, in whole lines, then horizontally: most of the work is one loop over bytes.
+        line.fill(0.0);
+        for (y, share) in row {
+            let source = &bytes[y * stride..(y + 1) * stride];
+            if has_alpha {
+                add_weighted(line, source, *share);
+            } else {
+                line.iter_mut().zip(source).for_each(|(sum, byte)| *sum += share * f32::from(*byte));
+            }
+        }
+        for (pixel, column) in output.iter_mut().zip(columns) {
+            *pixel = mean(line, column, has_alpha);
+        }
+    }
+}
+
+/// The pixel whose column covers these parts of a line: the line's colours, or with alpha their sums and weights.
+#[inline(always)]
+fn mean(line: &[f32], column: &[(usize, f32)], has_alpha: bool) -> [u8; 4] {
+    let mut sums = [0.0_f32; 4];
+    for (x, share) in column {
+        sums.iter_mut().zip(&line[4 * x..]).for_each(|(sum, value)| *sum += share * value);
+    }
+    let level = |value: f32| (value + 0.5) as u8;
+    let [r, g, b, weight] = sums;
+    match has_alpha {
+        false => [level(r), level(g), level(b), u8::MAX],
+        true => {
+            let alpha = level(weight - TRANSPARENT_WEIGHT);
+            [level(r / weight), level(g / weight), level(b / weight), alpha]
+        }
+    }
+}
+
 /// Adds a line of pixels, their colours multiplied by alpha (of 255) and [`TRANSPARENT_WEIGHT`], and these weights.
+#[inline(always)]
 fn add_weighted(line: &mut [f32], source: &[u8], share: f32) {
     for (sum, pixel) in line.as_chunks_mut::<4>().0.iter_mut().zip(source.as_chunks::<4>().0) {
         let weight = share * (f32::from(pixel[3]) + TRANSPARENT_WEIGHT);
@@ -91,19 +121,48 @@ pub(super) fn area_average_of(
     let rows = spans(own_size[1], size[1]);
     let own_width = own_size[0] as usize;
     let mut averaged = vec![[0.0; 4]; (size[0] * size[1]) as usize];
-    averaged.par_chunks_mut(size[0] as usize).zip(&rows).for_each(|(output, row)| {
-        for (mean, column) in output.iter_mut().zip(&columns) {
-            for (y, share_y) in row {
-                for (x, share_x) in column {
-                    let share = share_x * share_y;
-                    for (sum, value) in mean.iter_mut().zip(texel(y * own_width + x)) {
-                        *sum += share * value;
-                    }
-                }
-            }
-        }
+    let (arch, new_line) = (Arch::new(), || vec![[0.0; 4]; own_width]);
+    averaged.par_chunks_mut(size[0] as usize).zip(&rows).for_each_init(new_line, |line, (output, row)| {
+        arch.dispatch(Averaged { texel: &texel, row, columns: &columns, line, output });
     });
     averaged
+}
+
+/// A line of averaged texels.
+struct Averaged<'a, F: Fn(usize) -> [f32; 4]> {
+    texel: &'a F,
+    row: &'a [(usize, f32)],
+    columns: &'a [Vec<(usize, f32)>],
+    /// The mean of the lines that it covers, at full width.
+    line: &'a mut [[f32; 4]],
+    output: &'a mut [[f32; 4]],
+}
+
+impl<F: Fn(usize) -> [f32; 4]> WithSimd for Averaged<'_, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Averaged { texel, row, columns, line, output } = self;
+        // Vertically first, in whole lines, then horizontally.
+        line.fill([0.0; 4]);
+        for (y, share) in row {
+            let first = y * line.len();
+            for (x, sums) in line.iter_mut().enumerate() {
+                add(sums, *share, texel(first + x));
+            }
+        }
+        for (mean, column) in output.iter_mut().zip(columns) {
+            for (x, share) in column {
+                add(mean, *share, line[*x]);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn add(sums: &mut [f32; 4], share: f32, texel: [f32; 4]) {
+    sums.iter_mut().zip(texel).for_each(|(sum, value)| *sum += share * value);
 }
 
 /// For each output pixel along an axis, the input pixels that it covers with their shares, which sum to 1.

@@ -5,6 +5,7 @@
 //! marked as not seen.
 
 use image::{GrayImage, RgbaImage};
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use viewfuse_core::camera::Pinhole;
 use viewfuse_core::lens::{Lens, Projection, distort};
@@ -25,25 +26,60 @@ pub(super) fn undistorted(photograph: &Photograph, lens: &Lens, pinhole: &Pinhol
     let is_fisheye = lens.projection() == Projection::Fisheye;
 
     let texels = photograph.pixels.as_raw().as_chunks::<4>().0;
-    let between = |corners: &Corners| match photograph.has_alpha {
-        true => corners.premultiplied(texels),
-        false => corners.plain(texels),
-    };
     let mut pixels = RgbaImage::new(width, height);
     let mut seen = GrayImage::new(width, height);
     let lines = pixels.par_chunks_mut(4 * width as usize).zip(seen.par_chunks_mut(width as usize));
-    let new_places = || vec![[0; 2]; width as usize];
-    lines.enumerate().for_each_init(new_places, |places, (row, (line, seen))| {
-        match is_fisheye {
-            true => mapping.row::<true>(row as u32, places, seen),
-            false => mapping.row::<false>(row as u32, places, seen),
-        }
-        for (pixel, place) in line.as_chunks_mut::<4>().0.iter_mut().zip(places) {
-            *pixel = between(&Corners::around(*place, [width, height]));
-        }
+    let arch = Arch::new();
+    lines.enumerate().for_each(|(row, (line, seen))| {
+        let (mapping, pixels, has_alpha) = (&mapping, line.as_chunks_mut().0, photograph.has_alpha);
+        arch.dispatch(Line { texels, has_alpha, mapping, is_fisheye, row: row as u32, pixels, seen });
     });
     let all_seen = seen.as_raw().iter().all(|seen| *seen > 0);
     Photograph { pixels, has_alpha: photograph.has_alpha, seen: (!all_seen).then_some(seen) }
+}
+
+/// A line of the result.
+struct Line<'a> {
+    texels: &'a [[u8; 4]],
+    has_alpha: bool,
+    mapping: &'a Mapping,
+    is_fisheye: bool,
+    row: u32,
+    pixels: &'a mut [[u8; 4]],
+    seen: &'a mut [u8],
+}
+
+impl WithSimd for Line<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Line { texels, has_alpha, mapping, is_fisheye, row, pixels, seen } = self;
+        let mut corners = Corners::NONE;
+        for (part, (pixels, seen)) in (0_u32..).zip(pixels.chunks_mut(PART).zip(seen.chunks_mut(PART))) {
+            let first = part * PART as u32;
+            let places = match is_fisheye {
+                true => mapping.places::<true>(first, row, seen),
+                false => mapping.places::<false>(first, row, seen),
+            };
+            corners.surround(&places, mapping.size);
+            for (index, pixel) in pixels.iter_mut().enumerate() {
+                *pixel = match has_alpha {
+                    true => corners.premultiplied(index, texels),
+                    false => corners.plain(index, texels),
+                };
+            }
+        }
+    }
+}
+
+/// Pixels of a line that are mapped at once, in vectors, before their texels are read one by one.
+const PART: usize = 64;
+
+/// Places in the photograph, a coordinate as by [`fixed`].
+struct Places {
+    x: [u32; PART],
+    y: [u32; PART],
 }
 
 /// From the pixels of the result to places in the photograph.
@@ -63,18 +99,25 @@ impl Mapping {
         [(x - self.principal[0]) / self.focal[0], (y - self.principal[1]) / self.focal[1]]
     }
 
-    /// The places of a row's pixels, and whether the photograph shows them: 255 or 0. A loop without branches, which becomes vectors.
-    fn row<const FISHEYE: bool>(&self, row: u32, places: &mut [[u32; 2]], seen: &mut [u8]) {
+    /// The places of so many pixels of a row, and whether the photograph shows them: 255 or 0; some pixels behind the last one of the
+    /// row are mapped as well. A loop without branches, which becomes vectors.
+    #[inline(always)]
+    fn places<const FISHEYE: bool>(&self, first: u32, row: u32, seen: &mut [u8]) -> Places {
         let [width, height] = self.size;
-        for (column, (place, seen)) in (0_u32..).zip(places.iter_mut().zip(seen)) {
+        let mut places = Places { x: [0; PART], y: [0; PART] };
+        let mut are_seen = [0; PART];
+        for (index, is_seen) in are_seen.iter_mut().enumerate() {
+            let column = (first + index as u32) as i32;
             let ideal = self.ideal(f64::from(column) + 0.5, f64::from(row) + 0.5);
             let [x, y] = distort(FISHEYE, &self.coefficients, ideal);
             let (x, y) = (x * self.focal[0] + self.principal[0], y * self.focal[1] + self.principal[1]);
             let inside = (x >= 0.0) & (y >= 0.0) & (x <= f64::from(width)) & (y <= f64::from(height));
-            let is_seen = inside & (ideal[0] * ideal[0] + ideal[1] * ideal[1] <= self.reach * self.reach);
-            *place = [fixed(x, width), fixed(y, height)];
-            *seen = 0_u8.wrapping_sub(u8::from(is_seen));
+            let before_fold = ideal[0] * ideal[0] + ideal[1] * ideal[1] <= self.reach * self.reach;
+            (places.x[index], places.y[index]) = (fixed(x, width), fixed(y, height));
+            *is_seen = 0_u8.wrapping_sub(u8::from(inside & before_fold));
         }
+        seen.copy_from_slice(&are_seen[..seen.len()]);
+        places
     }
 }
 
@@ -91,43 +134,60 @@ fn fixed(at: f64, side: u32) -> u32 {
     (place * f64::from(1 << FRACTION_BITS) + 4_503_599_627_370_496.0).to_bits() as u32
 }
 
-/// The four pixels nearest to a point, and their shares, which sum to 1.
+/// The four pixels nearest to each of some places: the upper left one, steps to its neighbours, and the shares of these.
 struct Corners {
-    places: [usize; 4],
-    shares: [f32; 4],
+    upper: [u32; PART],
+    right: [u32; PART],
+    down: [u32; PART],
+    across: [f32; PART],
+    below: [f32; PART],
 }
 
 impl Corners {
-    /// Of a place as by [`fixed`].
+    const NONE: Corners =
+        Corners { upper: [0; PART], right: [0; PART], down: [0; PART], across: [0.0; PART], below: [0.0; PART] };
+
     #[inline(always)]
-    fn around(place: [u32; 2], [width, height]: [u32; 2]) -> Corners {
-        let split = |place: u32, side: u32| {
-            let (first, rest) = (place >> FRACTION_BITS, place & ((1 << FRACTION_BITS) - 1));
-            (first as usize, (first + 1).min(side - 1) as usize, rest as i32 as f32 / (1 << FRACTION_BITS) as f32)
-        };
-        let ((left, right, across), (top, bottom, below)) = (split(place[0], width), split(place[1], height));
-        let (top, bottom) = (top * width as usize, bottom * width as usize);
-        Corners {
-            places: [top + left, top + right, bottom + left, bottom + right],
-            shares: [(1.0 - across) * (1.0 - below), across * (1.0 - below), (1.0 - across) * below, across * below],
+    fn surround(&mut self, places: &Places, [width, height]: [u32; 2]) {
+        let share = |place: u32| (place & ((1 << FRACTION_BITS) - 1)) as i32 as f32 / (1 << FRACTION_BITS) as f32;
+        for index in 0..PART {
+            let (x, y) = (places.x[index], places.y[index]);
+            let (column, row) = (x >> FRACTION_BITS, y >> FRACTION_BITS);
+            self.upper[index] = row * width + column;
+            self.right[index] = if column + 1 < width { 1 } else { 0 };
+            self.down[index] = if row + 1 < height { width } else { 0 };
+            (self.across[index], self.below[index]) = (share(x), share(y));
         }
+    }
+
+    /// The four pixels of a place, and their shares, which sum to 1.
+    #[inline(always)]
+    fn of(&self, index: usize, texels: &[[u8; 4]]) -> [([u8; 4], f32); 4] {
+        let (upper, right, down) = (self.upper[index], self.right[index], self.down[index]);
+        let (across, below) = (self.across[index], self.below[index]);
+        [
+            (texels[upper as usize], (1.0 - across) * (1.0 - below)),
+            (texels[(upper + right) as usize], across * (1.0 - below)),
+            (texels[(upper + down) as usize], (1.0 - across) * below),
+            (texels[(upper + down + right) as usize], across * below),
+        ]
     }
 
     /// The mean of opaque pixels.
     #[inline(always)]
-    fn plain(&self, texels: &[[u8; 4]]) -> [u8; 4] {
+    fn plain(&self, index: usize, texels: &[[u8; 4]]) -> [u8; 4] {
         // The last bits of a sum with 2^23 are the nearest integer.
         let mut sums = [0.0_f32; 4];
-        for (place, share) in self.places.iter().zip(self.shares) {
-            let texel = texels[*place];
+        for (texel, share) in self.of(index, texels) {
             (0..4).for_each(|channel| sums[channel] += share * f32::from(texel[channel]));
         }
         sums.map(|sum| (sum + 8_388_608.0).to_bits() as u8)
     }
 
     /// The mean, colours weighted by alpha; where all is transparent, without it.
-    fn premultiplied(&self, texels: &[[u8; 4]]) -> [u8; 4] {
-        let corners: [_; 4] = std::array::from_fn(|corner| (texels[self.places[corner]], self.shares[corner]));
+    #[inline(always)]
+    fn premultiplied(&self, index: usize, texels: &[[u8; 4]]) -> [u8; 4] {
+        let corners = self.of(index, texels);
         let alpha: f32 = corners.iter().map(|(texel, share)| share * f32::from(texel[3])).sum();
         let weights = corners.map(|(texel, share)| match alpha > 0.0 {
             true => share * f32::from(texel[3]) / alpha,

@@ -89,7 +89,7 @@ fn consistency(
             return 1.0;
         }
         let [surface, _] = maps[other.texel_at(seen.x, seen.y)];
-        let behind = planes_behind(surface, disparity / seen.depth_ratio, WIDTH * step);
+        let behind = planes_behind(surface, disparity * seen.disparity_ratio, 1.0 / (WIDTH * step));
         1.0 - ONE_CONFIRMS * fade(std::f32::consts::FRAC_1_SQRT_2 * behind)
     });
     1.0 - doubt.product::<f32>()

@@ -42,7 +42,7 @@ pub(crate) fn samples(planes: &TargetPlanes, disparity: impl Fn(usize) -> f32) -
             let seen = Track::new(&block.target, camera, x, y).at(disparity);
             let first = camera.first_texel as usize;
             let texel = bilinear_from(&planes.texels[..], first, camera.width, camera.height, seen.x, seen.y);
-            let there = disparity / seen.depth_ratio;
+            let there = disparity * seen.disparity_ratio;
             let visible =
                 if seen.in_image { visibility(view, &planes.disparities[..], seen.x, seen.y, there) } else { 0.0 };
             let straight = 1.0 / texel[3].max(1.0e-6);
@@ -52,7 +52,7 @@ pub(crate) fn samples(planes: &TargetPlanes, disparity: impl Fn(usize) -> f32) -
                 in_image: seen.in_image,
                 visibility: visible,
                 part: view.weight * (HIDDEN_SHARE + visible),
-                at: [seen.x, seen.y, seen.depth_ratio / disparity.max(1.0e-9)],
+                at: [seen.x, seen.y, 1.0 / (seen.disparity_ratio * disparity.max(1.0e-9))],
             }
         };
         (0..width * block.target.height as usize).map(sample).collect()
