@@ -90,10 +90,12 @@ fn validation_says_nothing_about_a_picture(candidate: &Candidate) -> Result<(), 
 }
 
 /// All other trials of this device: cut work, memory that runs out, transfers. A device that is left alone is another
-/// process, and is wrong by the letter.
+/// process, and is wrong by the letter. The reference values of a GeNVS take minutes on a software driver; its kernels, passes and
+/// barriers are those of its pictures, which are among the trials.
 fn validation_says_nothing_about_these_tests(candidate: &Candidate) -> Result<(), Failed> {
     let mut command = validated(&fs::canonicalize(env::current_exe()?)?)?;
     command.args([candidate.adapter.name.as_str(), "--skip", "::validation_", "--skip", "left_alone"]);
+    command.args(["--skip", "genvs_has_the_reference_values"]);
     let outcome = Outcome::of(command);
     let passed = outcome.stdout.lines().filter(|line| line.ends_with("... ok")).count();
     assert!(outcome.code == Some(0) && passed > 10, "{}{}", outcome.stdout, outcome.stderr);

@@ -5,6 +5,7 @@ use viewfuse::check::world::Numbers;
 use viewfuse::device::Device;
 use viewfuse::device::cpu::Cpu;
 use viewfuse_kernels::bodies;
+use viewfuse_kernels::plane_sweep::evidence::UNSEEN;
 use viewfuse_kernels::plane_sweep::frustum::FrustumBlock;
 use viewfuse_kernels::plane_sweep::{PLANES, Planes};
 
@@ -45,26 +46,58 @@ fn views_are_compared_to_the_bit() {
     }
 }
 
+/// The census of a band: the loop of the CPU and the body.
+fn assert_same_census(swept: &Swept, grey: &Vec<Planes>, evidence: &Vec<Planes>, what: &str) {
+    let Swept { frustum, pairs, .. } = swept;
+    let FrustumBlock { camera, first_row, row_count, group_count, .. } = *frustum;
+    let none = [f32::NAN; PLANES];
+    let row_len = camera.width * group_count;
+    // In two parts: what a part does not compute stays.
+    let part = row_count / 3;
+    let mut costs = vec![none; 2 * ((first_row + row_count) * row_len) as usize];
+    for group in part * row_len..row_count * row_len {
+        bodies::census_cost(frustum, pairs, grey, evidence, &mut costs[..], group);
+    }
+    let mut own = vec![none; costs.len()];
+    Cpu.census_cost(frustum, part, row_count - part, pairs, grey, evidence, &mut own).expect("the CPU computes");
+    assert_eq!(bits(&own), bits(&costs), "{what}");
+}
+
 #[test]
 fn the_census_is_the_same_to_the_bit() {
     for seed in 0..SEEDS {
         let swept = Swept::new(seed, GROUPS);
+        let (grey, evidence) = band(&mut Numbers::new(seed), &swept);
+        assert_same_census(&swept, &grey, &evidence, &format!("seed {seed}"));
+    }
+}
+
+#[test]
+fn the_census_of_any_greys_is_the_same_to_the_bit() {
+    let extremes = [
+        0.0,
+        -0.0,
+        f32::MIN_POSITIVE,
+        1.0 / 1024.0,
+        1.0,
+        15.999,
+        16.0,
+        40.0,
+        f32::MAX,
+        f32::INFINITY,
+        f32::NAN,
+        UNSEEN,
+        -1.0e30,
+        f32::NEG_INFINITY,
+    ];
+    for seed in 0..SEEDS {
+        let swept = Swept::new(seed, GROUPS);
         let numbers = &mut Numbers::new(seed);
-        let (grey, evidence) = band(numbers, &swept);
-        let Swept { frustum, pairs, .. } = swept;
-        let FrustumBlock { camera, first_row, row_count, group_count, .. } = frustum;
-        let none = [f32::NAN; PLANES];
-        let row_len = camera.width * group_count;
-        // In two parts: what a part does not compute stays.
-        let part = row_count / 3;
-        let mut costs = vec![none; 2 * ((first_row + row_count) * row_len) as usize];
-        for group in part * row_len..row_count * row_len {
-            bodies::census_cost(&frustum, &pairs, &grey, &evidence, &mut costs[..], group);
+        let (mut grey, evidence) = band(numbers, &swept);
+        for grey in grey.as_flattened_mut().iter_mut().step_by(5) {
+            *grey = extremes[numbers.between(0.0, extremes.len() as f32) as usize % extremes.len()];
         }
-        let mut own = vec![none; costs.len()];
-        Cpu.census_cost(&frustum, part, row_count - part, &pairs, &grey, &evidence, &mut own)
-            .expect("the CPU computes");
-        assert_eq!(bits(&own), bits(&costs), "seed {seed}");
+        assert_same_census(&swept, &grey, &evidence, &format!("seed {seed}"));
     }
 }
 

@@ -3,6 +3,7 @@
 
 use super::{Firmware, PROFILES};
 use libtest_mimic::Failed;
+use rayon::prelude::*;
 use std::path::PathBuf;
 use std::sync::Arc;
 use viewfuse_core::attention::quantised::QuantisedAttention;
@@ -71,10 +72,23 @@ fn numbers(call: &Call) -> [Option<u64>; 3] {
     [Some(call.instructions), Some(u64::from(call.stack)), Some(call.code)]
 }
 
+/// Several at once, for an emulator takes one core: in the order of `runs`, each a board, a profile and a program.
+fn all_measured(runs: &[(&Firmware, &'static str, &str)]) -> Result<Vec<Vec<Call>>, Failed> {
+    let of = |(firmware, profile, program): &(&Firmware, &'static str, &str)| measured(firmware, profile, program);
+    runs.par_iter().map(of).collect::<Vec<_>>().into_iter().collect()
+}
+
 pub(super) fn what_the_calls_take(boards: &[Arc<Firmware>]) -> Result<(), Failed> {
-    let small = boards.iter().map(|board| measured(board, PROFILES[0], "calls")).collect::<Result<Vec<_>, _>>()?;
-    assert_eq!(small[0], measured(&boards[0], PROFILES[0], "calls")?, "the counts repeat exactly");
-    let fast = measured(&boards[0], PROFILES[1], "calls")?;
+    let first: &Firmware = &boards[0];
+    let [for_size, for_speed] = PROFILES;
+    let twice_and_fast = [(first, for_size, "calls"), (first, for_speed, "calls")];
+    let with_an_fpu = WITH_AN_FPU.iter().flat_map(|(program, _)| PROFILES.map(|profile| (first, profile, *program)));
+    let runs = boards.iter().map(|board| (&**board, for_size, "calls")).chain(twice_and_fast).chain(with_an_fpu);
+    let mut small = all_measured(&runs.collect::<Vec<_>>())?;
+    let mut others = small.split_off(boards.len()).into_iter();
+    let mut next = || others.next().ok_or("a run for each");
+    assert_eq!(small[0], next()?, "the counts repeat exactly");
+    let fast = next()?;
     within_limits(&small[0])?;
 
     let mut weighed = measured_schemes().into_iter().map(|(name, _)| name);
@@ -88,9 +102,8 @@ pub(super) fn what_the_calls_take(boards: &[Arc<Firmware>]) -> Result<(), Failed
     }
     assert_eq!(weighed.next(), None, "every scheme was measured");
 
-    for (program, named_calls) in WITH_AN_FPU {
-        let [small_floats, fast_floats] = PROFILES.map(|profile| measured(&boards[0], profile, program));
-        let (small_floats, fast_floats) = (small_floats?, fast_floats?);
+    for (_, named_calls) in WITH_AN_FPU {
+        let (small_floats, fast_floats) = (next()?, next()?);
         for (name, title) in named_calls {
             let nothing = [None; 3].repeat(boards.len() - 1);
             let row = numbers(named(&small_floats, name)?).into_iter().chain(nothing).collect();
