@@ -4,7 +4,8 @@ use viewfuse::check::swept::{Swept, opacities};
 use viewfuse::check::world::Numbers;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::pose::Pose;
-use viewfuse_kernels::plane_sweep::front::{FrontBlock, GUARD, front_cost, plane_opacity};
+use viewfuse_kernels::bodies;
+use viewfuse_kernels::plane_sweep::front::{FrontBlock, GUARD, plane_opacity};
 use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
 use viewfuse_kernels::plane_sweep::{PLANES, Planes};
 
@@ -48,11 +49,18 @@ fn opacity(surfaces: &[f32]) -> Planes {
     plane_opacity(&frustum, &views[..], &maps[..], 27, 0)
 }
 
+/// The costs of a pixel's planes with the preference, `[group]`.
+fn front_cost(block: &FrontBlock, opacities: &[Planes], costs: &[Planes], pixel: u32) -> Vec<Planes> {
+    let mut joined = vec![[f32::NAN; PLANES]; costs.len()];
+    bodies::front_cost(block, opacities, costs, &mut joined[..], pixel);
+    joined.drain((pixel * block.group_count) as usize..).take(block.group_count as usize).collect()
+}
+
 /// The plane of least cost at a pixel of costs that are all equal.
 fn chosen(block: &FrontBlock, opacities: &[Planes]) -> usize {
     let equal = vec![[0.1; PLANES]; opacities.len()];
     let costs = front_cost(block, opacities, &equal[..], 27);
-    let costs = costs[..block.group_count as usize].as_flattened();
+    let costs = costs.as_flattened();
     (0..costs.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b])).expect("planes")
 }
 
@@ -123,7 +131,7 @@ fn the_preference_is_bounded() {
         let zero = vec![[0.0; PLANES]; opacities.len()];
         for pixel in 0..volume.width * volume.height {
             let costs = front_cost(&block, &opacities[..], &zero[..], pixel);
-            for cost in costs[..volume.group_count as usize].as_flattened() {
+            for cost in costs.as_flattened() {
                 assert!((0.0..=0.200_001).contains(cost), "pixel {pixel}: {cost}");
             }
         }

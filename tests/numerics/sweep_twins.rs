@@ -7,6 +7,7 @@ use viewfuse::device::cpu::Cpu;
 use viewfuse_kernels::bodies;
 use viewfuse_kernels::plane_sweep::evidence::UNSEEN;
 use viewfuse_kernels::plane_sweep::frustum::FrustumBlock;
+use viewfuse_kernels::plane_sweep::window::WindowBlock;
 use viewfuse_kernels::plane_sweep::{PLANES, Planes};
 
 /// Groups of planes of all pixels together.
@@ -115,5 +116,27 @@ fn opacities_are_the_same_to_the_bit() {
         }
         Cpu.plane_opacity(&frustum, &views, &disparities, &mut own).expect("the CPU computes");
         assert_eq!(bits(&own), bits(&opacities), "seed {seed}");
+    }
+}
+
+#[test]
+fn windows_are_summed_to_the_bit() {
+    for seed in 0..SEEDS {
+        let numbers = &mut Numbers::new(seed);
+        // Images that are lower than a window, as high as one, and of several runs of rows; strips that end inside a row.
+        let [width, height] = [8.0, 40.0].map(|most| numbers.between(1.0, most) as u32);
+        let reach = [1.0, 5.0, 12.0].map(|most| numbers.between(1.0, most + 1.0) as u32);
+        let group_count = 1 + seed as u32 % 5;
+        let block = WindowBlock { width, height, group_count, reach, near_cost: 0.01, padding: 0 };
+        let count = (width * height * group_count) as usize;
+        let none = [f32::NAN; PLANES];
+        let mut sums = vec![none; 6 * count];
+        sums.iter_mut().flatten().for_each(|sum| *sum = numbers.between(0.0, 25.0));
+        let (mut means, mut own) = (vec![none; count], vec![none; count]);
+        for group in 0..count as u32 {
+            bodies::window_cost(&block, &sums, &mut means[..], group);
+        }
+        Cpu.window_cost(&block, &sums, &mut own).expect("the CPU computes");
+        assert_eq!(bits(&own), bits(&means), "seed {seed}: {block:?}");
     }
 }

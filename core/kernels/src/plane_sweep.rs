@@ -8,8 +8,8 @@
 //! evidence    what the views show there, compared by colour       Evidence
 //! census      ... and by its structure: soft census                census_cost
 //! window      means over windows of three sizes                    row_sums, window_cost
-//! front       the first opaque plane of each ray, by the sources' surfaces  FrontBlock, plane_opacity, front_cost
-//! path        semi-global regularisation along four directions     path_cost
+//! front       the first opaque plane of each ray, by the sources' surfaces  FrontBlock, plane_opacity, Front
+//! path        semi-global regularisation along four directions     Line, joined_cost
 //! disparity   a source's disparity and its confidence              pick_disparity
 //! blend       a target's pixel: softmax over planes                blend
 //! ```
@@ -30,6 +30,8 @@ pub mod frustum;
 pub mod path;
 pub mod window;
 
+use viewfuse_core::math::min;
+
 /// Neighbouring planes in an element of a volume.
 pub const PLANES: usize = 16;
 /// Most planes of a frustum.
@@ -41,3 +43,29 @@ pub const MAX_MATCHED: usize = 8;
 
 /// A number for each plane of a group.
 pub type Planes = [f32; PLANES];
+
+/// Of each plane the smaller one of `least` and `costs`, in `least`.
+#[inline(always)]
+pub fn lessen(least: &mut Planes, costs: &Planes) {
+    let mut plane = 0;
+    while plane < PLANES {
+        least[plane] = min(costs[plane], least[plane]);
+        plane += 1;
+    }
+}
+
+/// The least of a group's costs: halves are compared, then halves of these.
+#[inline(always)]
+pub fn least_of(costs: &Planes) -> f32 {
+    let mut least = *costs;
+    let mut half = PLANES / 2;
+    while half > 0 {
+        let mut plane = 0;
+        while plane < half {
+            least[plane] = min(least[plane + half], least[plane]);
+            plane += 1;
+        }
+        half /= 2;
+    }
+    least[0]
+}

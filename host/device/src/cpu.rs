@@ -19,6 +19,7 @@ mod splats;
 mod sweep;
 mod tracks;
 mod volumes;
+mod windows;
 mod winograd;
 
 use super::error::DeviceError;
@@ -43,6 +44,7 @@ use viewfuse_kernels::bodies;
 use viewfuse_kernels::for_each_kernel;
 use viewfuse_kernels::rows::*;
 use volumes::*;
+use windows::*;
 
 pub use network::Weights;
 
@@ -59,6 +61,10 @@ impl Memory for Cpu {
 
     fn upload<T: Element>(&self, values: &[T]) -> Result<Vec<T>, DeviceError> {
         Ok(values.to_vec())
+    }
+
+    fn upload_owned<T: Element>(&self, values: Vec<T>) -> Result<Vec<T>, DeviceError> {
+        Ok(values)
     }
 
     fn zeros<T: Element>(&self, count: usize) -> Result<Vec<T>, DeviceError> {

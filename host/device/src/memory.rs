@@ -48,6 +48,14 @@ pub trait Memory {
     /// If the device has no memory left.
     fn upload<T: Element>(&self, values: &[T]) -> Result<Self::Buffer<T>, DeviceError>;
 
+    /// As [`Memory::upload`], of values that are not needed any more: where memory is the host's, they are not copied.
+    ///
+    /// # Errors
+    /// If the device has no memory left.
+    fn upload_owned<T: Element>(&self, values: Vec<T>) -> Result<Self::Buffer<T>, DeviceError> {
+        self.upload(&values)
+    }
+
     /// A buffer of `count` default values.
     ///
     /// # Errors

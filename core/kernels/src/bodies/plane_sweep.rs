@@ -5,7 +5,7 @@ use crate::plane_sweep::blend::{self, BlendBlock};
 use crate::plane_sweep::census;
 use crate::plane_sweep::disparity;
 use crate::plane_sweep::evidence::{self, ViewPair};
-use crate::plane_sweep::front::{self, FrontBlock};
+use crate::plane_sweep::front::{self, Front, FrontBlock};
 use crate::plane_sweep::frustum::{FrustumBlock, SweptView};
 use crate::plane_sweep::path::{self, CostBlock, Line};
 use crate::plane_sweep::window::{self, WindowBlock};
@@ -100,12 +100,12 @@ pub fn front_cost(
     costs: &mut (impl Store<Planes> + ?Sized),
     pixel: u32,
 ) {
-    let groups = block.group_count as usize;
-    let joined = front::front_cost(block, opacities, means, pixel);
-    let mut group = 0;
-    while group < groups {
-        costs.store(pixel as usize * groups + group, joined[group]);
-        group += 1;
+    let mut front = Front::START;
+    let mut group = block.group_count;
+    while group > 0 {
+        group -= 1;
+        let joined = front.advance(block, opacities, means, pixel, group);
+        costs.store((pixel * block.group_count + group) as usize, joined);
     }
 }
 

@@ -3,7 +3,7 @@
 use super::evidence::planes_behind;
 use super::frustum::{SweptView, Track};
 use super::path::CostBlock;
-use super::{MAX_GROUPS, PLANES, Planes};
+use super::{MAX_GROUPS, PLANES, Planes, least_of, lessen};
 use crate::visual_hull::fade;
 use bytemuck::{Pod, Zeroable};
 use viewfuse_core::camera::CameraBlock;
@@ -201,17 +201,13 @@ impl BlendSums {
 /// The least cost of the planes in the first so many groups.
 #[inline(always)]
 pub fn least_cost(costs: &[Planes; MAX_GROUPS], groups: usize) -> f32 {
-    let mut least = f32::MAX;
+    let mut least = [f32::MAX; PLANES];
     let mut group = 0;
     while group < groups {
-        let mut plane = 0;
-        while plane < PLANES {
-            least = min(costs[group][plane], least);
-            plane += 1;
-        }
+        lessen(&mut least, &costs[group]);
         group += 1;
     }
-    least
+    least_of(&least)
 }
 
 /// The costs of all planes at an image coordinate of the target: bilinear in the volume.

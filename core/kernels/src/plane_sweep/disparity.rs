@@ -1,7 +1,7 @@
 //! A source pixel's disparity: the plane of least cost, and its confidence.
 
 use super::frustum::FrustumBlock;
-use super::{MAX_GROUPS, MAX_PLANES, PLANES, Planes};
+use super::{MAX_GROUPS, MAX_PLANES, PLANES, Planes, least_of, lessen};
 use viewfuse_core::math::{clamp, exp, max, min};
 
 /// Temperature of the softmax over planes.
@@ -59,21 +59,10 @@ fn least_cost(costs: &[Planes], first: usize, groups: usize) -> f32 {
     let mut least = [f32::MAX; PLANES];
     let mut group = 0;
     while group < groups {
-        let own = &costs[first + group];
-        let mut plane = 0;
-        while plane < PLANES {
-            least[plane] = min(own[plane], least[plane]);
-            plane += 1;
-        }
+        lessen(&mut least, &costs[first + group]);
         group += 1;
     }
-    let mut of_all = least[0];
-    let mut plane = 1;
-    while plane < PLANES {
-        of_all = min(least[plane], of_all);
-        plane += 1;
-    }
-    of_all
+    least_of(&least)
 }
 
 /// The first of a pixel's planes whose cost is this.

@@ -6,7 +6,7 @@
 
 use super::evidence::planes_behind;
 use super::frustum::{FrustumBlock, SweptView};
-use super::{MAX_GROUPS, PLANES, Planes};
+use super::{PLANES, Planes};
 use crate::visual_hull::fade;
 use bytemuck::{Pod, Zeroable};
 use viewfuse_core::fetch::Fetch;
@@ -35,7 +35,7 @@ pub struct FrontBlock {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// Groups of planes, from 1 to [`MAX_GROUPS`].
+    /// Groups of planes, from 1 to [`MAX_GROUPS`](super::MAX_GROUPS).
     pub group_count: u32,
     /// Cost of a plane that is transparent or hidden.
     pub front_share: f32,
@@ -93,79 +93,96 @@ pub fn opacity_of(support: &Planes, violation: &Planes) -> Planes {
     opacity
 }
 
-/// A pixel's costs of all planes, `costs[pixel][group]`, each with the preference added: `front_share` times 1 less the plane's
-/// opacity times the transmittance before it. The opacity is the mean over three by three pixels of `opacities[row][column][group]`
-/// (those in the image); the transmittance is 1 less what the most opaque plane hides of those at least [`GUARD`] planes before.
-#[inline(always)]
-pub fn front_cost(
-    block: &FrontBlock,
-    opacities: &(impl Fetch<Planes> + ?Sized),
-    costs: &(impl Fetch<Planes> + ?Sized),
-    pixel: u32,
-) -> [Planes; MAX_GROUPS] {
-    let groups = block.group_count as usize;
-    let here = mean_opacity(block, opacities, pixel);
-    let mut joined = [[0.0; PLANES]; MAX_GROUPS];
-    let mut group = 0;
-    while group < groups {
-        joined[group] = costs.fetch(pixel as usize * groups + group);
-        group += 1;
-    }
-    let mut hidden = 0.0;
-    let plane_count = groups * PLANES;
-    let mut step = 0;
-    while step < plane_count {
-        let plane = plane_count - 1 - step;
-        if step >= GUARD {
-            let before = plane + GUARD;
-            let hides = (here[before / PLANES][before % PLANES] - HIDES_NOTHING) / (HIDES_MOST - HIDES_NOTHING);
-            hidden = max(MAX_HIDDEN * clamp(hides, 0.0, 1.0), hidden);
+/// A ray that goes from the nearest group of planes to the farthest.
+#[derive(Clone, Copy, Debug)]
+pub struct Front {
+    /// What each plane of the group before hides, or one before that.
+    hides: Planes,
+}
+
+impl Front {
+    /// Before the nearest group.
+    pub const START: Front = Front { hides: [0.0; PLANES] };
+
+    /// A pixel's costs of the next group of planes, `costs[pixel][group]`, with the preference added: `front_share` times 1 less the
+    /// plane's opacity times the transmittance before it. The opacity is the mean over three by three pixels of
+    /// `opacities[row][column][group]` (those in the image); the transmittance is 1 less what the most opaque plane hides of those at
+    /// least [`GUARD`] planes before.
+    #[inline(always)]
+    pub fn advance(
+        &mut self,
+        block: &FrontBlock,
+        opacities: &(impl Fetch<Planes> + ?Sized),
+        costs: &(impl Fetch<Planes> + ?Sized),
+        pixel: u32,
+        group: u32,
+    ) -> Planes {
+        let here = mean_opacity(block, opacities, pixel, group);
+        let before = self.hides;
+        self.hides = most_hidden(&here, before[0]);
+        let mut joined = costs.fetch((pixel * block.group_count + group) as usize);
+        let mut plane = 0;
+        while plane < PLANES {
+            let at = plane + GUARD;
+            let hidden = if at < PLANES { self.hides[at % PLANES] } else { before[at % PLANES] };
+            joined[plane] += block.front_share * (1.0 - (1.0 - hidden) * here[plane]);
+            plane += 1;
         }
-        let seen = (1.0 - hidden) * here[plane / PLANES][plane % PLANES];
-        joined[plane / PLANES][plane % PLANES] += block.front_share * (1.0 - seen);
-        step += 1;
+        joined
     }
-    joined
+}
+
+/// The most that a plane of a group hides or one before it, of these or, `before` the group, of others.
+#[inline(always)]
+fn most_hidden(opacities: &Planes, before: f32) -> Planes {
+    let mut most = [0.0; PLANES];
+    let mut plane = 0;
+    while plane < PLANES {
+        let hides = (opacities[plane] - HIDES_NOTHING) / (HIDES_MOST - HIDES_NOTHING);
+        most[plane] = max(MAX_HIDDEN * clamp(hides, 0.0, 1.0), before);
+        plane += 1;
+    }
+    // Of two planes, then of four, of eight, of all.
+    let mut reach = 1;
+    while reach < PLANES {
+        let mut plane = 0;
+        while plane + reach < PLANES {
+            most[plane] = max(most[plane + reach], most[plane]);
+            plane += 1;
+        }
+        reach *= 2;
+    }
+    most
 }
 
 /// Means of three by three pixels, row by row.
 #[inline(always)]
-fn mean_opacity(block: &FrontBlock, opacities: &(impl Fetch<Planes> + ?Sized), pixel: u32) -> [Planes; MAX_GROUPS] {
+fn mean_opacity(block: &FrontBlock, opacities: &(impl Fetch<Planes> + ?Sized), pixel: u32, group: u32) -> Planes {
     let (column, row) = (pixel % block.width, pixel / block.width);
-    let groups = block.group_count as usize;
     let first_row = if row > 0 { row - 1 } else { 0 };
     let last_row = if row + 1 < block.height { row + 1 } else { row };
     let first_column = if column > 0 { column - 1 } else { 0 };
     let last_column = if column + 1 < block.width { column + 1 } else { column };
-    let mut sum = [[0.0; PLANES]; MAX_GROUPS];
+    let mut sum = [0.0; PLANES];
     let mut y = first_row;
     while y <= last_row {
         let mut x = first_column;
         while x <= last_column {
-            let first = (y * block.width + x) as usize * groups;
-            let mut group = 0;
-            while group < groups {
-                let there = opacities.fetch(first + group);
-                let mut plane = 0;
-                while plane < PLANES {
-                    sum[group][plane] += there[plane];
-                    plane += 1;
-                }
-                group += 1;
+            let there = opacities.fetch(((y * block.width + x) * block.group_count + group) as usize);
+            let mut plane = 0;
+            while plane < PLANES {
+                sum[plane] += there[plane];
+                plane += 1;
             }
             x += 1;
         }
         y += 1;
     }
     let inverse = 1.0 / ((last_row - first_row + 1) * (last_column - first_column + 1)) as f32;
-    let mut group = 0;
-    while group < groups {
-        let mut plane = 0;
-        while plane < PLANES {
-            sum[group][plane] *= inverse;
-            plane += 1;
-        }
-        group += 1;
+    let mut plane = 0;
+    while plane < PLANES {
+        sum[plane] *= inverse;
+        plane += 1;
     }
     sum
 }

@@ -1,7 +1,7 @@
 //! Semi-global regularisation: a pixel's cost is aggregated with that of the previous pixels along a line, with a
 //! penalty for changes of disparity.
 
-use super::{MAX_GROUPS, PLANES, Planes};
+use super::{MAX_GROUPS, PLANES, Planes, least_of, lessen};
 use bytemuck::{Pod, Zeroable};
 use viewfuse_core::fetch::Fetch;
 use viewfuse_core::math::min;
@@ -94,12 +94,12 @@ impl Line {
     #[inline(always)]
     pub fn advance(&mut self, costs: &(impl Fetch<Planes> + ?Sized), first: usize, group_count: usize) {
         let jump = self.least + JUMP_COST;
-        let mut joined = [[0.0; PLANES]; MAX_GROUPS];
-        let mut least = f32::MAX;
+        let mut least = [f32::MAX; PLANES];
+        // The last cost before this group's, of the pixel before.
+        let mut left = f32::MAX;
         let mut group = 0;
         while group < group_count {
             let before = self.costs[group];
-            let left = if group > 0 { self.costs[group - 1][PLANES - 1] } else { f32::MAX };
             let right = if group + 1 < group_count { self.costs[group + 1][0] } else { f32::MAX };
             let own = costs.fetch(first + group);
             let mut beside = [0.0; PLANES];
@@ -113,18 +113,14 @@ impl Line {
             let mut plane = 0;
             while plane < PLANES {
                 let reached = min(min(before[plane], beside[plane] + STEP_COST), jump);
-                joined[group][plane] = own[plane] + (reached - self.least);
+                self.costs[group][plane] = own[plane] + (reached - self.least);
                 plane += 1;
             }
-            let mut plane = 0;
-            while plane < PLANES {
-                least = min(joined[group][plane], least);
-                plane += 1;
-            }
+            lessen(&mut least, &self.costs[group]);
+            left = before[PLANES - 1];
             group += 1;
         }
-        self.costs = joined;
-        self.least = least;
+        self.least = least_of(&least);
     }
 
     /// The costs of a group of planes at the last pixel.

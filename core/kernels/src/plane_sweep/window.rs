@@ -79,33 +79,37 @@ pub fn row_sums(block: &WindowBlock, costs: &[Planes], pixel: u32, group: u32) -
     sums
 }
 
-/// The cost of a group of planes at a pixel: the three windows' means, from `sums[row][column][group][window][2]`.
+/// The rows of a window around a row, in two parts: `first..split` and `split..end`. Rows are counted in runs that are as long as
+/// the window; `split` is where the run begins in which the window ends, so that each part reaches to an end of its run, and
+/// neighbouring windows share the sums of it. At the image's lower border, where a window lies inside a run, the second part is empty.
+#[inline(always)]
+pub fn rows_of_window(row: u32, height: u32, reach: u32) -> [u32; 3] {
+    let first = less(row, reach);
+    let end = if row + reach < height { row + reach + 1 } else { height };
+    let split = (end - 1) - (end - 1) % (2 * reach + 1);
+    [first, if first > split { end } else { split }, end]
+}
+
+/// A coordinate less a reach, or 0.
+#[inline(always)]
+#[expect(clippy::implicit_saturating_sub, reason = "rust-gpu does not compile saturating subtraction")]
+fn less(at: u32, reach: u32) -> u32 {
+    if at > reach { at - reach } else { 0 }
+}
+
+/// The cost of a group of planes at a pixel: the three windows' means, from `sums[row][column][group][window][2]`. Of the rows of a
+/// window ([`rows_of_window`]) those of the first part are summed from the last to the first, those of the second from the first to
+/// the last, then both parts.
 #[inline(always)]
 pub fn window_cost(block: &WindowBlock, sums: &[Planes], pixel: u32, group: u32) -> Planes {
-    let (column, row) = ((pixel % block.width) as i32, (pixel / block.width) as i32);
-    let (width, height) = (block.width as i32, block.height as i32);
-    let groups = block.group_count as usize;
-    let at = |y: i32| 6 * ((y * width + column) as usize * groups + group as usize);
+    let (column, row) = (pixel % block.width, pixel / block.width);
     let mut total = [0.0; PLANES];
     let mut window = 0;
     while window < 3 {
-        let reach = block.reach[window] as i32;
-        let (first, last) =
-            (if row > reach { row - reach } else { 0 }, if row + reach < height { row + reach } else { height - 1 });
-        let (left, right) = (
-            if column > reach { column - reach } else { 0 },
-            if column + reach < width { column + reach } else { width - 1 },
-        );
-        let area = ((last - first + 1) * (right - left + 1)) as f32;
-        let mut cost = [0.0; PLANES];
-        let mut weight = [0.0; PLANES];
-        let mut y = first;
-        while y <= last {
-            add(&mut cost, &sums[at(y) + 2 * window]);
-            add(&mut weight, &sums[at(y) + 2 * window + 1]);
-            y += 1;
-        }
-        let prior = PRIOR_WEIGHT * area;
+        let rows = rows_of_window(row, block.height, block.reach[window]);
+        let cost = sum_of_rows(block, sums, [column, group], 2 * window, rows);
+        let weight = sum_of_rows(block, sums, [column, group], 2 * window + 1, rows);
+        let prior = prior_weight(block, window, column, rows);
         let mut plane = 0;
         while plane < PLANES {
             total[plane] += SHARE[window] * ((cost[plane] + prior * PRIOR_COST) / (weight[plane] + prior));
@@ -113,17 +117,58 @@ pub fn window_cost(block: &WindowBlock, sums: &[Planes], pixel: u32, group: u32)
         }
         window += 1;
     }
+    add_near_cost(&mut total, block, group);
+    total
+}
+
+/// The sum of number `part` of the sums over rows, at a column and group.
+#[inline(always)]
+fn sum_of_rows(
+    block: &WindowBlock,
+    sums: &[Planes],
+    [column, group]: [u32; 2],
+    part: usize,
+    [first, split, end]: [u32; 3],
+) -> Planes {
+    let at = |row: u32| 6 * ((row * block.width + column) * block.group_count + group) as usize + part;
+    let (mut before, mut after) = ([0.0; PLANES], [0.0; PLANES]);
+    let mut row = split;
+    while row > first {
+        row -= 1;
+        add(&mut before, &sums[at(row)]);
+    }
+    row = split;
+    while row < end {
+        add(&mut after, &sums[at(row)]);
+        row += 1;
+    }
+    add(&mut before, &after);
+    before
+}
+
+/// The weight of the prior in the window of a column and these rows: [`PRIOR_WEIGHT`] for each of its pixels.
+#[inline(always)]
+pub fn prior_weight(block: &WindowBlock, window: usize, column: u32, [first, _, end]: [u32; 3]) -> f32 {
+    let reach = block.reach[window];
+    let left = less(column, reach);
+    let right = if column + reach < block.width { column + reach + 1 } else { block.width };
+    PRIOR_WEIGHT * ((end - first) * (right - left)) as f32
+}
+
+/// Adds the cost of being near.
+#[inline(always)]
+pub fn add_near_cost(total: &mut Planes, block: &WindowBlock, group: u32) {
     let count = block.group_count as f32 * PLANES as f32;
     let mut plane = 0;
     while plane < PLANES {
         total[plane] += block.near_cost * ((group as f32 * PLANES as f32 + plane as f32) / count);
         plane += 1;
     }
-    total
 }
 
+/// Adds to each plane.
 #[inline(always)]
-fn add(sum: &mut Planes, more: &Planes) {
+pub fn add(sum: &mut Planes, more: &Planes) {
     let mut plane = 0;
     while plane < PLANES {
         sum[plane] += more[plane];

@@ -387,7 +387,7 @@ macro_rules! for_each_kernel {
             }
             /// Costs averaged over three windows: `means[row][column][group]`. An element is a group of planes of a pixel.
             WindowCost window_cost(block: WindowBlock)
-            for group in [0..block.width * block.height * block.group_count; 1024 a core], wide {
+            for group in [0..block.width * block.height * block.group_count; 1024 a core], twin {
                 read sums: Planes,
                 write means: Planes,
             }

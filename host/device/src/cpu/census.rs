@@ -57,7 +57,7 @@ impl WithSimd for Census<'_> {
         let reach = REACH as usize;
         // The rows of the window's first half.
         let first_row = row.saturating_sub(reach);
-        let seen = Greys::new(block, grey, first_row * row_len..(row + 1) * row_len);
+        let greys = Greys::new(block, grey, first_row * row_len..(row + 1) * row_len);
         let mut window = Window::new();
         for column in 0..width {
             // The half of the window before the pixel, as in the body.
@@ -72,7 +72,7 @@ impl WithSimd for Census<'_> {
             }
             for group in 0..groups {
                 let here = (row - first_row) * row_len + column * groups + group;
-                window.compare(&seen, here, before[..count].iter().map(|first| first + group));
+                window.compare(&greys, here, before[..count].iter().map(|first| first + group));
                 let at = 2 * (column * groups + group);
                 let sums = window.sums(pairs, count);
                 costs[at..at + 2].copy_from_slice(&cost_of_sums(block, evidence, first_row * row_len + here, &sums));

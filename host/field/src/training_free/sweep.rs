@@ -38,6 +38,7 @@ use kept::{Kept, Key};
 use matching::{Images, Matching, Range};
 use scratch::Scratch;
 use sources::SourceMeans;
+use std::borrow::Cow;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
@@ -192,11 +193,11 @@ impl Sweep {
         };
         let small = reduced(self.match_side)?;
         // With silhouettes, alpha 0 is the background.
-        let pictures: Vec<SourceImage> = match has_silhouettes {
-            true => sources.images.clone(),
-            false => sources.images.iter().map(|image| unseen::filled(image).into_owned()).collect(),
+        let pictures: Vec<Cow<'_, SourceImage>> = match has_silhouettes {
+            true => sources.images.iter().map(Cow::Borrowed).collect(),
+            false => sources.images.iter().map(unseen::filled).collect(),
         };
-        let texels = joined_texels(&small);
+        let (matched, texels) = Images::upload_kept(device, &small)?;
         Ok(Views {
             settings: *self,
             defaults: *self,
@@ -204,7 +205,7 @@ impl Sweep {
             has_silhouettes,
             background: sources.background,
             pictures: Images::upload(device, &pictures)?,
-            matched: Images::upload(device, &small)?,
+            matched,
             disparities: device.zeros(texels.len())?,
             settled: None,
             steps: vec![0.0; sources.images.len()],
@@ -221,11 +222,6 @@ impl Sweep {
             small,
         })
     }
-}
-
-/// The texels of all images.
-fn joined_texels(images: &[SourceImage]) -> Vec<[f32; 4]> {
-    images.iter().flat_map(|image| image.texels.iter().copied()).collect()
 }
 
 /// The views with a weight above 0, the greatest weights first. `cameras` are those of the texels, `maps` those of the

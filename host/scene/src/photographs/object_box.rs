@@ -3,6 +3,7 @@
 use super::{SourceImage, SourceImages};
 use crate::rig::nearest_point_to_lines;
 use rayon::prelude::*;
+use std::borrow::Borrow;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_kernels::visual_hull::ObjectBlock;
@@ -24,10 +25,10 @@ pub fn find_object(sources: &SourceImages) -> Option<ObjectBlock> {
 }
 
 /// All sources' texels, concatenated, and the cameras with the offsets of their texels.
-pub fn joined(images: &[SourceImage]) -> (Vec<CameraBlock>, Vec<[f32; 4]>) {
+pub fn joined(images: &[impl Borrow<SourceImage>]) -> (Vec<CameraBlock>, Vec<[f32; 4]>) {
     let mut cameras = Vec::with_capacity(images.len());
-    let mut texels = Vec::new();
-    for image in images {
+    let mut texels = Vec::with_capacity(images.iter().map(|image| image.borrow().texels.len()).sum());
+    for image in images.iter().map(Borrow::borrow) {
         cameras.push(image.camera.block(texels.len() as u32));
         texels.extend_from_slice(&image.texels);
     }

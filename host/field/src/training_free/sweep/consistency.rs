@@ -43,7 +43,7 @@ impl<D: Device> Views<'_, D> {
             let step = |view: usize| if views.contains(&view) { self.steps[view] } else { 0.0 };
             let steps: Vec<f32> = (0..self.steps.len()).map(step).collect();
             let gains = exposure::gains(&self.matched.cameras, &self.texels, &maps, &steps);
-            let maps = self.device.upload(&maps)?;
+            let maps = self.device.upload_owned(maps)?;
             self.compared = None;
             self.assessed = Some(Assessed { views: views.to_vec(), by_second, gains, maps });
         }

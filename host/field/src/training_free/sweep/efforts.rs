@@ -1,6 +1,6 @@
 //! Efforts of the plane sweep: views compared at a smaller size, fewer planes, fewer neighbours of a source.
 
-use super::{Images, Sweep, Views, joined_texels};
+use super::{Images, Sweep, Views};
 use crate::{Effort, Efforts, Encodings, FieldError};
 use viewfuse_device::Device;
 use viewfuse_scene::photographs::{SourceImage, longest_side};
@@ -59,8 +59,7 @@ impl<D: Device> Efforts for Views<'_, D> {
         self.settings = settings;
         let images = self.small.iter().map(|image| image.reduced(settings.match_side));
         let images: Vec<SourceImage> = images.collect::<Result<_, _>>().map_err(FieldError::unsuitable)?;
-        self.matched = Images::upload(self.device, &images)?;
-        self.texels = joined_texels(&images);
+        (self.matched, self.texels) = Images::upload_kept(self.device, &images)?;
         self.disparities = self.device.zeros(self.texels.len())?;
         self.steps.fill(0.0);
         self.settled = None;

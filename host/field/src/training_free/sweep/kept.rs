@@ -143,8 +143,7 @@ fn probe<D: Device>(device: &D, progress: &dyn Progress) -> Result<String, Field
     let frustum = matching.frustum(images.cameras[1], Range::new([0.1, 2.0], PLANES as u32), &swept);
     let mut maps = device.zeros::<[f32; 2]>(images.cameras.len() * (width * height) as usize)?;
     let mut scratch = Scratch::default();
-    let compared = matching.compared(&frustum, &swept, &images.texels, &maps, &mut scratch, progress)?;
-    let means = matching.means(&frustum, &compared, &mut scratch)?;
+    let means = matching.compared_means(&frustum, &swept, &images.texels, &maps, &mut scratch, progress)?;
     let costs = matching.costs(frustum, &means, &[], &maps, &mut scratch)?;
     device.pick_disparity(&frustum, &costs, &mut maps)?;
     Ok(sha256(cast_slice(&device.download(&maps)?)))

@@ -2,6 +2,7 @@
 
 use super::scratch::Scratch;
 use crate::FieldError;
+use std::borrow::Borrow;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
@@ -29,9 +30,15 @@ pub(super) struct Images<D: Device> {
 }
 
 impl<D: Device> Images<D> {
-    pub(super) fn upload(device: &D, images: &[SourceImage]) -> Result<Images<D>, FieldError> {
+    pub(super) fn upload(device: &D, images: &[impl Borrow<SourceImage>]) -> Result<Images<D>, FieldError> {
         let (cameras, texels) = joined(images);
-        Ok(Images { cameras, texels: device.upload(&texels)? })
+        Ok(Images { cameras, texels: device.upload_owned(texels)? })
+    }
+
+    /// With their texels on the host.
+    pub(super) fn upload_kept(device: &D, images: &[SourceImage]) -> Result<(Images<D>, Vec<[f32; 4]>), FieldError> {
+        let (cameras, texels) = joined(images);
+        Ok((Images { cameras, texels: device.upload(&texels)? }, texels))
     }
 }
 
@@ -96,12 +103,28 @@ impl<D: Device> Matching<'_, D> {
         scratch: &mut Scratch<D>,
         progress: &dyn Progress,
     ) -> Result<D::Buffer<Planes>, FieldError> {
+        let mut costs = self.device.zeros(2 * volume(whole))?;
+        self.compare(whole, swept, texels, maps, &mut costs, scratch, progress)?;
+        Ok(costs)
+    }
+
+    /// As [`Matching::compared`], into a buffer.
+    #[expect(clippy::too_many_arguments, reason = "what is compared, and where")]
+    fn compare(
+        &self,
+        whole: &FrustumBlock,
+        swept: &[SweptView],
+        texels: &D::Buffer<[f32; 4]>,
+        maps: &D::Buffer<[f32; 2]>,
+        costs: &mut D::Buffer<Planes>,
+        scratch: &mut Scratch<D>,
+        progress: &dyn Progress,
+    ) -> Result<(), FieldError> {
         let device = self.device;
         let FrustumBlock { camera: CameraBlock { width, height, .. }, group_count, .. } = *whole;
         let matched = &swept[..whole.view_count as usize];
         let row_len = (width * group_count) as usize;
         let (views, pairs) = (device.upload(matched)?, device.upload(&pairs(swept))?);
-        let mut costs = device.zeros::<Planes>(2 * row_len * height as usize)?;
         let band_rows = BAND_ROWS.min(height);
         let rows = (band_rows + REACH).min(height) as usize;
         let grey = scratch.grey.of_len(device, rows * row_len * matched.len())?;
@@ -112,9 +135,27 @@ impl<D: Device> Matching<'_, D> {
             let kept = band_rows.min(height - first);
             let band = FrustumBlock { first_row: first - halo, row_count: halo + kept, ..*whole };
             device.compare_views(&band, &views, &pairs, texels, maps, grey, evidence)?;
-            device.census_cost(&band, halo, kept, &pairs, grey, evidence, &mut costs)?;
+            device.census_cost(&band, halo, kept, &pairs, grey, evidence, costs)?;
         }
-        Ok(costs)
+        Ok(())
+    }
+
+    /// The means over windows of what [`Matching::compared`] finds, which is not kept: `means[row][column][group]`.
+    pub(super) fn compared_means(
+        &self,
+        whole: &FrustumBlock,
+        swept: &[SweptView],
+        texels: &D::Buffer<[f32; 4]>,
+        maps: &D::Buffer<[f32; 2]>,
+        scratch: &mut Scratch<D>,
+        progress: &dyn Progress,
+    ) -> Result<D::Buffer<Planes>, FieldError> {
+        let mut slot = std::mem::take(&mut scratch.compared);
+        let compared = slot.of_len(self.device, 2 * volume(whole))?;
+        self.compare(whole, swept, texels, maps, compared, scratch, progress)?;
+        let means = self.means(whole, compared, scratch)?;
+        scratch.compared = slot;
+        Ok(means)
     }
 
     /// The means over windows of what [`Matching::compared`] found: `means[row][column][group]`.

@@ -6,6 +6,7 @@ use viewfuse_kernels::plane_sweep::Planes;
 
 /// What is needed while the costs of a frustum are found.
 pub(super) struct Scratch<D: Device> {
+    pub(super) compared: Slot<D>,
     pub(super) grey: Slot<D>,
     pub(super) evidence: Slot<D>,
     pub(super) sums: Slot<D>,
@@ -16,13 +17,19 @@ pub(super) struct Scratch<D: Device> {
 
 impl<D: Device> Default for Scratch<D> {
     fn default() -> Scratch<D> {
-        let [grey, evidence, sums, opacities, costs, paths] = [(); 6].map(|()| Slot(None));
-        Scratch { grey, evidence, sums, opacities, costs, paths }
+        let [compared, grey, evidence, sums, opacities, costs, paths] = std::array::from_fn(|_| Slot::default());
+        Scratch { compared, grey, evidence, sums, opacities, costs, paths }
     }
 }
 
 /// One buffer and its length.
 pub(super) struct Slot<D: Device>(Option<(usize, D::Buffer<Planes>)>);
+
+impl<D: Device> Default for Slot<D> {
+    fn default() -> Slot<D> {
+        Slot(None)
+    }
+}
 
 impl<D: Device> Slot<D> {
     /// A buffer of this length. Its contents are not defined: the kernels write all that they read.

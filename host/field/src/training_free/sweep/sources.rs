@@ -119,8 +119,7 @@ impl<D: Device> Views<'_, D> {
             Some(known) => self.means.remove(known),
             None => {
                 let (texels, maps) = (&self.matched.texels, &self.disparities);
-                let compared = matching.compared(&frustum, &views, texels, maps, &mut scratch, progress)?;
-                let means = matching.means(&frustum, &compared, &mut scratch)?;
+                let means = matching.compared_means(&frustum, &views, texels, maps, &mut scratch, progress)?;
                 SourceMeans { frustum, views, near_cost: settings.near_cost, means }
             }
         };
@@ -147,7 +146,7 @@ impl<D: Device> Views<'_, D> {
         self.unkept.clear();
         if !self.found.is_empty() {
             self.found.clear();
-            self.disparities = self.device.upload(&maps)?;
+            self.disparities = self.device.upload_owned(maps)?;
         }
         Ok(())
     }

@@ -16,6 +16,9 @@ pub(super) fn filled(image: &SourceImage) -> Cow<'_, SourceImage> {
     let width = image.camera.pinhole.width() as usize;
     let mut filled = image.clone();
     for row in filled.texels.chunks_exact_mut(width) {
+        if row.iter().all(shown) {
+            continue;
+        }
         let own: Vec<usize> = (0..width).filter(|column| shown(&row[*column])).collect();
         let (Some(&first), Some(&last)) = (own.first(), own.last()) else { continue };
         for column in (0..width).filter(|column| own.binary_search(column).is_err()).collect::<Vec<_>>() {
