@@ -1,24 +1,27 @@
 //! The training-free field, for any scene and on any device.
 //!
 //! ```text
-//! hull     sources that show a silhouette: a solid carved by them and by photo-consistency
-//! sweep    any sources: planes through the frusta of sources and target
-//! space    near and far bounds, for the planes
-//! exposure gains that equalise the sources' exposure
-//! with_gaussians  pictures of the hull or the sweep with those of Gaussians
+//! space      near and far bounds, for the planes
+//! exposure   gains that equalise the sources' exposure
+//! sweep      any sources: planes through the frusta of sources and target
+//! hull       sources that show a silhouette: a solid carved by them and by photo-consistency
+//! splats     Gaussians that begin with the depths of the hull or the sweep
+//! mixed      pictures of the hull or the sweep, and those of Gaussians to mix with them
 //! gaussians  the field of Gaussians alone
-//! presets  settings to compare
+//! presets    settings to compare
 //! ```
 
 mod exposure;
 mod gaussians;
 pub mod hull;
+mod mixed;
 mod presets;
 mod space;
+mod splats;
 mod sweep;
-mod with_gaussians;
 
-use self::with_gaussians::WithGaussians;
+use self::mixed::Mixed;
+use self::splats::SourceDepths;
 use super::gaussians::Recipe;
 use super::options::{FieldOptions, Flag, FlagAbout, OpenError, flags};
 use super::row::{Origin, Row};
@@ -104,13 +107,9 @@ impl Field for TrainingFree {
         sources: &SourceImages,
         progress: &dyn Progress,
     ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
-        if sources.has_silhouettes {
-            let hull = Box::new(self.hull.views(device, sources, progress)?);
-            Ok(Box::new(WithGaussians::new(device, hull, sources, self.recipe, false)))
-        } else {
-            let sweep = self.sweep.prepare_kept(device, sources, self.cache.as_ref(), progress)?;
-            Ok(Box::new(WithGaussians::new(device, sweep, sources, self.recipe, false)))
-        }
+        let (fields, cache) = ((&self.hull, &self.sweep), self.cache.as_ref());
+        let depths = SourceDepths::prepare(device, fields, cache, sources, progress)?;
+        Ok(Box::new(Mixed::new(depths, self.recipe)))
     }
 
     fn preview(&self) -> Option<TrainingFree> {

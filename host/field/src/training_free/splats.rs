@@ -1,0 +1,145 @@
+//! Gaussians of the sources: optimised from the depths that the hull or the sweep found of them, and their pictures.
+
+use super::hull::Hull;
+use super::sweep::{Cache, Sweep};
+use crate::gaussians::{Optimisation, Optimised, Recipe, Residuals, Splatter, optimisation};
+use crate::point_cloud::cloud_of;
+use crate::{DepthMap, FieldError, Geometry, Prepared, Rendered, Request, Surfaces};
+use std::sync::Arc;
+use viewfuse_device::Device;
+use viewfuse_job::progress::{Progress, Quiet};
+use viewfuse_kernels::rows::GaussianBlock;
+use viewfuse_scene::photographs::SourceImages;
+use viewfuse_weighting::sources::SourceWeights;
+
+/// Opacity below which a pixel has no depth.
+const MIN_OPACITY: f32 = 0.5;
+
+/// Part of the iterations that are made for pictures of held-out sources: those are small and only compared.
+pub(super) const TRIAL_DIVISOR: u32 = 2;
+
+/// The sources as the hull or the sweep prepared them: Gaussians begin with their depths.
+pub(super) struct SourceDepths<'a, D: Device> {
+    pub(super) device: &'a D,
+    pub(super) views: Box<dyn Prepared + 'a>,
+    pub(super) images: Arc<SourceImages>,
+    encoded: Vec<bool>,
+    relevance: Vec<SourceWeights>,
+}
+
+impl<'a, D: Device> SourceDepths<'a, D> {
+    /// By the hull where the sources show silhouettes, elsewhere by the sweep, with what was found of the sources
+    /// before.
+    pub(super) fn prepare(
+        device: &'a D,
+        (hull, sweep): (&'a Hull, &'a Sweep),
+        cache: Option<&Cache>,
+        sources: &SourceImages,
+        progress: &dyn Progress,
+    ) -> Result<SourceDepths<'a, D>, FieldError> {
+        let views: Box<dyn Prepared + 'a> = match sources.has_silhouettes {
+            true => Box::new(hull.views(device, sources, progress)?),
+            false => sweep.prepare_kept(device, sources, cache, progress)?,
+        };
+        let encoded = vec![false; sources.images.len()];
+        Ok(SourceDepths { device, views, images: Arc::new(sources.clone()), encoded, relevance: Vec::new() })
+    }
+
+    /// Encodes a view, if it is not encoded yet: Gaussians need all of them, and the first picture may need them
+    /// before.
+    pub(super) fn encode(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
+        if !self.encoded[view] {
+            self.views.encode(view, progress)?;
+            self.encoded[view] = true;
+        }
+        Ok(())
+    }
+
+    /// Begins a weighting.
+    pub(super) fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
+        self.drop_encodings();
+        self.relevance = relevance.to_vec();
+        self.views.weighted().map_or(Ok(()), |weighted| weighted.weigh(relevance))
+    }
+
+    /// Views are encoded again when they are needed.
+    pub(super) fn drop_encodings(&mut self) {
+        self.encoded.fill(false);
+    }
+
+    /// The optimisation at its beginning, from the sources' surfaces; `None` where there are too few.
+    pub(super) fn optimisation(
+        &mut self,
+        recipe: Recipe,
+        progress: &dyn Progress,
+    ) -> Result<Option<Box<dyn Optimisation + 'a>>, FieldError> {
+        let quiet = &Quiet(progress);
+        for view in 0..self.encoded.len() {
+            progress.check()?;
+            self.encode(view, quiet)?;
+        }
+        let cloud = Recipe::cloud(self.images.images.len());
+        let points = cloud_of(&self.source_depths()?, &self.images, &self.relevance, cloud, quiet)?;
+        optimisation(self.device, &self.images, &points, recipe)
+    }
+}
+
+impl<D: Device> Geometry for SourceDepths<'_, D> {
+    fn surfaces(&self) -> Surfaces {
+        self.views.geometry().map_or_else(Surfaces::default, Geometry::surfaces)
+    }
+
+    fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError> {
+        self.views.geometry().map_or(Ok(Vec::new()), Geometry::source_depths)
+    }
+}
+
+/// Gaussians on a device.
+pub(super) struct Splats<D: Device> {
+    gaussians: D::Buffer<GaussianBlock>,
+    count: usize,
+    near: f32,
+    background: [f32; 3],
+    /// How much brighter each source is than they are: red, green, blue.
+    gains: Vec<[f32; 3]>,
+    residuals: Residuals,
+}
+
+impl<D: Device> Splats<D> {
+    pub(super) fn upload(device: &D, optimised: Optimised) -> Result<Splats<D>, FieldError> {
+        let Optimised { gaussians, near, background, gains } = optimised;
+        let (count, residuals) = (gaussians.len(), Residuals::new(gains.len()));
+        Ok(Splats { gaussians: device.upload(&gaussians)?, count, near, background, gains, residuals })
+    }
+
+    /// Their picture of a target, as bright as the sources that count for it, as the other pictures are.
+    pub(super) fn picture(
+        &mut self,
+        device: &D,
+        images: &SourceImages,
+        request: &Request<'_>,
+    ) -> Result<Rendered, FieldError> {
+        let Splats { gaussians, count, near, background, gains, residuals } = self;
+        let splatter = Splatter { device, near: *near, background: *background };
+        let mut picture = splatter.rendered(gaussians, *count, &request.camera.block(0), MIN_OPACITY)?;
+        let weights: Vec<(usize, f32)> = request.views.iter().copied().zip(request.view_weights()).collect();
+        let gain = common_gain(gains, &weights);
+        for colour in &mut picture.colours {
+            (0..3).for_each(|channel| colour[channel] = (colour[channel] * gain[channel]).clamp(0.0, 1.0));
+        }
+        for (view, _) in weights.iter().filter(|(_, weight)| *weight > 0.0) {
+            residuals.find(*view, &splatter, (gaussians, *count), (images, gains[*view]), MIN_OPACITY)?;
+        }
+        residuals.add(&request.camera.block(0), &weights, &mut picture);
+        Ok(picture)
+    }
+}
+
+/// The weighted geometric mean of the views' gains.
+fn common_gain(gains: &[[f32; 3]], weights: &[(usize, f32)]) -> [f32; 3] {
+    let sum: f32 = weights.iter().map(|(_, weight)| weight).sum();
+    [0, 1, 2].map(|channel| {
+        let part = |(view, weight): &(usize, f32)| weight * gains[*view][channel].max(f32::MIN_POSITIVE).ln();
+        if sum > 0.0 { (weights.iter().map(part).sum::<f32>() / sum).exp() } else { 1.0 }
+    })
+}
