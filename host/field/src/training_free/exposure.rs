@@ -28,9 +28,10 @@ struct Ratio {
     count: f64,
 }
 
-/// The gain of each source: red, green, blue, 1. `maps[texel]` are disparity and confidence, `steps[view]` from a plane's disparity to the
-/// next one's, or 0 for a view that is not used. The gains' logarithms solve the pairs' equations `g(first) - g(second) = ratio` in the sense of least squares and
-/// are 0 in the mean. All are 1 where sources differ by less than 3 %.
+/// The gain of each source: red, green, blue, 1. `maps[texel]` are disparity and confidence, `steps[view]` from a
+/// plane's disparity to the next one's, or 0 for a view that is not used. The gains' logarithms solve the pairs'
+/// equations `g(first) - g(second) = ratio` in the sense of least squares and are 0 in the mean. All are 1 where
+/// sources differ by less than 3 %.
 pub(super) fn gains(cameras: &[CameraBlock], texels: &[[f32; 4]], maps: &[[f32; 2]], steps: &[f32]) -> Vec<[f32; 4]> {
     let ratios = ratios(cameras, texels, maps, steps);
     let mut gains = vec![[1.0; 4]; cameras.len()];

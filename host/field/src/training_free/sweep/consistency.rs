@@ -1,68 +1,41 @@
-//! Geometric consistency: a source's disparity counts where other sources have their surface at the same point; and what else is
-//! found from the maps of all views of a picture, their gains.
+//! Geometric consistency: a source's disparity counts where other sources have their surface at the same point.
 //!
-//! The plane sweep's own confidence says how much better a plane matches than others, which textureless and repeated surfaces and
-//! what only one neighbour sees get wrong. Published multi-view stereo asks for consistency by the error of reprojection
-//! (Schönberger et al., "Pixelwise view selection", 2016); a bell in planes of the views' own sweeps is as good
-//! (`host/research/results/front_to_back.md`).
+//! The plane sweep's own confidence says how much better a plane matches than others, which textureless and repeated
+//! surfaces and what only one neighbour sees get wrong. Published multi-view stereo asks for consistency by the error
+//! of reprojection (Schönberger et al., "Pixelwise view selection", 2016); a bell in planes of the views' own sweeps is
+//! as good (`host/results/front_to_back.md`).
 
-use super::{Views, exposure};
-use crate::FieldError;
+use super::views::Views;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::Device;
 use viewfuse_kernels::plane_sweep::evidence::planes_behind;
 use viewfuse_kernels::plane_sweep::frustum::Track;
 use viewfuse_kernels::visual_hull::fade;
 
-/// Most other views that may confirm a disparity, those of greatest weight, and the fewest that are needed: two views agree by
-/// chance.
+/// Most other views that may confirm a disparity, those of greatest weight, and the fewest that are needed: two views
+/// agree by chance.
 const OTHERS: usize = 2;
 /// Consistency of a disparity that one view confirms exactly; each further one takes the same share of the rest.
 const ONE_CONFIRMS: f32 = 0.65;
 /// Width of the bell of what confirms, in planes of the confirming view's sweep.
 const WIDTH: f32 = 2.0;
 
-/// What is found from the maps of a picture's views.
-pub(super) struct Assessed<D: Device> {
-    views: Vec<usize>,
-    /// Whether from the second disparities.
-    by_second: bool,
-    /// Gain of each view: red, green, blue, 1.
-    pub(super) gains: Vec<[f32; 4]>,
-    /// `[view][row][column]`: disparity and confidence.
-    pub(super) maps: D::Buffer<[f32; 2]>,
-}
-
 impl<D: Device> Views<'_, D> {
-    /// Finds confidences and gains from these views alone: a picture does not depend on sources that its weights leave out.
-    pub(super) fn assess(&mut self, views: &[usize]) -> Result<(), FieldError> {
-        let by_second = self.settings.second_share > 0.0;
-        if self.assessed.as_ref().is_none_or(|own| own.views != views || own.by_second != by_second) {
-            let mut maps = self.device.download(self.found())?;
-            self.confirm(views, &mut maps);
-            let step = |view: usize| if views.contains(&view) { self.steps[view] } else { 0.0 };
-            let steps: Vec<f32> = (0..self.steps.len()).map(step).collect();
-            let gains = exposure::gains(&self.matched.cameras, &self.texels, &maps, &steps);
-            let maps = self.device.upload_owned(maps)?;
-            self.compared = None;
-            self.assessed = Some(Assessed { views: views.to_vec(), by_second, gains, maps });
-        }
-        Ok(())
-    }
-
-    /// Confidences of these views by what they say of one another, in `maps[view][row][column]`: of a view with at least [`OTHERS`]
-    /// others, `consistency_share` of each is its geometric consistency.
+    /// Confidences of these views by what they say of one another, in `maps[view][row][column]`: of a view with at
+    /// least [`OTHERS`] others, `consistency_share` of each is its geometric consistency.
     pub(super) fn confirm(&self, views: &[usize], maps: &mut [[f32; 2]]) {
         let share = self.settings.consistency_share;
-        let is_found = |view: usize| views.contains(&view) && self.steps[view] > 0.0;
+        let is_found = |view: usize| views.contains(&view) && self.maps.steps[view] > 0.0;
         for &view in views.iter().filter(|view| share > 0.0 && is_found(**view)) {
             let others = self.others(view).into_iter().filter(|(other, weight)| *weight > 0.0 && is_found(*other));
-            let others: Vec<(CameraBlock, f32)> =
-                others.take(OTHERS).map(|(other, _)| (self.matched.cameras[other], self.steps[other])).collect();
+            let others: Vec<(CameraBlock, f32)> = others
+                .take(OTHERS)
+                .map(|(other, _)| (self.matched.images.cameras[other], self.maps.steps[other]))
+                .collect();
             if others.len() < OTHERS {
                 continue;
             }
-            let camera = self.matched.cameras[view];
+            let camera = self.matched.images.cameras[view];
             for pixel in 0..camera.width * camera.height {
                 let at = (camera.first_texel + pixel) as usize;
                 let [disparity, confidence] = maps[at];
@@ -72,9 +45,10 @@ impl<D: Device> Views<'_, D> {
     }
 }
 
-/// Geometric consistency in `[0, 1]` of a pixel's disparity: 1 less the product, over the others, of 1 less [`ONE_CONFIRMS`] times a bell
-/// around the other's surface; a view that does not have the point in its image confirms nothing. `others` are cameras and the
-/// steps of their planes; only disparities are read from `maps[texel]`. `pixel` is counted row by row.
+/// Geometric consistency in `[0, 1]` of a pixel's disparity: 1 less the product, over the others, of 1 less
+/// [`ONE_CONFIRMS`] times a bell around the other's surface; a view that does not have the point in its image confirms
+/// nothing. `others` are cameras and the steps of their planes; only disparities are read from `maps[texel]`. `pixel`
+/// is counted row by row.
 fn consistency(
     camera: &CameraBlock,
     pixel: u32,

@@ -1,6 +1,8 @@
 //! Efforts of the plane sweep: views compared at a smaller size, fewer planes, fewer neighbours of a source.
 
-use super::{Images, Sweep, Views};
+use super::Sweep;
+use super::sources::SourceMaps;
+use super::views::{Matched, Views};
 use crate::{Effort, Efforts, Encodings, FieldError};
 use viewfuse_device::Device;
 use viewfuse_scene::photographs::{SourceImage, longest_side};
@@ -8,8 +10,8 @@ use viewfuse_scene::photographs::{SourceImage, longest_side};
 /// Most planes of a frustum in pictures that are only compared with one another.
 const TRIAL_PLANES: u32 = 32;
 
-/// Shares of the side at which views are compared and of the planes, and the neighbours of each source, with the error and the
-/// work that are typical of them (the experiment `efforts` of `viewfuse-research`, on the sample room and on herz_jesus_p8).
+/// Shares of the side at which views are compared and of the planes, and the neighbours of each source, with the error
+/// and the work that are typical of them (`host/results/front_to_back.md`, "Efforts").
 const EFFORTS: [(f32, f32, usize, f32, f32); 4] =
     [(0.25, 0.5, 2, 0.055, 0.1), (0.5, 1.0, 1, 0.035, 0.22), (0.75, 1.0, 1, 0.027, 0.4), (1.0, 1.0, 1, 0.024, 0.8)];
 
@@ -25,15 +27,15 @@ impl Sweep {
 }
 
 impl<D: Device> Views<'_, D> {
-    /// The settings with shares of the side at which the sources are compared and of the planes, and with at most so many
-    /// neighbours.
+    /// The settings with shares of the side at which the sources are compared and of the planes, and with at most so
+    /// many neighbours.
     fn at(&self, share: f32, planes: f32, neighbours: usize) -> Sweep {
-        let side = self.small.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
+        let side = self.scene.small.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
         let reduced = (share * side as f32).round().max(1.0) as u32;
         // The whole side is the settings' own: targets may be larger than the sources.
-        let match_side = if share < 1.0 { reduced } else { self.defaults.match_side };
-        let plane_count = (self.defaults.plane_count as f32 * planes).round() as u32;
-        Sweep { plane_count, match_side, neighbours: neighbours.min(self.defaults.neighbours), ..self.settings }
+        let match_side = if share < 1.0 { reduced } else { self.scene.defaults.match_side };
+        let plane_count = (self.scene.defaults.plane_count as f32 * planes).round() as u32;
+        Sweep { plane_count, match_side, neighbours: neighbours.min(self.scene.defaults.neighbours), ..self.settings }
     }
 }
 
@@ -51,23 +53,19 @@ impl<D: Device> Efforts for Views<'_, D> {
     fn set(&mut self, effort: usize) -> Result<Encodings, FieldError> {
         let settings = match EFFORTS.get(effort) {
             Some((share, planes, neighbours, ..)) => self.at(*share, *planes, *neighbours),
-            None => self.at(1.0, 1.0, self.defaults.neighbours),
+            None => self.at(1.0, 1.0, self.scene.defaults.neighbours),
         };
         if settings == self.settings {
             return Ok(Encodings::Kept);
         }
         self.settings = settings;
-        let images = self.small.iter().map(|image| image.reduced(settings.match_side));
+        let images = self.scene.small.iter().map(|image| image.reduced(settings.match_side));
         let images: Vec<SourceImage> = images.collect::<Result<_, _>>().map_err(FieldError::unsuitable)?;
-        (self.matched, self.texels) = Images::upload_kept(self.device, &images)?;
-        self.disparities = self.device.zeros(self.texels.len())?;
-        self.steps.fill(0.0);
-        self.settled = None;
-        self.found.clear();
-        self.unkept.clear();
-        self.assessed = None;
-        self.compared = None;
-        self.means.clear();
+        let device = self.scene.device;
+        let relevance = std::mem::take(&mut self.maps.relevance);
+        self.target = None;
+        self.matched = Matched::upload(device, &images)?;
+        self.maps = SourceMaps::new(device, &self.matched, relevance)?;
         Ok(Encodings::Dropped)
     }
 

@@ -1,8 +1,8 @@
-//! Holes of a picture: surfaces that no source shows. What the planes run on with there, a streak of a source's border or a second
-//! copy of what hides the surface, is replaced by the smooth colours around it.
+//! Holes of a picture: surfaces that no source shows. What the planes run on with there, a streak of a source's border
+//! or a second copy of what hides the surface, is replaced by the smooth colours around it.
 //!
-//! Hole filling by a pyramid ("push-pull", Gortler et al., The Lumigraph, 1996): colours are averaged over what is known, two by two
-//! pixels at a time, until all is known, and taken back from there, bilinear, where nothing was.
+//! Hole filling by a pyramid ("push-pull", Gortler et al., The Lumigraph, 1996): colours are averaged over what is
+//! known, two by two pixels at a time, until all is known, and taken back from there, bilinear, where nothing was.
 
 use crate::{DepthMap, Rendered};
 use viewfuse_core::camera::CameraBlock;
@@ -14,8 +14,8 @@ struct Level {
     pixels: Vec<[f32; 4]>,
 }
 
-/// Fills the pixels whose surface none of the views with these maps shows, and takes their confidence away. `target` is the picture's
-/// camera. Without any pixel that a view shows nothing changes.
+/// Fills the pixels whose surface none of the views with these maps shows, and takes their confidence away. `target` is
+/// the picture's camera. Without any pixel that a view shows nothing changes.
 pub(super) fn fill(picture: &mut Rendered, target: &CameraBlock, maps: &[DepthMap]) {
     let width = picture.width as usize;
     let shown = |(pixel, depth): (usize, &f32)| {

@@ -1,14 +1,14 @@
-//! What was found of the sources, kept in a folder between runs, so that a second command on the same scene need not find it
-//! again.
+//! What was found of the sources, kept in a folder between runs, so that a second command on the same scene need not
+//! find it again.
 //!
-//! A file's name is the SHA-256 of all that its content depends on: photographs at the size of the comparison, cameras, weights,
-//! settings, and what this program finds on this device in three small fixed images. Another version, driver or photograph whose
-//! results could differ so finds nothing, and makes a file of its own. A person may delete any file, or the folder. A file that is
-//! damaged, or not of this program, is not used.
+//! A file's name is the SHA-256 of all that its content depends on: photographs at the size of the comparison, cameras,
+//! weights, settings, and what this program finds on this device in three small fixed images. Another version, driver
+//! or photograph whose results could differ so finds nothing, and makes a file of its own. A person may delete any
+//! file, or the folder. A file that is damaged, or not of this program, is not used.
 
-use super::matching::{Images, Matching, Range};
+use super::Sweep;
+use super::matching::{Images, Matching, Range, swept};
 use super::scratch::Scratch;
-use super::{Sweep, swept};
 use crate::FieldError;
 use bytemuck::{AnyBitPattern, NoUninit, bytes_of, cast_slice, pod_collect_to_vec};
 use std::path::{Path, PathBuf};

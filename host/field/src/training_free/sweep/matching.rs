@@ -2,6 +2,7 @@
 
 use super::scratch::Scratch;
 use crate::FieldError;
+use crate::training_free::exposure;
 use std::borrow::Borrow;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::Device;
@@ -92,8 +93,8 @@ impl<D: Device> Matching<'_, D> {
         }
     }
 
-    /// Compares `swept` on all planes of a frustum: costs and how far the silhouettes contain the points, `[row][column][group][2]`.
-    /// `texels` are those of the views' cameras, `maps` their disparities and confidences.
+    /// Compares `swept` on all planes of a frustum: costs and how far the silhouettes contain the points,
+    /// `[row][column][group][2]`. `texels` are those of the views' cameras, `maps` their disparities and confidences.
     pub(super) fn compared(
         &self,
         whole: &FrustumBlock,
@@ -174,8 +175,9 @@ impl<D: Device> Matching<'_, D> {
         Ok(means)
     }
 
-    /// The costs of all planes in a frustum: `costs[row][column][group]`, from [`Matching::means`]. `maps` are the disparities and
-    /// confidences of the views; those of `voters`, of which the first [`MAX_MATCHED`] count, say which planes are opaque.
+    /// The costs of all planes in a frustum: `costs[row][column][group]`, from [`Matching::means`]. `maps` are the
+    /// disparities and confidences of the views; those of `voters`, of which the first [`MAX_MATCHED`] count, say which
+    /// planes are opaque.
     pub(super) fn costs(
         &self,
         whole: FrustumBlock,
@@ -205,6 +207,38 @@ impl<D: Device> Matching<'_, D> {
         device.join_paths(&block, paths, &mut costs)?;
         Ok(costs)
     }
+}
+
+/// The views with a weight above 0, the greatest weights first. `cameras` are those of the texels, `maps` those of the
+/// disparity maps, whose steps are used if given; without gains all are 1.
+pub(super) fn swept(
+    cameras: &[CameraBlock],
+    maps: &[CameraBlock],
+    weights: &[(usize, f32)],
+    steps: Option<&[f32]>,
+    gains: Option<&[[f32; 4]]>,
+) -> Vec<SweptView> {
+    let mut order: Vec<(usize, f32)> = weights.iter().copied().filter(|(_, weight)| *weight > 0.0).collect();
+    order.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    // The picture gets the exposure of the sources that count.
+    let common = gains.map_or([1.0; 4], |gains| exposure::common(gains, &order));
+    let gain = |view: usize| {
+        gains.map_or([1.0; 4], |gains| [0, 1, 2, 3].map(|channel| gains[view][channel] / common[channel]))
+    };
+    let view = |(view, weight): (usize, f32)| {
+        let map = &maps[view];
+        SweptView {
+            camera: cameras[view],
+            gain: gain(view),
+            weight,
+            disparity_step: steps.map_or(0.0, |steps| steps[view]),
+            first_disparity: map.first_texel,
+            map_width: map.width,
+            map_height: map.height,
+            padding: [0; 3],
+        }
+    };
+    order.into_iter().map(view).collect()
 }
 
 /// Groups of planes of all pixels.

@@ -1,6 +1,7 @@
 //! The scalars that are chosen for a scene, and the pictures that are worth mixing.
 
-use super::{DEFAULT, Sweep, Views};
+use super::views::Views;
+use super::{DEFAULT, Sweep};
 use crate::{Setting, Tunable, Tuned};
 use viewfuse_device::Device;
 
@@ -43,18 +44,18 @@ impl<D: Device> Tuned for Views<'_, D> {
 
     fn tune(&mut self, settings: &[Setting]) {
         let Sweep { plane_count, match_side, neighbours, .. } = self.settings;
-        self.settings = Sweep { plane_count, match_side, neighbours, ..self.defaults };
+        self.settings = Sweep { plane_count, match_side, neighbours, ..self.scene.defaults };
         for Setting { name, value } in settings {
-            if let Some((_, scalar)) = self.settings.scalars().into_iter().find(|(own, _)| own == name) {
+            if let Some((_, scalar)) = self.settings.scalars().into_iter().find(|(known, _)| known == name) {
                 *scalar = *value;
             }
         }
     }
 
-    /// Where the scene is as most sources see it, as the sources' own disparities say, and as the disparities say that are found
-    /// the second time: each is right where the others are not.
+    /// Where the scene is as most sources see it, as the sources' own disparities say, and as the disparities say that
+    /// are found the second time: each is right where the others are not.
     fn parts(&mut self, chosen: &[Setting]) -> Vec<Vec<Setting>> {
-        if self.has_silhouettes {
+        if self.scene.has_silhouettes {
             return Vec::new();
         }
         let with = |others: &[(&'static str, f32)]| {

@@ -1,4 +1,5 @@
-//! Memory that is used again from one frustum to the next: taking it from the system and clearing it was a tenth of the time.
+//! Memory that is used again from one frustum to the next: taking it from the system and clearing it was a tenth of the
+//! time.
 
 use crate::FieldError;
 use viewfuse_device::Device;

@@ -1,9 +1,8 @@
 //! Surface points of a scene whose files do not tell its depths: a coarse sweep of some sources, checked between them.
 
 use super::kept::Kept;
-use super::matching::{Images, Matching, Range};
+use super::matching::{Images, Matching, Range, swept};
 use super::scratch::Scratch;
-use super::swept;
 use crate::FieldError;
 use crate::training_free::space::{Space, first_guess};
 use viewfuse_core::Vec3;
@@ -13,15 +12,13 @@ use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImage;
 use viewfuse_scene::rig::spread;
 
-/// Longest side of the photographs, in pixels. With 128 the search takes 1.8 times as long, and over ten sets of photographs pictures are the
-/// same within 0.06 dB.
+/// Longest side of the photographs, in pixels (`host/results/front_to_back.md`, "The search for depths").
 pub(super) const SIDE: u32 = 96;
 /// Planes of a frustum.
 const PLANE_COUNT: u32 = 128;
 /// Most sources that are swept, as far apart as possible: the run time does not grow with further ones.
 const MAX_SWEPT: usize = 12;
-/// Neighbours that each is compared with. Two take half the time, and over ten scenes pictures are the same within 0.06 dB; but points are
-/// nearer to their thresholds: the sample room ten times as large differs by 2 levels of 255 then, not by 1.
+/// Neighbours that each is compared with (the same page).
 const NEIGHBOURS: usize = 4;
 /// Most points: a pixel of a source that is swept has one.
 const MAX_POINTS: usize = MAX_SWEPT * (SIDE * SIDE) as usize;

@@ -1,7 +1,10 @@
-//! The disparities of the sources: found in each one's own frustum, found a second time by what they say of one another, and
-//! kept between runs.
+//! The disparities of the sources: found in each one's own frustum, found a second time by what they say of one
+//! another, and kept between runs.
 
-use super::{Settled, Sweep, Views, swept};
+use super::Sweep;
+use super::kept::Key;
+use super::matching::swept;
+use super::views::{Matched, Views};
 use crate::FieldError;
 use std::ops::Range;
 use viewfuse_core::camera::CameraBlock;
@@ -9,9 +12,56 @@ use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
 use viewfuse_kernels::plane_sweep::{MAX_MATCHED, Planes};
+use viewfuse_weighting::sources::SourceWeights;
 
 /// Most bytes of the means that are kept: those of eight sources of 256x256 pixels and 64 planes.
 const MAX_BYTES: usize = 128 << 20;
+
+/// What is found of the sources under a weighting.
+pub(super) struct SourceMaps<D: Device> {
+    /// `[view]`: the weights of all sources for source `view` as a target.
+    pub(super) relevance: Vec<SourceWeights>,
+    /// `[view][row][column]` of the matched ones: disparity and confidence.
+    disparities: D::Buffer<[f32; 2]>,
+    /// Those found the second time.
+    settled: Option<Settled<D>>,
+    /// From a plane's disparity to the next one's, of each view; 0 if it is not encoded.
+    pub(super) steps: Vec<f32>,
+    /// Disparities that were kept, and are not on the device yet...
+    found: Vec<(usize, Vec<[f32; 2]>)>,
+    /// ... and those on the device that are to be kept.
+    unkept: Vec<(usize, Key)>,
+    /// The means of sources' planes, for their second disparities: those that were found last.
+    means: Vec<SourceMeans<D>>,
+}
+
+/// Disparities and confidences of some views, found the second time.
+struct Settled<D: Device> {
+    /// The settings under which they were found.
+    settings: Sweep,
+    /// Of each view, by which others and with which weights; none where it was not found.
+    voters: Vec<Option<Vec<(usize, f32)>>>,
+    maps: D::Buffer<[f32; 2]>,
+}
+
+impl<D: Device> SourceMaps<D> {
+    /// Nothing is found.
+    pub(super) fn new(
+        device: &D,
+        matched: &Matched<D>,
+        relevance: Vec<SourceWeights>,
+    ) -> Result<SourceMaps<D>, FieldError> {
+        Ok(SourceMaps {
+            relevance,
+            disparities: device.zeros(matched.texels.len())?,
+            settled: None,
+            steps: vec![0.0; matched.images.cameras.len()],
+            found: Vec::new(),
+            unkept: Vec::new(),
+            means: Vec::new(),
+        })
+    }
+}
 
 /// The means of a source's planes, which other views' disparities do not change.
 pub(super) struct SourceMeans<D: Device> {
@@ -31,36 +81,29 @@ impl<D: Device> SourceMeans<D> {
 }
 
 impl<D: Device> Views<'_, D> {
-    /// The sources' disparities and confidences, with what the current views say of one another if it is known.
-    pub(super) fn maps(&self) -> &D::Buffer<[f32; 2]> {
-        self.assessed.as_ref().map_or_else(|| self.found(), |own| &own.maps)
-    }
-
     /// The sources' disparities and confidences, each from the costs of its planes alone.
     pub(super) fn found(&self) -> &D::Buffer<[f32; 2]> {
         let is_settled = self.settings.second_share > 0.0;
-        let settled = self.settled.as_ref().filter(|_| is_settled);
-        settled.map_or(&self.disparities, |settled| &settled.maps)
+        let settled = self.maps.settled.as_ref().filter(|_| is_settled);
+        settled.map_or(&self.maps.disparities, |settled| &settled.maps)
     }
 
-    /// Finds the disparities of these views the second time, if the settings ask for it, where others say something of them than
-    /// the last time.
+    /// Finds the disparities of these views the second time, if the settings ask for it, where others say something of
+    /// them than the last time.
     pub(super) fn settle(&mut self, views: &[usize], progress: &dyn Progress) -> Result<(), FieldError> {
         if self.settings.second_share <= 0.0 {
             return Ok(());
         }
-        // A source's own planes contradict no maps, and the temperature is the picture's: with them the same maps are found.
-        let settings = Sweep {
-            front_share: self.settings.second_share,
-            dissent_share: self.defaults.dissent_share,
-            temperature: self.defaults.temperature,
-            ..self.settings
-        };
-        let Settled { mut voters, mut maps, .. } = match self.settled.take().filter(|own| own.settings == settings) {
-            Some(settled) => settled,
+        // A source's own planes contradict no maps, and the temperature is the picture's: with them the same maps are
+        // found.
+        let Sweep { dissent_share, temperature, .. } = self.scene.defaults;
+        let settings = Sweep { front_share: self.settings.second_share, dissent_share, temperature, ..self.settings };
+        let known = self.maps.settled.take().filter(|known| known.settings == settings);
+        let Settled { mut voters, mut maps, .. } = match known {
+            Some(known) => known,
             None => {
-                let voters = vec![None; self.steps.len()];
-                Settled { settings, voters, maps: self.device.zeros(self.texels.len())? }
+                let voters = vec![None; self.maps.steps.len()];
+                Settled { settings, voters, maps: self.scene.device.zeros(self.matched.texels.len())? }
             }
         };
         for &view in views {
@@ -68,23 +111,23 @@ impl<D: Device> Views<'_, D> {
             others.retain(|(other, weight)| views.contains(other) && *weight > 0.0);
             others.truncate(MAX_MATCHED);
             if voters[view].as_ref() != Some(&others) {
-                let cameras = &self.matched.cameras;
-                let own = swept(cameras, cameras, &others, Some(&self.steps), None);
+                let cameras = &self.matched.images.cameras;
+                let voting = swept(cameras, cameras, &others, Some(&self.maps.steps), None);
                 let (frustum, swept) = self.source_frustum(view, settings);
-                let costs = self.source_costs(frustum, swept, &own, settings, progress)?;
-                self.device.pick_disparity(&frustum, &costs, &mut maps)?;
+                let costs = self.source_costs(frustum, swept, &voting, settings, progress)?;
+                self.scene.device.pick_disparity(&frustum, &costs, &mut maps)?;
                 voters[view] = Some(others);
-                self.assessed = None;
+                self.target = None;
             }
         }
-        self.settled = Some(Settled { settings, voters, maps });
+        self.maps.settled = Some(Settled { settings, voters, maps });
         Ok(())
     }
 
     /// The other views with their weights for a source, the greatest first.
     pub(super) fn others(&self, view: usize) -> Vec<(usize, f32)> {
-        let relevance = &self.relevance[view];
-        let others = (0..self.matched.cameras.len()).filter(|other| *other != view);
+        let relevance = &self.maps.relevance[view];
+        let others = (0..self.matched.images.cameras.len()).filter(|other| *other != view);
         let mut weights: Vec<(usize, f32)> = others.map(|other| (other, relevance.get(other as u32))).collect();
         weights.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         weights
@@ -92,12 +135,12 @@ impl<D: Device> Views<'_, D> {
 
     /// A source's frustum, and the views that are compared in it.
     fn source_frustum(&self, view: usize, settings: Sweep) -> (FrustumBlock, Vec<SweptView>) {
-        let cameras = &self.matched.cameras;
+        let cameras = &self.matched.images.cameras;
         let camera = cameras[view];
         let mut weights = self.others(view);
         weights.truncate(settings.neighbours);
         weights.push((view, 1.0));
-        let matching = settings.matching(self.device, self.has_silhouettes);
+        let matching = settings.matching(self.scene.device, self.scene.has_silhouettes);
         let swept = swept(cameras, cameras, &weights, None, None);
         (matching.frustum(camera, self.range(&camera), &swept), swept)
     }
@@ -111,74 +154,76 @@ impl<D: Device> Views<'_, D> {
         settings: Sweep,
         progress: &dyn Progress,
     ) -> Result<D::Buffer<Planes>, FieldError> {
-        let matching = settings.matching(self.device, self.has_silhouettes);
-        let mut scratch = std::mem::take(&mut self.scratch);
-        let is_same =
-            |own: &SourceMeans<D>| own.frustum == frustum && own.views == views && own.near_cost == settings.near_cost;
-        let own = match self.means.iter().position(is_same) {
-            Some(known) => self.means.remove(known),
+        let matching = settings.matching(self.scene.device, self.scene.has_silhouettes);
+        let SourceMaps { disparities, means: kept, .. } = &mut self.maps;
+        let scratch = &mut self.scratch;
+        let is_same = |known: &SourceMeans<D>| {
+            known.frustum == frustum && known.views == views && known.near_cost == settings.near_cost
+        };
+        let source = match kept.iter().position(is_same) {
+            Some(known) => kept.remove(known),
             None => {
-                let (texels, maps) = (&self.matched.texels, &self.disparities);
-                let means = matching.compared_means(&frustum, &views, texels, maps, &mut scratch, progress)?;
+                let texels = &self.matched.images.texels;
+                let means = matching.compared_means(&frustum, &views, texels, disparities, scratch, progress)?;
                 SourceMeans { frustum, views, near_cost: settings.near_cost, means }
             }
         };
-        let costs = matching.costs(frustum, &own.means, voters, &self.disparities, &mut scratch)?;
-        self.scratch = scratch;
-        self.means.push(own);
-        while self.means.iter().map(SourceMeans::bytes).sum::<usize>() > MAX_BYTES {
-            self.means.remove(0);
+        let costs = matching.costs(frustum, &source.means, voters, disparities, scratch)?;
+        kept.push(source);
+        while kept.iter().map(SourceMeans::bytes).sum::<usize>() > MAX_BYTES {
+            kept.remove(0);
         }
         Ok(costs)
     }
 
     /// Brings what was kept to the device, and keeps what is new on it: once for all sources that were encoded since.
     pub(super) fn exchange(&mut self, progress: &dyn Progress) -> Result<(), FieldError> {
-        let Some(kept) = &self.kept else { return Ok(()) };
-        if self.found.is_empty() && self.unkept.is_empty() {
+        let Some(kept) = &self.scene.kept else { return Ok(()) };
+        if self.maps.found.is_empty() && self.maps.unkept.is_empty() {
             return Ok(());
         }
-        let mut maps = self.device.download(&self.disparities)?;
+        let mut maps = self.scene.device.download(&self.maps.disparities)?;
         self.add_kept(&mut maps);
-        for (view, key) in &self.unkept {
+        for (view, key) in &self.maps.unkept {
             kept.write(key, &maps[self.place(*view)], progress);
         }
-        self.unkept.clear();
-        if !self.found.is_empty() {
-            self.found.clear();
-            self.disparities = self.device.upload_owned(maps)?;
+        self.maps.unkept.clear();
+        if !self.maps.found.is_empty() {
+            self.maps.found.clear();
+            self.maps.disparities = self.scene.device.upload_owned(maps)?;
         }
         Ok(())
     }
 
     /// Adds the disparities that were kept and are not on the device yet to those of the device.
     pub(super) fn add_kept(&self, maps: &mut [[f32; 2]]) {
-        self.found.iter().for_each(|(view, found)| maps[self.place(*view)].copy_from_slice(found));
+        self.maps.found.iter().for_each(|(view, found)| maps[self.place(*view)].copy_from_slice(found));
     }
 
     /// Where a view's map lies among all.
     fn place(&self, view: usize) -> Range<usize> {
-        let CameraBlock { first_texel, width, height, .. } = self.matched.cameras[view];
+        let CameraBlock { first_texel, width, height, .. } = self.matched.images.cameras[view];
         first_texel as usize..(first_texel + width * height) as usize
     }
 
     /// Finds a source's disparities, or takes those that were kept.
     pub(super) fn find(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
-        self.settled = None;
-        self.assessed = None;
-        let settings = Sweep { dissent_share: self.defaults.dissent_share, ..self.settings };
+        self.maps.settled = None;
+        self.target = None;
+        let settings = Sweep { dissent_share: self.scene.defaults.dissent_share, ..self.settings };
         let (frustum, swept) = self.source_frustum(view, settings);
-        self.steps[view] = frustum.disparity_step;
-        let key = self.kept.as_ref().map(|kept| kept.of_source(&settings, &frustum, &swept, &self.texels));
+        self.maps.steps[view] = frustum.disparity_step;
+        let kept = self.scene.kept.as_ref();
+        let key = kept.map(|kept| kept.of_source(&settings, &frustum, &swept, &self.matched.texels));
         let len = (frustum.camera.width * frustum.camera.height) as usize;
-        let found = self.kept.as_ref().zip(key.as_ref()).and_then(|(kept, key)| kept.read(key, len));
+        let found = kept.zip(key.as_ref()).and_then(|(kept, key)| kept.read(key, len));
         if let Some(found) = found.filter(|found| found.len() == len) {
-            self.found.push((view, found));
+            self.maps.found.push((view, found));
             return Ok(());
         }
         let costs = self.source_costs(frustum, swept, &[], settings, progress)?;
-        self.device.pick_disparity(&frustum, &costs, &mut self.disparities)?;
-        self.unkept.extend(key.map(|key| (view, key)));
+        self.scene.device.pick_disparity(&frustum, &costs, &mut self.maps.disparities)?;
+        self.maps.unkept.extend(key.map(|key| (view, key)));
         Ok(())
     }
 }

@@ -6,8 +6,8 @@ use viewfuse_scene::photographs::SourceImage;
 /// Alpha of a pixel that is filled: it counts only where no source shows anything.
 const FILLED_ALPHA: f32 = 1.0e-3;
 
-/// The image with the colour of the nearest shown pixel of the row, or of the row above or below, where its alpha is 0. One that
-/// shows nothing stays as it is.
+/// The image with the colour of the nearest shown pixel of the row, or of the row above or below, where its alpha is 0.
+/// One that shows nothing stays as it is.
 pub(super) fn filled(image: &SourceImage) -> Cow<'_, SourceImage> {
     let shown = |texel: &[f32; 4]| texel[3] > 0.0;
     if image.texels.iter().all(shown) || !image.texels.iter().any(shown) {

@@ -1,0 +1,118 @@
+//! A target: what is found of the views that contribute to it, and the costs of its planes.
+
+use super::Sweep;
+use super::matching::swept;
+use super::views::Views;
+use crate::training_free::exposure;
+use crate::{FieldError, Request};
+use viewfuse_core::camera::Camera;
+use viewfuse_device::Device;
+use viewfuse_job::progress::Progress;
+use viewfuse_kernels::plane_sweep::Planes;
+use viewfuse_kernels::plane_sweep::blend::BlendBlock;
+use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
+use viewfuse_scene::photographs::reduced_size;
+
+/// What is found of the views of a target from the maps of all of them.
+pub(super) struct TargetViews<D: Device> {
+    views: Vec<usize>,
+    /// Whether from the second disparities.
+    by_second: bool,
+    /// Gain of each view: red, green, blue, 1.
+    gains: Vec<[f32; 4]>,
+    /// `[view][row][column]`: disparity and confidence.
+    pub(super) maps: D::Buffer<[f32; 2]>,
+    /// Of the last picture, for another one of the same target under other settings.
+    compared: Option<Compared<D>>,
+}
+
+/// What views show on a target's planes: the same for all settings but one.
+struct Compared<D: Device> {
+    /// With the setting that it is for, the cost of contradicting the maps.
+    frustum: FrustumBlock,
+    views: Vec<SweptView>,
+    /// As of [`Matching::compared`](super::matching::Matching::compared).
+    costs: D::Buffer<Planes>,
+}
+
+/// The planes of a target.
+pub(super) struct Volume<D: Device> {
+    pub(super) block: BlendBlock,
+    /// The views that are blended, with pictures' cameras.
+    pub(super) views: Vec<SweptView>,
+    /// `[row][column][group]`.
+    pub(super) costs: D::Buffer<Planes>,
+}
+
+impl<D: Device> Views<'_, D> {
+    /// Takes what is known of these views, or finds it from these views alone: a picture does not depend on sources
+    /// without a weight.
+    pub(super) fn target_views(
+        &mut self,
+        views: &[usize],
+        progress: &dyn Progress,
+    ) -> Result<TargetViews<D>, FieldError> {
+        self.exchange(progress)?;
+        self.settle(views, progress)?;
+        let by_second = self.settings.second_share > 0.0;
+        let known = self.target.take().filter(|target| target.views == views && target.by_second == by_second);
+        if let Some(known) = known {
+            return Ok(known);
+        }
+        let device = self.scene.device;
+        let mut maps = device.download(self.found())?;
+        self.confirm(views, &mut maps);
+        let steps = &self.maps.steps;
+        let used: Vec<f32> =
+            steps.iter().enumerate().map(|(view, step)| if views.contains(&view) { *step } else { 0.0 }).collect();
+        let gains = exposure::gains(&self.matched.images.cameras, &self.matched.texels, &maps, &used);
+        let maps = device.upload_owned(maps)?;
+        Ok(TargetViews { views: views.to_vec(), by_second, gains, maps, compared: None })
+    }
+
+    /// The costs of a target's planes, and what its pixels are blended from.
+    pub(super) fn volume(
+        &mut self,
+        target: &mut TargetViews<D>,
+        request: &Request<'_>,
+        progress: &dyn Progress,
+    ) -> Result<Volume<D>, FieldError> {
+        let Sweep { match_side, temperature, .. } = self.settings;
+        let (device, has_silhouettes) = (self.scene.device, self.scene.has_silhouettes);
+        let (small_width, small_height) = reduced_size(request.camera, match_side);
+        let pinhole = request.camera.pinhole.resized(small_width, small_height).map_err(FieldError::unsuitable)?;
+        let camera = Camera { pinhole, ..*request.camera }.block(0);
+        let weights: Vec<(usize, f32)> = request.views.iter().copied().zip(request.view_weights()).collect();
+        let range = self.range(&camera);
+        let (map_cameras, texels) = (&self.matched.images.cameras, &self.matched.images.texels);
+        let (steps, gains) = (Some(&self.maps.steps[..]), Some(&target.gains[..]));
+        let matched = swept(map_cameras, map_cameras, &weights, steps, gains);
+        let matching = self.settings.matching(device, has_silhouettes);
+        let frustum = matching.frustum(camera, range, &matched);
+        let scratch = &mut self.scratch;
+        let known = target.compared.take().filter(|known| known.frustum == frustum && known.views == matched);
+        let compared = match known {
+            Some(known) => known,
+            None => {
+                let costs = matching.compared(&frustum, &matched, texels, &target.maps, scratch, progress)?;
+                Compared { frustum, views: matched, costs }
+            }
+        };
+        let means = matching.means(&frustum, &compared.costs, scratch)?;
+        let costs = matching.costs(frustum, &means, &compared.views, &target.maps, scratch)?;
+        let views = swept(&self.scene.pictures.cameras, map_cameras, &weights, steps, gains);
+        let block = BlendBlock {
+            target: request.camera.block(0),
+            far_disparity: range.far_disparity,
+            disparity_step: range.step,
+            volume_width: camera.width,
+            volume_height: camera.height,
+            group_count: range.group_count,
+            view_count: views.len() as u32,
+            sharpness: 1.0 / temperature,
+            has_silhouettes: u32::from(has_silhouettes),
+        };
+        target.compared = Some(compared);
+        Ok(Volume { block, views, costs })
+    }
+}

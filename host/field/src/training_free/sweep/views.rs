@@ -1,0 +1,208 @@
+//! Sources on a device. What is kept of them has one of four lives, and is dropped whole at its end: that of the
+//! sources, of an effort, of a weighting, and of the views of a target.
+
+use super::kept::{Cache, Kept};
+use super::matching::{Images, Range};
+use super::scratch::Scratch;
+use super::sources::SourceMaps;
+use super::target::{TargetViews, Volume};
+use super::{Sweep, holes, search, unseen};
+use crate::training_free::space::Space;
+use crate::{
+    DepthMap, Efforts, Encoding, FieldError, Geometry, Prepared, Rendered, Request, Surfaces, Tuned, Weighted,
+};
+use std::borrow::Cow;
+use viewfuse_core::camera::CameraBlock;
+use viewfuse_device::Device;
+use viewfuse_job::progress::Progress;
+use viewfuse_scene::photographs::{SourceImage, SourceImages};
+use viewfuse_weighting::sources::SourceWeights;
+
+/// Most views that contribute to a picture: more of less weight lose (`host/results/training_free.md`, "Many sources").
+const MAX_VIEWS: usize = 9;
+
+/// Photographs on the device at two sizes, and their disparity maps.
+pub(super) struct Views<'a, D: Device> {
+    pub(super) scene: SceneViews<'a, D>,
+    /// The settings of the effort, with the scalars that are chosen.
+    pub(super) settings: Sweep,
+    /// For an effort.
+    pub(super) matched: Matched<D>,
+    /// For an effort and a weighting.
+    pub(super) maps: SourceMaps<D>,
+    /// For the views of the last target, as long as their maps stay.
+    pub(super) target: Option<TargetViews<D>>,
+    pub(super) scratch: Scratch<D>,
+}
+
+/// What stays as long as the sources do.
+pub(super) struct SceneViews<'a, D: Device> {
+    pub(super) device: &'a D,
+    /// The settings before any effort or scalar was chosen.
+    pub(super) defaults: Sweep,
+    pub(super) has_silhouettes: bool,
+    background: [f32; 3],
+    /// At the size of the pictures.
+    pub(super) pictures: Images<D>,
+    /// At the field's own size of the comparison.
+    pub(super) small: Vec<SourceImage>,
+    space: Space,
+    /// What is found of the sources, in a folder.
+    pub(super) kept: Option<Kept>,
+}
+
+/// The sources at the size of the comparison.
+pub(super) struct Matched<D: Device> {
+    pub(super) images: Images<D>,
+    /// Their texels on the host, for the gains.
+    pub(super) texels: Vec<[f32; 4]>,
+}
+
+impl<D: Device> Matched<D> {
+    pub(super) fn upload(device: &D, images: &[SourceImage]) -> Result<Matched<D>, FieldError> {
+        let (images, texels) = Images::upload_kept(device, images)?;
+        Ok(Matched { images, texels })
+    }
+}
+
+impl<'a, D: Device> Views<'a, D> {
+    /// Takes sources to the device; nothing is encoded.
+    pub(super) fn upload(
+        settings: Sweep,
+        device: &'a D,
+        sources: &SourceImages,
+        cache: Option<&Cache>,
+        progress: &dyn Progress,
+    ) -> Result<Views<'a, D>, FieldError> {
+        let kept = cache.map(|cache| Kept::new(cache.clone(), device, progress)).transpose()?;
+        let reduced = |side: u32| -> Result<Vec<SourceImage>, FieldError> {
+            let images = sources.images.iter().map(|image| image.reduced(side));
+            images.collect::<Result<_, _>>().map_err(FieldError::unsuitable)
+        };
+        let has_silhouettes = sources.has_silhouettes;
+        let known = Space::of(sources);
+        let space = match known.is_known() {
+            true => known,
+            false => {
+                let matching = settings.matching(device, has_silhouettes);
+                matching.kept_space(&reduced(search::SIDE)?, kept.as_ref(), progress)?
+            }
+        };
+        let small = reduced(settings.match_side)?;
+        // With silhouettes, alpha 0 is the background.
+        let pictures: Vec<Cow<'_, SourceImage>> = match has_silhouettes {
+            true => sources.images.iter().map(Cow::Borrowed).collect(),
+            false => sources.images.iter().map(unseen::filled).collect(),
+        };
+        let matched = Matched::upload(device, &small)?;
+        let maps = SourceMaps::new(device, &matched, Vec::new())?;
+        let (background, pictures) = (sources.background, Images::upload(device, &pictures)?);
+        let defaults = settings;
+        let scene = SceneViews { device, defaults, has_silhouettes, background, pictures, small, space, kept };
+        Ok(Views { scene, settings, matched, maps, target: None, scratch: Scratch::default() })
+    }
+
+    /// Planes for a camera.
+    pub(super) fn range(&self, camera: &CameraBlock) -> Range {
+        Range::new(self.scene.space.disparities(camera), self.settings.plane_count)
+    }
+
+    /// A view's depths, of the disparities of all views.
+    fn depth_map(&self, view: usize, maps: &[[f32; 2]]) -> DepthMap {
+        let (camera, step) = (self.matched.images.cameras[view], self.maps.steps[view]);
+        let pixels = maps[camera.first_texel as usize..].iter().take((camera.width * camera.height) as usize);
+        // Below half a step a disparity is that of the farthest plane: it bounds nothing.
+        let depth = |disparity: f32| if step > 0.0 && disparity > 0.5 * step { 1.0 / disparity } else { 0.0 };
+        DepthMap {
+            camera: CameraBlock { first_texel: 0, ..camera },
+            depths: pixels.clone().map(|[disparity, _]| depth(*disparity)).collect(),
+            confidences: pixels.map(|[_, confidence]| *confidence).collect(),
+        }
+    }
+}
+
+impl<D: Device> Prepared for Views<'_, D> {
+    fn encoding(&self) -> Encoding {
+        Encoding::Greatest(MAX_VIEWS)
+    }
+
+    fn encode(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
+        self.find(view, progress)
+    }
+
+    fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
+        let mut target = self.target_views(request.views, progress)?;
+        let Volume { block, views: blended, costs } = self.volume(&mut target, request, progress)?;
+        let device = self.scene.device;
+        let (width, height) = (block.target.width, block.target.height);
+        let count = (width * height) as usize;
+        let blend_views = device.upload(&blended)?;
+        let (mut colours, mut depths, mut confidences) =
+            (device.zeros::<[f32; 4]>(count)?, device.zeros::<f32>(count)?, device.zeros::<f32>(count)?);
+        device.blend_planes(
+            &block,
+            0,
+            height,
+            &blend_views,
+            &self.scene.pictures.texels,
+            &target.maps,
+            &costs,
+            &mut colours,
+            &mut depths,
+            &mut confidences,
+        )?;
+        let mut colours = device.download(&colours)?;
+        for colour in &mut colours {
+            let behind = 1.0 - colour[3];
+            (0..3).for_each(|channel| colour[channel] += behind * self.scene.background[channel]);
+        }
+        let (depths, confidences) = (device.download(&depths)?, device.download(&confidences)?);
+        let mut rendered = Rendered { colours, depths, confidences, width, height };
+        if !self.scene.has_silhouettes {
+            let maps = device.download(&target.maps)?;
+            let used: Vec<DepthMap> = request.views.iter().map(|view| self.depth_map(*view, &maps)).collect();
+            holes::fill(&mut rendered, &block.target, &used);
+        }
+        self.target = Some(target);
+        Ok(rendered)
+    }
+
+    fn weighted(&mut self) -> Option<&mut dyn Weighted> {
+        Some(self)
+    }
+
+    fn efforts(&mut self) -> Option<&mut dyn Efforts> {
+        Some(self)
+    }
+
+    fn tuned(&mut self) -> Option<&mut dyn Tuned> {
+        Some(self)
+    }
+
+    fn geometry(&self) -> Option<&dyn Geometry> {
+        Some(self)
+    }
+}
+
+impl<D: Device> Weighted for Views<'_, D> {
+    fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
+        self.target = None;
+        self.maps = SourceMaps::new(self.scene.device, &self.matched, relevance.to_vec())?;
+        Ok(())
+    }
+}
+
+impl<D: Device> Geometry for Views<'_, D> {
+    fn surfaces(&self) -> Surfaces {
+        self.scene.space.surfaces()
+    }
+
+    fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError> {
+        let mut maps = self.scene.device.download(self.found())?;
+        self.add_kept(&mut maps);
+        let view_count = self.maps.steps.len();
+        let encoded: Vec<usize> = (0..view_count).filter(|view| self.maps.steps[*view] > 0.0).collect();
+        self.confirm(&encoded, &mut maps);
+        Ok((0..view_count).map(|view| self.depth_map(view, &maps)).collect())
+    }
+}
