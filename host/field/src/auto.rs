@@ -11,9 +11,9 @@
 //!
 //! The choice is a coordinate search: the scheme first, then each of the field's scalars. All candidates are rendered
 //! from one encoding, under the first scheme. A candidate replaces the current choice only if its gain exceeds the
-//! noise; of an object with silhouettes, a scheme also where a left-out source is nearest to the others. At last, pictures under
-//! several settings are mixed by region, where that is not worse. With too few sources to leave one out, everything stays at its
-//! default.
+//! noise; of an object with silhouettes, a scheme also where a left-out source is nearest to the others. At last,
+//! pictures under several settings are mixed by region, where that is not worse. With too few sources to leave one out,
+//! everything stays at its default.
 
 mod calibration;
 mod detail;
@@ -25,6 +25,7 @@ pub use calibration::{Calibration, Group, POOR};
 pub use expectation::{Basis, Expected, PixelErrors, TERMS};
 pub use leave_out::{MAX_LEFT_OUT, MAX_NEIGHBOURS, SIDE};
 
+use crate::mixture::NearTargets;
 use crate::render::{Finished, Frame, RenderError, RenderOptions, Stage, render_chosen};
 use crate::standing::Measure;
 pub use crate::standing::Standing;
@@ -50,17 +51,16 @@ pub fn schemes() -> Vec<Scheme> {
     first.into_iter().flatten().chain(plain).collect()
 }
 
-/// The number of the scheme, from 0, that stands for those after it: where it loses to the first one by more than half of [`MIN_GAIN`] in
-/// the median, they are not tried. Of 43 sets of sources (ten scenes, 192 pixels) it did in 21, and of none of these one of them was chosen.
+/// The number of the scheme, from 0, that stands for those after it: where it loses to the first one by more than half
+/// of [`MIN_GAIN`] in the median, they are not tried (`host/results/speed.md`).
 const LEADER: usize = 2;
 
-/// Least significant gain, decibels. Of 0, 0.03 and 0.1, with and without a margin for the spread between sources, this
-/// came nearest to the best choice in hindsight over 15 scenes and selections; see also [`is_better`].
+/// Least significant gain, decibels (`host/results/training_free.md`, "What auto chooses and expects"); see also
+/// [`is_better`].
 const MIN_GAIN: f64 = 0.1;
 
-/// A mixture is taken unless its score on left-out sources is lower than that of the best single picture by more than this,
-/// decibels: on the targets of six scenes prototypes of it were above the default picture by 0.07 to 0.72
-/// (host/research/results/front_to_back.md).
+/// A mixture is taken unless its score on held-out sources is lower than that of the best single picture by more than
+/// this, decibels (`host/results/front_to_back.md`, "Mixtures by region").
 const MAX_LOSS: f64 = 0.05;
 /// The name in [`Candidate::settings`] of the number of pictures that are mixed.
 const MIXED: &str = "mixed pictures";
@@ -108,7 +108,8 @@ pub struct Chosen {
     pub left_out: Vec<LeftOutSource>,
     /// The data for a target's expected score; `None` if nothing could be left out.
     pub basis: Option<Basis>,
-    /// The errors that pixels of a confidence have; `None` if nothing could be left out, and for fields without confidences.
+    /// The errors that pixels of a confidence have; `None` if nothing could be left out, and for fields without
+    /// confidences.
     pub calibration: Option<Calibration>,
     measure: Measure,
     poses: Vec<Pose>,
@@ -134,8 +135,8 @@ impl Chosen {
         })
     }
 
-    /// The expected score of a picture in the middle between two neighbouring sources: the mean over all sources, each with
-    /// the one nearest to it. `None` if nothing could be left out.
+    /// The expected score of a picture in the middle between two neighbouring sources: the mean over all sources, each
+    /// with the one nearest to it. `None` if nothing could be left out.
     pub fn expected_between(&self) -> Option<Expected> {
         let basis = self.basis?;
         let middles: Vec<Pose> = self.poses.iter().enumerate().filter_map(|(own, _)| self.middle(own)).collect();
@@ -186,8 +187,8 @@ pub fn choose(
     choose_of(schemes(), Some(stage.tunables()), stage, renderer, options, progress)
 }
 
-/// As [`choose`] without a choice: the baseline alone is tried. For the scores of the sources that are left out, in a part of
-/// the time.
+/// As [`choose`] without a choice: the baseline alone is tried. For the scores of the sources that are left out, in a
+/// part of the time.
 ///
 /// # Errors
 /// [`RenderError`].
@@ -253,7 +254,8 @@ fn choose_of(
         && mean_score(&outcomes) > mean_score(&best) - MAX_LOSS
         && !(has_silhouettes && gain_where_nearest(&outcomes, &best) < -MAX_LOSS)
     {
-        (best, chosen.mixture) = (outcomes, Some(mixture));
+        let near = has_silhouettes.then(|| NearTargets::of(chosen.measure, chosen.poses.clone()));
+        (best, chosen.mixture) = (outcomes, Some(Mixture { near, ..mixture }));
     }
     chosen.candidates = search.candidates;
     let side = coarse.size.map_or(SIDE, |[width, height]| width.max(height));
@@ -287,8 +289,8 @@ struct Search<'t, 'a> {
 }
 
 impl Search<'_, '_> {
-    /// The results of a candidate on the sources that are left out, up to the one that decides that it is not better than what it would
-    /// replace: see [`is_lost`].
+    /// The results of a candidate on the sources that are left out, up to the one that decides that it is not better
+    /// than what it would replace: see [`is_lost`].
     fn outcomes(
         &mut self,
         weighting: &Weighting,
@@ -361,8 +363,8 @@ fn is_lost(first: &[Outcome], replaced: &[Outcome]) -> bool {
     replaced.iter().zip(first).map(gains_little).filter(|little| *little).count() > replaced.len() / 2
 }
 
-/// Whether a candidate beats the best one so far, and the one it replaces by more than the noise: in the mean, and by half
-/// of that in the median, so that one source alone does not decide. One that was given up does not.
+/// Whether a candidate beats the best one so far, and the one it replaces by more than the noise: in the mean, and by
+/// half of that in the median, so that one source alone does not decide. One that was given up does not.
 fn is_better(candidate: &[Outcome], best: &[Outcome], replaced: &[Outcome]) -> bool {
     if is_lost(candidate, replaced) {
         return false;
@@ -384,11 +386,10 @@ fn median_gain(candidate: &[Outcome], replaced: &[Outcome]) -> f64 {
     }
 }
 
-/// What the left-out source that is nearest to the others gains, decibels; the same number of both. Targets are nearer to their sources than
-/// sources that are left out, and of objects with silhouettes what gains far from the sources may lose near them. Schemes: over 16 sets
-/// of sources of seven objects (128 pixels) 0.56 dB on average, 7.3 for eight of dino's sixteen photographs in a ring, whose left-out ones
-/// are twice as far from the others as the targets. Whole photographs do not: 16 sets would lose 0.07 dB by it. Mixtures with Gaussians:
-/// the sample scene from five sources, 0.45 dB gained by the mean, 0.41 dB lost at the target.
+/// What the held-out source that is nearest to the others gains, decibels; the same number of both. Targets are nearer
+/// to their sources than held-out sources are, and of objects with silhouettes what gains far from the sources may lose
+/// near them (`host/results/training_free.md`, "What auto chooses and expects"; of mixtures
+/// `host/results/gaussians.md`).
 fn gain_where_nearest(candidate: &[Outcome], replaced: &[Outcome]) -> f64 {
     let nearest = replaced.iter().zip(candidate).min_by(|(a, _), (b, _)| a.standing.gap.total_cmp(&b.standing.gap));
     nearest.map_or(0.0, |(replaced, own)| own.psnr - replaced.psnr)

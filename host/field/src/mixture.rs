@@ -5,16 +5,25 @@
 //! x       = 1, k_0 - K, ..., k_(n-1) - K, |d_1|, ..., |d_(n-1)|
 //! ```
 //!
-//! `k_i` is the confidence of picture `i`, `d_i` its disparity less that of picture 0, both averaged over the pixels around. With
-//! constants `c` of 0 the mixture is the plain mean. Errors of pictures under different settings are partly independent, so the
-//! mean is nearly always nearer to the truth than each of them.
+//! `k_i` is the confidence of picture `i`, `d_i` its disparity less that of picture 0, both averaged over the pixels
+//! around. With constants `c` of 0 the mixture is the plain mean. Errors of pictures under different settings are
+//! partly independent, so the mean is nearly always nearer to the truth than each of them.
+//!
+//! ```text
+//! near     how much of a mixture is in the picture of a target near its sources
+//! ```
+
+mod near;
 
 use crate::{Rendered, Setting};
+pub use near::NearTargets;
 use serde::Serialize;
+use viewfuse_core::pose::Pose;
 
 /// Confidences count from here (`K`).
 const USUAL_CONFIDENCE: f32 = 0.3;
-/// Root mean square difference of the parts' colours from the mixed one that halves a pixel's confidence: of 0.02, 0.05 and 0.1,
+/// Root mean square difference of the parts' colours from the mixed one that halves a pixel's confidence: of 0.02, 0.05
+/// and 0.1,
 /// 0.02 and 0.05 told large errors best on targets of three scenes.
 const USUAL_SPREAD: f32 = 0.03;
 /// Reach of the mean over pixels, as a share of the longer side; it is taken twice.
@@ -24,14 +33,6 @@ const DISPARITY_SHARE: f32 = 0.1;
 /// ... and at most so many times.
 const MAX_DIFFERENCE: f32 = 2.0;
 
-/// Up to this gap to its sources ([`Standing`](crate::auto::Standing)) a target of an object with silhouettes is mixed by half...
-const NEAR_GAP: f64 = 0.35;
-/// ... and from this one on in full: near its sources the hull's own depths can be right where those of left-out sources are not
-/// (`host/research/results/gaussians.md`).
-const FAR_GAP: f64 = 0.4;
-/// The share of the mixture in the picture of a near target, the rest that of the picture under the chosen settings.
-const NEAR_SHARE: f64 = 0.5;
-
 /// Settings under which a target is rendered, and how the pictures are mixed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Mixture {
@@ -39,6 +40,9 @@ pub struct Mixture {
     pub parts: Vec<Vec<Setting>>,
     /// The constants `c_i` of each picture but the first.
     pub constants: Vec<Vec<f32>>,
+    /// Targets whose picture is only partly the mixture; none if all are.
+    #[serde(skip)]
+    pub near: Option<NearTargets>,
 }
 
 /// How many terms a share has, for so many pictures.
@@ -47,54 +51,26 @@ pub(crate) fn term_count(parts: usize) -> usize {
 }
 
 impl Mixture {
+    /// With these constants.
+    pub fn new(parts: Vec<Vec<Setting>>, constants: Vec<Vec<f32>>) -> Mixture {
+        Mixture { parts, constants, near: None }
+    }
+
     /// The plain mean.
     pub fn mean(parts: Vec<Vec<Setting>>) -> Mixture {
         let constants = vec![vec![0.0; term_count(parts.len())]; parts.len().saturating_sub(1)];
-        Mixture { parts, constants }
+        Mixture::new(parts, constants)
     }
 
-    /// Mixes pictures of one size, in the order of the parts; returns the mean share of each, too. Colours are mixed;
-    /// confidences are mixed, and divided by 1 plus the spread of the parts' colours over [`USUAL_SPREAD`]; a pixel's depth is that of the picture with the greatest share, so that no surface stands between two others.
+    /// Mixes pictures of one size, in the order of the parts; returns the mean share of each, too. See [`blended`].
     pub(crate) fn mixed(&self, parts: &[Rendered]) -> (Rendered, Vec<f32>) {
-        let Some(first) = parts.first() else {
-            let nothing =
-                Rendered { colours: Vec::new(), depths: Vec::new(), confidences: Vec::new(), width: 0, height: 0 };
-            return (nothing, Vec::new());
-        };
-        let terms = terms(parts);
-        let mut mixed = first.clone();
-        let mut sums = vec![0.0_f64; parts.len()];
-        let mut shares = vec![0.0; parts.len()];
-        for (pixel, terms) in terms.chunks_exact(term_count(parts.len())).enumerate() {
-            self.shares(terms, &mut shares);
-            let of = |values: &dyn Fn(&Rendered) -> f32| -> f32 {
-                parts.iter().zip(&shares).map(|(part, share)| share * values(part)).sum()
-            };
-            mixed.colours[pixel] = [0, 1, 2, 3].map(|channel| of(&|part| part.colours[pixel][channel]));
-            if let Some(confidence) = mixed.confidences.get_mut(pixel) {
-                let colour = mixed.colours[pixel];
-                let square = |part: &Rendered| -> f32 {
-                    let own = part.colours[pixel];
-                    (0..3).map(|channel| (own[channel] - colour[channel]).powi(2)).sum::<f32>() / 3.0
-                };
-                let apart = of(&square).sqrt() / USUAL_SPREAD;
-                *confidence = of(&|part| part.confidences.get(pixel).copied().unwrap_or(0.0)) / (1.0 + apart);
-            }
-            let greatest = (1..parts.len()).fold(0, |best, own| if shares[own] > shares[best] { own } else { best });
-            if let (Some(depth), Some(own)) = (mixed.depths.get_mut(pixel), parts[greatest].depths.get(pixel)) {
-                *depth = *own;
-            }
-            sums.iter_mut().zip(&shares).for_each(|(sum, share)| *sum += f64::from(*share));
-        }
-        let count = mixed.colours.len().max(1) as f64;
-        (mixed, sums.into_iter().map(|sum| (sum / count) as f32).collect())
+        let (terms, count) = (terms(parts), term_count(parts.len()));
+        blended(parts, |pixel, shares| self.shares(&terms[pixel * count..][..count], shares))
     }
 
-    /// A picture mixed with another one, which has this share.
-    pub(crate) fn between(first: Rendered, second: Rendered, share: f32) -> Rendered {
-        let mut mixture = Mixture::mean(vec![Vec::new(); 2]);
-        mixture.constants[0][0] = share - 0.5;
-        mixture.mixed(&[first, second]).0
+    /// The share of the mixture in a target's picture; the rest is that of the picture under the chosen settings.
+    pub(crate) fn share_at(&self, target: &Pose) -> f32 {
+        self.near.as_ref().map_or(1.0, |near| near.share_at(target))
     }
 
     /// The share of each picture at a pixel with these terms.
@@ -113,10 +89,45 @@ impl Mixture {
     }
 }
 
-/// The share of a mixture in the picture of an object with silhouettes, for a target with this gap to its sources.
-pub(crate) fn share_at(gap: f64) -> f32 {
-    let far = ((gap - NEAR_GAP) / (FAR_GAP - NEAR_GAP)).clamp(0.0, 1.0);
-    (NEAR_SHARE + (1.0 - NEAR_SHARE) * far) as f32
+/// A picture mixed with another one, which has this share everywhere.
+pub(crate) fn between(first: Rendered, second: Rendered, share: f32) -> Rendered {
+    blended(&[first, second], |_, shares| shares.copy_from_slice(&[1.0 - share, share])).0
+}
+
+/// Pictures of one size, each with a share at each pixel, and the mean share of each. Colours are mixed; confidences
+/// are mixed, and divided by 1 plus the spread of the parts' colours over [`USUAL_SPREAD`]; a pixel's depth is that of
+/// the picture with the greatest share, so that no surface stands between two others.
+fn blended(parts: &[Rendered], shares_at: impl Fn(usize, &mut [f32])) -> (Rendered, Vec<f32>) {
+    let Some(first) = parts.first() else {
+        let nothing =
+            Rendered { colours: Vec::new(), depths: Vec::new(), confidences: Vec::new(), width: 0, height: 0 };
+        return (nothing, Vec::new());
+    };
+    let mut blended = first.clone();
+    let mut sums = vec![0.0_f64; parts.len()];
+    let mut shares = vec![0.0; parts.len()];
+    for pixel in 0..first.colours.len() {
+        shares_at(pixel, &mut shares);
+        let mean = |value: &dyn Fn(&Rendered) -> f32| -> f32 {
+            parts.iter().zip(&shares).map(|(part, share)| share * value(part)).sum()
+        };
+        let colour = [0, 1, 2, 3].map(|channel| mean(&|part| part.colours[pixel][channel]));
+        blended.colours[pixel] = colour;
+        if let Some(confidence) = blended.confidences.get_mut(pixel) {
+            let square = |part: &Rendered| -> f32 {
+                (0..3).map(|channel| (part.colours[pixel][channel] - colour[channel]).powi(2)).sum::<f32>() / 3.0
+            };
+            let spread = mean(&square).sqrt() / USUAL_SPREAD;
+            *confidence = mean(&|part| part.confidences.get(pixel).copied().unwrap_or(0.0)) / (1.0 + spread);
+        }
+        let greatest = (1..parts.len()).fold(0, |best, part| if shares[part] > shares[best] { part } else { best });
+        if let (Some(depth), Some(surest)) = (blended.depths.get_mut(pixel), parts[greatest].depths.get(pixel)) {
+            *depth = *surest;
+        }
+        sums.iter_mut().zip(&shares).for_each(|(sum, share)| *sum += f64::from(*share));
+    }
+    let count = blended.colours.len().max(1) as f64;
+    (blended, sums.into_iter().map(|sum| (sum / count) as f32).collect())
 }
 
 /// The terms `x` of all pixels, `[pixel][term]`.
@@ -135,13 +146,14 @@ pub(crate) fn terms(parts: &[Rendered]) -> Vec<f32> {
         }
     }
     let disparity = |depth: f32| if depth > 0.0 { depth.recip() } else { 0.0 };
-    let own: Vec<f32> = parts[0].depths.iter().copied().map(disparity).collect();
-    let usual = DISPARITY_SHARE * median(&mut own.clone());
+    let first: Vec<f32> = parts[0].depths.iter().copied().map(disparity).collect();
+    let usual = DISPARITY_SHARE * median(&mut first.clone());
     for (index, part) in parts.iter().enumerate().skip(1) {
-        if usual > 0.0 && part.depths.len() == own.len() {
-            let difference =
-                |(depth, own): (&f32, &f32)| ((disparity(*depth) - own) / usual).clamp(-MAX_DIFFERENCE, MAX_DIFFERENCE);
-            let differences: Vec<f32> = part.depths.iter().zip(&own).map(difference).collect();
+        if usual > 0.0 && part.depths.len() == first.len() {
+            let difference = |(depth, first): (&f32, &f32)| {
+                ((disparity(*depth) - first) / usual).clamp(-MAX_DIFFERENCE, MAX_DIFFERENCE)
+            };
+            let differences: Vec<f32> = part.depths.iter().zip(&first).map(difference).collect();
             let smooth = smooth(&differences, size);
             set(parts.len() + index, &|pixel| smooth[pixel].abs());
         }
@@ -196,8 +208,8 @@ mod tests {
         }
     }
 
-    fn near(own: f32, expected: f32) -> bool {
-        (own - expected).abs() < 1.0e-6
+    fn near(value: f32, expected: f32) -> bool {
+        (value - expected).abs() < 1.0e-6
     }
 
     #[test]
@@ -207,7 +219,7 @@ mod tests {
         assert!(mixed.colours.iter().all(|colour| near(colour[0], 0.5) && near(colour[3], 1.0)));
         // The colours are 0.3, 0 and 0.3 from the mean, so that the spread is the square root of 0.06.
         let confidence = 0.4 / (1.0 + 0.06_f32.sqrt() / USUAL_SPREAD);
-        assert!(mixed.confidences.iter().all(|own| near(*own, confidence)), "{:?}", mixed.confidences);
+        assert!(mixed.confidences.iter().all(|mixed| near(*mixed, confidence)), "{:?}", mixed.confidences);
         assert!(shares.iter().all(|share| near(*share, 1.0 / 3.0)), "{shares:?}");
     }
 
@@ -225,12 +237,14 @@ mod tests {
     }
 
     #[test]
-    fn near_targets_of_objects_are_mixed_by_half() {
-        assert_eq!([0.1, 0.35, 0.4, 2.0].map(share_at), [0.5, 0.5, 1.0, 1.0]);
-        assert!(near(share_at(0.375), 0.75));
-        let own = Mixture::between(flat(0.2, 0.3, 1.0), flat(0.6, 0.3, 2.0), 0.25);
-        assert!(own.colours.iter().all(|colour| near(colour[0], 0.3)));
-        assert_eq!(own.depths, [1.0; 24], "the depth of the picture with the greater share");
+    fn a_share_may_be_the_same_everywhere() {
+        let (first, second) = (flat(0.2, 0.3, 1.0), flat(0.6, 0.3, 2.0));
+        let picture = between(first.clone(), second.clone(), 0.25);
+        assert!(picture.colours.iter().all(|colour| near(colour[0], 0.3)));
+        assert_eq!(picture.depths, [1.0; 24], "the depth of the picture with the greater share");
+        // As with a constant that no term of the pixels changes.
+        let mixture = Mixture::new(vec![Vec::new(); 2], vec![vec![0.25 - 0.5, 0.0, 0.0, 0.0]]);
+        assert_eq!(picture, mixture.mixed(&[first, second]).0);
     }
 
     #[test]

@@ -2,12 +2,10 @@
 
 use super::error::FieldError;
 use super::field::{Check, Effort, Encoding, Encodings, Prepared, Rendered, Request, Setting, Tunable};
-use super::mixture::{Mixture, share_at};
+use super::mixture::{Mixture, between};
 use super::record::{Record, VIEWS};
 use super::renderer::Renderer;
-use super::standing::Measure;
 use viewfuse_core::camera::Camera;
-use viewfuse_core::pose::Pose;
 use viewfuse_core::weights::Weights;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
@@ -24,8 +22,8 @@ pub(crate) enum Judge {
     Comparison,
 }
 
-/// Source views on a renderer's device, with the set of encoded views (for the current weighting, if encodings depend on
-/// it).
+/// Source views on a renderer's device, with the set of encoded views (for the current weighting, if encodings depend
+/// on it).
 pub(crate) struct Session<'a> {
     renderer: &'a dyn Renderer,
     pub(crate) prepared: Box<dyn Prepared + 'a>,
@@ -43,8 +41,6 @@ pub(crate) struct Session<'a> {
     effort: Option<usize>,
     settings: Vec<Setting>,
     mixture: Option<Mixture>,
-    /// Where the sources of an object with silhouettes are; `None` for whole photographs.
-    around: Option<(Measure, Vec<Pose>)>,
     /// The mean share of each part in the last picture; empty without a mixture.
     pub(crate) shares: Vec<f32>,
 }
@@ -65,8 +61,6 @@ impl<'a> Session<'a> {
         let efforts = prepared.efforts().map_or_else(Vec::new, |efforts| efforts.list());
         let goes_on = prepared.efforts().is_some_and(|efforts| efforts.goes_on());
         let tunables = prepared.tuned().map_or(&[][..], |tuned| tuned.tunables());
-        let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
-        let around = || (Measure::of(&cameras), cameras.iter().map(|camera| camera.pose).collect());
         let (is_weighted, encoded) = (prepared.weighted().is_some(), vec![false; sources.images.len()]);
         Ok(Session {
             renderer,
@@ -81,7 +75,6 @@ impl<'a> Session<'a> {
             effort: None,
             settings: Vec::new(),
             mixture: None,
-            around: sources.has_silhouettes.then(around),
             shares: Vec::new(),
         })
     }
@@ -105,8 +98,8 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Begins a weighting: encodes all views, if all of them contribute to each picture. `relevance[view]` are the weights of
-    /// all sources for source `view` as a target, its own 0.
+    /// Begins a weighting: encodes all views, if all of them contribute to each picture. `relevance[view]` are the
+    /// weights of all sources for source `view` as a target, its own 0.
     pub(crate) fn weigh(&mut self, relevance: &[SourceWeights], progress: &dyn Progress) -> Result<(), FieldError> {
         if let Some(weighted) = self.prepared.weighted() {
             self.encoded.fill(false);
@@ -148,7 +141,7 @@ impl<'a> Session<'a> {
     }
 
     /// Renders a target with the sources' weights for it. `early_termination` is the transmittance below which samples
-    /// are left out.
+    /// are omitted.
     pub(crate) fn render(
         &mut self,
         camera: &Camera,
@@ -159,10 +152,6 @@ impl<'a> Session<'a> {
         self.encode(weights, progress)?;
         let views = &self.views(weights);
         let request = Request { camera, weights, views, early_termination };
-        let share = self
-            .around
-            .as_ref()
-            .map_or(1.0, |(measure, poses)| share_at(measure.standing(&camera.pose, poses.iter()).gap));
         self.shares.clear();
         let Some(mixture) = self.mixture.clone() else { return self.prepared.render(&request, progress) };
         let mut parts = Vec::with_capacity(mixture.parts.len());
@@ -171,12 +160,13 @@ impl<'a> Session<'a> {
             parts.push(self.prepared.render(&request, progress)?);
         }
         self.set(&self.settings.clone());
-        let (mixed, shares) = mixture.mixed(&parts);
-        self.shares = shares.into_iter().map(|own| share * own).collect();
+        let (mixed, part_shares) = mixture.mixed(&parts);
+        let share = mixture.share_at(&camera.pose);
+        self.shares = part_shares.into_iter().map(|part| share * part).collect();
         if share == 1.0 {
             return Ok(mixed);
         }
-        Ok(Mixture::between(self.prepared.render(&request, progress)?, mixed, share))
+        Ok(between(self.prepared.render(&request, progress)?, mixed, share))
     }
 
     /// Renders what follows with one of the efforts. Views that this effort needs otherwise are encoded again.

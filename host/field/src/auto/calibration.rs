@@ -1,4 +1,5 @@
-//! What a confidence means: the error that pixels of that confidence have in the pictures of sources that were left out.
+//! What a confidence means: the error that pixels of that confidence have in the pictures of sources that were left
+//! out.
 
 use serde::Serialize;
 
@@ -6,8 +7,8 @@ use serde::Serialize;
 const MAX_GROUPS: usize = 16;
 /// Fewest pixels of a group.
 const MIN_PIXELS: usize = 64;
-/// The expected root mean square error, as a share of a colour's range, from which on a pixel counts as poor: a picture that is
-/// everywhere as wrong has a PSNR of 20 dB.
+/// The expected root mean square error, as a share of a colour's range, from which on a pixel counts as poor: a picture
+/// that is everywhere as wrong has a PSNR of 20 dB.
 pub const POOR: f32 = 0.1;
 
 /// A pixel of a left-out source: its confidence, and the mean square error of its colours, each in `[0, 1]`.
@@ -31,8 +32,9 @@ pub struct Group {
 pub struct Calibration(Vec<Group>);
 
 impl Calibration {
-    /// From the pixels of all left-out sources; `None` if there are too few. Groups of equally many pixels, by confidence; groups
-    /// that are out of order are joined (pool adjacent violators, which is the least-squares fit of a function that does not rise).
+    /// From the pixels of all left-out sources; `None` if there are too few. Groups of equally many pixels, by
+    /// confidence; groups that are out of order are joined (pool adjacent violators, which is the least-squares fit of
+    /// a function that does not rise).
     pub(super) fn of(mut samples: Vec<Sample>) -> Option<Calibration> {
         samples.sort_unstable_by(|a, b| a.confidence.total_cmp(&b.confidence));
         let count = (samples.len() / MIN_PIXELS).min(MAX_GROUPS);
@@ -73,7 +75,8 @@ impl Calibration {
         (count > 0).then(|| sum / count as f64)
     }
 
-    /// The share of the pixels of these confidences whose expected root mean square error, times `scale`, is above [`POOR`].
+    /// The share of the pixels of these confidences whose expected root mean square error, times `scale`, is above
+    /// [`POOR`].
     pub(super) fn poor(&self, confidences: &[f32], scale: f32) -> f32 {
         let is_poor = |confidence: &&f32| scale * self.square(**confidence).sqrt() > POOR;
         confidences.iter().filter(is_poor).count() as f32 / confidences.len().max(1) as f32

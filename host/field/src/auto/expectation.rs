@@ -1,13 +1,13 @@
-//! The expected score of a target's picture, from the scores of sources that were left out.
+//! The expected score of a target's picture, from the scores of held-out sources.
 //!
 //! ```text
 //! expected = P + c0 + c1 log2(G / g) + c2 (e - E) + c3 D + c4 n + s (c5 + c6 D)
 //! ```
 //!
-//! `P`, `G`: the means of score and gap over the sources that were left out (of the gap, the geometric one); `E`: of the scores that
-//! their confidences say by the calibration; `g`, `e`: the target's own gap and score by its confidences; `D`: the decibels that the
-//! coarse pictures do not show, see [`Basis::detail`]; `n`: the share of its surfaces that no photograph shows ([`Seen::by_none`]); `s`: 1
-//! for objects with silhouettes, 0 for whole photographs.
+//! `P`, `G`: the means of score and gap over the held-out sources (of the gap, the geometric one); `E`: of the scores
+//! that their confidences say by the calibration; `g`, `e`: the target's gap and score by its confidences; `D`: the
+//! decibels that the coarse pictures do not show, see [`Basis::detail`]; `n`: the share of its surfaces that no
+//! photograph shows ([`Seen::by_none`]); `s`: 1 for objects with silhouettes, 0 for whole photographs.
 
 use super::calibration::Calibration;
 use super::leave_out::Outcome;
@@ -15,13 +15,7 @@ use crate::render::Seen;
 use crate::standing::Standing;
 use serde::{Deserialize, Serialize};
 
-/// `c0` to `c6`: ridge regression over 72 targets of 27 selections of 3 to 10 sources, of 11 scenes (kangaroo, cup, herz_jesus_p8, fern,
-/// dtu_scan65, gold_cape, dino, fox, four torcs_cars as one, the room and the sample scene of the repository), at longest sides of 192
-/// and 288 pixels; `c3` is given, as the detail that is lost at these sizes says little of others. With constants that were
-/// fitted to the other scenes: root mean square error 1.95 dB, 54 % of the targets within 1.5 dB. How much the sources are on one side
-/// ([`Standing::outside`]) in place of `n` and `s` had 2.28 dB. Worse there as well: the score, spread and copies' scores of the left-out
-/// sources, and their scores weighted by how near each is to the target. The experiment `self_knowledge` of `viewfuse-research`
-/// prints the data and the fit.
+/// `c0` to `c6`, fitted to the targets of 11 scenes (`host/results/training_free.md`, "What auto chooses and expects").
 const CONSTANTS: [f64; TERMS] = [1.39, 2.70, 0.94, 0.1, -17.1, 1.50, 2.17];
 /// Root mean square error for scenes that the fit has not seen, decibels.
 const DEVIATION: f64 = 1.95;
@@ -45,14 +39,14 @@ pub struct Expected {
 /// What is expected of a picture's pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PixelErrors {
-    /// A pixel's expected root mean square error, as a share of a colour's range, is this times that of its confidence in the
-    /// calibration ([`Calibration`](super::Calibration)): so the whole picture has the expected score.
+    /// A pixel's expected root mean square error, as a share of a colour's range, is this times that of its confidence
+    /// in the calibration ([`Calibration`](super::Calibration)): so the whole picture has the expected score.
     pub scale: f32,
     /// The share of the pixels for which that is above [`POOR`](super::POOR).
     pub poor: f32,
 }
 
-/// The statistics of the sources that were left out.
+/// The statistics of the held-out sources.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Basis {
     /// Mean score, decibels.
@@ -92,11 +86,11 @@ impl Basis {
         }
     }
 
-    /// The terms that the constants multiply, for a target of this geometry, with this score by its confidences, and with so much
-    /// of it seen by few; what is not known counts 0.
+    /// The terms that the constants multiply, for a target of this geometry, with this score by its confidences, and
+    /// with so much of it seen by few; what is not known counts 0.
     pub fn terms(&self, standing: Standing, calibrated: Option<f64>, seen: Option<Seen>) -> [f64; TERMS] {
         let surer = match (calibrated, self.calibrated) {
-            (Some(own), Some(mean)) => own - mean,
+            (Some(score), Some(mean)) => score - mean,
             _ => 0.0,
         };
         let gap = self.log_gap - standing.gap.log2();

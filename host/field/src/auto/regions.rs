@@ -1,9 +1,11 @@
-//! The mixture of pictures under several settings: its constants are fitted to the errors on sources that were left out.
+//! The mixture of pictures under several settings: its constants are fitted to the errors on sources that were left
+//! out.
 //!
-//! The constants minimise the squares of the errors on all of these sources, each source's over the mean square error of its plain
-//! mean, plus a penalty that draws them towards the plain mean. The last picture is the dearest one, and its errors are the least
-//! like the others': it stays out where the mixture without it is better by more than the loss that a mixture may have, and where its
-//! share is too small for what it takes. A source's score is that with constants that were fitted to the other ones.
+//! The constants minimise the squares of the errors on all of these sources, each source's over the mean square error
+//! of its plain mean, plus a penalty that draws them towards the plain mean. The last picture is the dearest one, and
+//! its errors are the least like the others': it stays out where the mixture without it is better by more than the loss
+//! that a mixture may have, and where its share is too small for what it takes. A source's score is that with constants
+//! that were fitted to the other ones.
 
 use super::leave_out::{Outcome, Trials};
 use super::{MAX_LOSS, mean_score};
@@ -17,17 +19,19 @@ use viewfuse_weighting::Weighting;
 
 /// Fewest sources that are left out for a fit: one alone says nothing of the others.
 const MIN_SOURCES: usize = 3;
-/// The penalty of a constant's square, where each source's errors weigh [`SOURCE_WEIGHT`]. Penalties from 100 to 1000 gave
-/// scores within 0.05 dB on four scenes; the greatest keeps nearest to the plain mean, where targets are unlike the sources.
+/// The penalty of a constant's square, where each source's errors weigh [`SOURCE_WEIGHT`]. Penalties from 100 to 1000
+/// gave scores within 0.05 dB on four scenes; the greatest keeps nearest to the plain mean, where targets are unlike
+/// the sources.
 const PENALTY: f64 = 1000.0;
 /// The weight of all sources together, in mean squares of the plain mean's errors.
 const SOURCE_WEIGHT: f64 = 300.0;
 
-/// Least mean share of the last of three pictures or more. Two targets of fox (288x512, 49 sources): the Gaussians have shares of 0.05 and
+/// Least mean share of the last of three pictures or more. Two targets of fox (288x512, 49 sources): the Gaussians have
+/// shares of 0.05 and
 /// 0.06, left-out sources gain nothing by them, and with them it takes twice the time.
 const MIN_LAST_SHARE: f32 = 0.1;
-/// The same of the first source alone, with constants fitted to it, before the picture is made for the others. For 19 targets of six
-/// scenes it is taken or left out as with the first three sources (host/research/results/gaussians.md).
+/// The same of the first source alone, with constants fitted to it, before the picture is made for the others. For 19
+/// targets of six scenes it is taken or left out as with the first three sources (host/research/results/gaussians.md).
 const MIN_FIRST_SHARE: f32 = 0.5 * MIN_LAST_SHARE;
 
 /// A mixture with the scores that it has on the sources that were left out.
@@ -106,7 +110,7 @@ fn add(examples: &mut [Example], frames: Vec<Frame>) {
 fn first_share(example: &mut Example, parts: &[Vec<Setting>]) -> f32 {
     example.terms = terms(&example.parts);
     let constants = solved([Sums::of(example)].iter(), parts.len());
-    let (_, shares) = Mixture { parts: parts.to_vec(), constants }.mixed(&example.parts);
+    let (_, shares) = Mixture::new(parts.to_vec(), constants).mixed(&example.parts);
     shares.last().copied().unwrap_or(0.0)
 }
 
@@ -121,13 +125,13 @@ fn fitted(trials: &Trials<'_>, examples: &mut [Example], parts: &[Vec<Setting>])
     let mut last_share = 0.0;
     for (index, example) in examples.iter().enumerate() {
         let others = sums.iter().enumerate().filter(|(other, _)| *other != index).map(|(_, sums)| sums);
-        let mixture = Mixture { parts: parts.to_vec(), constants: solved(others, count) };
+        let mixture = Mixture::new(parts.to_vec(), solved(others, count));
         let (rendered, shares) = mixture.mixed(&example.parts);
         last_share += shares.last().copied().unwrap_or(0.0) / examples.len() as f32;
         let picture = to_rgb8(&rendered.colours, [rendered.width, rendered.height]);
         outcomes.push(trials.outcome(index, &picture, &rendered.confidences));
     }
-    let mixture = Mixture { constants: solved(sums.iter(), count), parts: parts.to_vec() };
+    let mixture = Mixture::new(parts.to_vec(), solved(sums.iter(), count));
     Mixed { mixture, outcomes, last_share }
 }
 
@@ -251,7 +255,7 @@ mod tests {
         let examples = [example(1), example(2), example(3)];
         let sums: Vec<Sums> = examples.iter().map(Sums::of).collect();
         let parts = vec![Vec::new(); 2];
-        let fitted = Mixture { constants: solved(sums.iter(), 2), parts: parts.clone() };
+        let fitted = Mixture::new(parts.clone(), solved(sums.iter(), 2));
         let error = |mixture: &Mixture| {
             let (mixed, _) = mixture.mixed(&examples[0].parts);
             let truth = examples[0].truth.pixels();
