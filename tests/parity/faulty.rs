@@ -70,41 +70,7 @@ impl Perturb for GaussianBlock {
     }
 }
 
-impl Memory for Faulty {
-    type Buffer<T: Element> = Vec<T>;
-
-    fn name(&self) -> String {
-        format!("faulty {}", self.kernel.name())
-    }
-
-    fn upload<T: Element>(&self, values: &[T]) -> Result<Vec<T>, DeviceError> {
-        Cpu.upload(values)
-    }
-
-    fn zeros<T: Element>(&self, count: usize) -> Result<Vec<T>, DeviceError> {
-        Cpu.zeros(count)
-    }
-
-    fn most_elements<T: Element>(&self) -> usize {
-        Cpu.most_elements::<T>()
-    }
-
-    fn busy_elements(&self) -> usize {
-        Cpu.busy_elements()
-    }
-
-    fn finish(&self) -> Result<(), DeviceError> {
-        Cpu.finish()
-    }
-
-    fn kernel_times(&self) -> Vec<KernelTime> {
-        Cpu.kernel_times()
-    }
-
-    fn download<T: Element>(&self, buffer: &Vec<T>) -> Result<Vec<T>, DeviceError> {
-        Cpu.download(buffer)
-    }
-}
+memory_of_the_cpu!(Faulty, |faulty| format!("faulty {}", faulty.kernel.name()));
 
 /// Perturbs what is written.
 macro_rules! perturb {

@@ -1,8 +1,9 @@
 //! Every form of every tiled kernel that a device can run: against `f64` as the first form is, with the same bits as that
-//! one, and chosen by measuring where none is asked for.
+//! one and as itself in pieces, and chosen by measuring where none is asked for.
 
 use super::Parity;
 use libtest_mimic::{Failed, Trial};
+use std::ops::RangeInclusive;
 use std::process::Command;
 use std::sync::Arc;
 use viewfuse::check::case::{Case, Visitor};
@@ -12,7 +13,7 @@ use viewfuse::device::{Device, Layer, LayerShape, Memory};
 use viewfuse_kernels::network::linear::LinearBlock;
 use viewfuse_tests::trials::{is_required, needing};
 use viewfuse_vulkan::kernel::{Form, Kernel};
-use viewfuse_vulkan::{Adapter, GpuOptions, Instance, Missing};
+use viewfuse_vulkan::{Adapter, GpuOptions, Instance, Limits, Missing};
 
 /// The trials of a device.
 pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> {
@@ -27,14 +28,20 @@ pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> 
                 |form| Vulkan::open(&instance, &adapter, &GpuOptions { form: Some(form), ..GpuOptions::default() });
             let device = open(form)?;
             visit(kernel, Parity { device: &device })?;
-            visit(kernel, SameBits { single: &open(Form::Single)?, other: &device })
+            visit(kernel, SameBits { one: &open(Form::Single)?, other: &device, seeds: 3..=3 })
         }))
+    };
+    let in_pieces = |kernel: Kernel| {
+        let (instance, adapter) = (instance.clone(), adapter.clone());
+        let name = format!("{}::{}::in_pieces", adapter.name, kernel.name());
+        ready(Trial::test(name, move || pieces_have_the_same_bits(&instance, &adapter, kernel)))
     };
     let tiled = Kernel::ALL.into_iter().filter(|kernel| kernel.is_tiled());
     let has_subgroups = adapter.subgroup_size.is_some();
     let is_there = move |form: &&Form| **form != Form::Single && (has_subgroups || !form.needs_subgroups());
     let others = |kernel: Kernel| kernel.forms().iter().filter(is_there).map(move |form| (kernel, *form));
-    let mut trials: Vec<Trial> = tiled.flat_map(others).map(|(kernel, form)| of_form(kernel, form)).collect();
+    let mut trials: Vec<Trial> = tiled.clone().map(in_pieces).collect();
+    trials.extend(tiled.flat_map(others).map(|(kernel, form)| of_form(kernel, form)));
     let (instance, adapter) = (instance.clone(), adapter.clone());
     let name = format!("{}::a_form_is_measured_and_remembered", adapter.name);
     let measured = (instance.clone(), adapter.clone());
@@ -76,22 +83,33 @@ fn refused(instance: &Arc<Instance>, adapter: &Adapter) -> Result<(), Failed> {
     }
 }
 
-struct SameBits<'a> {
-    single: &'a Vulkan,
-    other: &'a Vulkan,
+/// A device on which a dispatch has one workgroup, so that products are cut.
+fn pieces_have_the_same_bits(instance: &Arc<Instance>, adapter: &Adapter, kernel: Kernel) -> Result<(), Failed> {
+    let usual = GpuOptions { form: Some(Form::Single), ..GpuOptions::default() };
+    let whole = Vulkan::open(instance, adapter, &usual)?;
+    let limits = Limits { workgroup_count: 1, ..usual.limits };
+    let cut = Vulkan::open(instance, adapter, &GpuOptions { limits, ..usual })?;
+    visit(kernel, SameBits { one: &whole, other: &cut, seeds: 3..=3 })?;
+    let [one, several] = [&whole, &cut].map(|device| device.tally(kernel).dispatches);
+    if several > one { Ok(()) } else { Err(format!("{several} dispatches instead of {one}").into()) }
 }
 
-impl Visitor for SameBits<'_> {
+/// Two devices with the same bits.
+pub(super) struct SameBits<'a, A, B> {
+    pub(super) one: &'a A,
+    pub(super) other: &'a B,
+    pub(super) seeds: RangeInclusive<u64>,
+}
+
+impl<A: Device, B: Device> Visitor for SameBits<'_, A, B> {
     type Output = Result<(), Failed>;
 
     fn visit<C: Case>(self) -> Result<(), Failed> {
-        for size in [65, 700] {
-            let inputs = C::inputs(3, size);
-            let bits = |device: &Vulkan| -> Result<Vec<u32>, Failed> {
-                Ok(C::results(device, &inputs)?.into_iter().map(f32::to_bits).collect())
-            };
-            if bits(self.single)? != bits(self.other)? {
-                return Err(format!("another result of {} at size {size}", C::KERNEL.name()).into());
+        let bits = |values: Vec<f32>| values.into_iter().map(f32::to_bits).collect::<Vec<u32>>();
+        for (seed, size) in self.seeds.flat_map(|seed| [(seed, 65), (seed, 700)]) {
+            let inputs = C::inputs(seed, size);
+            if bits(C::results(self.one, &inputs)?) != bits(C::results(self.other, &inputs)?) {
+                return Err(format!("another result of {} at size {size}, seed {seed}", C::KERNEL.name()).into());
             }
         }
         Ok(())

@@ -1,11 +1,17 @@
-//! Every kernel on every device against `f64`, and the negative controls: an input that is off by 1 % must show.
+//! Every kernel on every device against `f64`, and the negative controls: an input that is off by 1 % must show. The bodies
+//! themselves are a device, too: the CPU has faster forms of some.
 //!
 //! One trial for each kernel and device. A device that is not there gives ignored trials, or, where
 //! `VIEWFUSE_REQUIRE_VULKAN=1` asks for it, failing ones.
 
+#[macro_use]
+mod memory;
+
+mod bodies;
 mod faulty;
 mod forms;
 
+use bodies::Bodies;
 use faulty::Faulty;
 use libtest_mimic::{Arguments, Failed, Trial};
 use std::process::ExitCode;
@@ -40,6 +46,12 @@ fn main() -> ExitCode {
     // The CPU has no dispatches to count.
     let cpu = Candidate { name: "cpu".to_owned(), open: || Ok(Cpu), missing: None, dispatch_count: |_, _| None };
     trials.extend(trials_of(&cpu));
+    let together: Vec<Kernel> = Kernel::ALL.into_iter().filter(|kernel| kernel.is_together()).collect();
+    for (name, in_workgroups, kernels) in [("bodies", false, Kernel::ALL.to_vec()), ("workgroups", true, together)] {
+        let open = move || Ok(Bodies { in_workgroups });
+        let bodies = Candidate { name: name.to_owned(), open, missing: None, dispatch_count: |_, _| None };
+        trials.extend(kernels.into_iter().map(|kernel| trial_of(&bodies, kernel)));
+    }
     match vulkan_devices() {
         Ok((instance, adapters)) => {
             for adapter in adapters {
@@ -65,6 +77,11 @@ fn main() -> ExitCode {
             dispatch_count: vulkan_dispatches,
         })),
     }
+    for kernel in [Kernel::CompareViews, Kernel::CensusCost, Kernel::WindowCost, Kernel::PlaneOpacity] {
+        let name = format!("the_cpu_has_the_bits_of_the_body::{}", kernel.name());
+        let same_bits = forms::SameBits { one: &Cpu, other: &Bodies { in_workgroups: false }, seeds: 1..=12 };
+        trials.push(Trial::test(name, move || visit(kernel, same_bits)));
+    }
     trials.push(Trial::test("every_input_has_a_control", every_input_has_a_control));
     for kernel in Kernel::ALL {
         let name = format!("check_reports_a_faulty::{}", kernel.name());
@@ -83,15 +100,17 @@ fn trials_of<D: Device + 'static, F>(candidate: &Candidate<D, F>) -> Vec<Trial>
 where
     F: Fn() -> Result<D, String> + Clone + Send + 'static,
 {
-    let dispatch_count = candidate.dispatch_count;
-    let trial = |kernel: Kernel| {
-        let name = format!("{}::{}", candidate.name, kernel.name());
-        let open = candidate.open.clone();
-        let missing = candidate.missing.clone();
-        let trial = Trial::test(name, move || parity(&open()?, kernel, dispatch_count));
-        needing(missing, is_required("VIEWFUSE_REQUIRE_VULKAN"), trial)
-    };
-    Kernel::ALL.into_iter().map(trial).collect()
+    Kernel::ALL.into_iter().map(|kernel| trial_of(candidate, kernel)).collect()
+}
+
+fn trial_of<D: Device + 'static, F>(candidate: &Candidate<D, F>, kernel: Kernel) -> Trial
+where
+    F: Fn() -> Result<D, String> + Clone + Send + 'static,
+{
+    let Candidate { name, open, missing, dispatch_count } = candidate;
+    let (open, dispatch_count) = (open.clone(), *dispatch_count);
+    let trial = Trial::test(format!("{name}::{}", kernel.name()), move || parity(&open()?, kernel, dispatch_count));
+    needing(missing.clone(), is_required("VIEWFUSE_REQUIRE_VULKAN"), trial)
 }
 
 /// Sizes of the trials: one element, an odd number, and several workgroups with a rest.

@@ -1,0 +1,61 @@
+//! The result of two runs as a table.
+
+use crate::{GROUPS, file};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+/// Answers of the groups, by body, then by change.
+type Answers = BTreeMap<String, BTreeMap<String, Vec<String>>>;
+
+fn read(name: &str) -> Answers {
+    let mut answers = Answers::new();
+    for line in std::fs::read_to_string(file(name)).expect("a run").lines() {
+        let mut columns: Vec<String> = line.rsplitn(GROUPS.len() + 1, '\t').map(str::to_owned).collect();
+        let key = columns.pop().expect("a change");
+        columns.reverse();
+        let (body, change) = key.split_once(' ').expect("a body");
+        answers.entry(body.to_owned()).or_default().insert(change.to_owned(), columns);
+    }
+    answers
+}
+
+fn is_noticed(answer: &str) -> bool {
+    !["none", "not reached"].contains(&answer)
+}
+
+/// How many changes of a body some groups notice.
+fn count(changes: &BTreeMap<String, Vec<String>>, groups: &[usize]) -> usize {
+    changes.values().filter(|answers| groups.iter().any(|group| is_noticed(&answers[*group]))).count()
+}
+
+/// A line a body, then the changes that no test of the second run notices.
+pub fn table(before: &str, after: &str) -> String {
+    let (before, after) = (read(before), read(after));
+    let mut text = String::from(
+        "| body | changes | before: case | numerics | entry points | any | after: case | bodies | numerics | any |\n\
+         |---|---|---|---|---|---|---|---|---|---|\n",
+    );
+    let (mut sums, mut unnoticed, mut lost) = ([0; 9], String::new(), Vec::new());
+    for (body, changes) in &after {
+        let none = BTreeMap::new();
+        let old = before.get(body).unwrap_or(&none);
+        let before = [&[0][..], &[2], &[3], &[0, 2, 3]].map(|groups| count(old, groups));
+        let after = [&[0][..], &[1], &[2], &[0, 1, 2]].map(|groups| count(changes, groups));
+        let row: Vec<usize> = [&[changes.len()][..], &before, &after].concat();
+        row.iter().zip(&mut sums).for_each(|(own, sum)| *sum += own);
+        let cells: Vec<String> = row.iter().map(usize::to_string).collect();
+        writeln!(text, "| `{body}` | {} |", cells.join(" | ")).expect("a text");
+        if after[3] == 0 {
+            lost.push(body.as_str());
+        }
+        for (change, answers) in changes.iter().filter(|(_, answers)| !answers.iter().any(|own| is_noticed(own))) {
+            let reach =
+                if answers.iter().all(|own| own == "not reached") { "reached by none" } else { "noticed by none" };
+            writeln!(unnoticed, "| `{body}` | {} | {reach} |", change.replace('|', "\\|")).expect("a text");
+        }
+    }
+    let cells: Vec<String> = sums.iter().map(usize::to_string).collect();
+    writeln!(text, "| all {} | {} |", after.len(), cells.join(" | ")).expect("a text");
+    writeln!(text, "\nBodies of which no change is noticed: {lost:?}\n").expect("a text");
+    text + "| body | kind, line, expression | |\n|---|---|---|\n" + &unnoticed
+}
