@@ -11,7 +11,6 @@ mod expectations;
 mod forms;
 mod gaussians;
 mod genvs;
-mod layers;
 mod limits;
 mod loader;
 mod memory;
@@ -55,7 +54,6 @@ fn main() -> ExitCode {
         transfers::TESTS,
         memory::TESTS,
         time::TESTS,
-        layers::TESTS,
         picture::TESTS,
         pixelnerf::TESTS,
         genvs::TESTS,

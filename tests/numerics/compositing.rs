@@ -90,31 +90,6 @@ fn random_samples(random: &mut Random, count: usize, low: f64, high: f64) -> Vec
 }
 
 #[test]
-fn compositing_agrees_with_f64() {
-    let mut random = Random::new(32);
-    for case in 0..3_000 {
-        let count = 1 + random.below(128);
-        let (low, high) = [(1.0e-6, 1.0e3), (1.0e-3, 1.0), (1.0e-6, 1.0e-2), (1.0, 1.0e3)][case % 4];
-        let samples = random_samples(&mut random, count, low, high);
-        let background: [f32; 3] = std::array::from_fn(|_| random.unit() as f32);
-        let (actual, weights) = composite(&samples, background);
-        let (channels, opacity, depth) = oracle(&samples, background);
-        // Each transmittance is off by the sum's roundings (N u o e^-o <= N u / e) and exp's 2 ULP.
-        let units = 0.4 * count as f64 + 4.0;
-        let tolerance = Comparator { absolute: 2.0 * (units + count as f64) / 16_777_216.0, relative: 0.0 };
-        tolerance.compare_varying(&actual.channels, &channels).unwrap_or_else(|e| panic!("{e}"));
-        tolerance.compare(&[actual.opacity], &[opacity]).unwrap_or_else(|e| panic!("{e}"));
-        assert!((0.0..=1.0).contains(&actual.opacity));
-        let depth_error = (f64::from(actual.depth) - depth).abs();
-        assert!(depth_error <= 4.0 * tolerance.absolute / opacity + 1.0e-6, "{depth_error} at opacity {opacity}");
-        // Weights are not negative and telescope to the opacity.
-        let sum: f64 = weights.iter().map(|w| f64::from(*w)).sum();
-        assert!((sum - f64::from(actual.opacity)).abs() <= count as f64 * 6.0e-8);
-        assert!(weights.iter().all(|w| *w >= 0.0), "{weights:?}");
-    }
-}
-
-#[test]
 fn two_thousand_thin_samples_are_not_lost() {
     let samples = vec![([1.0, 0.5, 0.0], 1.0e-7, 2.0); 2000];
     let (actual, _) = composite(&samples, [0.0; 3]);

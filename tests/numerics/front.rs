@@ -1,11 +1,9 @@
-//! The choice front to back: what views say of a point, and which of two surfaces a ray ends at.
+//! The choice front to back: which of two surfaces a ray ends at, and degenerate input.
 
-use viewfuse::check::swept::{Swept, opacities};
-use viewfuse::check::world::Numbers;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::pose::Pose;
 use viewfuse_kernels::bodies;
-use viewfuse_kernels::plane_sweep::front::{FrontBlock, GUARD, plane_opacity};
+use viewfuse_kernels::plane_sweep::front::{FrontBlock, plane_opacity};
 use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
 use viewfuse_kernels::plane_sweep::{PLANES, Planes};
 
@@ -64,17 +62,6 @@ fn chosen(block: &FrontBlock, opacities: &[Planes]) -> usize {
     (0..costs.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b])).expect("planes")
 }
 
-/// A view whose surface lies before a point says nothing about it; one that sees through it makes it more transparent.
-#[test]
-fn hidden_is_neutral_and_seen_through_is_not() {
-    let alone = opacity(&[4.0, 4.0]);
-    let hidden = opacity(&[4.0, 4.0, 12.0]);
-    let seen_through = opacity(&[4.0, 4.0, 0.0]);
-    assert!(alone[4] > 0.8, "{alone:?}");
-    assert_eq!(hidden[4], alone[4]);
-    assert!(seen_through[4] < alone[4] - 0.05, "{} and {}", seen_through[4], alone[4]);
-}
-
 /// Five views see a floor, two a body before it: the floor has the greater support, and the body is chosen. Where no view sees a
 /// body, the floor is.
 #[test]
@@ -91,51 +78,6 @@ fn the_nearer_surface_wins() {
     };
     assert_eq!(chosen(&block, &filled(two(0.75))), 11, "an opaque body before a more opaque floor");
     assert_eq!(chosen(&block, &filled(two(0.3))), 3, "what hides nothing before a floor");
-}
-
-/// Planes nearer to one another than [`GUARD`] may be one surface: they do not hide each other.
-#[test]
-fn a_surface_does_not_hide_itself() {
-    let block = FrontBlock { width: SIDE, height: SIDE, group_count: 1, front_share: 0.1 };
-    let with = |near: usize| -> Planes {
-        std::array::from_fn(|plane| {
-            if plane == 4 {
-                0.9
-            } else if plane == near {
-                0.8
-            } else {
-                0.0
-            }
-        })
-    };
-    let cost = |near: usize| {
-        let opacities = vec![with(near); (SIDE * SIDE) as usize];
-        front_cost(&block, &opacities[..], &opacities[..], 27)[0][4]
-    };
-    assert_eq!(cost(4 + GUARD - 1), cost(3));
-    assert!(cost(4 + GUARD) > cost(3) + 0.05);
-}
-
-/// Costs grow by at most the share, and by less the more opaque and the less hidden a plane is.
-#[test]
-fn the_preference_is_bounded() {
-    for seed in 1..5 {
-        let volume = Swept::new(seed, 200).volume();
-        let opacities = opacities(&mut Numbers::new(seed), &volume);
-        let block = FrontBlock {
-            width: volume.width,
-            height: volume.height,
-            group_count: volume.group_count,
-            front_share: 0.2,
-        };
-        let zero = vec![[0.0; PLANES]; opacities.len()];
-        for pixel in 0..volume.width * volume.height {
-            let costs = front_cost(&block, &opacities[..], &zero[..], pixel);
-            for cost in costs.as_flattened() {
-                assert!((0.0..=0.200_001).contains(cost), "pixel {pixel}: {cost}");
-            }
-        }
-    }
 }
 
 /// Without depth between planes, in a single pixel, with maps of no confidence: finite, and transparent.

@@ -1,13 +1,12 @@
-//! Normalisation, SiLU and softmax against `f64`, at their ends as well.
+//! Normalisation, SiLU and softmax at their ends: values far from 0, constant ones, infinite ones.
 
-use std::array::from_fn;
 use viewfuse::check::compare::relative_units;
 use viewfuse::check::poses::Random;
 use viewfuse::device::Device;
 use viewfuse::device::cpu::Cpu;
 use viewfuse_kernels::network::attend::{softmax_scale, softmax_value};
 use viewfuse_kernels::network::group_norm::{
-    GroupNormBlock, MeanBlock, channel_mean, group_norm_element, group_norm_partials, group_norm_statistics, silu,
+    GroupNormBlock, group_norm_element, group_norm_partials, group_norm_statistics, silu,
 };
 
 /// An image through all three kernels: by their bodies, and by the CPU's own way.
@@ -83,30 +82,6 @@ fn error(inputs: &[f32], weights: &[f32], bias: &[f32], block: &GroupNormBlock) 
 }
 
 #[test]
-fn groups_have_mean_0_and_variance_1() {
-    let mut random = Random::new(61);
-    for case in 0..200 {
-        let (groups, channels) = (1 + random.below(5) as u32, 1 + random.below(9) as u32);
-        let block = block(1 + random.below(300) as u32, groups, channels);
-        let gap = random.below(3) as u32;
-        let block = GroupNormBlock {
-            in_pitch: block.channels + gap,
-            in_first: gap,
-            variance_floor: [1.0e-5, 0.0, 0.1][case % 3],
-            silu_outputs: case as u32 & 1,
-            ..block
-        };
-        let magnitude = random.log_range(1.0e-3, 1.0e3);
-        // A floor is nothing beside large variances, and most of small ones.
-        let count = (gap + block.pixel_count * block.in_pitch) as usize;
-        let inputs: Vec<f32> = (0..count).map(|_| (magnitude * (random.normal() + 1.0)) as f32).collect();
-        let [weights, bias]: [Vec<f32>; 2] = from_fn(|_| (0..block.channels).map(|_| random.normal() as f32).collect());
-        let error = error(&inputs, &weights, &bias, &block);
-        assert!(error <= 1.0e-5, "{block:?} {magnitude}: {error}");
-    }
-}
-
-#[test]
 fn values_far_from_0_are_normalised() {
     let mut random = Random::new(62);
     for (distance, tolerance) in [(1.0e2, 5.0e-5), (1.0e3, 5.0e-4), (1.0e4, 5.0e-3)] {
@@ -149,28 +124,6 @@ fn a_pixel_alone_is_normalised_over_its_channels() {
 }
 
 #[test]
-fn means_are_means() {
-    let mut random = Random::new(63);
-    for _ in 0..50 {
-        let block = MeanBlock { pixel_count: 1 + random.below(5000) as u32, channels: 1 + random.below(4) as u32 };
-        let count = (block.pixel_count * block.channels) as usize;
-        let inputs: Vec<f32> = (0..count).map(|_| (1.0 + random.normal()) as f32).collect();
-        let mut sums = vec![0.0; block.channels as usize];
-        for pixel in inputs.chunks_exact(sums.len()) {
-            sums.iter_mut().zip(pixel).for_each(|(sum, value)| *sum += f64::from(*value));
-        }
-        let mut means = vec![0.0; sums.len()];
-        Cpu.channel_means(&block, &inputs, &mut means).expect("the CPU computes");
-        for (channel, sum) in sums.into_iter().enumerate() {
-            let expected = sum / f64::from(block.pixel_count);
-            for actual in [channel_mean(&inputs[..], &block, channel), means[channel]] {
-                assert!((f64::from(actual) - expected).abs() <= 2.0e-5, "{block:?} {channel}: {actual} {expected}");
-            }
-        }
-    }
-}
-
-#[test]
 fn silu_at_its_ends() {
     let mut worst = 0.0_f64;
     for step in -86_000..=200_000 {
@@ -199,24 +152,6 @@ fn softmax(scores: &[f32]) -> [Vec<f32>; 2] {
     let mut weights = vec![0.0; rows.len()];
     Cpu.softmax_rows(&(scores.len() as u32), 3, &rows, &mut weights).expect("the CPU computes");
     [by_body, weights[scores.len()..2 * scores.len()].to_vec()]
-}
-
-#[test]
-fn softmax_is_shares_of_exponentials() {
-    let mut random = Random::new(64);
-    for _ in 0..200 {
-        let (count, deviation) = (1 + random.below(300), random.log_range(1.0e-3, 30.0));
-        let scores: Vec<f32> = (0..count).map(|_| (deviation * random.normal()) as f32).collect();
-        let all: f64 = scores.iter().map(|score| f64::from(*score).exp()).sum();
-        for weights in softmax(&scores) {
-            for (score, weight) in scores.iter().zip(weights) {
-                // An error of the difference of scores is one of the exponent.
-                let expected = f64::from(*score).exp() / all;
-                let tolerance = expected * (1.0e-6 + 2.0e-7 * deviation * 8.0) + 1.0e-37;
-                assert!((f64::from(weight) - expected).abs() <= tolerance, "{weight} {expected}");
-            }
-        }
-    }
 }
 
 #[test]

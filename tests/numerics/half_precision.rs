@@ -1,4 +1,4 @@
-//! Half precision: all of them, what becomes of others, look-ups in grids of them, and volumes of GeNVS that are kept in them.
+//! Half precision: all of them, what becomes of others, and volumes of GeNVS that are kept in them.
 
 use half::f16;
 use viewfuse::check::poses::Random;
@@ -11,9 +11,7 @@ use viewfuse::scene::photographs::{SourceImage, SourceImages};
 use viewfuse::synthetic::{Orbit, render, toy};
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::half_precision::{MAX_F16, f16_bits, f16_value, fetch_f16, packed_f16, word_count};
-use viewfuse_core::rays::RayPoint;
 use viewfuse_core::weights::Weights;
-use viewfuse_kernels::pixelnerf::{GatherBlock, GridPlace, gathered_value, gathered_value_f16};
 use viewfuse_tests::fields::{self, line};
 
 #[test]
@@ -82,35 +80,6 @@ fn two_in_a_word() {
     }
     // A number that is there and does not count is left out.
     assert_eq!(packed_f16(&[1.0_f32, 1.0], 1, 0), 0x3c00);
-}
-
-/// A place in a grid is a mean of four nodes, each off by 2^-11 of it; with `f32`'s rounding of the mean on top.
-#[test]
-fn a_look_up_is_off_by_as_much_as_its_nodes() {
-    let mut random = Random::new(92);
-    for channel_count in [1, 2, 5, 8] {
-        let block = GatherBlock { point_count: 64, channel_count, height: 7, width: 6, ..GatherBlock::default() };
-        let grid: Vec<f32> = (0..42 * channel_count).map(|_| (100.0 * random.normal()) as f32).collect();
-        let count = grid.len() as u32;
-        let words: Vec<u32> = (0..word_count(count) as usize).map(|word| packed_f16(&grid[..], count, word)).collect();
-        let mut largest = 0.0_f32;
-        let views = [target().block(0)];
-        let points: Vec<RayPoint> = (0..64)
-            .map(|_| RayPoint { position: [0; 3].map(|_| (0.4 * random.normal()) as f32), ..RayPoint::default() })
-            .collect();
-        for element in 0..(64 * channel_count) as usize {
-            let (point, channel) = (element / channel_count as usize, element % channel_count as usize);
-            let nodes = GridPlace::of(&views[0], &points[point], &block).nodes.map(|node| grid[node + channel].abs());
-            let greatest = nodes.into_iter().fold(0.0, f32::max);
-            let whole = gathered_value(&views, &points[..], &grid[..], &[0.0; 0], &block, element);
-            let halves = gathered_value_f16(&views, &points[..], &words[..], &[0.0; 0], &block, element);
-            let bound = greatest * (0.5_f32.powi(11) + 8.0 * f32::EPSILON);
-            assert!((whole - halves).abs() <= bound, "{halves} is not {whole} within {bound}");
-            largest = largest.max((whole - halves).abs() / greatest);
-        }
-        println!("{channel_count} channels: off by {largest:.1e} of the greatest node");
-        assert!(largest > 0.5_f32.powi(14), "{largest:e}");
-    }
 }
 
 const SIDE: u32 = 64;

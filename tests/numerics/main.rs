@@ -3,6 +3,7 @@
 mod agreement;
 mod attention;
 mod camera;
+mod census;
 mod compare;
 mod compositing;
 mod front;
@@ -23,7 +24,6 @@ mod rays;
 mod sampler;
 mod sampling;
 mod schedule;
-mod sweep_twins;
 mod visual_hull;
 mod volumes;
 mod weighting;

@@ -1,16 +1,14 @@
 //! The plane sweep as a whole and its parts: what must hold whatever the numbers are.
 
-use viewfuse::check::swept::{Swept, band, costs};
+use viewfuse::check::swept::{Swept, costs};
 use viewfuse::check::world::Numbers;
 use viewfuse::device::Device;
 use viewfuse::device::cpu::Cpu;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::lookup::bilinear_from;
 use viewfuse_core::pose::Pose;
 use viewfuse_kernels::plane_sweep::blend::{BlendBlock, Blended, blend};
-use viewfuse_kernels::plane_sweep::census::{GREY_STEPS, census_cost};
 use viewfuse_kernels::plane_sweep::disparity::{NEAR_PLANES, pick_disparity};
-use viewfuse_kernels::plane_sweep::evidence::{UNSEEN, ViewPair, evidence};
+use viewfuse_kernels::plane_sweep::evidence::ViewPair;
 use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
 use viewfuse_kernels::plane_sweep::path::CostBlock;
 use viewfuse_kernels::plane_sweep::window::WindowBlock;
@@ -132,91 +130,6 @@ fn a_plane_that_faces_the_cameras_is_found() {
     }
 }
 
-/// Their order changes that of sums only.
-#[test]
-fn the_order_of_views_does_not_matter() {
-    for seed in 1..5 {
-        let swept = Swept::new(seed, 60);
-        let count = swept.views.len() as u32;
-        let mut turned = swept.clone();
-        turned.views.rotate_left(1);
-        // The view of number n is now n - 1.
-        let number = |view: u32| (view + count - 1) % count;
-        for pair in &mut turned.pairs {
-            (pair.first, pair.second) = (number(pair.second), number(pair.first));
-        }
-        turned.pairs.reverse();
-        let found = |swept: &Swept, pixel| {
-            let Swept { frustum, views, pairs, texels, disparities } = swept;
-            evidence(frustum, &views[..], pairs, &texels[..], &disparities[..], pixel, 0)
-        };
-        let mut compared = 0;
-        for pixel in 0..swept.frustum.camera.width * swept.frustum.camera.height {
-            let (a, b) = (found(&swept, pixel), found(&turned, pixel));
-            for view in 0..count {
-                assert_eq!(a.grey[view as usize], b.grey[number(view) as usize]);
-            }
-            let parts = [[a.difference, b.difference], [a.weight, b.weight], [a.dissent, b.dissent], [a.hull, b.hull]];
-            for [a, b] in parts {
-                for (a, b) in a.into_iter().zip(b) {
-                    assert!((a - b).abs() <= 1.0e-6, "{a} and {b}");
-                    compared += usize::from(a > 0.0);
-                }
-            }
-        }
-        assert!(compared > 100);
-
-        let volume = swept.volume();
-        let costs = costs(&mut Numbers::new(seed), &volume);
-        let [a, b] = [swept, turned].map(|swept| {
-            let (swept, block) = swept.halved(&volume);
-            blended(&swept, &block, &costs)
-        });
-        for (a, b) in a.iter().zip(&b) {
-            for (a, b) in numbers_of(a).into_iter().zip(numbers_of(b)) {
-                assert!((a - b).abs() <= 1.0e-5 * a.abs().max(1.0), "{a} and {b}");
-            }
-        }
-    }
-}
-
-/// The greys of a view in a small band: distinct for all pixels, each at least 0.05 from all others.
-fn stairs(swept: &mut Swept) -> (Vec<Planes>, Vec<Planes>) {
-    swept.frustum.camera.width = 4;
-    swept.frustum.row_count = 4;
-    swept.frustum.group_count = 1;
-    let (mut grey, evidence) = band(&mut Numbers::new(3), swept);
-    for (at, planes) in grey.iter_mut().enumerate() {
-        *planes = [0.05 * ((at % 16 * 7 + at / 16 * 3) % 16) as f32; PLANES];
-    }
-    (grey, evidence)
-}
-
-#[test]
-fn census_does_not_mind_exposure() {
-    let mut swept = Swept::new(2, 60);
-    let (grey, evidence) = stairs(&mut swept);
-    let cost = |grey: &[Planes]| -> Vec<[Planes; 2]> {
-        (0..16).map(|pixel| census_cost(&swept.frustum, &swept.pairs, grey, &evidence[..], pixel, 0)).collect()
-    };
-    let before = cost(&grey);
-    let with = |change: fn(f32) -> f32| {
-        let mut changed = grey.clone();
-        changed[16..32].iter_mut().flatten().for_each(|grey| *grey = change(*grey));
-        cost(&changed)
-    };
-    // Every difference is saturated, and stays so.
-    assert_eq!(with(|grey| 1.2 * grey + 0.05), before);
-    // And the other way about: the census sees what is lighter.
-    assert_ne!(with(|grey| 0.75 - grey), before);
-    // What is not saturated stays the same with an offset alone, of whole steps.
-    let small: Vec<Planes> =
-        grey.iter().map(|planes| planes.map(|grey| (grey / 0.05).round() * 10.0 / GREY_STEPS)).collect();
-    let mut offset = small.clone();
-    offset[16..32].iter_mut().flatten().for_each(|grey| *grey += 300.0 / GREY_STEPS);
-    assert_eq!(cost(&offset), cost(&small));
-}
-
 fn joined(volume: &CostBlock, means: &[Planes]) -> Vec<Planes> {
     let mut paths = vec![[0.0; PLANES]; 4 * means.len()];
     let mut joined = vec![[0.0; PLANES]; means.len()];
@@ -239,64 +152,6 @@ fn costs_do_not_grow_along_paths() {
     let means = costs(&mut Numbers::new(1), &volume);
     for (own, joined) in means.as_flattened().iter().zip(joined(&volume, &means).as_flattened()) {
         assert!(*joined >= own - 1.0e-5 && *joined <= own + 0.030_01, "{own} became {joined}");
-    }
-}
-
-#[test]
-fn a_single_outlier_is_smoothed() {
-    let volume = CostBlock { width: 9, height: 7, group_count: 2, padding: 0 };
-    let mut means = vec![[0.2; PLANES]; 9 * 7 * 2];
-    means.iter_mut().step_by(2).for_each(|planes| planes[6] = 0.1);
-    let middle = 2 * (3 * 9 + 4);
-    means[middle][6] = 0.115;
-    means[middle + 1][9] = 0.1;
-    let joined = joined(&volume, &means);
-    let least = |pixel: usize, costs: &[Planes]| {
-        let costs = costs[2 * pixel..][..2].as_flattened();
-        (0..2 * PLANES).min_by(|a, b| costs[*a].total_cmp(&costs[*b]))
-    };
-    assert_eq!(least(middle / 2, &means), Some(PLANES + 9));
-    for pixel in 0..9 * 7 {
-        assert_eq!(least(pixel, &joined), Some(6), "pixel {pixel}");
-    }
-}
-
-/// With one plane and one view a pixel is that view's, where the plane lies.
-#[test]
-fn one_plane_of_one_view_is_a_look_up() {
-    let mut swept = facing(5);
-    swept.views.truncate(1);
-    swept.views[0].camera = ahead([0.4, -0.3], 0);
-    let volume = swept.volume();
-    let (swept, block) = swept.halved(&volume);
-    let block = BlendBlock { view_count: 1, ..block };
-    let plane = 5;
-    let mut costs = vec![[1.0; PLANES]; (WIDTH * HEIGHT) as usize];
-    costs.iter_mut().for_each(|costs| costs[plane] = 0.01);
-    let shift = [0.4, -0.3].map(|offset| offset * plane as f32);
-    for (pixel, seen) in blended(&swept, &block, &costs).iter().enumerate() {
-        let (x, y) = (pixel as f32 % WIDTH as f32, (pixel / WIDTH as usize) as f32);
-        let (x, y) = (x.floor() + 0.5 - shift[0], y + 0.5 - shift[1]);
-        let expected: [f32; 4] = bilinear_from(&swept.texels[..], 0, WIDTH, HEIGHT, x, y);
-        for (found, expected) in seen.colour.into_iter().zip(expected) {
-            assert!((found - expected).abs() < 1.0e-4, "{:?} has {found}, not {expected}", seen.colour);
-        }
-        assert!((seen.depth - 32.0 / plane as f32).abs() < 1.0e-4, "depth {}", seen.depth);
-    }
-}
-
-#[test]
-fn pixels_are_in_range() {
-    for seed in 1..9 {
-        let swept = Swept::new(seed, 200);
-        let volume = swept.volume();
-        let costs = costs(&mut Numbers::new(seed), &volume);
-        let (swept, block) = swept.halved(&volume);
-        for pixel in blended(&swept, &block, &costs) {
-            let in_range = |value: f32| (0.0..=1.000_001).contains(&value);
-            assert!(pixel.colour.into_iter().all(in_range) && in_range(pixel.confidence), "{pixel:?}");
-            assert!(pixel.depth >= 0.0 && pixel.depth.is_finite(), "{pixel:?}");
-        }
     }
 }
 
@@ -364,17 +219,4 @@ fn equal_costs_are_far_and_unsure() {
     let [disparity, confidence] = pick_disparity(&swept.frustum, &costs, 77);
     assert_eq!(disparity, 0.0);
     assert!((confidence - (1 + NEAR_PLANES) as f32 / PLANES as f32).abs() < 0.02, "confidence {confidence}");
-}
-
-/// A view that does not see a pixel takes no part in its comparison.
-#[test]
-fn what_is_not_seen_is_not_compared() {
-    let swept = facing(4);
-    let Swept { frustum, views, pairs, texels, disparities } = &swept;
-    let found = evidence(frustum, &views[..], pairs, &texels[..], &disparities[..], 0, 0);
-    let last = PLANES - 1;
-    // The corner lies beyond the images of the cameras to the right and below on every plane but the first.
-    assert_eq!([0, 1, 2, 3].map(|view| found.grey[view][last] == UNSEEN), [true, false, true, false]);
-    assert!((found.weight[last] - 1.0 / 6.0).abs() < 1.0e-6, "weight {}", found.weight[last]);
-    assert!((found.weight[0] - 1.0).abs() < 1.0e-6, "weight {}", found.weight[0]);
 }

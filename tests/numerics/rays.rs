@@ -1,15 +1,12 @@
-//! Rays and where to look along them: random numbers, depths of both passes, what is seen and what is wanted, against `f64`
-//! and at extremes.
+//! Rays and where to look along them, at extremes: random numbers, depths of both passes, what is seen and what is wanted.
 
 use viewfuse::check::poses::Random;
 use viewfuse::check::ray_inputs;
 use viewfuse_core::composite::Compositor;
-use viewfuse_core::depths::{
-    CoarseBlock, FineBlock, coarse_depth, fine_depth, inverse_cdf, merged_depth, random_draw, stratified_depth,
-};
+use viewfuse_core::depths::{FineBlock, fine_depth, random_draw, stratified_depth};
 use viewfuse_core::math;
-use viewfuse_core::random::{normal, uniform_from, uniform_pair};
-use viewfuse_core::rays::{CastBlock, TargetRay, cast_ray, place_point};
+use viewfuse_core::random::{normal, uniform_pair};
+use viewfuse_core::rays::{TargetRay, place_point};
 use viewfuse_kernels::sample_mask::{SampleMaskBlock, is_sampled, weigh_sample};
 
 /// As [`normal`], in `f64`.
@@ -49,22 +46,6 @@ fn normal_numbers_are_normal() {
 }
 
 #[test]
-fn random_numbers_know_no_order() {
-    let block =
-        FineBlock { seed: [3, 4], coarse_count: 64, importance_count: 16, depth_count: 16, ..FineBlock::default() };
-    let forwards: Vec<_> = (0..40).flat_map(|pixel| (0..32).map(move |i| random_draw(pixel, i, &block))).collect();
-    let mut backwards: Vec<_> =
-        (0..40).rev().flat_map(|pixel| (0..32).rev().map(move |i| random_draw(pixel, i, &block))).collect();
-    backwards.reverse();
-    assert_eq!(forwards, backwards);
-    // Neither are they those of the first pass, nor of another pixel or seed.
-    let coarse: Vec<f32> = (0..64).map(|sample| uniform_from(block.seed, 5, sample)).collect();
-    assert!((16..32).all(|index| !coarse.contains(&random_draw(5, index, &block)[0])));
-    assert_ne!(random_draw(5, 3, &block), random_draw(6, 3, &block));
-    assert_ne!(random_draw(5, 3, &block), random_draw(5, 3, &FineBlock { seed: [4, 3], ..block }));
-}
-
-#[test]
 fn chances_are_one_in_each_part() {
     for importance_count in [1, 2, 16, 128] {
         let block = FineBlock { seed: [9, 0], coarse_count: 64, importance_count, ..FineBlock::default() };
@@ -79,38 +60,13 @@ fn chances_are_one_in_each_part() {
     }
 }
 
+/// A sample at or behind the end of its ray stands for nothing.
 #[test]
-fn rays_go_through_their_pixels() {
-    let mut random = Random::new(61);
-    for _ in 0..5_000 {
-        let camera = ray_inputs::camera(&mut random);
-        let pixel_centre = [0.5, 0.0, 0.3][random.below(3)];
-        let block = CastBlock { camera, near: 0.5, far: 2.0, pixel_centre, along_axis: 0 };
-        let pixel = random.below((camera.width * camera.height) as usize) as u32;
-        let ray = cast_ray(&block, pixel);
-        let length: f64 = ray.direction.iter().map(|d| f64::from(*d).powi(2)).sum::<f64>().sqrt();
-        assert!((length - 1.0).abs() <= 3.0e-7, "{length}");
-        assert_eq!((ray.origin, ray.near, ray.far), (camera.centre_world().to_array(), 0.5, 2.0));
-        let seen = camera.project(camera.centre_world() + viewfuse_core::Vec3::from_array(ray.direction) * 2.0);
-        let (column, row) = (pixel % camera.width, pixel / camera.width);
-        // What a unit is in pixels of a camera of up to 205 pixels focal length.
-        assert!((seen.x - column as f32 - pixel_centre).abs() <= 5.0e-4, "{seen:?}");
-        assert!((seen.y - row as f32 - pixel_centre).abs() <= 5.0e-4, "{seen:?}");
+fn points_behind_the_end_have_no_length() {
+    let ray = TargetRay { near: 1.0, direction: [0.0, 0.6, 0.8], far: 4.0, ..TargetRay::default() };
+    for depth in [4.0, 5.0] {
+        assert_eq!(place_point(&[ray], &[depth], 1, 0).length, 0.0);
     }
-}
-
-#[test]
-fn points_share_out_the_ray() {
-    let ray = TargetRay { origin: [1.0, 2.0, 3.0], near: 1.0, direction: [0.0, 0.6, 0.8], far: 4.0 };
-    let depths = [9.0, 9.0, 9.0, 1.0, 1.5, 3.0];
-    let points = [3, 4, 5].map(|sample| place_point(&[ray, ray], &depths, 3, sample));
-    assert_eq!(points.map(|point| point.length), [0.5, 1.5, 1.0]);
-    assert_eq!(points.map(|point| point.sample), [3, 4, 5]);
-    assert_eq!(points[2].position, [1.0, 2.0 + 0.6 * 3.0, 3.0 + 0.8 * 3.0]);
-    assert!(points.iter().all(|point| point.direction == ray.direction));
-    // A sample at or behind the end stands for nothing.
-    assert_eq!(place_point(&[ray], &[4.0], 1, 0).length, 0.0);
-    assert_eq!(place_point(&[ray], &[5.0], 1, 0).length, 0.0);
 }
 
 /// Weights that nobody should have.
@@ -152,31 +108,6 @@ fn fine_depths_stay_within_the_ray() {
 }
 
 #[test]
-fn importance_samples_lie_in_the_parts_that_were_seen() {
-    let ray = TargetRay { near: 1.0, far: 3.0, ..TargetRay::default() };
-    let block = FineBlock { seed: [1, 2], coarse_count: 8, importance_count: 64, ..FineBlock::default() };
-    let width = 2.0 / 8.0;
-    for part in 0..8_usize {
-        let seen: Vec<[f32; 2]> = (0..8).map(|other| [f32::from(u8::from(other == part)), 1.0]).collect();
-        let inside = (0..64).filter(|index| {
-            let depth = fine_depth(&seen[..], &ray, 2.0, 1.0, random_draw(3, *index, &block), *index, &block);
-            let from = 1.0 + part as f32 * width;
-            (from..=from + width).contains(&depth)
-        });
-        // The others have a hundred-thousandth each.
-        assert!(inside.count() >= 63);
-    }
-    // Where nothing was seen, they are spread evenly; the same part as that of the inverted distribution.
-    let nothing = [[0.0, 1.0]; 8];
-    for index in 0..64 {
-        let draw = random_draw(3, index, &block);
-        let depth = fine_depth(&nothing, &ray, 2.0, 0.0, draw, index, &block);
-        let part = ((inverse_cdf(1.0, 3.0, &[0.0; 8], draw[0]) - 1.0) / width) as u32;
-        assert_eq!(depth, stratified_depth(1.0, 3.0, part.min(7), 8, draw[1]));
-    }
-}
-
-#[test]
 fn depth_samples_lie_around_the_depth() {
     let ray = TargetRay { near: 1.0, far: 3.0, ..TargetRay::default() };
     let block = FineBlock { coarse_count: 1, depth_count: 4, depth_deviation: 0.01, ..FineBlock::default() };
@@ -191,47 +122,6 @@ fn depth_samples_lie_around_the_depth() {
         assert_eq!(at(9.0, 0.0, draw, &published), 1.0);
     }
     assert_eq!(at(9.0, 0.0, [0.0, 0.0], &block), 3.0);
-}
-
-#[test]
-fn coarse_depths_increase() {
-    let mut random = Random::new(63);
-    for _ in 0..2_000 {
-        let ray = ray_inputs::ray(&mut random);
-        let sample_count = 1 + random.below(128) as u32;
-        let seed = [random.below(1 << 30) as u32, 5];
-        for jitter in [0.0, 0.3, 1.0] {
-            let block = CoarseBlock { seed, sample_count, jitter };
-            let depths: Vec<f32> = (0..sample_count).map(|sample| coarse_depth(&ray, 11, sample, &block)).collect();
-            assert!(depths.is_sorted() && ray.near <= depths[0] && depths[depths.len() - 1] <= ray.far);
-            if jitter == 0.0 {
-                assert_eq!(depths[0], stratified_depth(ray.near, ray.far, 0, sample_count, 0.5));
-            }
-        }
-    }
-}
-
-#[test]
-fn merging_sorts() {
-    let mut random = Random::new(64);
-    for _ in 0..2_000 {
-        let (coarse_count, fine_count) = (1 + random.below(40), random.below(40));
-        // Many are equal, within a pass and between the two.
-        let mut depth = || (random.range(0.0, 2.0) * 8.0).round() as f32 / 8.0;
-        let coarse: Vec<f32> = (0..coarse_count).map(|_| depth()).collect();
-        let fine: Vec<f32> = (0..fine_count).map(|_| depth()).collect();
-        let mut expected: Vec<(f32, usize)> = coarse.iter().chain(&fine).copied().zip(0..).collect();
-        // Stable.
-        expected.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut merged = vec![None; coarse_count + fine_count];
-        for index in 0..merged.len() {
-            let (depth, place) =
-                merged_depth(&coarse[..], &fine[..], coarse_count as u32, fine_count as u32, index as u32);
-            assert!(merged[place as usize].is_none(), "each place once");
-            merged[place as usize] = Some((depth, index));
-        }
-        assert_eq!(merged.into_iter().flatten().collect::<Vec<_>>(), expected);
-    }
 }
 
 #[test]
@@ -309,73 +199,5 @@ fn without_thresholds_everything_is_sampled() {
     for depth in [-9.0, 1.0, 3.0, 9.0, f32::NAN, f32::INFINITY] {
         assert!(is_sampled(&seen[..], &RAY, depth, 0, 0, &EVERYTHING));
         assert!(is_sampled(&seen[..], &TargetRay { far: 1.0, ..RAY }, depth, 0, 0, &EVERYTHING));
-    }
-}
-
-#[test]
-fn neighbours_of_what_was_seen_are_wanted() {
-    let block = SampleMaskBlock { least_share: 0.5, termination: 0.01, ..EVERYTHING };
-    let occupied = |part: usize| weighed((0..8).map(|other| if other == part { 1.0 } else { 0.0 }));
-    for part in 0..8_usize {
-        let expected: Vec<bool> = (0..8_usize).map(|other| other.abs_diff(part) <= 1).collect();
-        assert_eq!(wanted_parts(&occupied(part), &block), expected, "{part}");
-    }
-    // A wall in part 2 hides everything from part 4 on; part 3 may hold its other half.
-    let wall = weighed([0.0, 0.0, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0]);
-    assert_eq!(wanted_parts(&wall, &block), [false, true, true, true, false, false, false, false]);
-    // A ray that hardly meets anything is left out where so much is asked for.
-    let thin = weighed([0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0, 0.0]);
-    let opaque = SampleMaskBlock { least_share: 1.0e-3, least_opacity: 0.1, ..block };
-    assert_eq!(wanted_parts(&thin, &opaque), [false; 8]);
-    assert!(wanted_parts(&thin, &SampleMaskBlock { least_opacity: 1.0e-3, ..opaque })[2]);
-}
-
-#[test]
-fn higher_thresholds_want_less() {
-    let mut random = Random::new(67);
-    let mut fewer = 0;
-    for _ in 0..20_000 {
-        let seen =
-            weighed((0..8).map(|_| if random.below(2) == 0 { 0.0 } else { random.log_range(1.0e-3, 3.0) as f32 }));
-        let mut unit = |high| random.range(0.0, high) as f32;
-        let low =
-            SampleMaskBlock { least_share: unit(0.5), termination: unit(0.5), least_opacity: unit(1.0), ..EVERYTHING };
-        let high = SampleMaskBlock {
-            least_share: low.least_share + unit(0.3),
-            termination: low.termination + unit(0.3),
-            least_opacity: low.least_opacity + unit(0.3),
-            ..low
-        };
-        for (low, high) in wanted_parts(&seen, &low).into_iter().zip(wanted_parts(&seen, &high)) {
-            assert!(low || !high);
-            fewer += u32::from(low && !high);
-        }
-    }
-    assert!(fewer > 1_000, "{fewer}");
-}
-
-#[test]
-fn rays_around_speak_for_a_pixel() {
-    // A picture of 7 times 5 pixels, seen at every third column and row: 3 times 2 rays, one of which met something.
-    let block = SampleMaskBlock {
-        least_share: 0.5,
-        termination: 0.0,
-        step: 3,
-        seen_columns: 3,
-        seen_rows: 2,
-        width: 7,
-        ..EVERYTHING
-    };
-    let full = weighed([1.0; 8]);
-    let empty = weighed([0.0; 8]);
-    for node in 0..6_u32 {
-        let seen: Vec<[f32; 2]> =
-            (0..6).flat_map(|ray| if ray == node { full.clone() } else { empty.clone() }).collect();
-        for pixel in 0..35 {
-            let (column, row) = (pixel % 7, pixel / 7);
-            let near = |at: u32, node: u32, last: u32| at / 3 == node || (at / 3 + 1).min(last) == node;
-            let expected = near(column, node % 3, 2) && near(row, node / 3, 1);
-            assert_eq!(is_sampled(&seen[..], &RAY, 2.0, 0, pixel, &block), expected, "node {node}, pixel {pixel}");
-        }
     }
 }

@@ -1,9 +1,7 @@
-//! Random numbers, depth samples and look-ups: known answers, distributions, `f64` oracles, and what degenerate input
-//! gives.
+//! Random numbers, depth samples and look-ups: known answers, distributions, and what degenerate input gives.
 
-use viewfuse::check::compare::Comparator;
 use viewfuse::check::poses::Random;
-use viewfuse_core::depths::{PROBABILITY_FLOOR, inverse_cdf, stratified_depth};
+use viewfuse_core::depths::{inverse_cdf, stratified_depth};
 use viewfuse_core::lookup::{bilinear, trilinear};
 use viewfuse_core::random::{threefry_2x32, uniform};
 
@@ -67,45 +65,6 @@ fn stratified_depths_stay_in_their_parts() {
     assert_eq!(stratified_depth(1.0, 3.0, 0, 4, f32::NAN), 1.0);
 }
 
-/// The inverse of the cumulative distribution in `f64`.
-fn inverse_cdf_oracle(near: f64, far: f64, weights: &[f32], u: f64) -> f64 {
-    let masses: Vec<f64> = weights.iter().map(|w| f64::from(w.max(0.0)) + f64::from(PROBABILITY_FLOOR)).collect();
-    let mut remaining = u.clamp(0.0, 1.0) * masses.iter().sum::<f64>();
-    let width = (far - near) / masses.len() as f64;
-    for (part, mass) in masses.iter().enumerate() {
-        if remaining < *mass {
-            return near + width * (part as f64 + remaining / mass);
-        }
-        remaining -= mass;
-    }
-    far
-}
-
-#[test]
-fn importance_samples_follow_the_distribution() {
-    let mut random = Random::new(22);
-    for case in 0..300 {
-        let weights: [f32; 64] = std::array::from_fn(|_| match case % 3 {
-            0 => random.unit() as f32,
-            1 => random.log_range(1.0e-9, 1.0) as f32,
-            _ => (random.unit() < 0.1) as u8 as f32,
-        });
-        let total: f64 = weights.iter().map(|w| f64::from(*w) + 1.0e-5).sum();
-        let mut previous = 0.0;
-        for i in 0..=400 {
-            let u = i as f32 / 400.0;
-            let depth = inverse_cdf(0.8, 1.8, &weights, u);
-            assert!((0.8..=1.8).contains(&depth) && depth >= previous, "{u}: {depth} after {previous}");
-            previous = depth;
-            // Sums are off by up to 2 N u of the total: the answer must lie where u could be by that much.
-            let slack = 130.0 / 16_777_216.0 * total.max(1.0) / total;
-            let low = inverse_cdf_oracle(0.8, 1.8, &weights, f64::from(u) - slack) - 5.0e-7;
-            let high = inverse_cdf_oracle(0.8, 1.8, &weights, f64::from(u) + slack) + 5.0e-7;
-            assert!((low..=high).contains(&f64::from(depth)), "{u}: {depth} not in {low}..{high}");
-        }
-    }
-}
-
 #[test]
 fn samples_hit_parts_as_often_as_their_weights_say() {
     let weights = [0.1_f32, 0.0, 0.4, 0.2, 0.0, 0.0, 0.25, 0.05];
@@ -148,41 +107,6 @@ const SIZE: [usize; 3] = [7, 5, 4];
 
 fn grid(random: &mut Random) -> Vec<[f32; 2]> {
     (0..SIZE.iter().product::<usize>()).map(|_| [random.normal() as f32, random.normal() as f32]).collect()
-}
-
-/// Nodes and shares of one axis in `f64`.
-fn split(coordinate: f32, count: usize) -> [(usize, f64); 2] {
-    let position = (f64::from(coordinate) - 0.5).clamp(0.0, count as f64 - 1.0);
-    let lower = position.floor();
-    let share = position - lower;
-    [(lower as usize, 1.0 - share), ((lower as usize + 1).min(count - 1), share)]
-}
-
-#[test]
-fn lookups_agree_with_f64() {
-    let mut random = Random::new(23);
-    let tolerance = Comparator { absolute: 3.0e-6, relative: 0.0 };
-    let grid = grid(&mut random);
-    for _ in 0..20_000 {
-        let [x, y, z] = SIZE.map(|count| random.range(-1.0, count as f64 + 1.0) as f32);
-        let (mut flat, mut deep) = ([0.0; 2], [0.0; 2]);
-        for (row, row_share) in split(y, SIZE[1]) {
-            for (column, column_share) in split(x, SIZE[0]) {
-                for channel in 0..2 {
-                    flat[channel] += row_share * column_share * f64::from(grid[row * SIZE[0] + column][channel]);
-                    for (slice, share) in split(z, SIZE[2]) {
-                        let node = grid[(slice * SIZE[1] + row) * SIZE[0] + column][channel];
-                        deep[channel] += share * row_share * column_share * f64::from(node);
-                    }
-                }
-            }
-        }
-        let size = SIZE.map(|count| count as u32);
-        tolerance
-            .compare_varying(&bilinear(&grid[..], size[0], size[1], x, y), &flat)
-            .unwrap_or_else(|e| panic!("{e}"));
-        tolerance.compare_varying(&trilinear(&grid[..], size, x, y, z), &deep).unwrap_or_else(|e| panic!("{e}"));
-    }
 }
 
 #[test]

@@ -1,79 +1,9 @@
-//! What the kernels of the training-free field are made of, against `f64`: functions that are no kernels themselves.
-//!
-//! Every element has its own tolerance: the oracle counts the roundings on the way to it (two for each operation) and
-//! multiplies them by what follows; an image coordinate's error counts as far as the image changes over it. Elements
-//! whose bound is larger than the tolerance stated here, or that hang on a threshold, are left out and must be few.
+//! The visual hull at its ends: beyond an image, at any focal length and at any distance.
 
-use viewfuse::check::agreement::{Disagreement, Limits, measure};
-use viewfuse::check::bounded::Bounded;
-use viewfuse::check::world::{Numbers, World};
-use viewfuse::check::{camera_oracle, hull_oracle as oracle};
+use viewfuse::check::world::World;
 use viewfuse_kernels::visual_hull::NO_SURFACE;
 use viewfuse_kernels::visual_hull::hull::{hull_alpha, hull_entry};
-use viewfuse_kernels::visual_hull::shade::{EMPTY, JUMP, depth_at, sample};
-
-const SEEDS: std::ops::Range<u64> = 1..5;
-
-/// What a function computed and what was expected.
-#[derive(Default)]
-struct Results {
-    actual: Vec<f32>,
-    expected: Vec<Option<Bounded>>,
-}
-
-impl Results {
-    fn push(&mut self, actual: f32, expected: Option<Bounded>) {
-        self.actual.push(actual);
-        self.expected.push(expected);
-    }
-}
-
-/// Runs a function on one world and the oracle on another.
-type Case = fn(&World, &World, &mut Results);
-
-/// An input by name, and how to put it off by 1 %.
-type NegativeControl = (&'static str, fn(&mut World));
-
-/// Compares on several worlds, prints the figures, and makes sure that each changed input shows.
-fn check(function: &str, tolerance: f64, case: Case, controls: &[NegativeControl]) {
-    let run = |change: fn(&mut World)| {
-        let mut results = Results::default();
-        for seed in SEEDS {
-            let world = World::new(seed);
-            let mut changed = world.clone();
-            change(&mut changed);
-            case(&changed, &world, &mut results);
-        }
-        measure(&results.actual, &results.expected, Limits { tolerance, least: 1.0e-2 })
-    };
-    let agreement = run(|_| {});
-    assert_eq!(agreement.disagreement, None, "{function}: {agreement:?}");
-    println!(
-        "{function}: {} elements, {:.2} % undecided, worst error {:.1e} ({:.0} % of its bound), tolerance {tolerance:.0e}",
-        agreement.compared,
-        100.0 * agreement.undecided,
-        agreement.worst.absolute,
-        100.0 * agreement.worst_of_bound,
-    );
-    for (input, change) in controls {
-        let outcome = run(*change).disagreement;
-        assert!(matches!(outcome, Some(Disagreement::Mismatch { .. })), "{function}, {input} off by 1 %: {outcome:?}");
-    }
-}
-
-// Ten roundings on the way to an image coordinate of at most 40, times an alpha's slope of at most 0.5 a pixel.
-#[test]
-fn hull_alpha_agrees() {
-    let case: Case = |actual, expected, results| {
-        for point in expected.points(2000) {
-            for least in [0.02, 0.3] {
-                let found = hull_alpha(&actual.object, &actual.views[..], &actual.texels[..], point, least);
-                results.push(found, oracle::hull_alpha(&expected.scene(), camera_oracle::point(point.into()), least));
-            }
-        }
-    };
-    check("hull_alpha", 1.0e-4, case, &[("focal length", World::change_focal), ("texels", World::change_texels)]);
-}
+use viewfuse_kernels::visual_hull::shade::{EMPTY, sample};
 
 /// A point beyond the right border of the first image, inside the others.
 #[test]
@@ -110,49 +40,6 @@ fn beyond_an_image_its_border_goes_on() {
     // The border shows background: the object ends inside the image.
     assert_eq!(alpha(&world), 0.0);
     assert_eq!(shade(&world), EMPTY);
-}
-
-// A coordinate's error times the change of depth over a pixel, at most a jump of 0.4.
-#[test]
-fn depth_at_agrees() {
-    let case: Case = |actual, expected, results| {
-        let numbers = &mut Numbers::new(8);
-        for (view, camera) in expected.views.iter().enumerate() {
-            let jump = JUMP * expected.footprints[view];
-            for _ in 0..1000 {
-                let x = numbers.between(0.0, camera.width as f32);
-                let y = numbers.between(0.0, camera.height as f32);
-                let found = depth_at(camera, &actual.depths[..], x, y, jump);
-                let at = [x, y, jump].map(Bounded::from);
-                results.push(found, oracle::depth_at(camera, &expected.depths, at[0], at[1], at[2]));
-            }
-        }
-    };
-    check("depth_at", 1.0e-4, case, &[("depths", World::change_depths)]);
-}
-
-// Depths in footprints are good to 1e-4, and the logistic step has a slope of 1 / (4 SURFACE_WIDTH); colours as a
-// look-up divided by an alpha of at least 0.02.
-#[test]
-fn sample_agrees() {
-    let case: Case = |actual, expected, results| {
-        for point in expected.points(4000) {
-            let World { object, views, footprints, texels, depths, weights, .. } = actual;
-            let found = sample(object, &views[..], footprints, &texels[..], &depths[..], weights, point);
-            let World { footprints, depths, weights, .. } = expected;
-            let place = camera_oracle::point(point.into());
-            let wanted = oracle::sample(&expected.scene(), footprints, depths, weights, place);
-            results.push(found.occupancy, wanted.map(|sample| sample.0));
-            (0..3).for_each(|c| results.push(found.colour[c], wanted.map(|sample| sample.1[c])));
-        }
-    };
-    let controls: [NegativeControl; 4] = [
-        ("focal length", World::change_focal),
-        ("texels", World::change_texels),
-        ("depths", World::change_depths),
-        ("weight", |world| world.weights[1] *= 1.01),
-    ];
-    check("sample", 1.0e-3, case, &controls);
 }
 
 #[test]

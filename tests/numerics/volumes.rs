@@ -1,16 +1,10 @@
-//! From volumes to a feature image against `f64`: rays with depths along the axis, trilinear look-up, compositing of features,
-//! the denoiser's inputs.
+//! From volumes to a feature image at the ends: nodes, borders and what lies outside; densities of all sizes.
 
 use viewfuse::check::poses::Random;
-use viewfuse::check::ray_inputs;
-use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock, Pinhole};
 use viewfuse_core::pose::Pose;
-use viewfuse_core::rays::{CastBlock, RayPoint, cast_ray};
-use viewfuse_kernels::genvs::{
-    DenoiserInputBlock, FeatureBlock, VolumeBlock, VolumePlace, denoiser_input, summed_feature, volume_value,
-    weigh_features,
-};
+use viewfuse_core::rays::RayPoint;
+use viewfuse_kernels::genvs::{FeatureBlock, VolumeBlock, VolumePlace, volume_value, weigh_features};
 
 /// At the origin, looks along z; an image of 8x8 pixels and a focal length of 8.
 fn camera() -> CameraBlock {
@@ -43,49 +37,6 @@ fn node(volume: &[f32], column: usize, row: usize, depth: usize, feature: usize)
 
 fn looked_up(volume: &[f32], point: RayPoint) -> [f64; 2] {
     [0, 1].map(|feature| f64::from(volume_value(&[camera()], &[point], volume, &BLOCK, feature)))
-}
-
-#[test]
-fn rays_with_depths_along_the_axis() {
-    let mut random = Random::new(70);
-    for _ in 0..200 {
-        let camera = ray_inputs::camera(&mut random);
-        let pixel = random.below((camera.width * camera.height) as usize) as u32;
-        let ray =
-            |along_axis| cast_ray(&CastBlock { camera, near: 0.5, far: 2.0, pixel_centre: 0.5, along_axis }, pixel);
-        let [unit, along] = [ray(0), ray(1)];
-        let (direction, forward) = (Vec3::from_array(along.direction), camera.pose.forward);
-        let depth = direction.dot(Vec3::new(forward[0], forward[1], forward[2]));
-        assert!((depth - 1.0).abs() <= 1.0e-6, "{depth}");
-        let straight = direction.normalize() - Vec3::from_array(unit.direction);
-        assert!(straight.length() <= 1.0e-6, "{along:?} {unit:?}");
-        assert_eq!((along.origin, along.near, along.far), (unit.origin, 0.5, 2.0));
-    }
-}
-
-#[test]
-fn look_up_is_trilinear_with_zeros_around() {
-    let (mut random, volume) = (Random::new(72), volume());
-    let mut inside = 0;
-    for _ in 0..5000 {
-        let [x, y, z] = [5.0, 4.0, 6.0].map(|count| random.range(-1.6, count + 0.6));
-        let tent = |at: f64, node: usize| (1.0 - (at - node as f64).abs()).max(0.0);
-        let mut expected = [0.0; 2];
-        for column in 0..5 {
-            for row in 0..4 {
-                for depth in 0..6 {
-                    let share = tent(x, column) * tent(y, row) * tent(z, depth);
-                    expected[0] += share * node(&volume, column, row, depth, 0);
-                    expected[1] += share * node(&volume, column, row, depth, 1);
-                }
-            }
-        }
-        inside += usize::from(expected[0] != 0.0);
-        for (actual, expected) in looked_up(&volume, point_at(x, y, z)).into_iter().zip(expected) {
-            assert!((actual - expected).abs() <= 3.0e-5, "{x} {y} {z}: {actual} {expected}");
-        }
-    }
-    assert!(inside > 2000);
 }
 
 #[test]
@@ -217,37 +168,4 @@ fn densities_at_their_ends() {
     };
     near(&exclusive, [0.5, 0.0, 0.5]);
     near(&inclusive, [0.25, 0.0, 0.0]);
-}
-
-#[test]
-fn features_are_summed_along_rays() {
-    let mut random = Random::new(74);
-    for _ in 0..100 {
-        let [rays, samples, features] = [1 + random.below(4), 1 + random.below(40), 1 + random.below(5)];
-        let block =
-            FeatureBlock { sample_count: samples as u32, feature_count: features as u32, ..FeatureBlock::default() };
-        let mut numbers = |count: usize| (0..count).map(|_| random.normal() as f32).collect::<Vec<f32>>();
-        let (weights, fused) = (numbers(rays * samples), numbers(rays * samples * features));
-        let raw = numbers(rays * samples * (features + 1));
-        let mut expected = vec![0.0; rays * features];
-        for (sample, weight) in weights.iter().enumerate() {
-            for feature in 0..features {
-                let value = f64::from(fused[sample * features + feature])
-                    + f64::from(raw[sample * (features + 1) + feature + 1]);
-                expected[sample / samples * features + feature] += f64::from(*weight) * value;
-            }
-        }
-        for (element, expected) in expected.into_iter().enumerate() {
-            let actual = f64::from(summed_feature(&weights[..], &fused[..], &raw[..], &block, element));
-            assert!((actual - expected).abs() <= 3.0e-5, "{block:?} {element}: {actual} {expected}");
-        }
-    }
-}
-
-#[test]
-fn the_denoiser_sees_the_noisy_picture_first() {
-    let block = DenoiserInputBlock { picture_channels: 2, condition_channels: 3, scale: 0.5 };
-    let (noisy, condition) = ([1.0, 2.0, 3.0, 4.0], [10.0, 20.0, 30.0, 40.0, 50.0, 60.0]);
-    let inputs: Vec<f32> = (0..10).map(|element| denoiser_input(&noisy, &condition, &block, element)).collect();
-    assert_eq!(inputs, [0.5, 1.0, 5.0, 10.0, 15.0, 1.5, 2.0, 20.0, 25.0, 30.0]);
 }
