@@ -103,7 +103,7 @@ fn commands_in_the_text_have_these_options() {
 
 /// The documents with pictures' lines.
 fn documents() -> [PathBuf; 2] {
-    ["README.md", "host/research/results/first_time.md"].map(|file| repository().join(file))
+    ["README.md", "host/results/first_time.md"].map(|file| repository().join(file))
 }
 
 /// The numbers of a line.

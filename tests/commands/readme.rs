@@ -50,7 +50,7 @@ const NOT_RUN: [(&str, &str); 16] = [
     ("tests/gpu", "it runs all tests of a GPU"),
     ("cargo build --profile firmware -p viewfuse-capi", "`embedded/capi.rs` runs it"),
     ("cc ", "`embedded/capi.rs` compiles the program"),
-    ("cargo run --release -p viewfuse-research ", "experiments, up to hours"),
+    ("tests/figures", "it writes the results"),
     ("cargo openmvg", "`tests/run` builds it, which takes minutes"),
     ("cargo run --release --features pose ", "`pose.rs` runs it where `viewfuse-openmvg` is"),
     ("cargo install", "it would change the machine"),
@@ -164,7 +164,7 @@ fn headings(text: &str) -> Vec<String> {
 
 fn links_lead_somewhere() {
     let mut count = 0;
-    let reports = files(&repository().join("host/research/results"), "md");
+    let reports = files(&repository().join("host/results"), "md");
     for path in readmes().into_iter().chain(reports) {
         for (link, file, heading) in links(&path, &read(&path)) {
             assert!(file.exists(), "{}: {link}", path.display());
@@ -196,13 +196,12 @@ fn numbers(line: &str) -> Vec<f64> {
 fn tables_are_what_the_program_prints() {
     // Numbers of pictures are the same everywhere but for roundings; those of `check` are times and the worst of many.
     for (name, difference) in [("toy", 0.05), ("cpu", f64::INFINITY)] {
-        let stored = read(&repository().join(format!("host/research/results/{name}.txt")));
+        let stored = read(&repository().join(format!("host/results/{name}.txt")));
         let (command, table) = stored.split_once('\n').expect("lines");
         let arguments: Vec<String> =
             command.strip_prefix("$ viewfuse ").expect("a command").split_whitespace().map(str::to_owned).collect();
         let printed: String = run(&arguments).lines().map(|line| format!("{}\n", line.trim_end())).collect();
-        let stale =
-            format!("{name}.txt is stale: `cargo run --release -p viewfuse-research -- run {name}` makes it again");
+        let stale = format!("{name}.txt is stale: `tests/figures {name}` makes it again");
         assert_eq!(structure(table), structure(&printed), "{stale}");
         for (old, new) in table.lines().zip(printed.lines()) {
             let differs = |(a, b): (f64, f64)| (a - b).abs() > difference;

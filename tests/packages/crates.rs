@@ -52,18 +52,18 @@ pub(crate) const ORDER: [&str; 18] = [
 
 /// Heavy dependencies, and where they may be: in crates, always or only as an option.
 const HEAVY: [(&str, &[&str]); 12] = [
-    ("candle-core", &["viewfuse-research", "viewfuse-train"]),
+    ("candle-core", &["viewfuse-train"]),
     ("ndarray", &["viewfuse-train"]),
-    ("faer", &["viewfuse-evaluate?", "viewfuse-research"]),
+    ("faer", &["viewfuse-evaluate?"]),
     ("maud", &["viewfuse-evaluate?"]),
     ("base64", &["viewfuse-evaluate?", "viewfuse-output"]),
-    ("plotters", &["viewfuse-evaluate?", "viewfuse-research", "viewfuse-train"]),
+    ("plotters", &["viewfuse-evaluate?", "viewfuse-train"]),
     ("httparse", &["viewfuse-view"]),
     ("exr", &["viewfuse-output?"]),
     ("gif", &["viewfuse-output?"]),
     ("clap", &["viewfuse-cli"]),
     ("ctrlc", &["viewfuse-cli"]),
-    ("anyhow", &["viewfuse-cli", "viewfuse-research"]),
+    ("anyhow", &["viewfuse-cli"]),
 ];
 
 /// What `cargo tree --prefix none` lists, each crate once, or what is wrong with it.
@@ -111,10 +111,6 @@ fn disorder(packages: &[Value]) -> Vec<String> {
             {
                 problems.push(format!("{name} uses {other}, which stands behind it"));
             }
-            // Nobody installs the experiments.
-            if other == "viewfuse-research" {
-                problems.push(format!("{name} uses {other}"));
-            }
             let is_optional = dependency["optional"] == true;
             let may = |places: &[&str]| {
                 places.iter().any(|place| match place.strip_suffix('?') {
@@ -155,5 +151,4 @@ fn disorder_is_found() {
     assert_eq!(of(package("viewfuse-evaluate", "faer", Value::Null, false)), 1, "not always");
     assert_eq!(of(package("viewfuse-evaluate", "faer", Value::Null, true)), 0);
     assert_eq!(of(package("viewfuse-device", "clap", json!("build"), false)), 1);
-    assert_eq!(of(package("viewfuse-view", "viewfuse-research", Value::Null, true)), 1);
 }

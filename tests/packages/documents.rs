@@ -2,7 +2,7 @@
 //!
 //! A number is *measured* where a unit of measurement stands behind it ([`UNITS`]; also in a list, "0.2 to 0.3 s"), or where it
 //! is in a cell of a table that holds numbers alone. What stands in code is none: options, sizes and commands; but a block `text`
-//! is what a program printed. Such a number must be, digit by digit, in one of the files of `host/research/results` that the same
+//! is what a program printed. Such a number must be, digit by digit, in one of the files of `host/results` that the same
 //! README links: a number of one digit may be met there by chance, a measurement with its digits hardly. Limits, defaults and properties of others, which nobody measured, are in [`STATED`], each with its reason.
 
 use std::collections::BTreeSet;
@@ -177,7 +177,7 @@ fn measured(text: &str) -> Vec<(usize, String)> {
 
 /// The results that a README links.
 fn results(path: &Path, text: &str) -> Vec<PathBuf> {
-    let folder = repository().join("host/research/results");
+    let folder = repository().join("host/results");
     let folder = folder.canonicalize().expect("the results");
     links(path, text)
         .into_iter()
@@ -205,7 +205,7 @@ fn readmes_are_short() {
     let sizes: Vec<(PathBuf, usize)> = readmes().into_iter().map(|path| (path.clone(), read(&path).len())).collect();
     assert!(sizes.len() > 20, "{sizes:?}");
     let long: Vec<_> = sizes.iter().filter(|(_, size)| *size > MAX_BYTES).collect();
-    assert!(long.is_empty(), "more than {MAX_BYTES} bytes: {long:#?}; measurements belong in host/research/results");
+    assert!(long.is_empty(), "more than {MAX_BYTES} bytes: {long:#?}; measurements belong in host/results");
 }
 
 #[test]
@@ -227,7 +227,7 @@ fn measured_numbers_are_in_a_result() {
     assert!(count > 50, "{count} measured numbers");
     assert!(
         faults.is_empty(),
-        "no linked file of host/research/results has these numbers (what nobody measured is in STATED): {faults:#?}"
+        "no linked file of host/results has these numbers (what nobody measured is in STATED): {faults:#?}"
     );
 }
 

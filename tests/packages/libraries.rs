@@ -16,7 +16,7 @@ const ALLOWED: [(&str, &str, &str); 1] = [(
 )];
 
 /// Folders of programs.
-const PROGRAMS: [&str; 4] = ["host/cli/", "host/pose/openmvg/", "host/research/", "vulkan/compiler/"];
+const PROGRAMS: [&str; 3] = ["host/cli/", "host/pose/openmvg/", "vulkan/compiler/"];
 
 /// What a file has that a library must not have, with its line.
 fn faults(path: &str, source: &Source) -> Vec<String> {

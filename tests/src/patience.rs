@@ -1,6 +1,6 @@
 //! Waiting for other processes, and for what they leave.
 //!
-//! No test asserts a time: how fast something is belongs in `bench`, `cargo bench` and the results of research. A process
+//! No test asserts a time: how fast something is belongs in `bench`, `cargo bench` and host/results. A process
 //! that hangs would end no test, so every wait ends at one deadline.
 
 use std::io;

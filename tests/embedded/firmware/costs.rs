@@ -1,5 +1,5 @@
 //! What calls take on each board: instructions, stack and code, counted in the emulators' traces, and the tables of
-//! `host/research/results/firmware.md`, which this test writes with `VIEWFUSE_WRITE_TABLES=1` and compares otherwise.
+//! `host/results/firmware.md`, which this test writes with `VIEWFUSE_WRITE_TABLES=1` and compares otherwise.
 
 use super::{Firmware, PROFILES};
 use libtest_mimic::Failed;
@@ -156,7 +156,7 @@ fn markdown(heading: &str, rows: &[Row]) -> String {
 }
 
 fn results() -> PathBuf {
-    repository().join("host/research/results/firmware.md")
+    repository().join("host/results/firmware.md")
 }
 
 /// The table of the results with this heading is this one, to a fifth: another compiler gives a few instructions more or

@@ -31,7 +31,7 @@ const SOURCE_WEIGHT: f64 = 300.0;
 /// 0.06, left-out sources gain nothing by them, and with them it takes twice the time.
 const MIN_LAST_SHARE: f32 = 0.1;
 /// The same of the first source alone, with constants fitted to it, before the picture is made for the others. For 19
-/// targets of six scenes it is taken or left out as with the first three sources (host/research/results/gaussians.md).
+/// targets of six scenes it is taken or left out as with the first three sources (host/results/gaussians.md).
 const MIN_FIRST_SHARE: f32 = 0.5 * MIN_LAST_SHARE;
 
 /// A mixture with the scores that it has on the sources that were left out.

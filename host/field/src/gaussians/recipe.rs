@@ -1,4 +1,4 @@
-//! The settings of an optimisation. What was measured of them is in `host/research/results/gaussians.md`.
+//! The settings of an optimisation. What was measured of them is in `host/results/gaussians.md`.
 
 use crate::point_cloud::CloudOptions;
 use viewfuse_scene::photographs::SourceImages;

@@ -19,8 +19,7 @@ use viewfuse_weighting::sources::SourceWeights;
 const BAND_ROWS: u32 = 16;
 /// Rows around a band that its depths depend on: the window's and the neighbours' reach.
 const HALO_ROWS: u32 = WINDOW_REACH + NEIGHBOUR_REACH;
-/// Shares of the sources' side, with the error and the work that are typical of them (the experiment `efforts` of
-/// `viewfuse-research`).
+/// Shares of the sources' side, with the error and the work that are typical of them (host/results/efforts.md).
 const EFFORTS: [(f32, f32, f32); 2] = [(0.25, 0.065, 0.2), (0.5, 0.04, 0.4)];
 /// Sources with a longer side than this take most of the time; smaller ones take less than the picture.
 const MIN_REDUCED: u32 = 256;
