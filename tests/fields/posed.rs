@@ -118,28 +118,6 @@ fn wrong_poses_that_all_attempts_agree_on_are_refused() {
 }
 
 #[test]
-fn refinement_brings_a_pose_nearer_to_the_true_one() {
-    let folder = tempfile::tempdir().expect("a folder");
-    bare(folder.path());
-    let options = Options { focal: Some(294.4), refine: true, ..Options::default() };
-    let oracle = Oracle { turn: |_, photo| if photo == 2 { 0.6 } else { 0.0 }, baseline: 1.0 };
-    let found = find(folder.path(), &[&oracle], &options, &Silent).expect("a verdict");
-    let verdict = found.verdict.as_ref().expect("poses that are nearly true");
-    let refinement = verdict.refinement.expect("a refinement");
-    assert!(refinement.after > refinement.before, "{refinement:?}");
-    // The angle between its rotation relative to a neighbour, and the true one.
-    let by_solver = found.attempts[verdict.attempt].solution.as_ref().expect("a solution");
-    let relative = |solution: &Solution| {
-        let rotation = |photo: usize| solution.photographs[photo].rotation().expect("a pose");
-        rotation(2) * rotation(1).transpose()
-    };
-    let true_one = DMat3::from_rotation_y(0.6_f64.to_radians()) * relative(by_solver);
-    let away = |own: DMat3| glam::DQuat::from_mat3(&(own * true_one.transpose())).to_axis_angle().1.to_degrees();
-    let (before, after) = (away(relative(by_solver)), away(relative(&verdict.solution)));
-    assert!((before - 0.6).abs() < 1.0e-6 && after < 0.4, "{before} degrees, then {after}");
-}
-
-#[test]
 fn attempts_that_disagree_are_refused() {
     let turn = |features, photo: usize| if features == Features::Sift { 4.0 * photo as f64 } else { 0.0 };
     assert_refused(&found(1.0, turn), "no other attempt has the same rotations");

@@ -19,14 +19,11 @@ pub struct Options {
     pub seed: u64,
     /// Every so many photographs are taken.
     pub every: usize,
-    /// Whether accepted poses are refined by the photographs themselves: off, because poses that meet left-out photographs better
-    /// were more often farther from the true ones than nearer (`host/research/results/poses.md`).
-    pub refine: bool,
 }
 
 impl Default for Options {
     fn default() -> Options {
-        Options { focal: None, seed: 0, every: 1, refine: false }
+        Options { focal: None, seed: 0, every: 1 }
     }
 }
 
@@ -100,6 +97,6 @@ pub fn find(
     let part = Part::begin(progress, "", 1..7, 10);
     let mut attempts = attempts(solvers, &intake, &cameras, options.seed, &part)?;
     let part = Part::begin(progress, "", 7..9, 10);
-    let verdict = verdict(folder, &intake.photos, &cameras, &mut attempts, options.refine, &part)?;
+    let verdict = verdict(folder, &intake.photos, &cameras, &mut attempts, &part)?;
     Ok(Found { intake, cameras, attempts, verdict })
 }

@@ -80,13 +80,13 @@ pub(crate) fn left_out(scene: &Scene, progress: &dyn Progress) -> Result<Vec<Lef
 ///
 /// # Errors
 /// [`RenderError`].
-pub(crate) fn open_album<'a>(scene: &'a Scene, progress: &dyn Progress) -> Result<Album<'a>, RenderError> {
+fn open_album<'a>(scene: &'a Scene, progress: &dyn Progress) -> Result<Album<'a>, RenderError> {
     Ok(Album::open_at(scene, 0..scene.views.len(), SIDE, progress)?)
 }
 
 /// Photographs with their cameras, each of which is rendered from the others.
-pub(crate) struct Photographs<'a> {
-    pub(crate) scene: Scene,
+struct Photographs<'a> {
+    scene: Scene,
     album: &'a Album<'a>,
     all: SourceImages,
 }
@@ -96,30 +96,17 @@ impl<'a> Photographs<'a> {
     ///
     /// # Errors
     /// [`RenderError`].
-    pub(crate) fn of(
-        scene: &Scene,
-        album: &'a Album<'a>,
-        progress: &dyn Progress,
-    ) -> Result<Photographs<'a>, RenderError> {
+    fn of(scene: &Scene, album: &'a Album<'a>, progress: &dyn Progress) -> Result<Photographs<'a>, RenderError> {
         let views: Vec<usize> = (0..scene.views.len()).collect();
         let all = album.sources(&views, SIDE, BackgroundChoice::None, progress)?;
         Ok(Photographs { scene: scene.clone(), album, all })
-    }
-
-    /// The same photographs at other poses, one for each view.
-    pub(crate) fn at(&self, poses: &[Pose]) -> Photographs<'a> {
-        let (mut scene, mut all) = (self.scene.clone(), self.all.clone());
-        for ((view, image), pose) in scene.views.iter_mut().zip(&mut all.images).zip(poses) {
-            (view.camera.pose, image.camera.pose) = (*pose, *pose);
-        }
-        Photographs { scene, album: self.album, all }
     }
 
     /// What each is met with.
     ///
     /// # Errors
     /// [`RenderError`].
-    pub(crate) fn left_out(&self, progress: &dyn Progress) -> Result<Vec<LeftOut>, RenderError> {
+    fn left_out(&self, progress: &dyn Progress) -> Result<Vec<LeftOut>, RenderError> {
         self.each(progress, |view, rendered| self.scores(view, rendered))
     }
 
@@ -127,7 +114,7 @@ impl<'a> Photographs<'a> {
     ///
     /// # Errors
     /// [`RenderError`].
-    pub(crate) fn each<T: Send>(
+    fn each<T: Send>(
         &self,
         progress: &dyn Progress,
         work: impl Fn(usize, &mut Rendered<'_>) -> Result<T, RenderError> + Sync,
@@ -191,34 +178,21 @@ impl<'a> Photographs<'a> {
 }
 
 /// A photograph, and its neighbours from which it is rendered.
-pub(crate) struct Rendered<'a> {
+struct Rendered<'a> {
     stage: Stage<'a>,
     weighting: Weighting,
-    pub(crate) camera: Camera,
+    camera: Camera,
     size: [u32; 2],
-    pub(crate) truth: Truth,
+    truth: Truth,
     progress: &'a dyn Progress,
 }
 
 impl Rendered<'_> {
-    /// What is shown at a pose, of the truth's size.
-    ///
-    /// # Errors
-    /// [`RenderError`].
-    pub(crate) fn shown(&mut self, pose: Pose) -> Result<Shown, RenderError> {
+    /// The score of the picture at a pose.
+    fn score(&mut self, pose: Pose) -> Result<f64, RenderError> {
         let camera = Camera { pose, ..self.camera };
         let frame = self.stage.frame_of_size(&self.weighting, &camera, self.size, self.progress)?;
-        let size = frame.picture.dimensions().into();
-        Ok(Shown { picture: self.truth.resized(frame.picture), depths: frame.depths, size })
-    }
-
-    /// The score of the picture at a pose.
-    ///
-    /// # Errors
-    /// [`RenderError`].
-    pub(crate) fn score(&mut self, pose: Pose) -> Result<f64, RenderError> {
-        let shown = self.shown(pose)?;
-        Ok(self.truth.score(&shown.picture))
+        Ok(self.truth.score(&self.truth.resized(frame.picture)))
     }
 }
 
@@ -251,24 +225,8 @@ fn turned(pose: &Pose) -> Vec<Pose> {
     [about(sin), about(-sin)].into_iter().flatten().flatten().collect()
 }
 
-/// A rendered picture of the truth's size, with its depths as they were rendered.
-pub(crate) struct Shown {
-    pub(crate) picture: RgbImage,
-    depths: Vec<f32>,
-    size: [u32; 2],
-}
-
-impl Shown {
-    /// The depth of a pixel of the picture, along the principal axis in world units; 0 without a surface.
-    pub(crate) fn depth(&self, pixel: [u32; 2]) -> f32 {
-        let (width, height) = self.picture.dimensions();
-        let [x, y] = [pixel[0] * self.size[0] / width, pixel[1] * self.size[1] / height];
-        self.depths.get((y * self.size[0] + x) as usize).copied().unwrap_or(0.0)
-    }
-}
-
 /// A photograph as it is compared.
-pub(crate) struct Truth {
+struct Truth {
     picture: RgbImage,
     /// The pixels that count.
     shown: Vec<bool>,
@@ -289,11 +247,11 @@ impl Truth {
         image::imageops::resize(&picture, width, height, image::imageops::FilterType::Triangle)
     }
 
-    /// The differences `truth - gain picture` of a picture of its size, three for each pixel that counts, and the gains.
-    pub(crate) fn differences(&self, picture: &RgbImage) -> (Vec<f64>, [f64; 3]) {
+    /// The differences `truth - gain picture` of a picture of its size, three for each pixel that counts.
+    fn differences(&self, picture: &RgbImage) -> Vec<f64> {
         let pairs = || self.picture.pixels().zip(picture.pixels()).zip(&self.shown).filter(|(_, shown)| **shown);
         let level = |pixel: &image::Rgb<u8>, channel: usize| f64::from(pixel[channel]) / 255.0;
-        let gains = std::array::from_fn(|channel| {
+        let gains: [f64; 3] = std::array::from_fn(|channel| {
             let (mut both, mut square) = (0.0, 0.0);
             for ((truth, own), _) in pairs() {
                 both += level(truth, channel) * level(own, channel);
@@ -302,18 +260,12 @@ impl Truth {
             if square > 0.0 { (both / square).clamp(0.5, 2.0) } else { 1.0 }
         });
         let of = |truth, own| (0..3).map(move |channel| level(truth, channel) - gains[channel] * level(own, channel));
-        (pairs().flat_map(|((truth, own), _)| of(truth, own)).collect(), gains)
-    }
-
-    /// The pixels that count, in the order of the differences.
-    pub(crate) fn places(&self) -> impl Iterator<Item = (u32, u32)> {
-        let shown = self.picture.enumerate_pixels().zip(&self.shown).filter(|(_, shown)| **shown);
-        shown.map(|((x, y, _), _)| (x, y))
+        pairs().flat_map(|((truth, own), _)| of(truth, own)).collect()
     }
 
     /// The score of a picture of its size.
-    pub(crate) fn score(&self, picture: &RgbImage) -> f64 {
-        let differences = self.differences(picture).0;
+    fn score(&self, picture: &RgbImage) -> f64 {
+        let differences = self.differences(picture);
         let error: f64 = differences.iter().map(|own| own * own).sum();
         if differences.is_empty() { 0.0 } else { (-10.0 * (error / differences.len() as f64).log10()).min(MAX_SCORE) }
     }

@@ -22,7 +22,6 @@
 //! agreement      rotations of two solutions between the same photographs
 //! support        parallax and the shape of the points: Support
 //! left_out       photographs rendered from the others: LeftOut
-//! refine         poses refined by the photographs themselves
 //! attempt        the attempts that are made: Attempt
 //! verdict        the attempt that is accepted, with the photographs that are: Verdict
 //! advice         where more photographs help: Neighbours
@@ -46,7 +45,6 @@ mod openmvg;
 mod posed;
 mod process;
 mod pycolmap;
-mod refine;
 mod solution;
 mod support;
 mod verdict;
@@ -68,7 +66,7 @@ pub use solution::{
     Solver, SolverError,
 };
 pub use support::Support;
-pub use verdict::{Refinement, Refusal, Verdict, Verified};
+pub use verdict::{Refusal, Verdict, Verified};
 pub use write::{CameraRecord, Record, is_current, write};
 
 /// The examples of the README, compiled and run.

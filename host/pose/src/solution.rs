@@ -1,6 +1,6 @@
 //! A job for a solver of structure from motion, and its answer.
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 use std::fmt::{self, Display, Formatter};
 use std::path::{Path, PathBuf};
@@ -111,19 +111,6 @@ impl SolvedPhotograph {
     pub fn centre(&self) -> Option<DVec3> {
         let rows = self.camera_from_world?;
         Some(-(self.rotation()?.transpose() * DVec3::new(rows[0][3], rows[1][3], rows[2][3])))
-    }
-}
-
-impl SolvedPhotograph {
-    /// Moves the camera in its own axes (right, down, forward): a rotation vector in radians, and a way in units of `scale`.
-    pub(crate) fn shift(&mut self, motion: &[f64; 6], scale: f64) {
-        let (Some(rotation), Some(centre)) = (self.rotation(), self.centre()) else { return };
-        let [turn, way] = [&motion[..3], &motion[3..]].map(|own| DVec3::new(own[0], own[1], own[2]));
-        let centre = centre + rotation.transpose() * (scale * way);
-        let rotation = DMat3::from_quat(DQuat::from_scaled_axis(turn)).transpose() * rotation;
-        let translation = -(rotation * centre);
-        let row = |row: usize| [rotation.x_axis[row], rotation.y_axis[row], rotation.z_axis[row], translation[row]];
-        self.camera_from_world = Some([row(0), row(1), row(2)]);
     }
 }
 

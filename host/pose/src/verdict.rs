@@ -7,7 +7,7 @@
 //! ```
 //!
 //! Photographs that fail are taken out and the rest is looked at again, until none fails. The first candidate that keeps at
-//! least three is accepted. The limits were set on scenes with known poses (`host/research/results/poses.md`).
+//! least three is accepted. The limits were set on scenes with known poses (`host/results/poses.md`).
 
 use crate::agreement::{differences, median};
 use crate::attempt::Attempt;
@@ -15,7 +15,6 @@ use crate::focal::Cameras;
 use crate::intake::Photo;
 use crate::left_out::{LeftOut, left_out};
 use crate::posed;
-use crate::refine::refine;
 use crate::solution::Solution;
 use std::path::Path;
 use viewfuse_field::render::RenderError;
@@ -52,25 +51,14 @@ pub struct Verdict {
     pub attempt: usize,
     /// Its scene of the accepted photographs.
     pub scene: Scene,
-    /// The attempt's solution, with refined poses if [`Verdict::refinement`] says so.
+    /// The attempt's solution.
     pub solution: Solution,
-    /// What refinement by the photographs gained; `None` if it gained nothing.
-    pub refinement: Option<Refinement>,
     /// The accepted photographs, as indices, ascending.
     pub photos: Vec<usize>,
     /// What each accepted photograph passed.
     pub verified: Vec<Verified>,
     /// Photographs that were taken out, as indices, with the reason.
     pub taken_out: Vec<(usize, String)>,
-}
-
-/// Mean scores of the left-out photographs in decibels.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Refinement {
-    /// At the solver's poses.
-    pub before: f64,
-    /// At the refined ones.
-    pub after: f64,
 }
 
 /// What a photograph passed.
@@ -117,7 +105,6 @@ pub(crate) fn verdict(
     photos: &[Photo],
     cameras: &Cameras,
     attempts: &mut [Attempt],
-    is_refined: bool,
     progress: &dyn Progress,
 ) -> Result<Result<Verdict, Refusal>, VerdictError> {
     let candidates = candidates(cameras, attempts);
@@ -131,19 +118,7 @@ pub(crate) fn verdict(
             Ok((scene, kept)) => {
                 let taken_out = trial.taken_out;
                 let (photos, verified) = kept.into_iter().unzip();
-                let mut verdict = Verdict {
-                    attempt,
-                    scene,
-                    solution: solution.clone(),
-                    refinement: None,
-                    photos,
-                    verified,
-                    taken_out,
-                };
-                if is_refined {
-                    refine_verdict((folder, trial.photos, cameras), &mut verdict, &part)?;
-                }
-                return Ok(Ok(verdict));
+                return Ok(Ok(Verdict { attempt, scene, solution: solution.clone(), photos, verified, taken_out }));
             }
             Err(reason) => attempts[attempt].tried.refused = Some(reason),
         }
@@ -152,25 +127,6 @@ pub(crate) fn verdict(
         attempt.tried.refused.clone().unwrap_or_else(|| "no other attempt agrees with it".to_owned())
     };
     Ok(Err(Refusal { reasons: attempts.iter().map(reason).collect() }))
-}
-
-/// Refines the poses of what was accepted, where that gains.
-fn refine_verdict(
-    (folder, photos, cameras): (&Path, &[Photo], &Cameras),
-    verdict: &mut Verdict,
-    progress: &dyn Progress,
-) -> Result<(), VerdictError> {
-    let before: Vec<f64> = verdict.verified.iter().map(|own| own.left_out.score).collect();
-    let Some(refined) = refine(&verdict.scene, &before, progress)? else { return Ok(()) };
-    for (photo, motions) in verdict.photos.iter().zip(&refined.motions) {
-        for motion in motions {
-            verdict.solution.photographs[*photo].shift(motion, verdict.scene.frame.scale);
-        }
-    }
-    let mean = before.iter().sum::<f64>() / before.len().max(1) as f64;
-    verdict.refinement = Some(Refinement { before: mean, after: refined.score });
-    verdict.scene = posed::scene(folder, photos, cameras, &verdict.solution, &verdict.photos)?;
-    Ok(())
 }
 
 /// Attempts that may be accepted, the most promising first, each with the photographs that another one confirms and by how much.

@@ -5,7 +5,7 @@ use crate::attempt::Tried;
 use crate::find::{Found, Options};
 use crate::focal::FocalSource;
 use crate::intake::{IntakeError, file_name, listed};
-use crate::verdict::{Refinement, Verdict, Verified};
+use crate::verdict::{Verdict, Verified};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use viewfuse_job::progress::Progress;
@@ -37,8 +37,6 @@ pub struct Record<'a> {
     pub attempts: Vec<&'a Tried>,
     /// The accepted photographs with what they passed.
     pub accepted: &'a [Verified],
-    /// What refinement by the photographs gained; `None` if it was not asked for or gained nothing.
-    pub refinement: Option<Refinement>,
     /// Photographs that were left out, each with the reason.
     pub left_out: Vec<(String, String)>,
     /// The accepted ones as neighbours.
@@ -100,7 +98,6 @@ impl Found {
             attempt: verdict.attempt,
             attempts: self.attempts.iter().map(|attempt| &attempt.tried).collect(),
             accepted: &verdict.verified,
-            refinement: verdict.refinement,
             left_out: self.left_out(Some(verdict)),
             neighbours: Neighbours::of(&verdict.scene),
         }
