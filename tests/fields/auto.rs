@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use viewfuse::device::cpu::Cpu;
-use viewfuse::field::auto::{self, Chosen, MAX_LEFT_OUT, choose, schemes};
+use viewfuse::field::auto::{self, Chosen, HOLD_OUT, choose, schemes};
 use viewfuse::field::pixelnerf::{Architecture, PixelNerf, PixelNerfOptions, test_networks};
 use viewfuse::field::render::{Frame, RenderError, RenderOptions, Stage, render};
 use viewfuse::field::training_free::TrainingFree;
@@ -88,11 +88,11 @@ fn the_choice_is_the_best_that_was_tried_or_the_default() -> Result<(), Box<dyn 
     let folder = tempfile::tempdir()?;
     let scene = room(folder.path(), 6);
     let (frames, chosen) = automatic(&scene)?;
-    let Chosen { candidates, left_out, weighting, settings, .. } = &chosen;
-    assert_eq!(left_out.len(), 5.min(MAX_LEFT_OUT));
+    let Chosen { candidates, held_out, weighting, settings, .. } = &chosen;
+    assert_eq!(held_out.len(), 5.min(HOLD_OUT.max_views));
     assert!(candidates.len() > schemes().len(), "the field's scalars are tried as well");
     assert!(candidates.iter().all(|candidate| candidate.scores.iter().all(|score| *score > 5.0)));
-    let given_up = |candidate: &&auto::Candidate| candidate.scores.len() < left_out.len();
+    let given_up = |candidate: &&auto::Candidate| candidate.scores.len() < held_out.len();
     assert!(candidates.iter().filter(given_up).all(|candidate| candidate.psnr.is_none()), "{candidates:?}");
     let score = |candidate: &auto::Candidate| candidate.psnr;
     let own = candidates.iter().find(|one| one.weighting == weighting.to_string() && &one.settings == settings);
@@ -159,7 +159,7 @@ fn two_sources_give_the_default_and_no_expectation() -> Result<(), Box<dyn Error
     let scene = room(folder.path(), 3);
     let (frames, chosen) = automatic(&scene)?;
     assert!(chosen.mixture.is_none() && frames[0].shares.is_empty());
-    assert!(chosen.candidates.is_empty() && chosen.settings.is_empty() && chosen.left_out.is_empty());
+    assert!(chosen.candidates.is_empty() && chosen.settings.is_empty() && chosen.held_out.is_empty());
     assert_eq!(chosen.expected(&frames[0]), None);
     Ok(())
 }
@@ -180,7 +180,7 @@ fn a_scene_on_which_copies_are_better_is_told() -> Result<(), Box<dyn Error>> {
     let scene = room(folder.path(), 5);
     let warnings = Warnings::default();
     let chosen_here = chosen(&scene, &[0, 1, 2, 3, 4], &TrainingFree::default(), &warnings)?;
-    assert!(chosen_here.left_out.iter().all(|source| source.copy_psnr > 5.0));
+    assert!(chosen_here.held_out.iter().all(|source| source.copy_psnr > 5.0));
     assert_eq!(*warnings.0.lock().expect("a list"), [""; 0]);
     // The same photograph for each camera: the camera poses are wrong, and a copy is perfect.
     let mut wrong = scene.clone();

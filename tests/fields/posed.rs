@@ -94,7 +94,7 @@ fn true_poses_pass() {
     assert_eq!(verdict.photos, (0..COUNT).collect::<Vec<_>>());
     for own in &verdict.verified {
         assert!(
-            own.rotation_difference < 1.0e-6 && own.left_out.gain() > 1.0 && own.left_out.sharpness() > 1.0,
+            own.rotation_difference < 1.0e-6 && own.held_out.gain() > 1.0 && own.held_out.sharpness() > 1.0,
             "{own:?}"
         );
     }

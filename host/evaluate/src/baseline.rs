@@ -19,10 +19,10 @@ mod warp;
 
 pub use warp::WarpedSample;
 
-use image::imageops::{self, FilterType};
 use image::{Rgb, RgbImage};
 use std::fmt;
 use viewfuse_core::camera::Camera;
+use viewfuse_field::held_out::resampled;
 use warp::Homography;
 
 /// A source photograph and the camera of its pixels.
@@ -84,10 +84,7 @@ impl Baseline {
         let (width, height) = (target.pinhole.width(), target.pinhole.height());
         let Some((first, _)) = nearest.split_first() else { return RgbImage::new(width, height) };
         if self == Baseline::NearestCopy {
-            return match first.picture.dimensions() == (width, height) {
-                true => first.picture.clone(),
-                false => imageops::resize(&first.picture, width, height, FilterType::Triangle),
-            };
+            return resampled(&first.picture, (width, height)).into_owned();
         }
         let taken = &nearest[..nearest.len().min(self.source_count())];
         let warps: Vec<(&Shot, Homography)> =

@@ -12,6 +12,7 @@ use viewfuse_core::camera::Camera;
 use viewfuse_field::Renderer;
 use viewfuse_field::auto::choose;
 use viewfuse_field::budget::Kept;
+use viewfuse_field::held_out::nearest;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, open_album};
 use viewfuse_job::progress::{Part, Progress};
 use viewfuse_scene::Scene;
@@ -66,7 +67,7 @@ pub struct Score {
 impl Score {
     /// A metric by name.
     pub fn value(&self, name: &str) -> Option<f64> {
-        self.values.iter().find(|(own, _)| own == name).map(|(_, value)| *value)
+        self.values.iter().find(|(known, _)| known == name).map(|(_, value)| *value)
     }
 }
 
@@ -192,7 +193,9 @@ impl Evaluator<'_> {
         for &target in targets {
             self.progress.check().map_err(PhotographsError::from).map_err(RenderError::from)?;
             let ((camera, truth), mask) = (shown_at(*subject, stage, target)?, self.mask(*subject, stage, target)?);
-            let nearest = nearest_sources(scene, sources, target, BLENDED);
+            let pose = &scene.views[target].camera.pose;
+            let distance = |source: usize| scene.views[source].camera.pose.distance(pose);
+            let nearest = nearest(sources.iter().copied(), distance, BLENDED);
             for &source in &nearest {
                 if let Entry::Vacant(place) = shots.entry(source) {
                     let (camera, GroundTruth { picture, .. }) = shown_at(*subject, stage, source)?;
@@ -259,8 +262,8 @@ impl Evaluator<'_> {
             let subject = Subject { scene, album: &album, masked: None };
             let place = 1 + READINGS_A_GROUP * index;
             let progress = &Part::begin(self.progress, "", place..place + READINGS_A_GROUP, of);
-            let own = Evaluator { progress, ..*self };
-            scores.extend(own.score(subject, sources, targets, |_, _, _, _| {})?);
+            let part = Evaluator { progress, ..*self };
+            scores.extend(part.score(subject, sources, targets, |_, _, _, _| {})?);
         }
         Ok(scores)
     }
@@ -271,7 +274,7 @@ fn kept_in_words(pictures: &[Kept]) -> Option<String> {
     let kept = pictures.iter().filter(|picture| picture.is_kept).count();
     let mut efforts: Vec<(&str, usize)> = Vec::new();
     for Kept { effort, .. } in pictures {
-        match efforts.iter_mut().find(|(own, _)| own == effort) {
+        match efforts.iter_mut().find(|(known, _)| known == effort) {
             Some((_, count)) => *count += 1,
             None => efforts.push((effort, 1)),
         }
@@ -311,16 +314,6 @@ fn source_groups(scene: &Scene, selection: &Selection, least_sources: usize) -> 
         .into_iter()
         .map(|target| Ok((selection.sources_without(scene, &[target], least_sources)?, vec![target])))
         .collect()
-}
-
-/// The sources whose centres are nearest to the target's, at most `count`, the nearest first; of equally near ones the
-/// first.
-fn nearest_sources(scene: &Scene, sources: &[usize], target: usize, count: usize) -> Vec<usize> {
-    let distance = |view: usize| scene.views[view].camera.pose.distance(&scene.views[target].camera.pose);
-    let mut nearest = sources.to_vec();
-    nearest.sort_by(|&a, &b| distance(a).total_cmp(&distance(b)));
-    nearest.truncate(count);
-    nearest
 }
 
 /// A view's photograph at working size over the run's background, and the camera of these pixels.

@@ -1,8 +1,8 @@
 //! Chooses the weighting scheme and the field's scalars for a scene, and estimates the expected score, from the sources
-//! alone: some of them are left out, one at a time, and rendered coarsely from the others.
+//! alone: some of them are held out, one at a time, and rendered coarsely from the others.
 //!
 //! ```text
-//! leave_out     sources rendered from the others
+//! held_out      sources rendered from the others
 //! regions       the mixture of pictures under several settings
 //! calibration   the errors that pixels of a confidence have
 //! detail        the detail that coarse pictures lack
@@ -11,27 +11,28 @@
 //!
 //! The choice is a coordinate search: the scheme first, then each of the field's scalars. All candidates are rendered
 //! from one encoding, under the first scheme. A candidate replaces the current choice only if its gain exceeds the
-//! noise; of an object with silhouettes, a scheme also where a left-out source is nearest to the others. At last,
-//! pictures under several settings are mixed by region, where that is not worse. With too few sources to leave one out,
+//! noise; of an object with silhouettes, a scheme also where a held-out source is nearest to the others. At last,
+//! pictures under several settings are mixed by region, where that is not worse. With too few sources to hold one out,
 //! everything stays at its default.
 
 mod calibration;
 mod detail;
 mod expectation;
-mod leave_out;
+mod held_out;
 mod regions;
 
 pub use calibration::{Calibration, Group, POOR};
 pub use expectation::{Basis, Expected, PixelErrors, TERMS};
-pub use leave_out::{MAX_LEFT_OUT, MAX_NEIGHBOURS, SIDE};
+pub use held_out::HOLD_OUT;
 
+use crate::held_out::nearest;
 use crate::mixture::NearTargets;
 use crate::render::{Finished, Frame, RenderError, RenderOptions, Stage, render_chosen};
 use crate::standing::Measure;
 pub use crate::standing::Standing;
 use crate::{Mixture, Renderer, Setting, Tunable};
 use expectation::decibels;
-use leave_out::{Outcome, Trials, coarse};
+use held_out::{HeldOutSources, Outcome, coarse, coarse_side};
 use regions::Mixed;
 use serde::Serialize;
 use viewfuse_core::pose::Pose;
@@ -42,11 +43,11 @@ use viewfuse_scene::few_shot::FewShot;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_weighting::Weighting;
 
-/// The schemes that are tried. The first is the baseline of the others: on left-out sources, the inverse square of the
+/// The schemes that are tried. The first is the baseline of the others: on held-out sources, the inverse square of the
 /// distance was best on average.
 pub fn schemes() -> Vec<Scheme> {
-    let of = |formula, choice, parameter| Scheme::new(formula, choice, parameter).ok();
-    let first = [of(Formula::Distance, 2, 0.0), of(Formula::Distance, 3, 0.0), of(Formula::Error, 0, 0.5)];
+    let scheme = |formula, choice, parameter| Scheme::new(formula, choice, parameter).ok();
+    let first = [scheme(Formula::Distance, 2, 0.0), scheme(Formula::Distance, 3, 0.0), scheme(Formula::Error, 0, 0.5)];
     let plain = [Scheme::ERROR, Scheme::MEAN, Scheme::L1, Scheme::of(Formula::Gaussian)];
     first.into_iter().flatten().chain(plain).collect()
 }
@@ -72,15 +73,15 @@ pub struct Candidate {
     pub weighting: String,
     /// The field's scalars that are not at their defaults.
     pub settings: Vec<Setting>,
-    /// Mean score of the sources that were left out, decibels; null if it was given up before the last of them.
+    /// Mean score of the held-out sources, decibels; null if it was given up before the last of them.
     pub psnr: Option<f64>,
     /// The score of each; of the first ones alone where so many of these do not gain that the median cannot.
     pub scores: Vec<f64>,
 }
 
-/// A source that was left out, with what was chosen.
+/// A held-out source, with what was chosen.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct LeftOutSource {
+pub struct HeldOutSource {
     /// Its name.
     pub source: String,
     /// Its score, decibels.
@@ -104,11 +105,11 @@ pub struct Chosen {
     pub mixture: Option<Mixture>,
     /// All candidates, in the order in which they were tried.
     pub candidates: Vec<Candidate>,
-    /// The sources that were left out; empty if there are too few.
-    pub left_out: Vec<LeftOutSource>,
-    /// The data for a target's expected score; `None` if nothing could be left out.
+    /// The held-out sources; empty if there are too few.
+    pub held_out: Vec<HeldOutSource>,
+    /// The data for a target's expected score; `None` if nothing could be held out.
     pub basis: Option<Basis>,
-    /// The errors that pixels of a confidence have; `None` if nothing could be left out, and for fields without
+    /// The errors that pixels of a confidence have; `None` if nothing could be held out, and for fields without
     /// confidences.
     pub calibration: Option<Calibration>,
     measure: Measure,
@@ -121,40 +122,41 @@ impl Chosen {
         self.measure.standing(&frame.target.camera.pose, self.poses.iter())
     }
 
-    /// A warning if the sources that were left out are no better than copies of the nearest other ones.
+    /// A warning if the held-out sources are no better than copies of the nearest other ones.
     fn copy_warning(&self) -> Option<String> {
-        let count = self.left_out.len().max(1) as f64;
-        let mean = |value: fn(&LeftOutSource) -> f64| self.left_out.iter().map(value).sum::<f64>() / count;
-        let (own, copy) = (mean(|source| source.psnr), mean(|source| source.copy_psnr));
-        (own < copy).then(|| {
+        let count = self.held_out.len().max(1) as f64;
+        let mean = |value: fn(&HeldOutSource) -> f64| self.held_out.iter().map(value).sum::<f64>() / count;
+        let (psnr, copy) = (mean(|source| source.psnr), mean(|source| source.copy_psnr));
+        (psnr < copy).then(|| {
             format!(
-                "sources that were left out and rendered from the others have a PSNR of {own:.1} dB, copies of the nearest \
-                 photographs {copy:.1} dB: pictures may be worse than a copy; take photographs nearer to one another, and \
-                 check the camera poses"
+                "sources that were left out and rendered from the others have a PSNR of {psnr:.1} dB, copies of the \
+                 nearest photographs {copy:.1} dB: pictures may be worse than a copy; take photographs nearer to one \
+                 another, and check the camera poses"
             )
         })
     }
 
     /// The expected score of a picture in the middle between two neighbouring sources: the mean over all sources, each
-    /// with the one nearest to it. `None` if nothing could be left out.
+    /// with the one nearest to it. `None` if nothing could be held out.
     pub fn expected_between(&self) -> Option<Expected> {
         let basis = self.basis?;
-        let middles: Vec<Pose> = self.poses.iter().enumerate().filter_map(|(own, _)| self.middle(own)).collect();
+        let middles: Vec<Pose> = (0..self.poses.len()).filter_map(|source| self.middle(source)).collect();
         let standings = middles.iter().map(|pose| self.measure.standing(pose, self.poses.iter()));
         let all: Vec<Expected> = standings.map(|standing| basis.expected(standing, basis.calibrated, None)).collect();
         let mean = |value: &dyn Fn(&Expected) -> f64| all.iter().map(value).sum::<f64>() / all.len() as f64;
-        let interval = [0, 1].map(|end| mean(&|own: &Expected| own.interval[end]));
-        (!all.is_empty()).then(|| Expected { psnr: mean(&|own| own.psnr), interval, pixels: None })
+        let interval = [0, 1].map(|end| mean(&|between: &Expected| between.interval[end]));
+        (!all.is_empty()).then(|| Expected { psnr: mean(&|between| between.psnr), interval, pixels: None })
     }
 
     /// The pose half-way between a source and the one nearest to it.
-    fn middle(&self, own: usize) -> Option<Pose> {
-        let own = &self.poses[own];
-        let others = self.poses.iter().filter(|other| !std::ptr::eq(*other, own));
-        let other = others.min_by(|a, b| a.distance(own).total_cmp(&b.distance(own)))?;
-        let centre = 0.5 * (own.centre_world() + other.centre_world());
-        let ahead = own.forward_world() + other.forward_world();
-        Pose::look_at(centre, centre + ahead, -(own.down_world() + other.down_world())).ok()
+    fn middle(&self, source: usize) -> Option<Pose> {
+        let pose = &self.poses[source];
+        let others = (0..self.poses.len()).filter(|other| *other != source);
+        let neighbour = nearest(others, |other| self.poses[other].distance(pose), 1);
+        let other = &self.poses[*neighbour.first()?];
+        let centre = 0.5 * (pose.centre_world() + other.centre_world());
+        let ahead = pose.forward_world() + other.forward_world();
+        Pose::look_at(centre, centre + ahead, -(pose.down_world() + other.down_world())).ok()
     }
 
     /// The score of a picture by the calibration of its confidences, decibels; `None` without one.
@@ -162,7 +164,7 @@ impl Chosen {
         self.calibration.as_ref()?.mean_square(frame.confidences.iter().copied()).map(decibels)
     }
 
-    /// The expected score of a target's picture; `None` if nothing could be left out.
+    /// The expected score of a target's picture; `None` if nothing could be held out.
     pub fn expected(&self, frame: &Frame) -> Option<Expected> {
         let calibrated = self.calibrated(frame);
         let expected = self.basis?.expected(self.standing(frame), calibrated, frame.seen);
@@ -187,7 +189,7 @@ pub fn choose(
     choose_of(schemes(), Some(stage.tunables()), stage, renderer, options, progress)
 }
 
-/// As [`choose`] without a choice: the baseline alone is tried. For the scores of the sources that are left out, in a
+/// As [`choose`] without a choice: the baseline alone is tried. For the scores of the held-out sources, in a
 /// part of the time.
 ///
 /// # Errors
@@ -212,27 +214,27 @@ fn choose_of(
     let mut schemes = schemes.into_iter().map(Weighting::from);
     let first = schemes.next().unwrap_or_else(Weighting::default_scheme);
     let coarse = coarse(options, stage);
-    let mut trials = Trials::prepare(stage, &first, renderer, &coarse, progress)?;
+    let mut held_out = HeldOutSources::prepare(stage, &first, renderer, &coarse, progress)?;
     let cameras: Vec<_> = stage.images.images.iter().map(|image| image.camera).collect();
     let mut chosen = Chosen {
         weighting: Weighting::default_scheme(),
         settings: Vec::new(),
         mixture: None,
         candidates: Vec::new(),
-        left_out: Vec::new(),
+        held_out: Vec::new(),
         basis: None,
         calibration: None,
         measure: Measure::of(&cameras),
         poses: cameras.iter().map(|camera| camera.pose).collect(),
     };
-    if trials.is_empty() {
+    if held_out.is_empty() {
         return Ok(chosen);
     }
     chosen.weighting = first;
     let (is_mixed, tunables) = (tunables.is_some(), tunables.unwrap_or(&[]));
     let others: usize = tunables.iter().map(|tunable| tunable.others.len()).sum();
-    progress.expect(trials.len() * (1 + schemes.len() + others));
-    let mut search = Search { trials: &mut trials, candidates: Vec::new(), progress };
+    progress.expect(held_out.len() * (1 + schemes.len() + others));
+    let mut search = Search { held_out: &mut held_out, candidates: Vec::new(), progress };
     let mut best = search.outcomes(&chosen.weighting, &[], &[])?;
     let has_silhouettes = stage.images.has_silhouettes;
     if let Some((outcomes, weighting)) = search.scheme(schemes, &best, has_silhouettes)? {
@@ -249,7 +251,7 @@ fn choose_of(
             }
         }
     }
-    let parts = if is_mixed { search.trials.parts(&chosen.settings) } else { Vec::new() };
+    let parts = if is_mixed { search.held_out.parts(&chosen.settings) } else { Vec::new() };
     if let Some(Mixed { mixture, outcomes, .. }) = search.mixed(&chosen.weighting, &chosen.settings, parts)?
         && mean_score(&outcomes) > mean_score(&best) - MAX_LOSS
         && !(has_silhouettes && gain_where_nearest(&outcomes, &best) < -MAX_LOSS)
@@ -258,38 +260,37 @@ fn choose_of(
         (best, chosen.mixture) = (outcomes, Some(Mixture { near, ..mixture }));
     }
     chosen.candidates = search.candidates;
-    let side = coarse.size.map_or(SIDE, |[width, height]| width.max(height));
     chosen.calibration = Calibration::of(best.iter().flat_map(|outcome| outcome.samples.iter().copied()).collect());
-    let detail = detail::lost_detail(&stage.images.images, side);
+    let detail = detail::lost_detail(&stage.images.images, coarse_side(&coarse));
     chosen.basis = Some(Basis::of(&best, chosen.calibration.as_ref(), detail, has_silhouettes));
-    chosen.left_out = left_out(&best, &trials);
+    chosen.held_out = scored(&best, &held_out);
     if let (Some(warning), Some(of)) = (chosen.copy_warning(), stage.scene()) {
         progress.warn(&format!("{}: {warning}", of.scene.path.display()));
     }
     Ok(chosen)
 }
 
-/// The sources that were left out, with their results.
-fn left_out(outcomes: &[Outcome], trials: &Trials<'_>) -> Vec<LeftOutSource> {
-    let of = |(&Outcome { psnr, standing, confidence, copy, .. }, source): (&Outcome, &str)| LeftOutSource {
+/// The held-out sources with their results.
+fn scored(outcomes: &[Outcome], held_out: &HeldOutSources<'_>) -> Vec<HeldOutSource> {
+    let scored = |(&Outcome { psnr, standing, confidence, copy, .. }, source): (&Outcome, &str)| HeldOutSource {
         source: source.to_owned(),
         psnr,
         copy_psnr: copy,
         standing,
         confidence,
     };
-    outcomes.iter().zip(trials.names()).map(of).collect()
+    outcomes.iter().zip(held_out.names()).map(scored).collect()
 }
 
 /// The candidates and their results.
-struct Search<'t, 'a> {
-    trials: &'t mut Trials<'a>,
+struct Search<'s, 'a> {
+    held_out: &'s mut HeldOutSources<'a>,
     candidates: Vec<Candidate>,
-    progress: &'t dyn Progress,
+    progress: &'s dyn Progress,
 }
 
 impl Search<'_, '_> {
-    /// The results of a candidate on the sources that are left out, up to the one that decides that it is not better
+    /// The results of a candidate on the held-out sources, up to the one that decides that it is not better
     /// than what it would replace: see [`is_lost`].
     fn outcomes(
         &mut self,
@@ -298,15 +299,15 @@ impl Search<'_, '_> {
         replaced: &[Outcome],
     ) -> Result<Vec<Outcome>, RenderError> {
         let mut outcomes = Vec::new();
-        for source in 0..self.trials.len() {
+        for source in 0..self.held_out.len() {
             if is_lost(&outcomes, replaced) {
                 self.progress.step();
             } else {
-                outcomes.extend(self.trials.outcomes(source..source + 1, weighting, settings, self.progress)?);
+                outcomes.extend(self.held_out.outcomes(source..source + 1, weighting, settings, self.progress)?);
             }
         }
         let scores: Vec<f64> = outcomes.iter().map(|outcome| outcome.psnr).collect();
-        let psnr = (outcomes.len() == self.trials.len()).then(|| mean_score(&outcomes));
+        let psnr = (outcomes.len() == self.held_out.len()).then(|| mean_score(&outcomes));
         self.candidates.push(Candidate { weighting: weighting.to_string(), settings: settings.to_vec(), psnr, scores });
         Ok(outcomes)
     }
@@ -322,7 +323,7 @@ impl Search<'_, '_> {
         let mut has_lost = false;
         for (number, weighting) in (1..).zip(schemes) {
             if has_lost {
-                (0..self.trials.len()).for_each(|_| self.progress.step());
+                (0..self.held_out.len()).for_each(|_| self.progress.step());
                 continue;
             }
             let outcomes = self.outcomes(&weighting, &[], first)?;
@@ -344,8 +345,8 @@ impl Search<'_, '_> {
         parts: Vec<Vec<Setting>>,
     ) -> Result<Option<Mixed>, RenderError> {
         let count = parts.len();
-        self.progress.expect(self.trials.len() * count);
-        let mixed = regions::mixed(self.trials, weighting, parts, self.progress)?;
+        self.progress.expect(self.held_out.len() * count);
+        let mixed = regions::mixed(self.held_out, weighting, parts, self.progress)?;
         if let Some(Mixed { outcomes, .. }) = &mixed {
             let mut settings = chosen.to_vec();
             settings.push(Setting { name: MIXED, value: count as f32 });
@@ -359,7 +360,7 @@ impl Search<'_, '_> {
 
 /// Whether more than half of the sources gain too little for [`is_better`]'s median, by the first ones' results.
 fn is_lost(first: &[Outcome], replaced: &[Outcome]) -> bool {
-    let gains_little = |(replaced, own): (&Outcome, &Outcome)| own.psnr - replaced.psnr <= 0.5 * MIN_GAIN;
+    let gains_little = |(replaced, new): (&Outcome, &Outcome)| new.psnr - replaced.psnr <= 0.5 * MIN_GAIN;
     replaced.iter().zip(first).map(gains_little).filter(|little| *little).count() > replaced.len() / 2
 }
 
@@ -376,7 +377,7 @@ fn is_better(candidate: &[Outcome], best: &[Outcome], replaced: &[Outcome]) -> b
 
 /// The median of the gains at the sources that both have, decibels; 0 without one.
 fn median_gain(candidate: &[Outcome], replaced: &[Outcome]) -> f64 {
-    let mut gains: Vec<f64> = candidate.iter().zip(replaced).map(|(own, other)| own.psnr - other.psnr).collect();
+    let mut gains: Vec<f64> = candidate.iter().zip(replaced).map(|(new, replaced)| new.psnr - replaced.psnr).collect();
     gains.sort_by(f64::total_cmp);
     let middle = gains.len() / 2;
     match gains.len() {
@@ -392,7 +393,7 @@ fn median_gain(candidate: &[Outcome], replaced: &[Outcome]) -> f64 {
 /// `host/results/gaussians.md`).
 fn gain_where_nearest(candidate: &[Outcome], replaced: &[Outcome]) -> f64 {
     let nearest = replaced.iter().zip(candidate).min_by(|(a, _), (b, _)| a.standing.gap.total_cmp(&b.standing.gap));
-    nearest.map_or(0.0, |(replaced, own)| own.psnr - replaced.psnr)
+    nearest.map_or(0.0, |(replaced, new)| new.psnr - replaced.psnr)
 }
 
 /// Mean score, decibels.
@@ -426,15 +427,15 @@ mod tests {
 
     fn outcomes(scores: &[f64]) -> Vec<Outcome> {
         let standing = Standing { gap: 0.1, outside: 0.5 };
-        let of = |&psnr: &f64| Outcome { psnr, confidence: None, samples: Vec::new(), standing, copy: 10.0 };
-        scores.iter().map(of).collect()
+        let scored = |&psnr: &f64| Outcome { psnr, confidence: None, samples: Vec::new(), standing, copy: 10.0 };
+        scores.iter().map(scored).collect()
     }
 
     #[test]
     fn the_nearest_source_says_what_is_gained_near_the_sources() {
         let at = |scores: [f64; 2]| -> Vec<Outcome> {
-            let of = |(outcome, gap)| Outcome { standing: Standing { gap, outside: 0.5 }, ..outcome };
-            outcomes(&scores).into_iter().zip([0.5, 0.4]).map(of).collect()
+            let at_gap = |(outcome, gap)| Outcome { standing: Standing { gap, outside: 0.5 }, ..outcome };
+            outcomes(&scores).into_iter().zip([0.5, 0.4]).map(at_gap).collect()
         };
         assert_eq!(gain_where_nearest(&at([22.0, 25.0]), &at([17.0, 26.0])), -1.0);
         assert_eq!(gain_where_nearest(&at([16.0, 26.5]), &at([17.0, 26.0])), 0.5);

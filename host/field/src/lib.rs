@@ -13,6 +13,7 @@
 //! scores            PSNR and SSIM of what a photograph shows
 //! budget            how much of a field's work a bound on the error or on the time needs
 //! render            the render loop, from a scene to pictures
+//! held_out          photographs that are rendered from others as if they were not there
 //! point_cloud       the sources' depths as one cloud of points
 //! gaussians         Gaussians optimised for the sources
 //! auto              the scheme and the field's scalars for a scene, and the score to expect
@@ -37,6 +38,7 @@ pub mod field;
 pub mod finite;
 pub mod gaussians;
 pub mod genvs;
+pub mod held_out;
 pub mod learned;
 pub mod mixture;
 pub mod options;

@@ -239,8 +239,8 @@ impl<'a> Session<'a> {
 
 /// Equal weights of all sources for each source as a target.
 fn even(count: usize) -> Vec<SourceWeights> {
-    let weights = |own: usize| {
-        let score = |view: usize| f32::from(view < count && view != own);
+    let weights = |target: usize| {
+        let score = |view: usize| f32::from(view < count && view != target);
         Weights::from_scores(&std::array::from_fn::<f32, MAX_SOURCES, _>(score), count as u32)
     };
     (0..count).map(weights).collect()

@@ -1,5 +1,4 @@
-//! How far a camera is from its sources, in a measure that is comparable between a target and a source that was left
-//! out.
+//! How far a camera is from its sources, in a measure that is comparable between a target and a held-out source.
 
 use glam::DVec3;
 use serde::Serialize;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 use viewfuse_device::{KernelTime, Transfers};
-use viewfuse_field::auto::{Calibration, Candidate, Chosen, Expected, LeftOutSource};
+use viewfuse_field::auto::{Calibration, Candidate, Chosen, Expected, HeldOutSource};
 use viewfuse_field::budget::Kept;
 use viewfuse_field::render::{Frame, RenderOptions, Seen, StageCosts};
 use viewfuse_field::{Denoising, LeftOut, Mixture, Setting};
@@ -105,7 +105,7 @@ pub struct ChosenRecord {
     /// All schemes and settings that were tried, with the mean score of the sources that were left out.
     pub candidates: Vec<Candidate>,
     /// The sources that were left out, each rendered coarsely from the others with what was chosen.
-    pub left_out: Vec<LeftOutSource>,
+    pub left_out: Vec<HeldOutSource>,
     /// What confidences mean: the root mean square error, as a share of a colour's range, that pixels of a confidence have in
     /// those pictures; null for fields without confidences. In a frame it is this times `expected.pixels.scale`.
     pub calibration: Option<Calibration>,
@@ -113,8 +113,8 @@ pub struct ChosenRecord {
 
 impl From<Chosen> for ChosenRecord {
     fn from(chosen: Chosen) -> ChosenRecord {
-        let Chosen { settings, mixture, candidates, left_out, calibration, .. } = chosen;
-        ChosenRecord { settings, mixture, candidates, left_out, calibration }
+        let Chosen { settings, mixture, candidates, held_out, calibration, .. } = chosen;
+        ChosenRecord { settings, mixture, candidates, left_out: held_out, calibration }
     }
 }
 

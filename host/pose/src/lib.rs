@@ -2,7 +2,7 @@
 //!
 //! Solvers of structure from motion can be wrong by tens of degrees without a sign of it in their own figures: the number of
 //! points, the reprojection error, what they accept. Two things tell. Attempts with other features, seeds and focal lengths
-//! disagree where poses are wrong. And photographs, left out one at a time and rendered from the others, are met only at their
+//! disagree where poses are wrong. And photographs, held out one at a time and rendered from the others, are met only at their
 //! true poses.
 //!
 //! The modules are listed in the order of the data; a module uses only modules listed above it:
@@ -21,7 +21,7 @@
 //! posed          a solution as a scene
 //! agreement      rotations of two solutions between the same photographs
 //! support        parallax and the shape of the points: Support
-//! left_out       photographs rendered from the others: LeftOut
+//! held_out       photographs rendered from the others: HeldOutScores
 //! attempt        the attempts that are made: Attempt
 //! verdict        the attempt that is accepted, with the photographs that are: Verdict
 //! advice         where more photographs help: Neighbours
@@ -38,9 +38,9 @@ mod colmap_folder;
 mod exif;
 mod find;
 mod focal;
+mod held_out;
 mod intake;
 mod kept;
-mod left_out;
 mod openmvg;
 mod posed;
 mod process;
@@ -56,9 +56,9 @@ pub use colmap::Colmap;
 pub use exif::Exif;
 pub use find::{Found, Options, PoseError, find};
 pub use focal::{CameraGroup, Cameras, FocalSource};
+pub use held_out::HeldOutScores;
 pub use intake::{Intake, IntakeError, MAX_PHOTOGRAPHS, Photo, Unusable, is_photograph};
 pub use kept::Kept;
-pub use left_out::LeftOut;
 pub use openmvg::OpenMvg;
 pub use pycolmap::PyColmap;
 pub use solution::{

@@ -3,17 +3,17 @@
 //! ```text
 //! candidates   at least three photographs; a plausible focal length; parallax
 //! agreement    an attempt with other features, or another guess of the focal length, has the same rotations
-//! left out     each photograph, rendered from the others, is met at its pose and nowhere else
+//! held out     each photograph, rendered from the others, is met at its pose and nowhere else
 //! ```
 //!
-//! Photographs that fail are taken out and the rest is looked at again, until none fails. The first candidate that keeps at
-//! least three is accepted. The limits were set on scenes with known poses (`host/results/poses.md`).
+//! Photographs that fail are taken out and the rest is looked at again, until none fails. The first candidate that
+//! keeps at least three is accepted. The limits were set on scenes with known poses (`host/results/poses.md`).
 
 use crate::agreement::{differences, median};
 use crate::attempt::Attempt;
 use crate::focal::Cameras;
+use crate::held_out::{HeldOutScores, hold_out_all};
 use crate::intake::Photo;
-use crate::left_out::{LeftOut, left_out};
 use crate::posed;
 use crate::solution::Solution;
 use std::path::Path;
@@ -35,9 +35,9 @@ const MIN_PARALLAX: f64 = 1.0;
 const MIN_THICKNESS: f64 = 0.03;
 /// Most degrees between the relative rotations of two attempts.
 const MAX_ROTATION_DIFFERENCE: f64 = 1.5;
-/// Least decibels by which a left-out photograph is met better at its pose than at disturbed ones.
+/// Least decibels by which a held-out photograph is met better at its pose than at disturbed ones.
 const MIN_SHARPNESS: f64 = 0.5;
-/// Least decibels by which left-out photographs are met better than their copies: each, and the median.
+/// Least decibels by which held-out photographs are met better than their copies: each, and the median.
 const MIN_GAIN: f64 = 0.5;
 const MIN_MEDIAN_GAIN: f64 = 1.0;
 
@@ -66,9 +66,9 @@ pub struct Verdict {
 pub struct Verified {
     /// Degrees between its relative rotations and those of the attempt that agrees best.
     pub rotation_difference: f64,
-    /// The scores when it was left out.
+    /// The scores when it was held out.
     #[serde(flatten)]
-    pub left_out: LeftOut,
+    pub held_out: HeldOutScores,
 }
 
 /// Why nothing was accepted.
@@ -129,7 +129,8 @@ pub(crate) fn verdict(
     Ok(Err(Refusal { reasons: attempts.iter().map(reason).collect() }))
 }
 
-/// Attempts that may be accepted, the most promising first, each with the photographs that another one confirms and by how much.
+/// Attempts that may be accepted, the most promising first, each with the photographs that another one confirms and by
+/// how much.
 fn candidates(cameras: &Cameras, attempts: &mut [Attempt]) -> Vec<(usize, Vec<(usize, f64)>)> {
     for attempt in attempts.iter_mut().filter(|attempt| attempt.tried.refused.is_none()) {
         attempt.tried.refused = implausible(cameras, attempt);
@@ -180,7 +181,8 @@ fn implausible(cameras: &Cameras, attempt: &Attempt) -> Option<String> {
     None
 }
 
-/// The photographs of an attempt whose relative rotations another one confirms, each with the least difference in degrees.
+/// The photographs of an attempt whose relative rotations another one confirms, each with the least difference in
+/// degrees.
 fn confirmed(cameras: &Cameras, attempts: &[Attempt], own: usize) -> Vec<(usize, f64)> {
     let Some(solution) = &attempts[own].solution else { return Vec::new() };
     let mut least = vec![f64::INFINITY; solution.photographs.len()];
@@ -226,7 +228,7 @@ impl Trial<'_> {
         all.map(|photo| (photo, reason.clone())).collect()
     }
 
-    /// Leaves photographs out until none fails: the scene and the photographs that stay, or why they do not.
+    /// Excludes photographs until none fails: the scene and the photographs that stay, or why they do not.
     #[allow(clippy::type_complexity)]
     fn run(
         &mut self,
@@ -243,22 +245,22 @@ impl Trial<'_> {
             }
             let taken: Vec<usize> = kept.iter().map(|(photo, _)| *photo).collect();
             let scene = posed::scene(self.folder, self.photos, self.cameras, self.solution, &taken)?;
-            let scores = left_out(&scene, progress)?;
+            let scores = hold_out_all(&scene, progress)?;
             let mut failed: Vec<(f64, usize, String)> = taken
                 .iter()
                 .zip(&scores)
                 .filter_map(|(photo, scores)| Some((scores.sharpness().min(scores.gain()), *photo, failure(scores)?)))
                 .collect();
             if failed.is_empty() {
-                let gain = median(scores.iter().map(LeftOut::gain).collect());
+                let gain = median(scores.iter().map(HeldOutScores::gain).collect());
                 if gain < MIN_MEDIAN_GAIN {
                     return Ok(Err(format!(
                         "photographs that were left out are met {gain:.1} dB better than by copies of their neighbours, {MIN_MEDIAN_GAIN} are needed"
                     )));
                 }
                 let verified = kept.into_iter().zip(scores);
-                let verified = verified.map(|((photo, rotation_difference), left_out)| {
-                    (photo, Verified { rotation_difference, left_out })
+                let verified = verified.map(|((photo, rotation_difference), held_out)| {
+                    (photo, Verified { rotation_difference, held_out })
                 });
                 return Ok(Ok((scene, verified.collect())));
             }
@@ -272,7 +274,7 @@ impl Trial<'_> {
 }
 
 /// Why a photograph fails.
-fn failure(scores: &LeftOut) -> Option<String> {
+fn failure(scores: &HeldOutScores) -> Option<String> {
     if scores.sharpness() < MIN_SHARPNESS {
         return Some(format!(
             "left out and rendered from the others, it is met no better at its pose ({:.1} dB) than two degrees beside it ({:.1} dB)",

@@ -182,7 +182,7 @@ fn print(found: &Found, verdict: &Verdict, record: &Record<'_>) -> std::io::Resu
     let features = tried.features;
     say(format_args!("points     {points} by {solver} ({features}), reprojection error {error:.2} pixels"))?;
     for own in record.accepted {
-        let scores = &own.left_out;
+        let scores = &own.held_out;
         say(format_args!(
             "left-out   {} rendered from the others {:.1} dB; copies {:.1} dB, two degrees beside {:.1} dB; attempts differ by {:.2} degrees",
             scores.photograph,

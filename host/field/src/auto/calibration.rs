@@ -1,5 +1,5 @@
-//! What a confidence means: the error that pixels of that confidence have in the pictures of sources that were left
-//! out.
+//! What a confidence means: the error that pixels of that confidence have in the pictures of held-out
+//! sources.
 
 use serde::Serialize;
 
@@ -11,7 +11,7 @@ const MIN_PIXELS: usize = 64;
 /// that is everywhere as wrong has a PSNR of 20 dB.
 pub const POOR: f32 = 0.1;
 
-/// A pixel of a left-out source: its confidence, and the mean square error of its colours, each in `[0, 1]`.
+/// A pixel of a held-out source: its confidence, and the mean square error of its colours, each in `[0, 1]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Sample {
     pub(super) confidence: f32,
@@ -32,7 +32,7 @@ pub struct Group {
 pub struct Calibration(Vec<Group>);
 
 impl Calibration {
-    /// From the pixels of all left-out sources; `None` if there are too few. Groups of equally many pixels, by
+    /// From the pixels of all held-out sources; `None` if there are too few. Groups of equally many pixels, by
     /// confidence; groups that are out of order are joined (pool adjacent violators, which is the least-squares fit of
     /// a function that does not rise).
     pub(super) fn of(mut samples: Vec<Sample>) -> Option<Calibration> {
@@ -41,9 +41,9 @@ impl Calibration {
         // Sums of confidences and squares, and numbers of pixels.
         let mut groups: Vec<[f64; 3]> = Vec::with_capacity(count);
         for group in 0..count {
-            let own = &samples[group * samples.len() / count..(group + 1) * samples.len() / count];
-            let sum = |value: fn(&Sample) -> f32| own.iter().map(|sample| f64::from(value(sample))).sum::<f64>();
-            let mut last = [sum(|sample| sample.confidence), sum(|sample| sample.square), own.len() as f64];
+            let pixels = &samples[group * samples.len() / count..(group + 1) * samples.len() / count];
+            let sum = |value: fn(&Sample) -> f32| pixels.iter().map(|sample| f64::from(value(sample))).sum::<f64>();
+            let mut last = [sum(|sample| sample.confidence), sum(|sample| sample.square), pixels.len() as f64];
             while let Some(before) = groups.pop_if(|before| before[1] / before[2] <= last[1] / last[2]) {
                 last = [0, 1, 2].map(|index| before[index] + last[index]);
             }
@@ -89,20 +89,20 @@ mod tests {
 
     /// Pixels whose mean square error falls from 0.04 to 0 as the confidence rises, with noise of mean 0.
     fn falling() -> Vec<Sample> {
-        let of = |index: usize| {
+        let sample = |index: usize| {
             let confidence = (index % 4096) as f32 / 4096.0;
             let noise = if index.is_multiple_of(2) { 0.5 } else { 1.5 };
             Sample { confidence, square: 0.04 * (1.0 - confidence) * noise }
         };
-        (0..8192).map(of).collect()
+        (0..8192).map(sample).collect()
     }
 
     #[test]
     fn the_error_of_a_confidence_is_that_of_its_pixels() {
         let calibration = Calibration::of(falling()).expect("pixels");
         for confidence in [0.1, 0.5, 0.9] {
-            let own = calibration.square(confidence);
-            assert!((own - 0.04 * (1.0 - confidence)).abs() < 0.001, "{confidence}: {own}");
+            let square = calibration.square(confidence);
+            assert!((square - 0.04 * (1.0 - confidence)).abs() < 0.001, "{confidence}: {square}");
         }
         // Half of a picture with an error of 0.2 (nearly), half of one of 0.
         let square = calibration.mean_square([0.0, 1.0].into_iter()).expect("pixels");

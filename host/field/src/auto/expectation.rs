@@ -10,7 +10,7 @@
 //! photograph shows ([`Seen::by_none`]); `s`: 1 for objects with silhouettes, 0 for whole photographs.
 
 use super::calibration::Calibration;
-use super::leave_out::Outcome;
+use super::held_out::Outcome;
 use crate::render::Seen;
 use crate::standing::Standing;
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,4 @@
-//! The mixture of pictures under several settings: its constants are fitted to the errors on sources that were left
-//! out.
+//! The mixture of pictures under several settings: its constants are fitted to the errors on held-out sources.
 //!
 //! The constants minimise the squares of the errors on all of these sources, each source's over the mean square error
 //! of its plain mean, plus a penalty that draws them towards the plain mean. The last picture is the dearest one, and
@@ -7,34 +6,32 @@
 //! that a mixture may have, and where its share is too small for what it takes. A source's score is that with constants
 //! that were fitted to the other ones.
 
-use super::leave_out::{Outcome, Trials};
+use super::held_out::{HeldOutSources, Outcome};
 use super::{MAX_LOSS, mean_score};
 use crate::mixture::{Mixture, term_count, terms};
 use crate::render::{Frame, RenderError};
 use crate::{Rendered, Setting};
 use image::RgbImage;
 use viewfuse_job::progress::Progress;
-use viewfuse_scene::photographs::to_rgb8;
+use viewfuse_scene::photographs::{GroundTruth, to_rgb8};
 use viewfuse_weighting::Weighting;
 
-/// Fewest sources that are left out for a fit: one alone says nothing of the others.
+/// Fewest held-out sources for a fit: one alone says nothing of the others.
 const MIN_SOURCES: usize = 3;
-/// The penalty of a constant's square, where each source's errors weigh [`SOURCE_WEIGHT`]. Penalties from 100 to 1000
-/// gave scores within 0.05 dB on four scenes; the greatest keeps nearest to the plain mean, where targets are unlike
-/// the sources.
+/// The penalty of a constant's square, where each source's errors weigh [`SOURCE_WEIGHT`]
+/// (`host/results/front_to_back.md`, "Mixtures by region").
 const PENALTY: f64 = 1000.0;
 /// The weight of all sources together, in mean squares of the plain mean's errors.
 const SOURCE_WEIGHT: f64 = 300.0;
 
-/// Least mean share of the last of three pictures or more. Two targets of fox (288x512, 49 sources): the Gaussians have
-/// shares of 0.05 and
-/// 0.06, left-out sources gain nothing by them, and with them it takes twice the time.
+/// Least mean share of the last of three pictures or more: with less, nothing is gained for twice the time
+/// (`host/results/gaussians.md`).
 const MIN_LAST_SHARE: f32 = 0.1;
-/// The same of the first source alone, with constants fitted to it, before the picture is made for the others. For 19
-/// targets of six scenes it is taken or left out as with the first three sources (host/results/gaussians.md).
+/// The same of the first source alone, with constants fitted to it, before the picture is made for the others (the same
+/// page).
 const MIN_FIRST_SHARE: f32 = 0.5 * MIN_LAST_SHARE;
 
-/// A mixture with the scores that it has on the sources that were left out.
+/// A mixture with the scores that it has on the held-out sources.
 pub(super) struct Mixed {
     pub(super) mixture: Mixture,
     pub(super) outcomes: Vec<Outcome>,
@@ -42,7 +39,7 @@ pub(super) struct Mixed {
     last_share: f32,
 }
 
-/// The pictures of a source that was left out, and what they should have shown.
+/// The pictures of a held-out source, and what they should have shown.
 struct Example {
     parts: Vec<Rendered>,
     /// `[pixel][term]`.
@@ -57,41 +54,41 @@ struct Example {
 /// # Errors
 /// [`RenderError`].
 pub(super) fn mixed(
-    trials: &mut Trials<'_>,
+    held_out: &mut HeldOutSources<'_>,
     weighting: &Weighting,
     parts: Vec<Vec<Setting>>,
     progress: &dyn Progress,
 ) -> Result<Option<Mixed>, RenderError> {
-    if parts.len() < 2 || trials.len() < MIN_SOURCES {
+    if parts.len() < 2 || held_out.len() < MIN_SOURCES {
         return Ok(None);
     }
-    let mut examples: Vec<Example> = trials
+    let mut examples: Vec<Example> = held_out
         .truths()
-        .map(|(truth, seen)| Example {
+        .map(|GroundTruth { picture, seen }| Example {
             parts: Vec::new(),
             terms: Vec::new(),
-            seen: seen.map_or_else(
-                || vec![true; truth.pixels().len()],
-                |seen| seen.as_raw().iter().map(|level| *level > 0).collect(),
-            ),
-            truth: truth.clone(),
+            seen: match seen {
+                Some(seen) => seen.as_raw().iter().map(|level| *level > 0).collect(),
+                None => vec![true; picture.pixels().len()],
+            },
+            truth: picture.clone(),
         })
         .collect();
     let count = examples.len();
     let cheap = if parts.len() < 3 { parts.len() } else { parts.len() - 1 };
     for settings in &parts[..cheap] {
-        add(&mut examples, trials.frames(0..count, weighting, settings, progress)?);
+        add(&mut examples, held_out.frames(0..count, weighting, settings, progress)?);
     }
-    let without_last = fitted(trials, &mut examples, &parts[..cheap]);
+    let without_last = fitted(held_out, &mut examples, &parts[..cheap]);
     let Some(last) = parts.get(cheap) else { return Ok(Some(without_last)) };
     // The last picture is the dearest one: a source says whether it has a share at all.
-    add(&mut examples, trials.frames(0..1, weighting, last, progress)?);
+    add(&mut examples, held_out.frames(0..1, weighting, last, progress)?);
     if first_share(&mut examples[0], &parts) < MIN_FIRST_SHARE {
         (1..count).for_each(|_| progress.step());
         return Ok(Some(without_last));
     }
-    add(&mut examples[1..], trials.frames(1..count, weighting, last, progress)?);
-    let all = fitted(trials, &mut examples, &parts);
+    add(&mut examples[1..], held_out.frames(1..count, weighting, last, progress)?);
+    let all = fitted(held_out, &mut examples, &parts);
     let is_worth_it =
         mean_score(&all.outcomes) > mean_score(&without_last.outcomes) - MAX_LOSS && all.last_share >= MIN_LAST_SHARE;
     Ok(Some(if is_worth_it { all } else { without_last }))
@@ -115,7 +112,7 @@ fn first_share(example: &mut Example, parts: &[Vec<Setting>]) -> f32 {
 }
 
 /// The mixture of the examples' pictures.
-fn fitted(trials: &Trials<'_>, examples: &mut [Example], parts: &[Vec<Setting>]) -> Mixed {
+fn fitted(held_out: &HeldOutSources<'_>, examples: &mut [Example], parts: &[Vec<Setting>]) -> Mixed {
     for example in &mut *examples {
         example.terms = terms(&example.parts);
     }
@@ -129,7 +126,7 @@ fn fitted(trials: &Trials<'_>, examples: &mut [Example], parts: &[Vec<Setting>])
         let (rendered, shares) = mixture.mixed(&example.parts);
         last_share += shares.last().copied().unwrap_or(0.0) / examples.len() as f32;
         let picture = to_rgb8(&rendered.colours, [rendered.width, rendered.height]);
-        outcomes.push(trials.outcome(index, &picture, &rendered.confidences));
+        outcomes.push(held_out.outcome(index, &picture, &rendered.confidences));
     }
     let mixture = Mixture::new(parts.to_vec(), solved(sums.iter(), count));
     Mixed { mixture, outcomes, last_share }
@@ -160,10 +157,10 @@ impl Sums {
                     let change = value(part) - value(&parts[0]);
                     products.iter_mut().zip(terms).for_each(|(product, term)| *product = change * f64::from(*term));
                 }
-                for (row, own) in products.iter().enumerate() {
-                    right[row] += own * error;
+                for (row, product) in products.iter().enumerate() {
+                    right[row] += product * error;
                     let columns = matrix[row * size..].iter_mut().zip(&products);
-                    columns.for_each(|(sum, other)| *sum += own * other);
+                    columns.for_each(|(sum, other)| *sum += product * other);
                 }
             }
         }
@@ -178,15 +175,15 @@ fn solved<'s>(sums: impl Iterator<Item = &'s Sums>, parts: usize) -> Vec<Vec<f32
     let term_count = term_count(parts);
     let size = (parts - 1) * term_count;
     let (mut matrix, mut right, mut count) = (vec![0.0; size * size], vec![0.0; size], 0.0);
-    for own in sums {
-        matrix.iter_mut().zip(&own.matrix).for_each(|(sum, own)| *sum += own);
-        right.iter_mut().zip(&own.right).for_each(|(sum, own)| *sum += own);
+    for source in sums {
+        matrix.iter_mut().zip(&source.matrix).for_each(|(sum, term)| *sum += term);
+        right.iter_mut().zip(&source.right).for_each(|(sum, term)| *sum += term);
         count += 1.0;
     }
     matrix.iter_mut().chain(&mut right).for_each(|sum| *sum /= f64::max(count, 1.0));
     (0..size).for_each(|row| matrix[row * size + row] += PENALTY);
     let solution = cholesky(matrix, right);
-    solution.chunks_exact(term_count).map(|own| own.iter().map(|value| *value as f32).collect()).collect()
+    solution.chunks_exact(term_count).map(|constants| constants.iter().map(|value| *value as f32).collect()).collect()
 }
 
 /// Solves `matrix x = right` for a symmetric positive definite matrix, row-major.
@@ -223,7 +220,10 @@ mod tests {
         let expected = [1.0, -2.0, 0.5];
         let right = matrix.chunks_exact(3).map(|row| row.iter().zip(expected).map(|(a, b)| a * b).sum()).collect();
         let solution = cholesky(matrix, right);
-        assert!(solution.iter().zip(expected).all(|(own, other)| (own - other).abs() < 1.0e-12), "{solution:?}");
+        assert!(
+            solution.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1.0e-12),
+            "{solution:?}"
+        );
     }
 
     /// Two pictures of noise, and a truth that is the first one where it is sure and the second one elsewhere.
@@ -244,8 +244,8 @@ mod tests {
         let parts = vec![part(0), part(1)];
         let truth = RgbImage::from_fn(width, height, |x, y| {
             let index = (y * width + x) as usize;
-            let own = parts[usize::from(!is_left(index))].colours[index];
-            Rgb([0, 1, 2].map(|channel| (own[channel] * 255.0).round() as u8))
+            let colour = parts[usize::from(!is_left(index))].colours[index];
+            Rgb([0, 1, 2].map(|channel| (colour[channel] * 255.0).round() as u8))
         });
         Example { terms: terms(&parts), parts, truth, seen: vec![true; 576] }
     }
@@ -259,11 +259,11 @@ mod tests {
         let error = |mixture: &Mixture| {
             let (mixed, _) = mixture.mixed(&examples[0].parts);
             let truth = examples[0].truth.pixels();
-            let square = |(own, truth): (&[f32; 4], &Rgb<u8>)| (own[0] - f32::from(truth.0[0]) / 255.0).powi(2);
+            let square = |(colour, truth): (&[f32; 4], &Rgb<u8>)| (colour[0] - f32::from(truth.0[0]) / 255.0).powi(2);
             mixed.colours.iter().zip(truth).map(square).sum::<f32>()
         };
-        let (own, plain) = (error(&fitted), error(&Mixture::mean(parts)));
-        assert!(own < 0.5 * plain, "{own} instead of {plain}: {:?}", fitted.constants);
+        let (error_fitted, error_plain) = (error(&fitted), error(&Mixture::mean(parts)));
+        assert!(error_fitted < 0.5 * error_plain, "{error_fitted} instead of {error_plain}: {:?}", fitted.constants);
     }
 
     #[test]

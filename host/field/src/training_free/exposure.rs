@@ -95,10 +95,10 @@ fn ratios(cameras: &[CameraBlock], texels: &[[f32; 4]], maps: &[[f32; 2]], steps
                 if (maps[at][0] - 1.0 / seen.depth).abs() > 1.5 * steps[second] {
                     continue;
                 }
-                let (own, there) = (texels[texel], texels[at]);
+                let (here, there) = (texels[texel], texels[at]);
                 for channel in 0..3 {
-                    if COMPARABLE.contains(&own[channel]) && COMPARABLE.contains(&there[channel]) {
-                        logarithms[second][channel].push(f64::from(there[channel] / own[channel]).ln());
+                    if COMPARABLE.contains(&here[channel]) && COMPARABLE.contains(&there[channel]) {
+                        logarithms[second][channel].push(f64::from(there[channel] / here[channel]).ln());
                     }
                 }
             }

@@ -87,9 +87,9 @@ fn common_volume(cameras: &[Camera]) -> [f32; 2] {
 /// The greatest disparity that is searched when nothing is known: that at the median distance of neighbouring cameras.
 pub(super) fn first_guess(cameras: &[Camera]) -> [f32; 2] {
     let centres: Vec<Vec3> = cameras.iter().map(|camera| camera.pose.centre_world()).collect();
-    let nearest = |own: usize| {
-        let others = centres.iter().enumerate().filter(|(other, _)| *other != own);
-        others.map(|(_, other)| other.distance(centres[own])).fold(f32::INFINITY, f32::min)
+    let nearest = |camera: usize| {
+        let others = centres.iter().enumerate().filter(|(other, _)| *other != camera);
+        others.map(|(_, other)| other.distance(centres[camera])).fold(f32::INFINITY, f32::min)
     };
     let mut gaps: Vec<f32> = (0..centres.len()).map(nearest).filter(|gap| *gap > 0.0 && gap.is_finite()).collect();
     gaps.sort_by(f32::total_cmp);

@@ -4,7 +4,7 @@ use crate::cli::say;
 use serde::Serialize;
 use std::time::Instant;
 use viewfuse_device::cpu::Cpu;
-use viewfuse_field::auto::{self, Chosen, Expected, LeftOutSource};
+use viewfuse_field::auto::{self, Chosen, Expected, HeldOutSource};
 use viewfuse_field::render::{RenderError, RenderOptions, Stage};
 use viewfuse_field::training_free::TrainingFree;
 use viewfuse_field::{Field, On};
@@ -17,7 +17,7 @@ use viewfuse_scene::photographs::{Album, BackgroundChoice};
 #[derive(Debug, Serialize)]
 pub(super) struct Quality {
     /// The photographs that were left out; none if there are too few.
-    left_out: Vec<LeftOutSource>,
+    left_out: Vec<HeldOutSource>,
     /// The score to expect between two neighbouring photographs.
     expected: Option<Expected>,
     /// Why nothing could be measured.
@@ -36,7 +36,7 @@ impl Quality {
         match measured {
             Ok(chosen) => {
                 let expected = chosen.expected_between();
-                Ok(Quality { left_out: chosen.left_out, expected, problem: None, seconds })
+                Ok(Quality { left_out: chosen.held_out, expected, problem: None, seconds })
             }
             Err(error) if is_of_scene(&error) => {
                 Ok(Quality { left_out: Vec::new(), expected: None, problem: Some(error.to_string()), seconds })
@@ -47,14 +47,14 @@ impl Quality {
 
     /// Prints it as a person reads it.
     pub(super) fn print(&self) -> std::io::Result<()> {
-        let order = |a: &&LeftOutSource, b: &&LeftOutSource| a.psnr.total_cmp(&b.psnr);
+        let order = |a: &&HeldOutSource, b: &&HeldOutSource| a.psnr.total_cmp(&b.psnr);
         let (least, most) = (self.left_out.iter().min_by(order), self.left_out.iter().max_by(order));
         let (Some(least), Some(most), Some(expected)) = (least, most, self.expected) else {
             let problem = self.problem.as_deref().unwrap_or("too few photographs to leave one out");
             return say(format_args!("expected   not measured: {problem}"));
         };
         let count = self.left_out.len() as f64;
-        let mean = |value: &dyn Fn(&LeftOutSource) -> f64| self.left_out.iter().map(value).sum::<f64>() / count;
+        let mean = |value: &dyn Fn(&HeldOutSource) -> f64| self.left_out.iter().map(value).sum::<f64>() / count;
         say(format_args!(
             "left out   {count} photographs, rendered from the others: PSNR {:.1} dB, from {:.1} ({}) to {:.1} ({}); a copy of \
              the nearest photograph {:.1} dB",

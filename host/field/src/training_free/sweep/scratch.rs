@@ -35,7 +35,7 @@ impl<D: Device> Default for Slot<D> {
 impl<D: Device> Slot<D> {
     /// A buffer of this length. Its contents are not defined: the kernels write all that they read.
     pub(super) fn of_len(&mut self, device: &D, len: usize) -> Result<&mut D::Buffer<Planes>, FieldError> {
-        let known = self.0.take().filter(|(own, _)| *own == len);
+        let known = self.0.take().filter(|(known, _)| *known == len);
         let slot = match known {
             Some(known) => known,
             None => (len, device.zeros(len)?),

@@ -19,11 +19,11 @@ pub(super) fn filled(image: &SourceImage) -> Cow<'_, SourceImage> {
         if row.iter().all(shown) {
             continue;
         }
-        let own: Vec<usize> = (0..width).filter(|column| shown(&row[*column])).collect();
-        let (Some(&first), Some(&last)) = (own.first(), own.last()) else { continue };
-        for column in (0..width).filter(|column| own.binary_search(column).is_err()).collect::<Vec<_>>() {
-            let after = own.partition_point(|other| *other < column);
-            let (left, right) = (own[..after].last().unwrap_or(&first), own.get(after).unwrap_or(&last));
+        let known: Vec<usize> = (0..width).filter(|column| shown(&row[*column])).collect();
+        let (Some(&first), Some(&last)) = (known.first(), known.last()) else { continue };
+        for column in (0..width).filter(|column| known.binary_search(column).is_err()).collect::<Vec<_>>() {
+            let after = known.partition_point(|other| *other < column);
+            let (left, right) = (known[..after].last().unwrap_or(&first), known.get(after).unwrap_or(&last));
             row[column] = faint(row[if left.abs_diff(column) <= right.abs_diff(column) { *left } else { *right }]);
         }
     }
@@ -66,7 +66,7 @@ mod tests {
         let colour = |at: usize| filled.texels[at].map(|value| value / filled.texels[at][3]);
         for (at, expected) in [(0, a), (1, a), (2, b), (3, b), (4, a), (7, b)] {
             let expected = expected.map(|value| value / expected[3]);
-            let near = colour(at).iter().zip(expected).all(|(own, other)| (own - other).abs() < 1.0e-6);
+            let near = colour(at).iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1.0e-6);
             assert!(near && filled.texels[at][3] < 2.0 * FILLED_ALPHA, "{at}: {:?}", filled.texels[at]);
         }
         assert_eq!((filled.texels[5], filled.texels[6]), (a, b), "what is shown stays");

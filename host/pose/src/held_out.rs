@@ -1,0 +1,245 @@
+//! Photographs, held out one at a time and rendered coarsely from their neighbours by the training-free field.
+//!
+//! A picture that is rendered at the photograph's pose is compared with the photograph, and so are what needs no poses
+//! (a copy of the nearest photograph), what needs little of them (the same, warped by a plane), and pictures at poses
+//! that are turned by two degrees. Where poses are true the first is nearer to the photograph than all others.
+//!
+//! ```text
+//! score = -10 log10 mean (truth - gain picture)^2     decibels, over the pixels that the photograph shows
+//! ```
+//!
+//! with a gain for each channel that minimises the error, within a factor of two: photographs differ in exposure.
+
+use glam::DVec3;
+use image::RgbImage;
+use rayon::prelude::*;
+use viewfuse_core::camera::Camera;
+use viewfuse_core::pose::Pose;
+use viewfuse_device::cpu::Cpu;
+use viewfuse_evaluate::baseline::plane::plane_depth;
+use viewfuse_evaluate::baseline::{Baseline, Shot};
+use viewfuse_field::held_out::{self, HeldOut, HoldOut, MAX_SCORE, resampled};
+use viewfuse_field::render::{RenderError, RenderOptions};
+use viewfuse_field::training_free::{Sweep, TrainingFree};
+use viewfuse_field::{Field, On, Surfaces};
+use viewfuse_job::progress::{Progress, Quiet};
+use viewfuse_scene::Scene;
+use viewfuse_scene::photographs::{Album, BackgroundChoice, GroundTruth, SourceImages, scaled_size};
+use viewfuse_weighting::Weighting;
+
+/// Every photograph is held out, and rendered from few others: all of them must agree with its pose.
+const HOLD_OUT: HoldOut = HoldOut { max_views: usize::MAX, max_neighbours: 4, side: 128 };
+
+/// The turn of disturbed poses.
+const DISTURBANCE_DEGREES: f64 = 2.0;
+
+/// What a held-out photograph is met with. Scores in decibels.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct HeldOutScores {
+    /// Its name.
+    pub photograph: String,
+    /// The score of what was rendered at its pose.
+    pub score: f64,
+    /// The score of a copy of the nearest photograph.
+    pub copy: f64,
+    /// The score of the nearest photograph, warped by a plane.
+    pub warp: f64,
+    /// The greatest score of what was rendered at poses that are turned by two degrees.
+    pub disturbed: f64,
+}
+
+impl HeldOutScores {
+    /// How much better than its copies, decibels.
+    pub fn gain(&self) -> f64 {
+        self.score - self.copy.max(self.warp)
+    }
+
+    /// How much better than at disturbed poses, decibels.
+    pub fn sharpness(&self) -> f64 {
+        self.score - self.disturbed
+    }
+}
+
+/// Holds out every view of a scene with at least three, which all have photographs.
+///
+/// # Errors
+/// [`RenderError`].
+pub(crate) fn hold_out_all(scene: &Scene, progress: &dyn Progress) -> Result<Vec<HeldOutScores>, RenderError> {
+    let quiet = Quiet(progress);
+    let album = open_album(scene, &quiet)?;
+    let photographs = Photographs::of(scene, &album, &quiet)?;
+    photographs.each(progress, |view, rendered| photographs.scores(view, rendered))
+}
+
+/// The photographs of a scene at the size at which they are compared.
+///
+/// # Errors
+/// [`RenderError`].
+fn open_album<'a>(scene: &'a Scene, progress: &dyn Progress) -> Result<Album<'a>, RenderError> {
+    Ok(Album::open_at(scene, 0..scene.views.len(), HOLD_OUT.side, progress)?)
+}
+
+/// Photographs with their cameras, each of which is rendered from the others.
+struct Photographs<'a> {
+    scene: Scene,
+    album: &'a Album<'a>,
+    all: SourceImages,
+}
+
+impl<'a> Photographs<'a> {
+    /// Of a scene whose views all have photographs, in an album of it.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    fn of(
+        scene: &Scene,
+        album: &'a Album<'a>,
+        progress: &dyn Progress,
+    ) -> Result<Photographs<'a>, RenderError> {
+        let views: Vec<usize> = (0..scene.views.len()).collect();
+        let all = album.sources(&views, HOLD_OUT.side, BackgroundChoice::None, progress)?;
+        Ok(Photographs { scene: scene.clone(), album, all })
+    }
+
+    /// Does something with each view, rendered from the others, on all cores.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    fn each<T: Send>(
+        &self,
+        progress: &dyn Progress,
+        work: impl Fn(usize, &mut Rendered<'_>) -> Result<T, RenderError> + Sync,
+    ) -> Result<Vec<T>, RenderError> {
+        let (field, options) =
+            (field(), RenderOptions { background: BackgroundChoice::None, ..RenderOptions::default() });
+        let renderer = On { device: &Cpu, field: &field };
+        let surfaces = Surfaces { points: self.all.points.clone(), near_far: self.all.near_far };
+        let views: Vec<usize> = (0..self.scene.views.len()).collect();
+        let scene = (&self.scene, self.album);
+        let photographs = held_out::Photographs::new(scene, views, &self.all, surfaces, HOLD_OUT, &field.about())?;
+        let poses: Vec<Pose> = self.scene.views.iter().map(|view| view.camera.pose).collect();
+        let weighting = Weighting::default_scheme();
+        let one = |&view: &usize| {
+            progress.check().map_err(|stopped| RenderError::Field(stopped.into()))?;
+            let quiet = &Quiet(progress);
+            let neighbours = HOLD_OUT.neighbours(&poses, view);
+            let mut held_out = photographs.hold_out(view, neighbours, &renderer, &options, quiet)?;
+            held_out.stage.weigh(&weighting, quiet)?;
+            let camera = self.scene.views[view].camera;
+            let (width, height) = held_out.truth.picture.dimensions();
+            let size = scaled_size(&camera, HOLD_OUT.side.min(width.max(height))).into();
+            let truth = Truth::of(&held_out.truth);
+            let done =
+                work(view, &mut Rendered { held_out, weighting: &weighting, camera, size, truth, progress: quiet })?;
+            progress.step();
+            Ok(done)
+        };
+        let views = HOLD_OUT.views(&poses);
+        progress.expect(views.len());
+        views.par_iter().map(one).collect::<Vec<_>>().into_iter().collect()
+    }
+
+    fn scores(&self, view: usize, rendered: &mut Rendered<'_>) -> Result<HeldOutScores, RenderError> {
+        let pose = rendered.camera.pose;
+        let score = rendered.score(pose)?;
+        let mut disturbed = f64::NEG_INFINITY;
+        for pose in turned(&pose) {
+            disturbed = disturbed.max(rendered.score(pose)?);
+        }
+        let shot = |&other: &usize| Shot { camera: self.all.images[other].camera, picture: self.all.picture(other) };
+        let shots: Vec<Shot> = rendered.held_out.neighbours.iter().map(shot).collect();
+        let target = rendered.held_out.camera;
+        let cameras: Vec<Camera> = self.scene.views.iter().map(|view| view.camera).collect();
+        let depth = plane_depth(&target, self.all.points.iter().copied(), None, &cameras);
+        let near: Vec<&Shot> = shots.iter().collect();
+        let copy = rendered.truth.score(&rendered.held_out.nearest_copy());
+        let warp = rendered.truth.score(&Baseline::WarpedCopy.picture(&near, &target, depth));
+        Ok(HeldOutScores { photograph: self.scene.views[view].name.clone(), score, copy, warp, disturbed })
+    }
+}
+
+/// A held-out photograph, rendered from its neighbours.
+struct Rendered<'a> {
+    held_out: HeldOut<'a>,
+    weighting: &'a Weighting,
+    camera: Camera,
+    size: [u32; 2],
+    truth: Truth,
+    progress: &'a dyn Progress,
+}
+
+impl Rendered<'_> {
+    /// The score of the picture at a pose.
+    fn score(&mut self, pose: Pose) -> Result<f64, RenderError> {
+        let camera = Camera { pose, ..self.camera };
+        let frame = self.held_out.stage.frame_of_size(self.weighting, &camera, self.size, self.progress)?;
+        Ok(self.truth.score(&resampled(&frame.picture, self.truth.picture.dimensions())))
+    }
+}
+
+/// A pose turned about its own right and down axes, both ways.
+fn turned(pose: &Pose) -> Vec<Pose> {
+    let (sin, cos) = DISTURBANCE_DEGREES.to_radians().sin_cos();
+    let [right, down, forward] =
+        [pose.right_world(), pose.down_world(), pose.forward_world()].map(|axis| axis.as_dvec3());
+    let centre = pose.centre_world();
+    let with = |axes: [DVec3; 3]| {
+        let row = |row: usize| [axes[0][row] as f32, axes[1][row] as f32, axes[2][row] as f32, centre[row]];
+        Pose::from_opencv(&[row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]).ok()
+    };
+    let about = |sin: f64| {
+        [
+            with([right, cos * down + sin * forward, cos * forward - sin * down]),
+            with([cos * right + sin * forward, down, cos * forward - sin * right]),
+        ]
+    };
+    [about(sin), about(-sin)].into_iter().flatten().flatten().collect()
+}
+
+/// A photograph as it is compared.
+struct Truth {
+    picture: RgbImage,
+    /// The pixels that count.
+    shown: Vec<bool>,
+}
+
+impl Truth {
+    fn of(GroundTruth { picture, seen }: &GroundTruth) -> Truth {
+        let shown = match seen {
+            Some(seen) => seen.as_raw().iter().map(|level| *level > 0).collect(),
+            None => vec![true; picture.pixels().len()],
+        };
+        Truth { picture: picture.clone(), shown }
+    }
+
+    /// The differences `truth - gain picture` of a picture of its size, three for each pixel that counts.
+    fn differences(&self, picture: &RgbImage) -> Vec<f64> {
+        let pairs = || self.picture.pixels().zip(picture.pixels()).zip(&self.shown).filter(|(_, shown)| **shown);
+        let level = |pixel: &image::Rgb<u8>, channel: usize| f64::from(pixel[channel]) / 255.0;
+        let gains: [f64; 3] = std::array::from_fn(|channel| {
+            let (mut both, mut square) = (0.0, 0.0);
+            for ((truth, shown), _) in pairs() {
+                both += level(truth, channel) * level(shown, channel);
+                square += level(shown, channel).powi(2);
+            }
+            if square > 0.0 { (both / square).clamp(0.5, 2.0) } else { 1.0 }
+        });
+        let difference =
+            |truth, shown| (0..3).map(move |channel| level(truth, channel) - gains[channel] * level(shown, channel));
+        pairs().flat_map(|((truth, shown), _)| difference(truth, shown)).collect()
+    }
+
+    /// The score of a picture of its size.
+    fn score(&self, picture: &RgbImage) -> f64 {
+        let differences = self.differences(picture);
+        let error: f64 = differences.iter().map(|difference| difference * difference).sum();
+        if differences.is_empty() { 0.0 } else { (-10.0 * (error / differences.len() as f64).log10()).min(MAX_SCORE) }
+    }
+}
+
+/// The field that renders a view from the others: each source's depths count as they are, as a pose that is a little
+/// off should be felt, not its photograph doubted.
+fn field() -> TrainingFree {
+    let sweep = Sweep { consistency_share: 0.0, ..Sweep::default() };
+    TrainingFree { sweep, ..TrainingFree::default() }
+}
