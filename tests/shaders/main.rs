@@ -3,3 +3,4 @@
 mod bits;
 mod contract;
 mod freshness;
+mod loops;

@@ -9,6 +9,7 @@
 //! compile   sources -> modules               spirv-builder, without its optimiser
 //! split     module -> modules                what needs operations of subgroups is a module of its own
 //! legalise  module -> module                 no composites of pointers
+//! loops     module -> module                 the branch on a loop's condition leaves the loop
 //! share     module -> module                 workgroup memory is visible to all its invocations
 //! refine    module -> module                 no paths, no contraction of float arithmetic
 //! tokens    text -> tokens                   without comments, documentation and layout
@@ -18,6 +19,7 @@
 pub mod backend;
 pub mod compile;
 pub mod legalise;
+pub mod loops;
 pub mod refine;
 pub mod share;
 pub mod split;

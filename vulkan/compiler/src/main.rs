@@ -8,6 +8,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 use viewfuse_shader_compiler::backend::{Backend, BackendError, HOME_VARIABLE, Toolchain};
 use viewfuse_shader_compiler::compile::{compile, validate};
+use viewfuse_shader_compiler::loops::{Joined, joined};
+use viewfuse_shader_compiler::refine::read;
 use viewfuse_shader_compiler::split::Modules;
 use viewfuse_shader_compiler::stamp::{Inputs, MODULE, STAMP, SUBGROUPS, Stamp};
 
@@ -74,6 +76,10 @@ fn run(check: bool) -> Result<ExitCode, Box<dyn Error>> {
     let validated = if validated { "accepted by spirv-val" } else { "not validated: spirv-val is not installed" };
     for (name, bytes) in named(&modules) {
         println!("{name}: {} bytes by {}; {validated}", bytes.len(), stamp.compiler);
+        for Joined { function, kept } in joined(&read(bytes)?) {
+            let why = kept.map_or_else(|| "for no reason".to_owned(), |reason| reason.to_string());
+            println!("  {function}: a loop keeps its shape: {why}");
+        }
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -26,10 +26,11 @@ pub const MANIFESTS: [&str; 3] = ["core/Cargo.toml", "core/kernels/Cargo.toml", 
 /// The folder of `viewfuse-core`, of which only the modules count that kernels reach.
 pub const CORE: &str = "core/src";
 /// Source files, and folders with all their Rust files.
-pub const SOURCES: [&str; 7] = [
+pub const SOURCES: [&str; 8] = [
     "core/kernels/src",
     "vulkan/compiler/src/compile.rs",
     "vulkan/compiler/src/legalise.rs",
+    "vulkan/compiler/src/loops.rs",
     "vulkan/compiler/src/refine.rs",
     "vulkan/compiler/src/share.rs",
     "vulkan/compiler/src/split.rs",
