@@ -10,15 +10,10 @@ pub use viewfuse_evaluate as evaluate;
 pub use viewfuse_field as field;
 pub use viewfuse_job as job;
 pub use viewfuse_nn as nn;
-#[cfg(feature = "output")]
 pub use viewfuse_output as output;
 #[cfg(feature = "pose")]
 pub use viewfuse_pose as pose;
 pub use viewfuse_scene as scene;
-#[cfg(feature = "synthetic")]
-pub use viewfuse_synthetic as synthetic;
-#[cfg(feature = "train")]
-pub use viewfuse_train as train;
 #[cfg(feature = "view")]
 pub use viewfuse_view as view;
 pub use viewfuse_vulkan as vulkan;

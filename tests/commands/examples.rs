@@ -1,7 +1,7 @@
 //! What documents show beside commands that `readme.rs` runs to their end: the viewer, commands on photographs of a person, trainings
 //! that take hours, commands in the text, and what is printed.
 
-use super::BINARY;
+use super::{BINARY, lab};
 use std::fs;
 use std::path::{Path, PathBuf};
 use viewfuse_tests::command::{self, command, killed_when, toy};
@@ -22,9 +22,9 @@ fn read(path: &Path) -> String {
 pub(super) fn run(line: &str) -> bool {
     if let Some(arguments) = line.strip_prefix("cargo run --release -- view ") {
         view(arguments);
-    } else if let Some(arguments) = line.strip_prefix("viewfuse scenes make ") {
+    } else if let Some(arguments) = line.strip_prefix("viewfuse-lab scenes make ") {
         starts_to_write(arguments);
-    } else if let Some(arguments) = line.strip_prefix("viewfuse train ") {
+    } else if let Some(arguments) = line.strip_prefix("viewfuse-lab train ") {
         lacks_only_its_data(arguments);
     } else if let Some(arguments) = line.strip_prefix("viewfuse ") {
         let scene = toy();
@@ -53,22 +53,16 @@ fn view(arguments: &str) {
 
 /// Hours of generating: until the first scene is there.
 fn starts_to_write(arguments: &str) {
-    if !cfg!(feature = "scenes") {
-        return;
-    }
     let folder = tempfile::tempdir().expect("a folder");
     let output = arguments.split(' ').nth(1).expect("a folder's name");
     let is_there = || fs::read_dir(folder.path().join(output)).is_ok_and(|mut entries| entries.next().is_some());
-    killed_when(BINARY, folder.path(), &format!("scenes make {arguments}"), is_there);
+    killed_when(lab(), folder.path(), &format!("scenes make {arguments}"), is_there);
 }
 
 /// Hours of training: everything that is written on the command line is right, and the first file that it reads is missing.
 fn lacks_only_its_data(arguments: &str) {
-    if !cfg!(feature = "train") {
-        return;
-    }
     let folder = tempfile::tempdir().expect("a folder");
-    let outcome = command::run(BINARY, folder.path(), &format!("train {arguments}"));
+    let outcome = command::run(lab(), folder.path(), &format!("train {arguments}"));
     let missing = ["no such file or folder", "No such file", "no data set: looked for"];
     let is_missing = missing.iter().any(|words| outcome.stderr.contains(words));
     assert!(outcome.code == Some(1) && is_missing, "{:?}: {}", outcome.code, outcome.stderr);

@@ -11,6 +11,7 @@ viewfuse_tests::trials![
     the_short_help_has_what_is_needed_first,
     options_of_networks_need_one,
     what_was_nearly_written_is_suggested,
+    commands_of_the_laboratory_are_told,
     shells_complete_and_pages_tell,
 ];
 
@@ -77,6 +78,18 @@ fn what_was_nearly_written_is_suggested() {
         let outcome = run(BINARY, folder.path(), arguments);
         assert!(outcome.code == Some(2) && outcome.stderr.contains(meant), "{}", outcome.stderr);
     }
+}
+
+fn commands_of_the_laboratory_are_told() {
+    let folder = Folder::new();
+    for name in ["train", "scenes", "report"] {
+        for rest in ["", " --help", " learn/cars -o out --steps 5"] {
+            let line = format!("`cargo run --release -p viewfuse-lab -- {name}`");
+            assert_wrong_arguments(BINARY, folder.path(), &format!("{name}{rest}"), &[&line]);
+        }
+    }
+    let outcome = run(BINARY, folder.path(), "trane");
+    assert!(outcome.code == Some(2) && !outcome.stderr.contains("viewfuse-lab"), "{}", outcome.stderr);
 }
 
 fn shells_complete_and_pages_tell() {

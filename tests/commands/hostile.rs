@@ -1,6 +1,6 @@
 //! Input from somebody else, and a machine that is full or closed: no panic, no abort, nothing on the terminal but text.
 
-use super::BINARY;
+use super::{BINARY, binary};
 use serde_json::json;
 use std::fs::{self, OpenOptions};
 use std::process::Stdio;
@@ -142,7 +142,7 @@ fn devices_without_an_end() {
         let mut limited = std::process::Command::new("sh");
         // Four GiB of addresses: more would be taken by a reader without a limit.
         let script = format!("ulimit -v 4194304; exec \"$0\" {arguments}");
-        limited.current_dir(folder.path()).args(["-c", &script, BINARY]);
+        limited.current_dir(folder.path()).args(["-c", &script, binary(arguments)]);
         let Outcome { code, stderr, .. } = Outcome::of(limited);
         assert_eq!(code, Some(1), "{arguments}: {stderr}");
         assert!(stderr.starts_with("viewfuse: ") && stderr.lines().count() == 1, "{arguments}: {stderr}");

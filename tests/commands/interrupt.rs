@@ -1,7 +1,7 @@
 //! Ctrl-C in the middle of a render, and everywhere else.
 #![cfg(unix)]
 
-use super::BINARY;
+use super::{BINARY, binary};
 use std::fs::{self, OpenOptions};
 use std::process::Command;
 use std::thread::sleep;
@@ -67,7 +67,7 @@ fn a_signal_ends_what_waits_for_a_pipe() {
     for (index, arguments) in waits.into_iter().enumerate() {
         // `files_below` must not open the pipe, and does not: it asks for lengths only.
         let before = files_below(folder.path());
-        let mut child = start(BINARY, folder.path(), arguments);
+        let mut child = start(binary(arguments), folder.path(), arguments);
         let process = child.id();
         wait_while_running(&mut child, || catches_interrupts(process));
         // Then it soon waits for the pipe. A slow machine is still on the way there, which must end as well.

@@ -1,7 +1,7 @@
 //! Kills without a warning, at random moments of every command that writes: no half-written file, nothing lost that was
 //! finished, and the same command goes on. `VIEWFUSE_KILLS=N` kills N times; the tests do it a few times.
 
-use super::{BINARY, done};
+use super::{binary, done};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
@@ -34,15 +34,15 @@ const COMMANDS: [&str; 19] = [
     "weights toy --targets 20,21 --npy OUT/weights.npy",
     "points toy --size 32x32 -o OUT/toy.ply",
     "inspect toy -o OUT/cameras.png",
-    "scenes make toys OUT --train 3 --val 1 --test 0 --views 2 --test-views 2 --size 64",
+    "scenes make cars OUT --train 3 --val 1 --test 0 --views 2 --test-views 2 --size 64",
     "scenes photograph room OUT --views 3 --size 64x48",
     "export toy --layout transforms -o OUT/toy",
     "convert small/model.safetensors OUT/small.safetensors --half",
     "convert weighting/model.safetensors OUT/attention.h",
-    "train pixelnerf learn/toys --width 8 --objects 1 --rays 8 --coarse 4 --fine 2 --side 16 --steps 12 \
+    "train pixelnerf learn/cars --width 8 --objects 1 --rays 8 --coarse 4 --fine 2 --side 16 --steps 12 \
      --validate-every 4 --write-every 0 -o OUT",
-    "train genvs learn/toys --width 4 --objects 1 --samples 4 --side 16 --steps 3 --validate-every 3 --write-every 0 -o OUT",
-    "train weighting small/model.safetensors learn/toys --objects 1 --rays 4 --steps 4 --validate-every 4 \
+    "train genvs learn/cars --width 4 --objects 1 --samples 4 --side 16 --steps 3 --validate-every 3 --write-every 0 -o OUT",
+    "train weighting small/model.safetensors learn/cars --objects 1 --rays 4 --steps 4 --validate-every 4 \
      --write-every 0 -o OUT",
 ];
 
@@ -59,10 +59,10 @@ const FEW: usize = COMMANDS.len();
 fn folder() -> Folder {
     let folder = toy();
     for arguments in [
-        "scenes make toys learn --train 2 --val 1 --test 0 --views 9 --test-views 9 --size 64",
-        "train pixelnerf learn/toys --width 8 --objects 1 --rays 8 --coarse 4 --fine 2 --side 16 --steps 4 \
+        "scenes make cars learn --train 2 --val 1 --test 0 --views 9 --test-views 9 --size 64",
+        "train pixelnerf learn/cars --width 8 --objects 1 --rays 8 --coarse 4 --fine 2 --side 16 --steps 4 \
          --validate-every 4 -o small",
-        "train weighting small/model.safetensors learn/toys --objects 1 --rays 4 --steps 1 --validate-every 1 -o weighting",
+        "train weighting small/model.safetensors learn/cars --objects 1 --rays 4 --steps 1 --validate-every 1 -o weighting",
         "evaluate toy --protocol random --trials 2 --targets-per-trial 1 --weights mean --size 16x16 --device cpu -o run",
     ] {
         done(folder.path(), arguments);
@@ -165,7 +165,7 @@ fn killed_at_any_moment() {
                 fs::remove_dir_all(&out).expect("an output");
             }
             let earlier = assert_whole(&out, like);
-            let mut run = command(BINARY, folder.path(), arguments);
+            let mut run = command(binary(arguments), folder.path(), arguments);
             let mut child = run.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the command starts");
             sleep(moment);
             let is_in_the_middle = child.try_wait().expect("a process").is_none();

@@ -41,15 +41,43 @@ mod view;
 
 use libtest_mimic::{Arguments, run};
 use serde_json::Value;
+use std::fs;
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::LazyLock;
 use viewfuse_tests::command;
 
 viewfuse_tests::trials![help_fits_and_gives_examples,];
 
 const BINARY: &str = env!("CARGO_BIN_EXE_viewfuse");
 
+/// Commands of the laboratory.
+const IN_THE_LABORATORY: [&str; 3] = ["train", "scenes", "report"];
+
+/// The laboratory's command. Cargo tells only tests of its own package where its binary is: this program is it under its name.
+fn lab() -> &'static str {
+    static LINK: LazyLock<String> = LazyLock::new(|| {
+        let link = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("viewfuse-lab{}", std::env::consts::EXE_SUFFIX));
+        let other = link.with_extension(std::process::id().to_string());
+        fs::hard_link(std::env::current_exe().expect("this program"), &other).expect("a link");
+        fs::rename(&other, &link).expect("a name");
+        // Two names of one file: renaming keeps both.
+        let _ = fs::remove_file(&other);
+        link.to_str().expect("text").to_owned()
+    });
+    &LINK
+}
+
+/// The command, the product's or the laboratory's, that knows the first of these words.
+fn binary(arguments: &str) -> &'static str {
+    let first = arguments.split_whitespace().next().unwrap_or_default();
+    if IN_THE_LABORATORY.contains(&first) { lab() } else { BINARY }
+}
+
 fn main() -> ExitCode {
+    if std::env::args_os().next().is_some_and(|name| Path::new(&name).file_stem() == Some("viewfuse-lab".as_ref())) {
+        return viewfuse_lab::main();
+    }
     let arguments = Arguments::from_args();
     let trials = [
         trials(),
@@ -94,10 +122,10 @@ fn main() -> ExitCode {
     run(&arguments, trials.into_iter().flatten().collect()).exit_code()
 }
 
-/// Runs the command in a folder; it must succeed and say nothing on standard error.
+/// Runs a command in a folder; it must succeed and say nothing on standard error.
 #[track_caller]
 fn done(folder: &Path, arguments: &str) -> String {
-    command::done(BINARY, folder, arguments)
+    command::done(binary(arguments), folder, arguments)
 }
 
 /// The numbers of a JSON list.
@@ -144,7 +172,8 @@ fn help_fits_and_gives_examples() {
     ];
     for name in commands {
         let help = done(here, &format!("{name} --help"));
-        assert!(name.is_empty() || help.contains(&format!("viewfuse {name} ")), "an example of {name}:\n{help}");
+        let is_example = help.contains(&format!("viewfuse {name} ")) || help.contains(&format!("viewfuse-lab {name} "));
+        assert!(name.is_empty() || is_example, "an example of {name}:\n{help}");
         assert!(name.is_empty() || help.contains("Example"), "an example of {name}:\n{help}");
         for line in help.lines() {
             assert!(line.chars().count() <= 110, "{line:?} is too long");

@@ -1,6 +1,6 @@
 //! Outputs that would replace something else: refused before work begins, with everything as it was.
 
-use super::{BINARY, done};
+use super::{BINARY, binary, done};
 use std::fs;
 use std::path::{Path, PathBuf};
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, names_in, toy};
@@ -29,7 +29,7 @@ fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
 #[track_caller]
 fn assert_kept(folder: &Folder, arguments: &str, parts: &[&str]) {
     let before = contents(folder.path());
-    assert_wrong_arguments(BINARY, folder.path(), arguments, parts);
+    assert_wrong_arguments(binary(arguments), folder.path(), arguments, parts);
     assert_eq!(contents(folder.path()), before, "viewfuse {arguments} changed a file");
 }
 
@@ -136,7 +136,7 @@ fn links_to_nothing_are_noticed_first() {
         "convert toy/rgb/000000.png out/a.safetensors".to_owned(),
         "train pixelnerf cars -o out".to_owned(),
     ] {
-        assert_refused(BINARY, folder.path(), &arguments, &["cannot be written: out is a link to nothing"]);
+        assert_refused(binary(&arguments), folder.path(), &arguments, &["cannot be written: out is a link to nothing"]);
     }
 }
 

@@ -1,7 +1,7 @@
 //! Progress where standard error is no terminal: each long command names its stages, its share never falls, and lines come
 //! while it works, with the time that is left.
 
-use super::BINARY;
+use super::{BINARY, binary};
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -39,7 +39,7 @@ impl Line {
 /// Every change that a command tells; it must succeed.
 #[track_caller]
 fn lines(folder: &Path, arguments: &str) -> Vec<Line> {
-    let mut run = command(BINARY, folder, arguments);
+    let mut run = command(binary(arguments), folder, arguments);
     let output = run.env("VIEWFUSE_PROGRESS", "0").output().expect("the command starts");
     let said = String::from_utf8(output.stderr).expect("text");
     assert!(output.status.success(), "viewfuse {arguments}\n{said}");
@@ -113,11 +113,11 @@ fn every_long_command_names_its_stages() {
 fn training_and_its_scenes_name_their_stages() {
     let scene = toy();
     let folder = scene.path();
-    let make = "scenes make toys learn --train 2 --val 1 --test 0 --views 8 --test-views 8 --size 64";
+    let make = "scenes make cars learn --train 2 --val 1 --test 0 --views 8 --test-views 8 --size 64";
     let told = lines(folder, make);
     assert_stages(&told, &["making scenes"], make);
     assert!(told.len() > 20, "a step for each of 24 views: {told:#?}");
-    let train = "train pixelnerf learn/toys --width 8 --objects 1 --rays 8 --coarse 4 --fine 2 --side 16 --steps 12 \
+    let train = "train pixelnerf learn/cars --width 8 --objects 1 --rays 8 --coarse 4 --fine 2 --side 16 --steps 12 \
         --validate-every 4 --write-every 0 -o net";
     assert_stages(&lines(folder, train), &["reading the scenes", "training"], train);
     let photograph = "scenes photograph room shoot --views 3 --size 32x24";

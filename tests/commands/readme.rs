@@ -1,7 +1,7 @@
 //! The READMEs: their commands are run as they stand there, their links and those of the results' reports lead somewhere, two
 //! tables are what the program prints, and every published package has its own.
 
-use super::examples;
+use super::{BINARY, examples, lab};
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
@@ -52,7 +52,7 @@ const NOT_RUN: [(&str, &str); 16] = [
     ("cc ", "`embedded/capi.rs` compiles the program"),
     ("tests/figures", "it writes the results"),
     ("cargo openmvg", "`tests/run` builds it, which takes minutes"),
-    ("cargo run --release --features pose ", "`pose.rs` runs it where `viewfuse-openmvg` is"),
+    ("cargo run --release -- pose ", "`pose.rs` runs it where `viewfuse-openmvg` is"),
     ("cargo install", "it would change the machine"),
     ("pip install", "it would change the machine"),
     ("host/python/test", "`python.rs` runs it where it is asked for"),
@@ -62,36 +62,17 @@ const NOT_RUN: [(&str, &str); 16] = [
     ("  --shard ", "the same"),
 ];
 
-/// The arguments of the command, and the features of the package that it needs.
-fn ours(line: &str) -> Option<(&str, &str)> {
+/// The binary of the command or of the laboratory's, and its arguments.
+fn ours(line: &str) -> Option<(&'static str, &str)> {
     let rest = line.strip_prefix("cargo run --release ")?;
-    match rest.strip_prefix("-- ") {
-        Some(arguments) => Some((arguments, "")),
-        None => rest.strip_prefix("--features ")?.split_once(" -- ").map(|(features, arguments)| (arguments, features)),
+    match rest.strip_prefix("-p viewfuse-lab -- ") {
+        Some(arguments) => Some((lab(), arguments)),
+        None => rest.strip_prefix("-- ").map(|arguments| (BINARY, arguments)),
     }
 }
 
-/// Whether the binary under test was built with it.
-fn is_built_with(feature: &str) -> bool {
-    match feature {
-        "" => true,
-        "check" => cfg!(feature = "check"),
-        "fid" => cfg!(feature = "fid"),
-        "pareto" => cfg!(feature = "pareto"),
-        "report" => cfg!(feature = "report"),
-        "scenes" => cfg!(feature = "scenes"),
-        "train" => cfg!(feature = "train"),
-        "view" => cfg!(feature = "view"),
-        _ => panic!("no feature '{feature}' is known here"),
-    }
-}
-
-fn run(arguments: &[String]) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_viewfuse"))
-        .args(arguments)
-        .current_dir(repository())
-        .output()
-        .expect("the command starts");
+fn run(binary: &str, arguments: &[String]) -> String {
+    let output = Command::new(binary).args(arguments).current_dir(repository()).output().expect("the command starts");
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).expect("text")
 }
@@ -113,7 +94,7 @@ fn every_command_runs() {
             continue;
         }
         let is_left_out = line.trim().is_empty() || NOT_RUN.iter().any(|(start, _)| line.starts_with(start));
-        let Some((arguments, features)) = ours(&line).filter(|_| !is_left_out) else {
+        let Some((binary, arguments)) = ours(&line).filter(|_| !is_left_out) else {
             assert!(is_left_out, "neither run here nor in the list of what is not: {line}");
             continue;
         };
@@ -123,21 +104,13 @@ fn every_command_runs() {
         if arguments == ["check"] {
             arguments.extend(["--seeds", "1"].map(str::to_owned));
         }
-        if features.split(',').all(is_built_with) {
-            run(&arguments);
-        } else {
-            println!("left out, the binary was built without {features}: {line}");
-        }
+        run(binary, &arguments);
     }
     assert!(count >= 20, "{count}");
     let files = ["000020.png", "room/002_sheet.png", "run.json", "car/000048.png", "orbit/video.webp", "cameras.png"];
-    for file in files.into_iter().chain(["scores.csv", "attention.h"]) {
+    let of_others = ["scores.csv", "attention.h", "weighting/model.safetensors", "report.html", "pareto/pareto.svg"];
+    for file in files.into_iter().chain(of_others) {
         assert!(out.join(file).exists(), "{file}");
-    }
-    for (feature, file) in
-        [("train", "weighting/model.safetensors"), ("report", "report.html"), ("pareto", "pareto/pareto.svg")]
-    {
-        assert_eq!(out.join(file).exists(), is_built_with(feature), "{file}");
     }
 }
 
@@ -200,7 +173,7 @@ fn tables_are_what_the_program_prints() {
         let (command, table) = stored.split_once('\n').expect("lines");
         let arguments: Vec<String> =
             command.strip_prefix("$ viewfuse ").expect("a command").split_whitespace().map(str::to_owned).collect();
-        let printed: String = run(&arguments).lines().map(|line| format!("{}\n", line.trim_end())).collect();
+        let printed: String = run(BINARY, &arguments).lines().map(|line| format!("{}\n", line.trim_end())).collect();
         let stale = format!("{name}.txt is stale: `tests/figures {name}` makes it again");
         assert_eq!(structure(table), structure(&printed), "{stale}");
         for (old, new) in table.lines().zip(printed.lines()) {

@@ -1,16 +1,16 @@
-//! `viewfuse report`: the page as text, and as a browser shows it.
+//! `viewfuse-lab report`: the page as text, and as a browser shows it.
 //!
 //! The browser is Chromium or Chrome: `VIEWFUSE_BROWSER`, or the first that is found. Without one its tests are ignored and
 //! say why; with `VIEWFUSE_REQUIRE_BROWSER=1` they fail instead. Pictures of the page, to be looked at, are left in
 //! `tmp/report` of the target folder.
 
-use super::BINARY;
 use super::browser::{self, Browser, InBrowser};
+use super::{done, lab};
 use libtest_mimic::Trial;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
-use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, done, names_in, toy};
+use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, names_in, toy};
 use viewfuse_tests::scenes::Folder;
 use viewfuse_tests::trials::trial;
 
@@ -48,9 +48,9 @@ fn runs() -> Folder {
         fs::copy(path.join("toy/intrinsics.txt"), folder.file(&format!("{name}/intrinsics.txt"))).expect("a copy");
     };
     copy("lorry");
-    done(BINARY, path, &format!("evaluate toy lorry --protocol count:sources=2+4+8 {SMALL} -o count"));
-    done(BINARY, path, &format!("evaluate toy lorry --protocol random {SMALL} --pictures 1 -o random"));
-    done(BINARY, path, "pareto toy --targets 20 --views 3 --size 16x16 --repeat 1 --device cpu -o sweep");
+    done(path, &format!("evaluate toy lorry --protocol count:sources=2+4+8 {SMALL} -o count"));
+    done(path, &format!("evaluate toy lorry --protocol random {SMALL} --pictures 1 -o random"));
+    done(path, "pareto toy --targets 20 --views 3 --size 16x16 --repeat 1 --device cpu -o sweep");
     folder.write(
         "trained/record.json",
         json!({"steps": 12, "settings": {"rate": 0.001}, "scores": (0..20).collect::<Vec<_>>()}).to_string(),
@@ -70,7 +70,7 @@ fn page(folder: &Path) -> String {
 
 fn the_page_holds_everything() {
     let folder = runs();
-    let said = done(BINARY, folder.path(), REPORT);
+    let said = done(folder.path(), REPORT);
     assert!(said.starts_with("page.html: ") && said.ends_with(" kB\n"), "{said}");
     let first = page(folder.path());
     // No address but those that hold what they point to, and those on the page.
@@ -104,29 +104,29 @@ fn the_page_holds_everything() {
         assert!(first.contains(part), "no {part}");
     }
     // The same again is the same page, and the records alone are one as well.
-    done(BINARY, folder.path(), REPORT);
+    done(folder.path(), REPORT);
     assert_eq!(page(folder.path()), first);
-    done(BINARY, folder.path(), "report --training trained --title <b>&amp; -o page.html");
+    done(folder.path(), "report --training trained --title <b>&amp; -o page.html");
     assert!(page(folder.path()).contains("<h1>&lt;b&gt;&amp;amp;</h1>"));
 }
 
 fn evaluations_under_way_are_shown() {
     let folder = toy();
     let path = folder.path();
-    done(BINARY, path, &format!("evaluate toy --protocol random --trials 5 {SMALL} --shard 1/2 -o half"));
-    done(BINARY, path, "report half -o page.html");
+    done(path, &format!("evaluate toy --protocol random --trials 5 {SMALL} --shard 1/2 -o half"));
+    done(path, "report half -o page.html");
     assert!(page(path).contains("<strong>Not finished: </strong>2 of 5 jobs"), "{}", page(path));
     assert!(page(path).contains("Missing: 0, 2, 4."));
     // Nothing at all is done yet.
     fs::remove_file(path.join("half/scores-1-of-2.jsonl")).expect("a journal");
-    done(BINARY, path, "report half -o page.html");
+    done(path, "report half -o page.html");
     assert!(page(path).contains("0 of 5 jobs") && !page(path).contains("warped copy"));
 }
 
 fn what_is_no_record_is_refused() {
     let folder = toy();
     let path = folder.path();
-    let refused = |arguments: &str, parts: &[&str]| assert_refused(BINARY, path, arguments, parts);
+    let refused = |arguments: &str, parts: &[&str]| assert_refused(lab(), path, arguments, parts);
     refused("report toy -o page.html", &["toy/run.json: cannot be read"]);
     refused(
         "report --pareto toy/intrinsics.txt -o page.html",
@@ -134,8 +134,8 @@ fn what_is_no_record_is_refused() {
     );
     refused("report --training toy -o page.html", &["toy/record.json: cannot be read"]);
     refused("report --training toy -o toy", &["toy: cannot be written: it is a folder"]);
-    assert_wrong_arguments(BINARY, path, "report -o page.html", &["required"]);
-    done(BINARY, path, &format!("evaluate toy --protocol random {SMALL} -o out"));
+    assert_wrong_arguments(lab(), path, "report -o page.html", &["required"]);
+    done(path, &format!("evaluate toy --protocol random {SMALL} -o out"));
     fs::remove_file(path.join("out/pictures/job-00000-truth.png")).expect("a picture");
     refused("report out -o page.html", &["out/pictures/job-00000-truth.png: cannot be read"]);
     fs::write(path.join("out/pictures/job-00000.json"), "{}").expect("a file");
@@ -177,7 +177,7 @@ fn assert_marks(table: &Value) {
 
 fn a_person_sees_what_was_measured(browser: &Browser) {
     let folder = runs();
-    done(BINARY, folder.path(), REPORT);
+    done(folder.path(), REPORT);
     let page = page(folder.path());
     let seen = browser.look(&page);
     assert_eq!(seen.console, "", "the browser complains");
@@ -200,8 +200,7 @@ fn a_person_sees_what_was_measured(browser: &Browser) {
         tables.iter().for_each(|table| assert_marks(table));
     }
     // The cells are the table's that the command prints.
-    let printed =
-        done(BINARY, folder.path(), &format!("evaluate toy lorry --protocol random {SMALL} --pictures 1 -o random"));
+    let printed = done(folder.path(), &format!("evaluate toy lorry --protocol random {SMALL} --pictures 1 -o random"));
     let row = printed.lines().find(|line| line.starts_with(" distance:power=2")).expect("a row");
     let words = |text: &str| text.replace(['*', '~'], "").split_whitespace().map(str::to_owned).collect::<Vec<_>>();
     let rows = views[0]["tables"][3]["rows"].as_array().expect("rows");
@@ -209,8 +208,7 @@ fn a_person_sees_what_was_measured(browser: &Browser) {
     let shown: Vec<String> = own.iter().flat_map(|cell| words(cell["text"].as_str().expect("a text"))).collect();
     assert_eq!(shown, words(row));
     // What is bold has its mark on the terminal, and nothing else.
-    let counted =
-        done(BINARY, folder.path(), &format!("evaluate toy lorry --protocol count:sources=2+4+8 {SMALL} -o count"));
+    let counted = done(folder.path(), &format!("evaluate toy lorry --protocol count:sources=2+4+8 {SMALL} -o count"));
     let tables = views[0]["tables"].as_array().expect("tables");
     let mut marks = [0, 0];
     for (printed, tables) in [(&counted, &tables[..3]), (&printed, &tables[3..4])] {
@@ -234,8 +232,8 @@ fn a_person_sees_what_was_measured(browser: &Browser) {
 /// The negative control: pages on which something is wrong are not taken for good ones.
 fn the_looks_at_the_page_can_fail(browser: &Browser) {
     let folder = toy();
-    done(BINARY, folder.path(), &format!("evaluate toy --protocol random {SMALL} --pictures 0 -o out"));
-    done(BINARY, folder.path(), "report out -o page.html");
+    done(folder.path(), &format!("evaluate toy --protocol random {SMALL} --pictures 0 -o out"));
+    done(folder.path(), "report out -o page.html");
     let good = page(folder.path());
     let with = |addition: &str| browser.look(&good.replace("</main>", &format!("{addition}</main>")));
     let wide = with("<p style=\"width: 400px\">x</p>");
@@ -257,7 +255,7 @@ fn the_looks_at_the_page_can_fail(browser: &Browser) {
 
 fn light_and_dark(browser: &Browser) {
     let folder = runs();
-    done(BINARY, folder.path(), REPORT);
+    done(folder.path(), REPORT);
     let pictures = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report");
     fs::create_dir_all(&pictures).expect("a folder");
     for (name, width, is_dark) in
@@ -281,7 +279,7 @@ fn light_and_dark(browser: &Browser) {
 fn small_run() -> Folder {
     let folder = toy();
     let run = "evaluate toy --protocol random --trials 2 --targets-per-trial 1 --pictures 1 --size 16x16 --device cpu";
-    done(BINARY, folder.path(), &format!("{run} --weights mean -o run"));
+    done(folder.path(), &format!("{run} --weights mean -o run"));
     folder
 }
 
@@ -310,24 +308,24 @@ fn a_received_folder_shows_only_its_own() {
         for old in [truth, "job-00000-source-000.png", "job-00000-scheme-000.png"] {
             fs::write(&file, text.replace(old, name)).expect("a file");
             let parts = ["run/pictures/job-00000.json: names", "no picture in the folder"];
-            assert_refused(BINARY, path, "report run -o page.html", &parts);
+            assert_refused(lab(), path, "report run -o page.html", &parts);
         }
     }
     fs::write(&file, text.replace(truth, "false.png")).expect("a file");
-    assert_refused(BINARY, path, "report run -o page.html", &["run/pictures/false.png: is not a PNG"]);
+    assert_refused(lab(), path, "report run -o page.html", &["run/pictures/false.png: is not a PNG"]);
     #[cfg(unix)]
     {
         use std::os::unix::fs::symlink;
         fs::copy(path.join("toy/rgb/000000.png"), path.join("mine.png")).expect("a picture");
         symlink(path.join("mine.png"), path.join("run/pictures/link.png")).expect("a link");
         fs::write(&file, text.replace(truth, "link.png")).expect("a file");
-        assert_refused(BINARY, path, "report run -o page.html", &["link.png", "no picture in the folder"]);
+        assert_refused(lab(), path, "report run -o page.html", &["link.png", "no picture in the folder"]);
         folder.write("trained/record.json", "{}");
         symlink("/etc/passwd", path.join("trained/curve.svg")).expect("a link");
-        assert_refused(BINARY, path, "report --training trained -o page.html", &["curve.svg: is not the curve"]);
+        assert_refused(lab(), path, "report --training trained -o page.html", &["curve.svg: is not the curve"]);
     }
     fs::write(&file, text).expect("a file");
-    done(BINARY, path, "report run -o page.html");
+    done(path, "report run -o page.html");
 }
 
 fn damaged_numbers_are_refused() {
@@ -341,7 +339,7 @@ fn damaged_numbers_are_refused() {
         fs::write(path.join(name), format!("{value}\n")).expect("a file");
         text
     };
-    let refused = |parts: &[&str]| assert_refused(BINARY, path, "report run -o page.html", parts);
+    let refused = |parts: &[&str]| assert_refused(lab(), path, "report run -o page.html", parts);
     for count in [1_000_000_000_000_000_000_u64, 10_000_001] {
         let whole = change("run/run.json", &|record| record["job_count"] = count.into());
         refused(&["run/run.json: job_count is", &count.to_string(), "at most 10000000"]);
@@ -358,17 +356,17 @@ fn damaged_numbers_are_refused() {
         refused(&["scores-0-of-1.jsonl:1: is not of an evaluation", "seconds is"]);
         fs::write(path.join(journal), whole).expect("a file");
     }
-    done(BINARY, path, "pareto toy --targets 20 --views 3 --size 16x16 --repeat 1 --device cpu -o sweep");
+    done(path, "pareto toy --targets 20 --views 3 --size 16x16 --repeat 1 --device cpu -o sweep");
     let text = fs::read_to_string(path.join("sweep/pareto.json")).expect("a sweep");
     for key in ["seconds", "encode_seconds", "gain", "truth_psnr"] {
         let mut record: Value = serde_json::from_str(&text).expect("JSON");
         record["devices"][0]["points"][1][key] = 1.0e300.into();
         folder.write("sweep/pareto.json", record.to_string());
         let parts = ["sweep/pareto.json: is not a record of viewfuse pareto", "out of its range"];
-        assert_refused(BINARY, path, "report --pareto sweep -o page.html", &parts);
+        assert_refused(lab(), path, "report --pareto sweep -o page.html", &parts);
     }
     // An empty record of settings is that of a machine that lost its power: the evaluation goes on.
     folder.write("run/run.json", "");
     let run = "evaluate toy --protocol random --trials 2 --targets-per-trial 1 --pictures 1 --size 16x16 --device cpu";
-    assert!(done(BINARY, path, &format!("{run} --weights mean -o run")).contains("0 jobs done; 2 of 2"));
+    assert!(done(path, &format!("{run} --weights mean -o run")).contains("0 jobs done; 2 of 2"));
 }

@@ -1,56 +1,60 @@
-//! `viewfuse scenes make` and `scenes photograph`: what it writes, and how it stops and goes on.
+//! `viewfuse-lab scenes make` and `scenes photograph`: what it writes, and how it stops and goes on.
 
-use super::{BINARY, done};
+use super::{done, lab};
 use std::fs;
 use viewfuse::scene::Scene;
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, names_in};
+use viewfuse_tests::places::data;
 use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![
     scenes_appear_in_their_folders_and_are_read_again,
     a_room_is_photographed_as_asked,
+    the_sample_scene_is_made_again,
     wrong_arguments_are_told,
     ctrl_c_leaves_whole_scenes_and_the_same_command_goes_on,
 ];
 
-const FEW: &str = "scenes make chairs out --train 2 --val 1 --test 1 --views 2 --test-views 3 --size 64";
+const FEW: &str = "scenes make cars out --train 2 --val 1 --test 1 --views 2 --test-views 3 --size 64";
 
 fn scenes_appear_in_their_folders_and_are_read_again() {
     let folder = Folder::new();
     assert_eq!(done(folder.path(), FEW), "out: 4 new scenes, 0 existing\n");
-    assert_eq!(names_in(&folder.path().join("out")), ["chairs.json", "chairs_test", "chairs_train", "chairs_val"]);
-    assert_eq!(names_in(&folder.path().join("out/chairs_train")), ["000000", "000001"]);
-    assert!(done(folder.path(), "inspect out/chairs_train/000001").contains("2"));
+    assert_eq!(names_in(&folder.path().join("out")), ["cars.json", "cars_test", "cars_train", "cars_val"]);
+    assert_eq!(names_in(&folder.path().join("out/cars_train")), ["000000", "000001"]);
+    assert!(done(folder.path(), "inspect out/cars_train/000001").contains("2"));
     assert_eq!(done(folder.path(), FEW), "out: 0 new scenes, 4 existing\n");
     assert_eq!(done(folder.path(), &FEW.replace("--train 2", "--train 3")), "out: 1 new scenes, 4 existing\n");
     let other = FEW.replace("--views 2", "--views 4");
-    assert_refused(BINARY, folder.path(), &other, &["out/chairs.json: what is there was made with other settings"]);
-    // Another kind has files of its own.
-    let toys = "scenes make toys out --train 1 --val 0 --test 0 --views 1 --size 64 --threads 1";
-    assert_eq!(done(folder.path(), toys), "out: 1 new scenes, 0 existing\n");
+    assert_refused(lab(), folder.path(), &other, &["out/cars.json: what is there was made with other settings"]);
 }
 
 fn a_room_is_photographed_as_asked() {
     let folder = Folder::new();
-    let room = "scenes photograph room out --rig handheld --views 3 --size 64x48 --seed 2 --exposures 0.2 --focals 0.1 --distortion -0.1";
+    let room = "scenes photograph room out --views 3 --size 64x48 --seed 2";
     assert_eq!(done(folder.path(), room), "out: 3 views\n");
     let scene = Scene::open(folder.path().join("out")).expect("a scene");
     assert_eq!(scene.views.len(), 3);
-    assert_eq!(scene.views[0].lens.map(|lens| lens.coefficients()[0]), Some(-0.1));
-    let focals: Vec<f32> = scene.views.iter().map(|view| view.camera.pinhole.focal()[0]).collect();
-    assert!(focals[0] != focals[1] && scene.photograph(2).expect("a photograph").pixels.dimensions() == (64, 48));
-    assert_refused(BINARY, folder.path(), room, &["out: exists already"]);
-    assert_refused(BINARY, folder.path(), &room.replace("-0.1", "-2").replace("out", "other"), &["the lens", "twice"]);
-    assert!(!folder.path().join("other").exists());
+    assert_eq!(scene.photograph(2).expect("a photograph").pixels.dimensions(), (64, 48));
+    assert_refused(lab(), folder.path(), room, &["out: exists already"]);
+}
+
+fn the_sample_scene_is_made_again() {
+    let folder = Folder::new();
+    assert_eq!(done(folder.path(), "scenes toy out"), "out: 24 views\n");
+    for name in ["rgb/000021.png", "pose/000003.txt", "intrinsics.txt"] {
+        let [made, stored] = [folder.path().join("out"), data("toy")].map(|scene| fs::read(scene.join(name)));
+        assert!(made.expect("a file") == stored.expect("a file of the sample"), "{name}");
+    }
 }
 
 fn wrong_arguments_are_told() {
     let folder = Folder::new();
-    let wrong = |arguments: &str, parts: &[&str]| assert_wrong_arguments(BINARY, folder.path(), arguments, parts);
-    wrong("scenes make lorries out", &["lorries", "cars, chairs or toys"]);
+    let wrong = |arguments: &str, parts: &[&str]| assert_wrong_arguments(lab(), folder.path(), arguments, parts);
+    wrong("scenes make lorries out", &["lorries", "cars"]);
     wrong("scenes make cars out --size 100", &["the size must be 64 or 128"]);
     wrong("scenes make cars out --views 0", &["--views"]);
-    wrong("scenes photograph moon out", &["moon", "room or garden"]);
+    wrong("scenes photograph moon out", &["moon", "room"]);
     wrong("scenes make cars out --train 2000000", &["--train"]);
 }
 
@@ -59,9 +63,9 @@ fn ctrl_c_leaves_whole_scenes_and_the_same_command_goes_on() {
     use viewfuse_tests::command::{interrupt, start};
     use viewfuse_tests::patience::wait_while_running;
     let folder = Folder::new();
-    let scenes = folder.path().join("out/toys_train");
-    let arguments = |count: usize| format!("scenes make toys out --train {count} --val 0 --test 0 --views 4 --size 64");
-    let mut child = start(BINARY, folder.path(), &arguments(50_000));
+    let scenes = folder.path().join("out/cars_train");
+    let arguments = |count: usize| format!("scenes make cars out --train {count} --val 0 --test 0 --views 4 --size 64");
+    let mut child = start(lab(), folder.path(), &arguments(50_000));
     wait_while_running(&mut child, || scenes.join("000000").exists());
     interrupt(child, "-INT");
     let names = names_in(&scenes);

@@ -1,7 +1,7 @@
-//! `viewfuse train`: what a run leaves, and that it ends in the same numbers however often it is killed.
+//! `viewfuse-lab train`: what a run leaves, and that it ends in the same numbers however often it is killed.
 #![cfg(unix)]
 
-use super::{BINARY, done};
+use super::{done, lab};
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -20,14 +20,14 @@ viewfuse_tests::trials![
 ];
 
 /// Small enough for a second a run.
-const PIXELNERF: &str = "train pixelnerf learn/toys --width 16 --objects 2 --rays 12 --coarse 8 --fine 4 --steps 30 \
+const PIXELNERF: &str = "train pixelnerf learn/cars --width 16 --objects 2 --rays 12 --coarse 8 --fine 4 --steps 30 \
     --sources 1,2,3,5 --sides 32,64 --least-crop 0.7 --weights mean --weights error:alpha=1 --validate-every 10 --write-every 0";
-const GENVS: &str = "train genvs learn/toys --width 4 --objects 1 --samples 8 --steps 3 --sources 1,3 --least-crop 0.7 \
+const GENVS: &str = "train genvs learn/cars --width 4 --objects 1 --samples 8 --steps 3 --sources 1,3 --least-crop 0.7 \
     --weights error:alpha=1 --weights mean --validate-every 3 --write-every 0";
 
 fn scenes() -> Folder {
     let folder = Folder::new();
-    done(folder.path(), "scenes make toys learn --train 2 --val 1 --test 0 --views 10 --test-views 10 --size 64");
+    done(folder.path(), "scenes make cars learn --train 2 --val 1 --test 0 --views 10 --test-views 10 --size 64");
     folder
 }
 
@@ -37,7 +37,7 @@ fn bytes(folder: &Path, name: &str) -> Vec<u8> {
 
 /// Starts a run and kills it without a warning as soon as it has written its state.
 fn kill(folder: &Path, arguments: &str, state: &str) {
-    killed_when(BINARY, folder, arguments, || folder.join(state).exists());
+    killed_when(lab(), folder, arguments, || folder.join(state).exists());
 }
 
 fn a_killed_run_goes_on_and_ends_in_the_same_numbers() {
@@ -57,7 +57,7 @@ fn a_killed_run_goes_on_and_ends_in_the_same_numbers() {
     done(path, &format!("{PIXELNERF} -o parts --threads 1"));
     assert_eq!(bytes(path, "parts/model.safetensors"), bytes(path, "whole/model.safetensors"));
     // And what it learned is a model that renders.
-    let scene = "learn/toys_val/000000";
+    let scene = "learn/cars_val/000000";
     done(
         path,
         &format!("render {scene} --model whole/model.safetensors --sources 0,1,2 --targets 5 --size 16x16 -o out"),
@@ -67,7 +67,7 @@ fn a_killed_run_goes_on_and_ends_in_the_same_numbers() {
     let before = bytes(path, "whole/state.safetensors");
     let other = PIXELNERF.replace("--rays 12", "--rays 13");
     assert_refused(
-        BINARY,
+        lab(),
         path,
         &format!("{other} -o whole"),
         &["whole/state.safetensors", "settings.rays was 12 and is 13"],
@@ -77,7 +77,7 @@ fn a_killed_run_goes_on_and_ends_in_the_same_numbers() {
     // The weighting for it: the same again, with both embeddings; a scheme that evaluate knows.
     for embedding in ["fourier", "flat"] {
         let weighting = format!(
-            "train weighting whole/model.safetensors learn/toys --embedding {embedding} --objects 1 --rays 6 --steps 4 \
+            "train weighting whole/model.safetensors learn/cars --embedding {embedding} --objects 1 --rays 6 --steps 4 \
              --validate-every 4 --write-every 0"
         );
         done(path, &format!("{weighting} -o {embedding}"));
@@ -96,7 +96,7 @@ fn ctrl_c_writes_the_state_first() {
     let long = PIXELNERF.replace("--steps 30", "--steps 100000").replace("--write-every 0", "--write-every 1000");
     // The first state appears when the run is asked to end: nothing else writes it.
     let arguments = format!("{long} --validate-every 5 -o run").replace(" --validate-every 10", "");
-    let mut child = start(BINARY, path, &arguments);
+    let mut child = start(lab(), path, &arguments);
     let mut news = BufReader::new(child.stdout.take().expect("its output"));
     let mut first = String::new();
     news.read_line(&mut first).expect("text");
@@ -120,8 +120,8 @@ fn genvs_goes_on_too() {
     done(path, &format!("{from} -o more"));
     assert_eq!(bytes(path, "more/model.safetensors"), bytes(path, model));
     let small = from.replace("--samples 8", "--samples 8 --side 32");
-    assert_refused(BINARY, path, &format!("{small} -o out"), &[model, "for pictures of 64x64 pixels", "not of 32x32"]);
-    assert_wrong_arguments(BINARY, path, &format!("{from} --width 4 -o out"), &["--from", "--width"]);
+    assert_refused(lab(), path, &format!("{small} -o out"), &[model, "for pictures of 64x64 pixels", "not of 32x32"]);
+    assert_wrong_arguments(lab(), path, &format!("{from} --width 4 -o out"), &["--from", "--width"]);
 }
 
 fn data_are_told_by_what_is_in_them() {
@@ -136,35 +136,35 @@ fn data_are_told_by_what_is_in_them() {
     // A run goes on where its scenes lie elsewhere now, and does not where they are others under the same names.
     fs::rename(path.join("learn"), path.join("moved")).expect("a folder");
     done(path, &format!("{} -o run", first.replace("learn/", "moved/")));
-    done(path, "scenes make toys learn --train 2 --val 1 --test 0 --views 10 --test-views 10 --size 64 --seed 2");
-    assert_refused(BINARY, path, &format!("{first} -o run"), &["run/state.safetensors", "settings", "data was"]);
+    done(path, "scenes make cars learn --train 2 --val 1 --test 0 --views 10 --test-views 10 --size 64 --seed 2");
+    assert_refused(lab(), path, &format!("{first} -o run"), &["run/state.safetensors", "settings", "data was"]);
     // Nor from another network of the same name.
     let moved = from.replace("learn/", "moved/");
     done(path, &format!("{moved} -o more"));
     done(path, &format!("{} --seed 3 -o other", first.replace("learn/", "moved/")));
     fs::rename(path.join("other/model.safetensors"), path.join("run/model.safetensors")).expect("a file");
-    assert_refused(BINARY, path, &format!("{moved} -o more"), &["more/state.safetensors", "checkpoint was"]);
+    assert_refused(lab(), path, &format!("{moved} -o more"), &["more/state.safetensors", "checkpoint was"]);
 }
 
 fn wrong_input_is_told() {
     let folder = scenes();
-    let refused = |arguments: &str, parts: &[&str]| assert_refused(BINARY, folder.path(), arguments, parts);
+    let refused = |arguments: &str, parts: &[&str]| assert_refused(lab(), folder.path(), arguments, parts);
     refused("train pixelnerf learn/lorries -o out", &["lorries"]);
-    refused("train weighting learn/toys.json learn/toys -o out", &["learn/toys.json"]);
+    refused("train weighting learn/cars.json learn/cars -o out", &["learn/cars.json"]);
     fs::write(folder.path().join("state.safetensors"), "nothing").expect("a file");
-    refused("train pixelnerf learn/toys -o .", &["./state.safetensors: is not the state of a training run"]);
+    refused("train pixelnerf learn/cars -o .", &["./state.safetensors: is not the state of a training run"]);
     if cfg!(target_os = "linux") {
         // Nobody can make a folder there; it is noticed before the first of many steps.
-        refused("train pixelnerf learn/toys --steps 1000000 -o /proc/out", &["/proc/out/", "cannot be written"]);
+        refused("train pixelnerf learn/cars --steps 1000000 -o /proc/out", &["/proc/out/", "cannot be written"]);
     }
-    assert_wrong_arguments(BINARY, folder.path(), "train genvs learn/toys -o out --width 5", &["a multiple of 4"]);
-    let attention = "train pixelnerf learn/toys -o out --weights cross-attention";
-    assert_wrong_arguments(BINARY, folder.path(), attention, &["--weights", "formulas only"]);
-    refused("train pixelnerf learn/toys -o out --sources 3,10", &["has 10 photographs; 11 are needed"]);
-    refused("train genvs learn/toys -o out --sources 3,9 --targets 2", &["has 10 photographs; 11 are needed"]);
+    assert_wrong_arguments(lab(), folder.path(), "train genvs learn/cars -o out --width 5", &["a multiple of 4"]);
+    let attention = "train pixelnerf learn/cars -o out --weights cross-attention";
+    assert_wrong_arguments(lab(), folder.path(), attention, &["--weights", "formulas only"]);
+    refused("train pixelnerf learn/cars -o out --sources 3,10", &["has 10 photographs; 11 are needed"]);
+    refused("train genvs learn/cars -o out --sources 3,9 --targets 2", &["has 10 photographs; 11 are needed"]);
     // Validation has three sources, however few the steps have.
-    done(folder.path(), "scenes make toys few --train 1 --val 1 --test 0 --views 3 --test-views 3 --size 64");
-    refused("train genvs few/toys --side 16 -o out --sources 1 --targets 1", &["has 3 photographs; 4 are needed"]);
+    done(folder.path(), "scenes make cars few --train 1 --val 1 --test 0 --views 3 --test-views 3 --size 64");
+    refused("train genvs few/cars --side 16 -o out --sources 1 --targets 1", &["has 3 photographs; 4 are needed"]);
     assert!(!folder.path().join("out").exists());
 }
 
@@ -172,8 +172,8 @@ fn wrong_input_is_told() {
 fn numbers_without_sense_are_refused() {
     let folder = scenes();
     let wrong = |model: &str, option: &str, parts: &[&str]| {
-        let arguments = format!("train {model} learn/toys -o out {option}");
-        assert_wrong_arguments(BINARY, folder.path(), &arguments, parts);
+        let arguments = format!("train {model} learn/cars -o out {option}");
+        assert_wrong_arguments(lab(), folder.path(), &arguments, parts);
     };
     for option in ["objects", "rays", "width"] {
         for value in ["0", "100000", "18446744073709551615"] {
@@ -199,8 +199,8 @@ fn numbers_without_sense_are_refused() {
     }
     wrong("pixelnerf", "--sides 32,33", &["--sides", "a multiple of 16"]);
     wrong("genvs", "--new-denoiser", &["required arguments"]);
-    let larger = "train pixelnerf learn/toys -o out --side 32 --sides 32,48";
-    assert_refused(BINARY, folder.path(), larger, &["sides is 48", "a multiple of 16 from 16 to the side"]);
+    let larger = "train pixelnerf learn/cars -o out --side 32 --sides 32,48";
+    assert_refused(lab(), folder.path(), larger, &["sides is 48", "a multiple of 16 from 16 to the side"]);
     for value in ["0", "8", "100000"] {
         wrong("pixelnerf", &format!("--side {value}"), &["--side", "a multiple of 16 from 16 to 1024"]);
     }
@@ -212,13 +212,13 @@ fn numbers_without_sense_are_refused() {
             wrong(model, &format!("--write-every={value}"), &["--write-every", "from 0 to 86400"]);
         }
     }
-    let all = "train pixelnerf learn/toys -o out --objects 1024 --rays 1024 --coarse 1024 --width 1024";
-    assert_refused(BINARY, folder.path(), all, &["objects", "at most 2^28"]);
-    let all = "train genvs learn/toys -o out --objects 1024 --sources 3";
-    assert_refused(BINARY, folder.path(), all, &["objects is 1024", "volume", "at most 2^30"]);
+    let all = "train pixelnerf learn/cars -o out --objects 1024 --rays 1024 --coarse 1024 --width 1024";
+    assert_refused(lab(), folder.path(), all, &["objects", "at most 2^28"]);
+    let all = "train genvs learn/cars -o out --objects 1024 --sources 3";
+    assert_refused(lab(), folder.path(), all, &["objects is 1024", "volume", "at most 2^30"]);
     // The least that can be computed.
     let least = "--side 16 --objects 1 --rays 1 --coarse 2 --fine 0 --width 1 --steps 1";
-    done(folder.path(), &format!("train pixelnerf learn/toys -o least {least}"));
+    done(folder.path(), &format!("train pixelnerf learn/cars -o least {least}"));
 }
 
 /// The state of a run with this in the place of its progress.
@@ -247,7 +247,7 @@ fn a_damaged_state_is_refused_and_an_empty_one_is_none() {
         ("1.0,", "-1.0,"),
     ] {
         fs::write(&path, with_progress(&state, &sound.replace(from, to))).expect("a file");
-        assert_refused(BINARY, folder.path(), &run, &["run/state.safetensors: is not the state", "out of range"]);
+        assert_refused(lab(), folder.path(), &run, &["run/state.safetensors: is not the state", "out of range"]);
     }
     fs::write(&path, with_progress(&state, sound)).expect("a file");
     done(folder.path(), &run);
@@ -256,7 +256,7 @@ fn a_damaged_state_is_refused_and_an_empty_one_is_none() {
     assert!(done(folder.path(), &run).contains("2 steps in"));
     fs::remove_file(&path).expect("a file");
     fs::create_dir(&path).expect("a folder in the way");
-    assert_refused(BINARY, folder.path(), &run, &["run/state.safetensors: cannot be written: it is a folder"]);
+    assert_refused(lab(), folder.path(), &run, &["run/state.safetensors: cannot be written: it is a folder"]);
 }
 
 fn a_loss_is_shown_once_there_is_one() {

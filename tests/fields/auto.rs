@@ -14,13 +14,13 @@ use viewfuse::job::progress::{Interrupted, Progress, Silent};
 use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::{FewShot, Selection};
 use viewfuse::scene::photographs::Album;
-use viewfuse::synthetic::{Place, Rig, generate, write_shoot};
+use viewfuse_lab::scenes::{generate, write_shoot};
 
 const SIZE: [u32; 2] = [96, 72];
 
 /// A room from an arc, views 0 to `count` - 1.
 fn room(folder: &Path, count: u32) -> Scene {
-    let shoot = generate(Place::Room, Rig::Arc, 17, SIZE, count).expect("a room");
+    let shoot = generate(17, SIZE, count).expect("a room");
     let folder = folder.join("room");
     write_shoot(&folder, &shoot, 1, &Silent).expect("photographs");
     Scene::open(&folder).expect("a scene")

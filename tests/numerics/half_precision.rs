@@ -8,10 +8,10 @@ use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, Omissions, test_
 use viewfuse::field::{Record, Rendered};
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::photographs::{SourceImage, SourceImages};
-use viewfuse::synthetic::{Orbit, render, toy};
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::half_precision::{MAX_F16, f16_bits, f16_value, fetch_f16, packed_f16, word_count};
 use viewfuse_core::weights::Weights;
+use viewfuse_lab::scenes::{Orbit, render, toy};
 use viewfuse_tests::fields::{self, line};
 
 #[test]

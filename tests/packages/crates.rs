@@ -7,29 +7,11 @@ use std::collections::BTreeSet;
 /// So many crates the command may take with its default features, procedural macros and what builds them included.
 const MAX_CRATES: usize = 120;
 /// Not one of these is among them: features that are off by default, and dependencies that cost more than they saved.
-const FORBIDDEN: [&str; 18] = [
-    "viewfuse-pose",
-    "viewfuse-check",
-    "viewfuse-synthetic",
-    "viewfuse-train",
-    "candle-core",
-    "clap_complete",
-    "clap_mangen",
-    "faer",
-    "maud",
-    "plotters",
-    "exr",
-    "gif",
-    "tiff",
-    "half",
-    "embedded-graphics",
-    "indicatif",
-    "comfy-table",
-    "tokenizers",
-];
+const FORBIDDEN: [&str; 8] =
+    ["viewfuse-lab", "candle-core", "faer", "maud", "embedded-graphics", "indicatif", "comfy-table", "tokenizers"];
 
 /// The crates along the data: one uses only those before it.
-pub(crate) const ORDER: [&str; 18] = [
+pub(crate) const ORDER: [&str; 17] = [
     "viewfuse-core",
     "viewfuse-kernels",
     "viewfuse-vulkan",
@@ -41,29 +23,28 @@ pub(crate) const ORDER: [&str; 18] = [
     "viewfuse-field",
     "viewfuse-output",
     "viewfuse-evaluate",
-    "viewfuse-synthetic",
     "viewfuse-check",
-    "viewfuse-train",
     "viewfuse-pose",
     "viewfuse-view",
     "viewfuse-cli",
+    "viewfuse-lab",
     "viewfuse",
 ];
 
 /// Heavy dependencies, and where they may be: in crates, always or only as an option.
 const HEAVY: [(&str, &[&str]); 12] = [
-    ("candle-core", &["viewfuse-train"]),
-    ("ndarray", &["viewfuse-train"]),
+    ("candle-core", &["viewfuse-lab"]),
+    ("ndarray", &["viewfuse-lab"]),
     ("faer", &["viewfuse-evaluate?"]),
-    ("maud", &["viewfuse-evaluate?"]),
-    ("base64", &["viewfuse-evaluate?", "viewfuse-output"]),
-    ("plotters", &["viewfuse-evaluate?", "viewfuse-train"]),
+    ("maud", &["viewfuse-lab"]),
+    ("base64", &["viewfuse-lab", "viewfuse-output"]),
+    ("plotters", &["viewfuse-evaluate", "viewfuse-lab"]),
     ("httparse", &["viewfuse-view"]),
     ("exr", &["viewfuse-output?"]),
-    ("gif", &["viewfuse-output?"]),
-    ("clap", &["viewfuse-cli"]),
+    ("gif", &["viewfuse-output"]),
+    ("clap", &["viewfuse-cli", "viewfuse-lab"]),
     ("ctrlc", &["viewfuse-cli"]),
-    ("anyhow", &["viewfuse-cli"]),
+    ("anyhow", &["viewfuse-cli", "viewfuse-lab"]),
 ];
 
 /// What `cargo tree --prefix none` lists, each crate once, or what is wrong with it.

@@ -15,8 +15,9 @@ const ALLOWED: [(&str, &str, &str); 1] = [(
     "Vulkan's own loader reads VK_DRIVER_FILES; the error of a driver that is not found says what it was told",
 )];
 
-/// Folders of programs.
-const PROGRAMS: [&str; 3] = ["host/cli/", "host/pose/openmvg/", "vulkan/compiler/"];
+/// Where programs begin: only the command and the laboratory's print, among what is installed.
+const PROGRAMS: [&str; 4] =
+    ["host/cli/", "host/lab/src/command", "host/pose/openmvg/", "vulkan/compiler/"];
 
 /// What a file has that a library must not have, with its line.
 fn faults(path: &str, source: &Source) -> Vec<String> {

@@ -11,7 +11,7 @@ use viewfuse_tests::places::repository;
 use viewfuse_tests::source::{Source, files};
 
 /// Crates whose modules have an order.
-const CRATES: [&str; 16] = [
+const CRATES: [&str; 15] = [
     "core",
     "vulkan",
     "host/job",
@@ -22,11 +22,10 @@ const CRATES: [&str; 16] = [
     "host/field",
     "host/output",
     "host/evaluate",
-    "host/synthetic",
     "host/check",
-    "host/train",
     "host/pose",
     "host/view",
+    "host/lab",
     "host/python",
 ];
 

@@ -25,7 +25,7 @@ for_each_kernel!(marks);
 
 /// Crates that make pictures: what calls a kernel here calls it for a user. What checks and measures devices does not.
 const PRODUCTION: [&str; 7] =
-    ["host/weighting", "host/nn", "host/field", "host/evaluate", "host/pose", "host/view", "host/train"];
+    ["host/weighting", "host/nn", "host/field", "host/evaluate", "host/pose", "host/view", "host/lab"];
 
 fn sources(folders: &[&str]) -> Vec<Source> {
     let paths = folders.iter().flat_map(|folder| files(&repository().join(folder).join("src"), "rs"));

@@ -1,8 +1,8 @@
 //! Photographs of the lorry in memory, as fields are given them, and cameras around it.
 
 use viewfuse::scene::photographs::{SourceImage, SourceImages};
-use viewfuse::synthetic::{Orbit, render, toy};
 use viewfuse_core::camera::{Camera, Pinhole};
+use viewfuse_lab::scenes::{Orbit, render, toy};
 
 /// Cameras at distance 1.3 whose pictures have this side; the focal length is that of SRN's cars.
 ///

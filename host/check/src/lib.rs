@@ -7,6 +7,7 @@
 //!
 //! ```text
 //! compare, bounded, agreement   differences of numbers, and whether they are within their bounds
+//! half                          half precision from its definition
 //! oracle, attention_oracle,     expected outputs in f64
 //!   camera_oracle, hull_oracle,
 //!   ray_oracle, compositing_oracle,
@@ -37,6 +38,7 @@ pub mod compositing_oracle;
 pub mod dispatch;
 pub mod gaussian_oracle;
 pub mod group_norm_oracle;
+pub mod half;
 pub mod hull_oracle;
 pub mod matrix_oracle;
 pub mod measure;

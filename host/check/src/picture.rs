@@ -1,6 +1,6 @@
 //! A whole picture on a device compared with the CPU's.
 //!
-//! The scene is a given one, or the synthetic lorry, rendered into a temporary folder: an installed program has no
+//! The scene is a given one, or the synthetic lorry, written to a temporary folder: an installed program has no
 //! sample scene. The last view is rendered from up to [`MAX_SOURCES`] others.
 
 use super::measure::Role;
@@ -15,20 +15,23 @@ use viewfuse_device::choice::AnyDevice;
 use viewfuse_device::cpu::Cpu;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, render};
 use viewfuse_field::{AnyField, Renderer};
-use viewfuse_job::progress::{Progress, Quiet};
+use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{FewShot, Selection};
 use viewfuse_scene::photographs::longest_side;
-use viewfuse_synthetic::render::RAYS_PER_SIDE;
-use viewfuse_synthetic::{toy, write_scene};
 use viewfuse_weighting::Weighting;
 
 /// The most sources of the picture.
 pub const MAX_SOURCES: usize = 12;
 /// Longest side of the picture.
 pub const LONGEST_SIDE: u32 = 160;
-/// Width and height of the synthetic scene's photographs.
-const SYNTHETIC_SIDE: u32 = 64;
+/// The photographs of the synthetic lorry, one below the other, and their poses, one a line: every other training view of the
+/// sample scene and one of its test views, half as large. The laboratory's tests compare them with what makes them.
+const LORRY: (&[u8], &str) = (include_bytes!("picture/lorry.png"), include_str!("picture/lorry.txt"));
+/// Width and height of these photographs.
+const LORRY_SIDE: u32 = 64;
+/// Their intrinsics, in the layout of SRN.
+const LORRY_INTRINSICS: &str = "65.625 32. 32. 0.\n0. 0. 0.\n1.\n64 64\n";
 /// Largest difference of a channel that passes, in steps of 1/255: rounding to 8 bits may fall to either side.
 pub const MAX_DIFFERENCE: u8 = 1;
 
@@ -60,8 +63,8 @@ impl Picture {
         let (folder, scene) = match path {
             Some(path) => (None, Scene::open(path)?),
             None => {
-                let folder = synthetic(progress)?;
-                let scene = Scene::open(folder.path().join("lorry"))?;
+                let folder = lorry()?;
+                let scene = Scene::open(folder.path())?;
                 (Some(folder), scene)
             }
         };
@@ -120,15 +123,19 @@ fn size(camera: &Camera) -> Option<[u32; 2]> {
     (longest > LONGEST_SIDE).then(|| [side(camera.pinhole.width()), side(camera.pinhole.height())])
 }
 
-/// A temporary folder with the synthetic scene `lorry`: every other training view of the sample, and one of its test views.
-fn synthetic(progress: &dyn Progress) -> Result<TempDir, AnyError> {
+/// A temporary folder with the synthetic lorry.
+fn lorry() -> Result<TempDir, AnyError> {
     let folder = tempfile::tempdir()?;
-    let cameras = toy::training_cameras()?.into_iter().step_by(2).chain(toy::test_cameras()?.into_iter().take(1));
-    let smaller = |camera: Camera| -> Result<Camera, AnyError> {
-        Ok(Camera { pinhole: camera.pinhole.resized(SYNTHETIC_SIDE, SYNTHETIC_SIDE)?, ..camera })
-    };
-    let cameras: Vec<Camera> = cameras.map(smaller).collect::<Result<_, _>>()?;
-    write_scene(&folder.path().join("lorry"), &toy::lorry()?, &cameras, RAYS_PER_SIDE, &Quiet(progress))?;
+    let path = |name: &str| folder.path().join(name);
+    std::fs::create_dir(path("rgb"))?;
+    std::fs::create_dir(path("pose"))?;
+    std::fs::write(path("intrinsics.txt"), LORRY_INTRINSICS)?;
+    let photographs = image::load_from_memory(LORRY.0)?;
+    for (view, pose) in (0..).zip(LORRY.1.lines()) {
+        std::fs::write(path(&format!("pose/{view:06}.txt")), pose)?;
+        let photograph = photographs.crop_imm(0, view * LORRY_SIDE, LORRY_SIDE, LORRY_SIDE);
+        photograph.save(path(&format!("rgb/{view:06}.png")))?;
+    }
     Ok(folder)
 }
 

@@ -1,11 +1,8 @@
 //! The command line: what each command takes. What each does is in its own file.
 
-#[cfg(feature = "check")]
 mod bench;
-#[cfg(feature = "check")]
 mod check;
 mod compare;
-#[cfg(feature = "completions")]
 mod completions;
 mod convert;
 mod devices;
@@ -16,55 +13,27 @@ mod export;
 mod help;
 mod hints;
 mod inspect;
-mod left_out;
 mod metrics_options;
 mod model;
 mod optimise;
 mod options;
 mod outputs;
-#[cfg(feature = "pareto")]
 mod pareto;
 mod parse;
 mod path;
 mod points;
-#[cfg(feature = "pose")]
 mod pose;
 mod posed;
 mod printing;
 mod render;
-#[cfg(feature = "report")]
-mod report;
-#[cfg(feature = "scenes")]
-mod scenes;
 mod select;
 mod shown;
 mod table;
 mod terminal;
-#[cfg(feature = "train")]
-mod train;
-#[cfg(feature = "check")]
 mod verify;
-#[cfg(feature = "view")]
 mod view;
 mod weighting;
 mod weights;
-
-#[cfg(not(feature = "completions"))]
-use left_out::completions;
-#[cfg(not(feature = "pareto"))]
-use left_out::pareto;
-#[cfg(not(feature = "pose"))]
-use left_out::pose;
-#[cfg(not(feature = "report"))]
-use left_out::report;
-#[cfg(not(feature = "scenes"))]
-use left_out::scenes;
-#[cfg(not(feature = "train"))]
-use left_out::train;
-#[cfg(not(feature = "view"))]
-use left_out::view;
-#[cfg(not(feature = "check"))]
-use left_out::{bench, check, verify};
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -110,12 +79,6 @@ enum Command {
     Pareto(pareto::Arguments),
     /// Score pictures against their ground truth.
     Compare(compare::Arguments),
-    /// Train a network, or the weighting of views for a network, on scenes.
-    Train(train::Arguments),
-    /// Generate scenes for training.
-    Scenes(scenes::Arguments),
-    /// Write an HTML page with evaluations, run times and trainings.
-    Report(report::Arguments),
     /// Write a checkpoint as safetensors.
     Convert(convert::Arguments),
     /// Write a scene in another layout.
@@ -134,8 +97,11 @@ enum Command {
 
 pub(crate) use ending::INTERRUPTED;
 pub(crate) use hints::{hint, is_of_arguments};
-use printing::say;
+pub use outputs::keep_input;
+pub use parse::parse_size;
+pub use printing::say;
 pub(crate) use printing::{complain, complain_of_arguments};
+pub use terminal::Terminal;
 
 fn long_about() -> String {
     format!(
@@ -148,21 +114,17 @@ fn long_about() -> String {
 
 /// Runs the command that the process was started with.
 pub(crate) fn run() -> anyhow::Result<ExitCode> {
-    let mut command = help::shortened(left_out::marked(Arguments::command()));
+    let mut command = help::shortened(Arguments::command());
     let matches = match command.try_get_matches_from_mut(args_os()) {
         Ok(matches) => matches,
         Err(error) => help::explained(error, args_os(), &mut command).exit(),
     };
     let arguments = Arguments::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
-    terminal::silence_caught_panics();
-    terminal::listen()?;
+    listen()?;
     match arguments.command {
         Command::Pose(arguments) => pose::run(&arguments),
         Command::Render(arguments) => render::run(&arguments, &options::values(&command, &matches)),
-        #[cfg(feature = "view")]
         Command::View(arguments) => view::run(&arguments, &options::given(&command, &matches)),
-        #[cfg(not(feature = "view"))]
-        Command::View(arguments) => view::run(&arguments),
         Command::Weights(arguments) => weights::run(&arguments),
         Command::Select(arguments) => select::run(&arguments),
         Command::Optimise(arguments) => optimise::run(&arguments),
@@ -171,15 +133,9 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
         Command::Evaluate(arguments) => evaluate::run(&arguments, options::values(&command, &matches)),
         Command::Pareto(arguments) => pareto::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
-        Command::Train(arguments) => train::run(&arguments),
-        Command::Scenes(arguments) => scenes::run(&arguments),
-        Command::Report(arguments) => report::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
-        #[cfg(feature = "completions")]
         Command::Completions(arguments) => completions::run(&arguments, command),
-        #[cfg(not(feature = "completions"))]
-        Command::Completions(arguments) => completions::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
@@ -187,14 +143,36 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
     }
 }
 
+/// Makes Ctrl-C set a flag that the work looks at, and keeps panics silent that become errors.
+///
+/// # Errors
+/// If another handler is already installed.
+pub fn listen() -> anyhow::Result<()> {
+    terminal::silence_caught_panics();
+    Ok(terminal::listen()?)
+}
+
 /// The error of arguments that do not fit the content of a file; the exit code is that of wrong arguments.
-fn wrong(message: impl Display) -> anyhow::Error {
+pub fn wrong(message: impl Display) -> anyhow::Error {
     clap::Error::raw(ErrorKind::ArgumentConflict, format_args!("{message}\n\nFor more information, try '--help'.\n"))
         .into()
 }
 
+/// That this build lacks something, and how to get it.
+fn not_built(what: &str, feature: &str) -> String {
+    format!(
+        "this build has no {what}; in the repository `cargo run --release --features {feature} -- ...` and \
+         `cargo install --path host/cli --features {feature}` have it, elsewhere \
+         `cargo install --git {} viewfuse-cli --features {feature}`",
+        env!("CARGO_PKG_REPOSITORY")
+    )
+}
+
 /// Runs `work` on this many threads instead of all cores.
-fn on_threads<T: Send>(threads: Option<u16>, work: impl FnOnce() -> T + Send) -> anyhow::Result<T> {
+///
+/// # Errors
+/// If the threads cannot be started.
+pub fn on_threads<T: Send>(threads: Option<u16>, work: impl FnOnce() -> T + Send) -> anyhow::Result<T> {
     match threads {
         None => Ok(work()),
         Some(count) => Ok(rayon::ThreadPoolBuilder::new().num_threads(count.into()).build()?.install(work)),

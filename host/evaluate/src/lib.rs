@@ -7,11 +7,10 @@
 //! baseline     baselines without a field: copies and warps of the nearest sources
 //! evaluator    each weighting scheme on views that are left out      Evaluator
 //! protocol     which views are sources, which are targets
-//! pareto       error against run time (feature `pareto`)
+//! pareto       error against run time
 //! run_folder   an evaluation that resumes after a kill, in shards
 //! summary      its tables: means with intervals
 //! gallery      its pictures
-//! report       all of it on one page
 //! ```
 #![forbid(unsafe_code)]
 
@@ -19,11 +18,8 @@ pub mod baseline;
 mod evaluator;
 pub mod gallery;
 pub mod metrics;
-#[cfg(feature = "pareto")]
 pub mod pareto;
 pub mod protocol;
-#[cfg(feature = "report")]
-pub mod report;
 pub mod run_folder;
 pub mod summary;
 

@@ -35,7 +35,6 @@ mod earlier;
 pub mod exr;
 pub mod folder;
 pub mod gaussian_page;
-#[cfg(feature = "gif")]
 mod gif;
 pub mod journal;
 pub mod ply;

@@ -1,6 +1,5 @@
 //! The frames of a run as one file: an animated picture, or a video.
 
-#[cfg(feature = "gif")]
 use crate::gif::Gif;
 use crate::rate::FrameRate;
 use crate::webp::Animation;
@@ -25,7 +24,6 @@ pub enum VideoFormat {
     /// Animated WebP without loss, for pages and messages.
     Webp,
     /// Animated GIF of 256 colours a frame, for those that take no WebP.
-    #[cfg(feature = "gif")]
     Gif,
     /// YUV4MPEG2, without compression, for video programs.
     Y4m,
@@ -34,14 +32,8 @@ pub enum VideoFormat {
 }
 
 impl VideoFormat {
-    /// All of them that this build writes.
-    pub const ALL: &[VideoFormat] = &[
-        VideoFormat::Webp,
-        #[cfg(feature = "gif")]
-        VideoFormat::Gif,
-        VideoFormat::Y4m,
-        VideoFormat::Mp4,
-    ];
+    /// All of them.
+    pub const ALL: &[VideoFormat] = &[VideoFormat::Webp, VideoFormat::Gif, VideoFormat::Y4m, VideoFormat::Mp4];
 
     /// Whether this machine can write it: MP4 needs an `ffmpeg` on the path.
     pub fn is_possible(self) -> bool {
@@ -56,7 +48,6 @@ impl fmt::Display for VideoFormat {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             VideoFormat::Webp => "webp",
-            #[cfg(feature = "gif")]
             VideoFormat::Gif => "gif",
             VideoFormat::Y4m => "y4m",
             VideoFormat::Mp4 => "mp4",
@@ -138,7 +129,6 @@ pub fn write_video(
             frames.each(|frame| Ok(animation.add(&frame).map_err(encode)?))?;
             Ok(write_whole(path, &animation.finish())?)
         }
-        #[cfg(feature = "gif")]
         VideoFormat::Gif => {
             let encode =
                 |cause: ::gif::EncodingError| WriteError::Encode { path: path.to_path_buf(), cause: cause.into() };

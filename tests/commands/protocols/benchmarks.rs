@@ -2,15 +2,15 @@
 
 use crate::BINARY;
 use image::{GrayImage, Luma};
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
 use viewfuse::evaluate::protocol::{Draws, Job, Protocol};
-use viewfuse::job::progress::Silent;
 use viewfuse::scene::dataset::Split;
 use viewfuse::scene::{Scene, View};
-use viewfuse::synthetic::cameras::{random_views, sphere, spiral_views};
-use viewfuse::synthetic::{toy::lorry, write_splits};
+use viewfuse_core::camera::Camera;
+use viewfuse_lab::scenes::cameras::{random_views, sphere, spiral_views};
+use viewfuse_lab::scenes::{render_with, toy::lorry};
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, done, toy};
 
 viewfuse_tests::trials![
@@ -122,8 +122,18 @@ fn blender_on_a_scene_in_its_layout() {
     train.retain(|(view, _)| [2, 16, 26, 55, 73, 75, 86, 93].contains(view));
     let mut test: Vec<_> = (0..).zip(spiral_views(&sphere, 200).expect("cameras")).collect();
     test.retain(|(view, _)| [0, 3, 40, 104].contains(view));
-    let splits = [("train", train), ("val", test[1..2].to_vec()), ("test", test)];
-    write_splits(&folder.path().join("lorry"), &lorry().expect("a lorry"), &splits, 2, &Silent).expect("a scene");
+    let lorry = lorry().expect("a lorry");
+    let angle = 2.0 * (f64::from(sphere.pinhole.width()) / 2.0 / f64::from(sphere.pinhole.focal()[0])).atan();
+    for (split, views) in [("train", train), ("val", test[1..2].to_vec()), ("test", test)] {
+        let frame = |(number, camera): &(u32, Camera)| {
+            let path = format!("./{split}/r_{number}");
+            render_with(&lorry, camera, 2).save(folder.file(&format!("lorry/{path}.png"))).expect("a picture");
+            json!({ "file_path": path, "transform_matrix": camera.pose.to_opengl() })
+        };
+        let frames: Vec<Value> = views.iter().map(frame).collect();
+        let transforms = json!({ "camera_angle_x": angle, "frames": frames });
+        folder.write(&format!("lorry/transforms_{split}.json"), transforms.to_string());
+    }
     let scene = Scene::open(folder.path().join("lorry")).expect("a scene");
     let of = |split| scene.views.iter().filter(|view| view.split == Some(split)).count();
     assert_eq!([Split::Train, Split::Validation, Split::Test].map(of), [8, 1, 4]);
@@ -131,7 +141,7 @@ fn blender_on_a_scene_in_its_layout() {
     let expected = sphere.pinhole;
     assert!(scene.views.iter().all(|view| (view.camera.pinhole.focal()[0] - expected.focal()[0]).abs() < 1e-4));
     let whole = json(folder.path(), "lorry --protocol blender:8");
-    assert_eq!(whole["jobs"][0]["targets"], serde_json::json!(["test_r_0", "test_r_40", "test_r_104"]));
+    assert_eq!(whole["jobs"][0]["targets"], json!(["test_r_0", "test_r_40", "test_r_104"]));
     assert_eq!(whole["settings"]["protocol"], "blender:8");
     let rows = whole["tables"][0]["rows"].as_array().expect("rows");
     let psnr = |row: usize| rows[row]["cells"][0]["value"]["mean"].as_f64().expect("a number");
@@ -194,7 +204,7 @@ fn tables_without_a_folder() {
     assert!(kept.contains("1 jobs done; 1 of 1 are in kept"), "{kept}");
     let record: Value =
         serde_json::from_slice(&fs::read(scene.path().join("kept/run.json")).expect("a record")).expect("JSON");
-    assert_eq!((&record["protocol"], &record["scenes"][0]["size"]), (&"llff:3".into(), &serde_json::json!([32, 32])));
+    assert_eq!((&record["protocol"], &record["scenes"][0]["size"]), (&"llff:3".into(), &json!([32, 32])));
     assert!(record["metric"].as_str().is_some_and(|metric| metric.starts_with("full: ")), "{record}");
 }
 
@@ -203,7 +213,7 @@ fn json_is_the_table() {
     let folder = scene.path();
     let whole = json(folder, "toy --protocol llff:3 --size 32x32");
     assert_eq!(whole["settings"]["protocol"], "llff:3");
-    assert_eq!(whole["jobs"][0]["targets"], serde_json::json!(["000000", "000008", "000016"]));
+    assert_eq!(whole["jobs"][0]["targets"], json!(["000000", "000008", "000016"]));
     let table = &whole["tables"][0];
     assert_eq!((&table["unit"], &table["target_count"]), (&"views".into(), &3.into()));
     let rows = table["rows"].as_array().expect("rows");
@@ -261,7 +271,7 @@ fn like_dtu(folder: &Path, with_masks: bool) {
         over_black.save(folder.join(&name)).expect("a picture");
         let [fx, fy] = view.camera.pinhole.focal();
         let [cx, cy] = view.camera.pinhole.principal();
-        let mut frame = serde_json::json!({
+        let mut frame = json!({
             "file_path": name, "transform_matrix": view.camera.pose.to_opengl(), "fl_x": fx, "fl_y": fy, "cx": cx, "cy": cy,
             "w": photograph.width(), "h": photograph.height(),
         });
@@ -276,7 +286,7 @@ fn like_dtu(folder: &Path, with_masks: bool) {
         }
         frames.push(frame);
     }
-    let transforms = serde_json::json!({ "frames": frames }).to_string();
+    let transforms = json!({ "frames": frames }).to_string();
     fs::write(folder.join("transforms.json"), transforms).expect("a file");
 }
 
@@ -321,13 +331,13 @@ fn published_figures_stand_beside_the_same_size() {
             };
             let picture = image::RgbImage::from_fn(504, 378, |x, y| image::Rgb(colour(x, y)));
             picture.save(folder.path().join("fern").join(&name)).expect("a picture");
-            serde_json::json!({
+            json!({
                 "file_path": name, "transform_matrix": sample.views[view].camera.pose.to_opengl(),
                 "fl_x": 400.0, "fl_y": 400.0, "cx": 252.0, "cy": 189.0, "w": 504, "h": 378,
             })
         })
         .collect();
-    let transforms = serde_json::json!({ "frames": frames }).to_string();
+    let transforms = json!({ "frames": frames }).to_string();
     fs::write(folder.path().join("fern/transforms.json"), transforms).expect("a file");
     let run = "evaluate fern --protocol llff:3 --device cpu --weights mean";
     let text = done(BINARY, folder.path(), run);

@@ -4,7 +4,7 @@
 //! Where GNU parallel or Slurm are missing, these tests are ignored and say so; with `VIEWFUSE_REQUIRE_CLUSTER=1` they fail.
 
 use super::folders::finished;
-use crate::BINARY;
+use crate::{BINARY, lab};
 use libtest_mimic::Trial;
 use serde_json::Value;
 use std::fs;
@@ -61,7 +61,7 @@ impl Workspace {
     fn new() -> Workspace {
         let folder = tempfile::tempdir().expect("a folder");
         done(
-            BINARY,
+            lab(),
             folder.path(),
             "scenes make cars data --train 0 --val 0 --test 2 --views 4 --test-views 6 --size 64",
         );

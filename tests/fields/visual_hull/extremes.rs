@@ -4,8 +4,8 @@ use super::worlds::{Run, assert_shows_an_object, assert_sound, ball, ball_views,
 use image::{Rgba, RgbaImage};
 use viewfuse::field::training_free::NoObject;
 use viewfuse::scene::photographs::SourceImages;
-use viewfuse::synthetic::render;
 use viewfuse_core::camera::Camera;
+use viewfuse_lab::scenes::render;
 
 #[test]
 fn identical_sources() {

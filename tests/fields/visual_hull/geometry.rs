@@ -7,11 +7,11 @@ use super::worlds::{
 use viewfuse::field::Rendered;
 use viewfuse::field::training_free::NoObject;
 use viewfuse::scene::photographs::{SourceImage, SourceImages};
-use viewfuse::synthetic::toy::lorry;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::math::sin_cos;
 use viewfuse_core::pose::Pose;
+use viewfuse_lab::scenes::toy::lorry;
 
 /// Depth along the principal axis at which a pixel's ray meets the ball; `None` if it misses it.
 fn closed_form(camera: &Camera, column: u32, row: u32) -> Option<f64> {

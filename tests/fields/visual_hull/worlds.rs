@@ -8,14 +8,14 @@ use viewfuse::field::training_free::TrainingFree;
 use viewfuse::field::{FieldError, On, Rendered};
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::photographs::{SourceImage, SourceImages};
-use viewfuse::synthetic::toy::{lorry, training_cameras};
-use viewfuse::synthetic::{Finish, Object, Orbit, Part, Placement, Shape, Texture, render};
 use viewfuse::weighting::Weighting;
 use viewfuse::weighting::sources::{MAX_SOURCES, SourceWeights};
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::sources::Sources;
 use viewfuse_core::weights::Weights;
+use viewfuse_lab::scenes::toy::{lorry, training_cameras};
+use viewfuse_lab::scenes::{Finish, Object, Orbit, Part, Placement, Shape, Texture, render};
 
 /// The sphere's radius, around the origin.
 pub(crate) const RADIUS: f32 = 0.4;

@@ -9,8 +9,8 @@ use std::path::PathBuf;
 use std::time::Duration;
 use tempfile::TempDir;
 use viewfuse::evaluate::Score;
-use viewfuse::evaluate::report::{Evaluation, Report, ReportError, Sweep, Training, page};
 use viewfuse::evaluate::run_folder::{Finished, SceneSettings, Settings};
+use viewfuse_lab::report::{Evaluation, Report, ReportError, Sweep, Training, page};
 
 /// A folder one of whose files is broken at a time. The first byte of an input says which.
 struct Files {

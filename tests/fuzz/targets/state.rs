@@ -2,7 +2,7 @@
 
 use super::{OneFile, Target, Verdict, verdict};
 use serde_json::json;
-use viewfuse::train::check_state;
+use viewfuse_lab::train::check_state;
 use viewfuse_tests::checkpoints::safetensors;
 
 pub(crate) struct State(OneFile);

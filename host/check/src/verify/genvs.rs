@@ -4,7 +4,7 @@
 
 use super::file::{File, compared, full};
 use super::{Measure, Quantity, Report, VerifyError};
-use half::f16;
+use crate::half::from_half;
 use safetensors::Dtype;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::sampler::Sampler;
@@ -187,7 +187,7 @@ impl<D: Device> Comparison<'_, '_, D> {
         let name = format!("feature_image_full.{WHOLE}");
         let view = self.file.view(&name, Dtype::F16)?;
         let values: Vec<f32> =
-            view.data().as_chunks::<2>().0.iter().map(|bytes| f16::from_le_bytes(*bytes).to_f32()).collect();
+            view.data().as_chunks::<2>().0.iter().map(|bytes| from_half(u16::from_le_bytes(*bytes)) as f32).collect();
         let features = self.reference.architecture().encoder.feature_count;
         if values.len() != features * self.side * self.side {
             return Err(self.file.wrong(&name, format!("is not {features}x{0}x{0}", self.side)));

@@ -212,5 +212,5 @@ fn distances(predictions: &Features, truths: &Features, seed: u64) -> anyhow::Re
 /// `--fid` was rejected before ([`MetricOptions::open`]).
 #[cfg(not(feature = "fid"))]
 fn distances(_: &Features, _: &Features, _: u64) -> anyhow::Result<[f64; 2]> {
-    Err(super::left_out::in_feature("FID and KID", "fid"))
+    Err(super::wrong(super::not_built("FID and KID", "fid")))
 }

@@ -31,7 +31,6 @@ pub(crate) fn device_options(gpu: GpuOptions) -> DeviceOptions {
 
 /// The program that finds poses: `VIEWFUSE_OPENMVG`, or the one that lies beside this command; where neither is, one of this
 /// name that the system finds.
-#[cfg(feature = "pose")]
 pub(crate) fn openmvg() -> PathBuf {
     let name = format!("viewfuse-openmvg{}", env::consts::EXE_SUFFIX);
     let beside = || env::current_exe().ok().map(|own| own.with_file_name(&name)).filter(|path| path.is_file());
@@ -39,13 +38,11 @@ pub(crate) fn openmvg() -> PathBuf {
 }
 
 /// The person's own COLMAP: `VIEWFUSE_COLMAP`, or `colmap` that the system finds.
-#[cfg(feature = "pose")]
 pub(crate) fn colmap() -> PathBuf {
     env::var_os("VIEWFUSE_COLMAP").map_or_else(|| "colmap".into(), PathBuf::from)
 }
 
 /// The Python that has the person's own pycolmap: `VIEWFUSE_PYTHON`, or `python3` that the system finds.
-#[cfg(feature = "pose")]
 pub(crate) fn python() -> PathBuf {
     env::var_os("VIEWFUSE_PYTHON").map_or_else(|| "python3".into(), PathBuf::from)
 }

@@ -52,8 +52,19 @@ pub(crate) fn shortened(mut commands: Command) -> Command {
     commands
 }
 
-/// An error of arguments, in words where an option of a network was given without one.
+/// Commands of the laboratory, which a person may look for here.
+const IN_THE_LABORATORY: [&str; 3] = ["train", "scenes", "report"];
+
+/// An error of arguments, in words where an option of a network was given without one, and where a command is the laboratory's.
 pub(crate) fn explained(error: Error, arguments: impl Iterator<Item = OsString>, command: &mut Command) -> Error {
+    if let Some(ContextValue::String(name)) = error.get(ContextKind::InvalidSubcommand)
+        && IN_THE_LABORATORY.contains(&name.as_str())
+    {
+        let message = format!(
+            "`{name}` is a command of the laboratory: in the repository, `cargo run --release -p viewfuse-lab -- {name}`"
+        );
+        return command.error(ErrorKind::InvalidSubcommand, message);
+    }
     let is_model = |value: &ContextValue| match value {
         ContextValue::Strings(missing) => missing.len() == 1 && missing[0].starts_with("--model "),
         _ => false,

@@ -21,10 +21,8 @@ pub(crate) fn hint(error: &anyhow::Error) -> Option<&'static str> {
         let render = cause.downcast_ref::<RenderError>().and_then(of_render);
         let evaluation = cause.downcast_ref::<EvaluateError>().and_then(of_evaluation);
         let output = cause.downcast_ref::<OutputError>().and_then(of_output);
-        let others = || {
-            let of_scenes = of_tiff(cause).or_else(|| of_bare(cause));
-            of_training(cause).or_else(|| of_viewer(cause)).or(of_scenes).or_else(|| of_pose(cause))
-        };
+        let others =
+            || of_viewer(cause).or_else(|| of_tiff(cause)).or_else(|| of_bare(cause)).or_else(|| of_pose(cause));
         few_shot.or(photographs).or(output).or(folder).or(render).or(evaluation).or_else(others)
     })
 }
@@ -110,7 +108,7 @@ fn of_tiff(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
         Some(SceneError::Image { cause: ImageError::Unsupported(problem), .. })
             if problem.format_hint() == ImageFormatHint::Exact(ImageFormat::Tiff) =>
         {
-            Some("a build with `--features tiff` reads it: `cargo install --path host/cli --features tiff`")
+            Some("a build with `--features formats` reads it: `cargo install --path host/cli --features formats`")
         }
         _ => None,
     }
@@ -128,7 +126,6 @@ fn of_bare(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
 }
 
 /// A transparent error replaces its cause, which is then not part of the chain.
-#[cfg(feature = "pose")]
 fn of_pose(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
     use viewfuse_pose::{IntakeError, PoseError, SolverError};
     match cause.downcast_ref::<PoseError>() {
@@ -151,33 +148,9 @@ fn of_pose(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
     }
 }
 
-#[cfg(not(feature = "pose"))]
-fn of_pose(_: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
-    None
-}
-
-#[cfg(feature = "train")]
-fn of_training(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
-    match cause.downcast_ref::<viewfuse_train::TrainError>() {
-        Some(viewfuse_train::TrainError::NotFinite { .. }) => Some("a lower --rate may help"),
-        _ => None,
-    }
-}
-
-#[cfg(not(feature = "train"))]
-fn of_training(_: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
-    None
-}
-
-#[cfg(feature = "view")]
 fn of_viewer(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
     match cause.downcast_ref::<viewfuse_view::ListenError>() {
         Some(viewfuse_view::ListenError::Port { .. }) => Some("give another --port, or none"),
         _ => None,
     }
-}
-
-#[cfg(not(feature = "view"))]
-fn of_viewer(_: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
-    None
 }

@@ -1,7 +1,6 @@
 //! The metrics, and the files of their networks' parameters.
 
-use super::left_out::in_feature;
-use super::wrong;
+use super::{not_built, wrong};
 use anyhow::Context;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -85,7 +84,7 @@ impl MetricOptions {
     /// Loads the networks to a device.
     pub(crate) fn open<D: Device>(&self, device: &D) -> anyhow::Result<Metrics<D>> {
         if self.fid.is_some() && cfg!(not(feature = "fid")) {
-            return Err(in_feature("FID and KID", "fid"));
+            return Err(wrong(not_built("FID and KID", "fid")));
         }
         let mut lpips: Vec<Lpips<D>> = Vec::new();
         for (kind, files) in &self.lpips {

@@ -71,7 +71,6 @@ impl NetworkOptions {
     }
 
     /// Opens the field with its default efforts.
-    #[cfg(feature = "pareto")]
     pub(crate) fn open(&self, seed: u64) -> anyhow::Result<AnyField> {
         self.open_with(FieldOptions { seed, ..FieldOptions::default() })
     }

@@ -3,7 +3,6 @@
 use super::environment::device_options;
 use super::parse::{parse_count, parse_error, parse_seconds, parse_share, parse_size};
 use super::wrong;
-#[cfg(feature = "view")]
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, Command};
 use std::collections::BTreeMap;
@@ -130,7 +129,6 @@ pub(crate) fn values(command: &Command, matches: &ArgMatches) -> BTreeMap<String
 }
 
 /// The options of the command that were written on the command line, by long name, each with its value if it takes one.
-#[cfg(feature = "view")]
 pub(crate) fn given(command: &Command, matches: &ArgMatches) -> Vec<(String, Option<String>)> {
     let Some((name, matches)) = matches.subcommand() else { return Vec::new() };
     let arguments = command.find_subcommand(name).into_iter().flat_map(Command::get_arguments);

@@ -27,27 +27,15 @@ fn inside(scene: &Scene, path: &Path, what: &str) -> anyhow::Error {
 }
 
 /// Refuses an output that is the input itself, under any spelling.
-pub(super) fn keep_input(input: &Path, output: &Path) -> anyhow::Result<()> {
+///
+/// # Errors
+/// That of wrong arguments.
+pub fn keep_input(input: &Path, output: &Path) -> anyhow::Result<()> {
     match (canonicalize(input), canonicalize(output)) {
         (Ok(from), Ok(to)) if from == to => {
             let (input, output) = (input.display(), output.display());
             Err(wrong(format_args!("{output}: is the input {input} itself, which is not replaced; give another name")))
         }
         _ => Ok(()),
-    }
-}
-
-/// Refuses an existing file in one of these folders, or in a folder in them, that is no page: it belongs to the folder's run.
-#[cfg(feature = "report")]
-pub(super) fn keep_runs<'a>(folders: impl IntoIterator<Item = &'a Path>, output: &Path) -> anyhow::Result<()> {
-    let is_page = output.extension().is_some_and(|extension| extension == "html" || extension == "htm");
-    let Some(output) = canonicalize(output).ok().filter(|_| !is_page) else { return Ok(()) };
-    let holds = |folder: &&Path| canonicalize(folder).is_ok_and(|folder| output.starts_with(folder));
-    match folders.into_iter().find(holds) {
-        Some(folder) => {
-            let (output, folder) = (output.display(), folder.display());
-            Err(wrong(format_args!("--output {output}: belongs to {folder}; give the name of a page (.html)")))
-        }
-        None => Ok(()),
     }
 }

@@ -10,7 +10,10 @@ const PIXEL_BYTES: u64 = 48;
 const MAX_PICTURE_BYTES: u64 = 4 << 30;
 
 /// Width and height of pictures.
-pub(super) fn parse_size(text: &str) -> Result<[u32; 2], String> {
+///
+/// # Errors
+/// In words, what a size is.
+pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
     match sides {
         Some([width, height]) if (1..=16_384).contains(&width) && (1..=16_384).contains(&height) => {

@@ -2,9 +2,15 @@
 //!
 //! The scene is written beside the photographs, and used again as long as the photographs are the same.
 
+use super::complain;
+use super::pose::find_with_defaults;
+use anyhow::bail;
 use clap::Args;
+use std::ffi::OsString;
+use std::fs;
 use std::path::{Path, PathBuf};
-use viewfuse_scene::Scene;
+use viewfuse_pose::is_current;
+use viewfuse_scene::{Scene, SceneError};
 
 #[derive(Args)]
 pub(crate) struct PoseOption {
@@ -23,71 +29,34 @@ impl PoseOption {
     }
 }
 
-#[cfg(not(feature = "pose"))]
-fn posed(_: &Path) -> anyhow::Result<PathBuf> {
-    Err(missing())
+fn posed(scene: &Path) -> anyhow::Result<PathBuf> {
+    // All other errors are those of the command itself.
+    if !matches!(Scene::open(scene), Err(SceneError::BarePhotographs { .. })) {
+        return Ok(scene.to_path_buf());
+    }
+    let folder = beside(scene)?;
+    if folder.exists() {
+        if !is_current(&folder, scene)? {
+            bail!(
+                "{}: exists already and is not of the photographs in {}; remove it, or find poses with `viewfuse pose`",
+                folder.display(),
+                scene.display()
+            );
+        }
+        complain(format_args!("{}: the poses found before", folder.display()));
+        return Ok(folder);
+    }
+    complain(format_args!("{}", find_with_defaults(scene, &folder)?));
+    Ok(folder)
 }
 
-/// The error of a build without the feature.
-#[cfg(any(test, not(feature = "pose")))]
-fn missing() -> anyhow::Error {
-    super::left_out::in_feature("option `--pose`", "pose")
-}
-
-#[cfg(feature = "pose")]
-use found::posed;
-
-#[cfg(feature = "pose")]
-mod found {
-    use crate::cli::complain;
-    use crate::cli::pose::find_with_defaults;
-    use anyhow::bail;
-    use std::ffi::OsString;
-    use std::fs;
-    use std::path::{Path, PathBuf};
-    use viewfuse_pose::is_current;
-    use viewfuse_scene::{Scene, SceneError};
-
-    pub(super) fn posed(scene: &Path) -> anyhow::Result<PathBuf> {
-        // All other errors are those of the command itself.
-        if !matches!(Scene::open(scene), Err(SceneError::BarePhotographs { .. })) {
-            return Ok(scene.to_path_buf());
-        }
-        let folder = beside(scene)?;
-        if folder.exists() {
-            if !is_current(&folder, scene)? {
-                bail!(
-                    "{}: exists already and is not of the photographs in {}; remove it, or find poses with `viewfuse pose`",
-                    folder.display(),
-                    scene.display()
-                );
-            }
-            complain(format_args!("{}: the poses found before", folder.display()));
-            return Ok(folder);
-        }
-        complain(format_args!("{}", find_with_defaults(scene, &folder)?));
-        Ok(folder)
-    }
-
-    /// `FOLDER-posed`, also where the folder is called `.`.
-    fn beside(scene: &Path) -> anyhow::Result<PathBuf> {
-        let scene = match scene.file_name() {
-            Some(_) => scene.to_path_buf(),
-            None => fs::canonicalize(scene)?,
-        };
-        let mut name = OsString::from(scene.file_name().unwrap_or_default());
-        name.push("-posed");
-        Ok(scene.with_file_name(name))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn without_the_feature_it_says_how_to_get_it() {
-        let error = super::missing().to_string();
-        for part in ["this build has no option `--pose`; ", "--features pose"] {
-            assert!(error.contains(part), "{error}");
-        }
-    }
+/// `FOLDER-posed`, also where the folder is called `.`.
+fn beside(scene: &Path) -> anyhow::Result<PathBuf> {
+    let scene = match scene.file_name() {
+        Some(_) => scene.to_path_buf(),
+        None => fs::canonicalize(scene)?,
+    };
+    let mut name = OsString::from(scene.file_name().unwrap_or_default());
+    name.push("-posed");
+    Ok(scene.with_file_name(name))
 }

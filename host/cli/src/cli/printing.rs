@@ -5,7 +5,10 @@ use std::fmt::Display;
 use std::io::{self, Write};
 
 /// Prints a line on standard output. A closed pipe (`| head`) is ignored, because the files are still to be written.
-pub(crate) fn say(text: impl Display) -> io::Result<()> {
+///
+/// # Errors
+/// If standard output cannot be written for another reason.
+pub fn say(text: impl Display) -> io::Result<()> {
     match writeln!(io::stdout().lock(), "{}", shown(text)) {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         outcome => outcome,

@@ -52,7 +52,7 @@ pub(crate) fn silence_caught_panics() {
 }
 
 /// On standard error: a bar on a terminal, elsewhere a line every few seconds, and warnings. Messages on standard output.
-pub(crate) struct Terminal {
+pub struct Terminal {
     display: Arc<ProgressDisplay>,
     /// Shows the time that is left also while nothing else changes. `None` where there is nothing to show it on.
     clock: Option<Clock>,
@@ -62,7 +62,7 @@ pub(crate) struct Terminal {
 
 impl Terminal {
     /// Without progress; `label` is the stage until the work names one.
-    pub(crate) fn new(label: &str) -> Terminal {
+    pub fn new(label: &str) -> Terminal {
         let display = Arc::new(ProgressDisplay::new(label, io::stderr().is_terminal(), time_between_lines()));
         let own = Arc::clone(&display);
         let clock = Clock::start(move || own.show());
@@ -70,7 +70,6 @@ impl Terminal {
     }
 
     /// Without a bar: for work that shows its progress elsewhere.
-    #[cfg(feature = "view")]
     pub(crate) fn without_bar() -> Terminal {
         Terminal { display: Arc::new(ProgressDisplay::hidden()), clock: None, told: Mutex::default() }
     }

@@ -20,7 +20,7 @@ pub struct PlotError(String);
 
 const SIZE: (u32, u32) = (1100, 720);
 /// Distinguishable also with colour blindness (Okabe and Ito).
-pub(crate) const COLOURS: [RGBColor; 6] = [
+pub const COLOURS: [RGBColor; 6] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),

@@ -1,6 +1,6 @@
 //! Options of what a render writes.
 
-use crate::cli::left_out::told;
+use crate::cli::not_built;
 use clap::Args;
 use viewfuse_output::depth::{DepthFormat, UnknownDepthFormat};
 use viewfuse_output::rate::FrameRate;
@@ -25,7 +25,7 @@ pub(crate) struct OutputOptions {
     /// Remove what an earlier run wrote to the folder and this one does not replace
     #[arg(long, help_heading = FILES)]
     pub(crate) replace: bool,
-    /// Write all pictures, in order, also as video.FORMAT: webp and gif (animated; gif is a feature), y4m (not compressed), mp4
+    /// Write all pictures, in order, also as video.FORMAT: webp and gif (animated), y4m (not compressed), mp4
     /// (by the ffmpeg on the path; without one y4m)
     #[arg(long, value_name = "FORMATS", value_delimiter = ',', value_parser = parse_video, help_heading = FILES)]
     pub(crate) video: Vec<VideoFormat>,
@@ -47,16 +47,13 @@ impl OutputOptions {
 
 fn parse_depth(text: &str) -> Result<DepthFormat, String> {
     text.parse().map_err(|error: UnknownDepthFormat| match text {
-        "exr" => told("OpenEXR", "exr"),
+        "exr" => not_built("OpenEXR", "formats"),
         _ => error.to_string(),
     })
 }
 
 fn parse_video(text: &str) -> Result<VideoFormat, String> {
-    text.parse().map_err(|error: UnknownVideoFormat| match text {
-        "gif" => told("GIF", "gif"),
-        _ => error.to_string(),
-    })
+    text.parse().map_err(|error: UnknownVideoFormat| error.to_string())
 }
 
 fn parse_rate(text: &str) -> Result<FrameRate, String> {

@@ -21,7 +21,6 @@ pub(super) struct ProgressDisplay {
 
 /// How a course is shown.
 enum ProgressStyle {
-    #[cfg(feature = "view")]
     Hidden,
     /// The last line of a terminal, and what it says.
     Bar(String),
@@ -50,7 +49,6 @@ impl ProgressDisplay {
     }
 
     /// Shows nothing.
-    #[cfg(feature = "view")]
     pub(super) fn hidden() -> ProgressDisplay {
         ProgressDisplay {
             course: Mutex::new(Course::new("", Instant::now())),
@@ -86,7 +84,6 @@ impl ProgressDisplay {
             return;
         };
         match &mut *style {
-            #[cfg(feature = "view")]
             ProgressStyle::Hidden => {}
             ProgressStyle::Bar(shown) => {
                 let width = terminal_size_of(io::stderr()).map_or(WIDTH, |(Width(width), _)| width);

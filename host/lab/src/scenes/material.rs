@@ -1,0 +1,145 @@
+//! Materials: patterns with structure at every size, as surfaces in a room and outdoors have them.
+//!
+//! A material is a function of the point like a texture, most of them flat: they look at two of the three coordinates.
+//! None repeats itself exactly. Every brick, plank and motif differs a little from its neighbours, so that a place in one
+//! photograph can be told from its neighbours in another one. Colours are display values, lengths are in world units.
+
+mod cloth;
+mod font;
+mod glaze;
+mod letters;
+mod masonry;
+mod painting;
+mod rug;
+mod spine;
+mod stone;
+mod wallpaper;
+mod wood;
+
+pub use cloth::Cloth;
+pub use glaze::Glaze;
+pub use letters::{Letters, Setting};
+pub use masonry::Masonry;
+pub use painting::Painting;
+pub use rug::Rug;
+pub use spine::Spine;
+pub use stone::Stone;
+pub use wallpaper::{Motif, Wallpaper};
+pub use wood::Wood;
+
+use crate::scenes::noise::{blend, layered};
+use viewfuse_core::Vec3;
+
+/// Which two local coordinates a flat pattern is drawn with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Plane {
+    /// `x` to the right and `z` up: what stands.
+    Front,
+    /// `y` to the right and `z` up: what stands and is seen from the side.
+    Side,
+    /// `x` to the right and `y` up: what lies.
+    Top,
+}
+
+impl Plane {
+    /// The coordinates to the right, upwards, and through the plane.
+    pub fn coordinates(self, p: Vec3) -> [f32; 3] {
+        match self {
+            Plane::Front => [p.x, p.z, p.y],
+            Plane::Side => [p.y, p.z, p.x],
+            Plane::Top => [p.x, p.y, p.z],
+        }
+    }
+
+    /// The plane with the same pattern whose right is this one's up.
+    pub fn turned(self, coordinates: [f32; 3]) -> [f32; 3] {
+        let [right, up, through] = coordinates;
+        [up, right, through]
+    }
+}
+
+/// What a surface is made of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Material {
+    /// Planks or solid wood with grain.
+    Wood(Wood),
+    /// Bricks, stones or tiles between joints.
+    Masonry(Masonry),
+    /// Printed wallpaper.
+    Wallpaper(Wallpaper),
+    /// Woven cloth, checked or striped.
+    Cloth(Cloth),
+    /// A knotted rug with borders and a medallion.
+    Rug(Rug),
+    /// Printed letters: a page, a poster, the faces of a toy block.
+    Letters(Letters),
+    /// A picture to hang on a wall.
+    Painting(Painting),
+    /// The back of a book, and its pages.
+    Spine(Spine),
+    /// Painted pottery.
+    Glaze(Glaze),
+    /// Anything with blotches: marble, plaster, soil, leaves.
+    Stone(Stone),
+}
+
+impl Material {
+    /// The display colour at a point in local coordinates.
+    pub fn colour(&self, point_local: Vec3) -> Vec3 {
+        match self {
+            Material::Wood(wood) => wood.colour(point_local),
+            Material::Masonry(masonry) => masonry.colour(point_local),
+            Material::Wallpaper(wallpaper) => wallpaper.colour(point_local),
+            Material::Cloth(cloth) => cloth.colour(point_local),
+            Material::Rug(rug) => rug.colour(point_local),
+            Material::Letters(letters) => letters.colour(point_local),
+            Material::Painting(painting) => painting.colour(point_local),
+            Material::Spine(spine) => spine.colour(point_local),
+            Material::Glaze(glaze) => glaze.colour(point_local),
+            Material::Stone(stone) => stone.colour(point_local),
+        }
+    }
+
+    /// Whether colours and sizes are finite and sizes positive.
+    pub fn is_sound(&self) -> bool {
+        match self {
+            Material::Wood(wood) => wood.is_sound(),
+            Material::Masonry(masonry) => masonry.is_sound(),
+            Material::Wallpaper(wallpaper) => wallpaper.is_sound(),
+            Material::Cloth(cloth) => cloth.is_sound(),
+            Material::Rug(rug) => rug.is_sound(),
+            Material::Letters(letters) => letters.is_sound(),
+            Material::Painting(painting) => painting.is_sound(),
+            Material::Spine(spine) => spine.is_sound(),
+            Material::Glaze(glaze) => glaze.is_sound(),
+            Material::Stone(stone) => stone.is_sound(),
+        }
+    }
+}
+
+/// Smallest size of anything in a material, in world units: far below a pixel, far above rounding errors.
+pub const SMALLEST_SIZE: f32 = 1.0e-4;
+
+/// Whether every length is finite and at least [`SMALLEST_SIZE`].
+fn sizes<const N: usize>(lengths: [f32; N]) -> bool {
+    lengths.into_iter().all(|length| (SMALLEST_SIZE..=f32::MAX).contains(&length))
+}
+
+fn finite<const N: usize>(colours: [Vec3; N]) -> bool {
+    colours.into_iter().all(|colour| colour.is_finite())
+}
+
+/// A colour with the small unevenness of everything that was made or used: `strength` of it, in spots of `size`.
+fn worn(colour: Vec3, p: Vec3, size: f32, strength: f32, seed: u32) -> Vec3 {
+    colour * (1.0 + strength * (2.0 * layered(p / size, seed, 2) - 1.0))
+}
+
+/// Softly 1 inside and 0 outside of an edge at 0; `width` is that of the transition.
+fn inside(distance: f32, width: f32) -> f32 {
+    (0.5 - distance / width).clamp(0.0, 1.0)
+}
+
+/// A colour over another one where `amount` is 1.
+fn over(ground: Vec3, colour: Vec3, amount: f32) -> Vec3 {
+    blend(ground, colour, amount)
+}
