@@ -25,8 +25,8 @@ use viewfuse_weighting::Weighting;
 pub const MAX_SOURCES: usize = 12;
 /// Longest side of the picture.
 pub const LONGEST_SIDE: u32 = 160;
-/// The photographs of the synthetic lorry, one below the other, and their poses, one a line: every other training view of the
-/// sample scene and one of its test views, half as large. The laboratory's tests compare them with what makes them.
+/// The photographs of the synthetic lorry, one below the other, and their poses, one a line: every other training view
+/// of the sample scene and one of its test views, half as large. A test compares them with what the laboratory makes.
 const LORRY: (&[u8], &str) = (include_bytes!("picture/lorry.png"), include_str!("picture/lorry.txt"));
 /// Width and height of these photographs.
 const LORRY_SIDE: u32 = 64;

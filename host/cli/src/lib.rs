@@ -1,5 +1,5 @@
-//! The command `viewfuse`, called by its binary. It is a library so that tests can build it with all features, and so that the
-//! laboratory's command ([`shared`]) speaks as this one does.
+//! The command `viewfuse`, called by its binary. It is a library so that tests can build it with all features, and so
+//! that the laboratory's command speaks as this one does ([`shared`]).
 #![forbid(unsafe_code)]
 
 mod cli;

@@ -1,7 +1,8 @@
 //! Synthetic scenes: objects described by formulas, and photographs of them.
 //!
 //! A scene of this making has what no photograph has: exact poses, exact alpha, exact depth and no licence but ours.
-//! The repository's sample scenes are made here: `viewfuse-lab scenes toy FOLDER`, `scenes photograph room FOLDER --views 11 --seed 17`.
+//! The repository's sample scenes are made here: `viewfuse-lab scenes toy FOLDER` and
+//! `viewfuse-lab scenes photograph room FOLDER --views 11 --seed 17`.
 //! The modules stand in the order of the data; a module uses only modules listed above it:
 //!
 //! ```text

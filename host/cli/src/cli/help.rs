@@ -55,7 +55,8 @@ pub(crate) fn shortened(mut commands: Command) -> Command {
 /// Commands of the laboratory, which a person may look for here.
 const IN_THE_LABORATORY: [&str; 3] = ["train", "scenes", "report"];
 
-/// An error of arguments, in words where an option of a network was given without one, and where a command is the laboratory's.
+/// An error of arguments, in words where an option of a network was given without one, and where a command is the
+/// laboratory's.
 pub(crate) fn explained(error: Error, arguments: impl Iterator<Item = OsString>, command: &mut Command) -> Error {
     if let Some(ContextValue::String(name)) = error.get(ContextKind::InvalidSubcommand)
         && IN_THE_LABORATORY.contains(&name.as_str())

@@ -1,11 +1,10 @@
-//! Objects: cars to learn from, and chairs that stand in rooms. Each is a whole distribution, of which one is named by a seed and an
-//! index.
+//! Objects: cars to learn from, and chairs that stand in rooms. Each is a whole distribution, of which one is named by a
+//! seed and an index.
 //!
 //! Everything about an object is drawn with counter-based random numbers (`viewfuse_core::random`): proportions, parts,
 //! colours, patterns, lamps. The same seed and index give the same object bit for bit, whatever was drawn before.
-//! They stand upright along world z, face along world x, and are normalised as ShapeNet's are: the
-//! diagonal of the box around them is about 1 (0.8 to 1), its middle about the origin. Nothing reaches farther
-//! than [`MAX_RADIUS`], so that no camera of [`crate::scenes::cameras`] cuts anything off.
+//! They stand upright along world z, face along world x, and are normalised as ShapeNet's are: the diagonal of the box
+//! around them is about 1 (0.8 to 1), its middle about the origin. No car reaches farther than [`MAX_RADIUS`], so that no camera of [`crate::scenes::cameras`] cuts anything off.
 
 pub(crate) mod build;
 mod cars;
@@ -26,7 +25,8 @@ pub const MAX_RADIUS: f32 = 0.55;
 const CARS: u32 = 0;
 const CHAIRS: u32 = 1;
 
-/// The car with this seed and index: a saloon, hatchback, van, pick-up, sports or race car, in half of all cases without wheels.
+/// The car with this seed and index: a saloon, hatchback, van, pick-up, sports or race car, about half of them without
+/// wheels.
 ///
 /// # Errors
 /// [`ObjectError`] if a part is unusable; none for cars as they are.

@@ -47,7 +47,8 @@ pub struct Shoot {
     seed: u32,
 }
 
-/// A room and `count` cameras on an arc in front of its table, drawn for a seed, with pictures of `[width, height]` pixels.
+/// A room and `count` cameras on an arc in front of its table, drawn for a seed, with pictures of `[width, height]`
+/// pixels.
 ///
 /// # Errors
 /// [`ShootError`]; none for a size that a camera can have.
