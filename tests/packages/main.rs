@@ -1,18 +1,13 @@
 //! The packages as such: which depend on which, in which order their modules stand, what a library must not do, what a
-//! crate outside can add, which kernels have a twin on the CPU, why unsafe code is sound, how long functions are, how the
-//! tests are arranged, and what documents may say.
+//! crate outside can add, which kernels have a twin on the CPU, why unsafe code is sound, and that every test is run.
 
 mod crates;
-mod documents;
 mod libraries;
 mod modules;
 mod outside;
-mod picture;
 mod release;
 mod rooms;
 mod safety;
-mod sizes;
-mod summary;
 mod twins;
 
 use serde_json::Value;

@@ -228,53 +228,23 @@ fn modules_that_are_not_named_are_fields() {
 #[test]
 fn a_module_that_uses_a_later_one_is_found() {
     let folder = tempfile::tempdir().expect("a folder");
-    let write = |name: &str, text: &str| {
-        let path = folder.path().join("src").join(name);
-        std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
-        std::fs::write(path, text).expect("a file");
-    };
-    let library = "//! A crate.\n//!\n//! ```text\n//! first, second  what they do\n//!                more of it\n//! third          \
-                   the last\n//! ```\npub mod second;\nmod first;\npub mod third;\npub use third::{Thing, Other};\n\
-                   pub struct Shared;\n";
+    std::fs::create_dir_all(folder.path().join("src/first")).expect("a folder");
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join("src").join(name), text).expect("a file");
+    let library = "//! ```text\n//! first, second  what they do\n//! third          the last\n//! ```\n\
+                   pub mod second;\nmod first;\npub mod third;\npub use third::Thing;\npub struct Shared;\n";
     write("lib.rs", library);
-    write("first.rs", "pub use crate::Shared; // crate::third\n/// [`crate::third`]\nmod inner;");
+    write("first.rs", "pub use crate::Shared; // crate::third\nmod inner;");
     write("first/inner.rs", "const A: &str = \"crate::third\"; use super::super::first; use super::third;");
     write("second.rs", "use crate::{first::{a, b}, Shared};");
     write("third.rs", "use crate::first; fn a() { super::second::b() }");
     assert_eq!(faults(folder.path()), [""; 0]);
-    for (text, used) in [
-        ("use crate::third::x;", "third"),
-        ("use crate::{first, third::{a, b}};", "third"),
-        ("\nfn a() -> crate::Thing {}", "third"),
-        ("use super::Other;", "third"),
-        ("use super::{first::a, third};", "third"),
-    ] {
+    for text in ["use crate::{first, third::{a, b}};", "fn a() -> crate::Thing {}", "use super::{first::a, third};"] {
         write("second.rs", text);
-        let found = faults(folder.path());
-        assert_eq!(found.len(), 1, "{text}: {found:?}");
-        assert!(found[0].ends_with(&format!("uses {used}, which is listed behind second")), "{found:?}");
+        assert_eq!(faults(folder.path()), ["second:1 uses third, which is listed behind second"], "{text}");
     }
     write("second.rs", "");
     write("first/inner.rs", "use super::super::second;");
     assert_eq!(faults(folder.path()), ["first/inner:1 uses second, which is listed behind first"]);
-    write("first/inner.rs", "");
-    // Modules that are not named.
-    write("lib.rs", &library.replacen("third ", "* ", 1).replace("mod first;", "mod first;\nmod fourth;"));
-    for (text, fault) in [
-        ("use crate::{first, third};", &[][..]),
-        ("use super::fourth;", &["third:1 uses fourth, which is of the same kind as third"]),
-    ] {
-        write("third.rs", text);
-        assert_eq!(faults(folder.path()), fault, "{text}");
-    }
-    write("third.rs", "");
-    // Lists that are wrong.
-    for (from, to, fault) in [
-        ("third ", "fourth", ["third is not listed", "fourth is no module"].as_slice()),
-        ("first, second", "first, second, first", &["first is listed 2 times"]),
-        ("//! ```text", "//! ```rust", &["first is not listed", "second is not listed", "third is not listed"]),
-    ] {
-        write("lib.rs", &library.replacen(from, to, 1));
-        assert_eq!(faults(folder.path()), fault, "{from}");
-    }
+    write("lib.rs", &library.replacen("third ", "fourth", 1));
+    assert!(faults(folder.path()).starts_with(&["third is not listed".to_owned(), "fourth is no module".to_owned()]));
 }
