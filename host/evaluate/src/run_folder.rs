@@ -13,7 +13,7 @@
 mod journal;
 mod settings;
 
-pub use journal::{Finished, Journal, Shard};
+pub use journal::{Finished, JobJournal, Shard};
 pub use settings::{SceneSettings, Settings};
 
 use std::collections::BTreeMap;
@@ -159,8 +159,8 @@ impl RunFolder {
     ///
     /// # Errors
     /// [`FolderError`]; [`FolderError::Busy`] while another process has it open.
-    pub fn journal(&self, shard: Shard) -> Result<Journal, FolderError> {
-        Journal::open(&self.path, shard)
+    pub fn journal(&self, shard: Shard) -> Result<JobJournal, FolderError> {
+        JobJournal::open(&self.path, shard)
     }
 
     /// Every finished job of every shard, by number. For a job that was run twice, the first shard's result.

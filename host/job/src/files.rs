@@ -2,14 +2,16 @@
 
 mod bounded;
 mod folder;
+mod journal;
 mod lock;
 mod ordinary;
 mod unfinished;
 
 pub use bounded::read_at_most;
 pub use folder::WholeFolder;
+pub use journal::{Journal, JournalLines};
 pub use lock::FolderLock;
-pub use ordinary::{append_ordinary, is_ordinary, open_ordinary, read_line};
+pub use ordinary::{is_ordinary, open_ordinary};
 pub use unfinished::remove_all;
 
 use std::io::{BufWriter, Write};

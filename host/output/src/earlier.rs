@@ -1,7 +1,7 @@
 //! What an earlier run left in an output folder, as its record and its journal say.
 
 use crate::depth::DepthFormat;
-use crate::journal::Journal;
+use crate::journal::FrameJournal;
 use crate::record::{RECORD, SUFFIXES};
 use crate::video::VideoFormat;
 use serde::Deserialize;
@@ -70,7 +70,7 @@ fn bytes_of_record(folder: &Path) -> Option<Vec<u8>> {
 pub(crate) fn earlier_files(folder: &Path) -> BTreeSet<String> {
     let recorded = recorded_targets(folder);
     let videos = recorded.iter().flat_map(|_| VideoFormat::ALL).map(|format| format!("video.{format}"));
-    let finished = Journal::files_of_any_run(folder);
+    let finished = FrameJournal::files_of_any_run(folder);
     let of_targets = recorded.iter().flatten().flat_map(|target| files_of(target));
     let is_there = |name: &String| {
         let is_inside = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));

@@ -5,10 +5,9 @@
 
 use crate::record::FrameRecord;
 use serde::{Deserialize, Serialize};
-use std::fs::{self, File};
-use std::io::{BufReader, Write};
+use std::fs;
 use std::path::{Path, PathBuf};
-use viewfuse_job::files::{WriteError, append_ordinary, open_ordinary, read_line, remove_if_there};
+use viewfuse_job::files::{Journal, JournalLines, WriteError, remove_if_there};
 
 /// Name of the file.
 pub const JOURNAL: &str = "frames.jsonl";
@@ -43,20 +42,20 @@ struct FinishedFiles {
 
 /// The journal of a run.
 #[derive(Debug)]
-pub struct Journal {
+pub struct FrameJournal {
     path: PathBuf,
     run: String,
     /// How much of the file is whole and of this run.
     whole: u64,
-    file: Option<File>,
+    lines: Option<Journal>,
 }
 
 /// A journal that is there, behind its first line.
 struct Reading {
     path: PathBuf,
-    reader: BufReader<File>,
-    /// Which run it is of, and how long the first line is; `None` if that is not whole.
-    head: Option<(Head, u64)>,
+    lines: JournalLines,
+    /// Which run it is of; `None` if the first line is not whole.
+    head: Option<Head>,
 }
 
 impl Reading {
@@ -64,48 +63,45 @@ impl Reading {
     fn open(folder: &Path) -> Result<Option<Reading>, WriteError> {
         let path = folder.join(JOURNAL);
         let failed = |cause| WriteError::Io { path: path.clone(), cause };
-        let Some(file) = open_ordinary(&path).map_err(failed)? else { return Ok(None) };
-        let mut reader = BufReader::new(file);
-        // What has a longer line is not of this program.
-        let Ok(line) = read_line(&mut reader, MAX_LINE) else { return Err(WriteError::NotOwn { path }) };
-        if line.ends_with(b"\n") {
-            return match serde_json::from_slice(&line) {
-                Ok(head) => Ok(Some(Reading { path, reader, head: Some((head, line.len() as u64)) })),
-                Err(_) => Err(WriteError::NotOwn { path }),
-            };
+        let Some(mut lines) = JournalLines::open(&path, MAX_LINE).map_err(failed)? else { return Ok(None) };
+        let head = match lines.next_line() {
+            Ok(Some(line)) => serde_json::from_slice(&line).ok(),
+            // A kill in the middle of the first line.
+            Ok(None) if lines.is_begun_like(BEGINNING) => return Ok(Some(Reading { path, lines, head: None })),
+            // What has a longer line is not of this program.
+            Ok(None) | Err(_) => None,
+        };
+        match head {
+            Some(head) => Ok(Some(Reading { path, lines, head: Some(head) })),
+            None => Err(WriteError::NotOwn { path }),
         }
-        // A kill in the middle of the first line.
-        let is_own = line.starts_with(BEGINNING) || BEGINNING.starts_with(&line);
-        if is_own { Ok(Some(Reading { path, reader, head: None })) } else { Err(WriteError::NotOwn { path }) }
     }
 
     /// The next line that is whole.
     fn line(&mut self) -> Result<Option<Vec<u8>>, WriteError> {
-        let line = read_line(&mut self.reader, MAX_LINE);
-        let line = line.map_err(|cause| WriteError::Io { path: self.path.clone(), cause })?;
-        Ok(Some(line).filter(|line| line.ends_with(b"\n")))
+        self.lines.next_line().map_err(|cause| WriteError::Io { path: self.path.clone(), cause })
     }
 }
 
-impl Journal {
+impl FrameJournal {
     /// The journal of a folder for a run, and the frames that an earlier start of the same run has finished: those whose
     /// files are all there. `run` is any text that differs for runs that would write different frames. Nothing is
     /// written yet.
     ///
     /// # Errors
     /// [`WriteError::Io`] if there is a journal that cannot be read, [`WriteError::NotOwn`] if what has its name is none.
-    pub fn open(folder: &Path, run: &str) -> Result<(Journal, Vec<FinishedFrame>), WriteError> {
-        let mut journal = Journal { path: folder.join(JOURNAL), run: run.to_owned(), whole: 0, file: None };
+    pub fn open(folder: &Path, run: &str) -> Result<(FrameJournal, Vec<FinishedFrame>), WriteError> {
+        let mut journal = FrameJournal { path: folder.join(JOURNAL), run: run.to_owned(), whole: 0, lines: None };
         let mut frames: Vec<FinishedFrame> = Vec::new();
         let Some(mut reading) = Reading::open(folder)? else { return Ok((journal, frames)) };
-        let Some((_, length)) = reading.head.take().filter(|(head, _)| head.run == run) else {
+        if reading.head.as_ref().is_none_or(|head| head.run != run) {
             return Ok((journal, frames));
-        };
-        journal.whole = length;
+        }
+        journal.whole = reading.lines.whole();
         while let Some(line) = reading.line()? {
             // What another program wrote ends it.
             let Ok(finished) = serde_json::from_slice::<FinishedFrame>(&line) else { break };
-            journal.whole += line.len() as u64;
+            journal.whole = reading.lines.whole();
             if finished.files.iter().all(|file| folder.join(file).is_file()) {
                 frames.retain(|earlier| earlier.frame.target != finished.frame.target);
                 frames.push(finished);
@@ -141,7 +137,7 @@ impl Journal {
     /// # Errors
     /// [`WriteError`].
     pub fn begin(&mut self) -> Result<(), WriteError> {
-        if self.file.is_some() {
+        if self.lines.is_some() {
             return Ok(());
         }
         let failed = |cause| WriteError::Io { path: self.path.clone(), cause };
@@ -150,13 +146,12 @@ impl Journal {
             // Nothing is cut that appeared in the meantime and is not of this program.
             Reading::open(folder)?;
         }
-        let mut file = append_ordinary(&self.path).map_err(failed)?;
-        file.set_len(self.whole).map_err(failed)?;
+        let mut lines = Journal::append(&self.path).map_err(failed)?;
+        lines.cut(self.whole).map_err(failed)?;
         if self.whole == 0 {
-            let head = line_of(&self.path, &Head { run: self.run.clone() })?;
-            file.write_all(&head).map_err(failed)?;
+            lines.add(line_of(&self.path, &Head { run: self.run.clone() })?).map_err(failed)?;
         }
-        self.file = Some(file);
+        self.lines = Some(lines);
         Ok(())
     }
 
@@ -167,7 +162,7 @@ impl Journal {
     pub fn add(&mut self, finished: &FinishedFrame) -> Result<(), WriteError> {
         self.begin()?;
         let line = line_of(&self.path, finished)?;
-        let written = self.file.as_mut().map_or(Ok(()), |file| file.write_all(&line));
+        let written = self.lines.as_mut().map_or(Ok(()), |lines| lines.add(line));
         written.map_err(|cause| WriteError::Io { path: self.path.clone(), cause })
     }
 
@@ -176,14 +171,11 @@ impl Journal {
     /// # Errors
     /// [`WriteError`].
     pub fn remove(self) -> Result<(), WriteError> {
-        drop(self.file);
+        drop(self.lines);
         remove_if_there(&self.path)
     }
 }
 
 fn line_of(path: &Path, value: &impl Serialize) -> Result<Vec<u8>, WriteError> {
-    let encoded = serde_json::to_vec(value);
-    let mut line = encoded.map_err(|cause| WriteError::Encode { path: path.to_path_buf(), cause: cause.into() })?;
-    line.push(b'\n');
-    Ok(line)
+    serde_json::to_vec(value).map_err(|cause| WriteError::Encode { path: path.to_path_buf(), cause: cause.into() })
 }

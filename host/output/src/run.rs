@@ -5,7 +5,7 @@
 
 use crate::depth::{DepthFormat, write_depth};
 use crate::earlier::{earlier_files, files_of};
-use crate::journal::{FinishedFrame, Journal};
+use crate::journal::{FinishedFrame, FrameJournal};
 use crate::png::{without_background, write_png};
 use crate::rate::FrameRate;
 use crate::record::{
@@ -54,7 +54,7 @@ pub struct RunWriter {
     outputs: Outputs,
     /// From the beginning if the folder is there, otherwise from the first file.
     lock: Option<FolderLock>,
-    journal: Option<Journal>,
+    journal: Option<FrameJournal>,
     continued: usize,
     /// The targets' names, in their order.
     target_names: Vec<String>,
@@ -152,7 +152,7 @@ impl RunWriter {
     /// [`WriteError::Io`] if there is a journal that cannot be read.
     pub fn resume(&mut self, run: &str) -> Result<BTreeSet<String>, WriteError> {
         self.lock()?;
-        let (journal, mut finished) = Journal::open(&self.folder, run)?;
+        let (journal, mut finished) = FrameJournal::open(&self.folder, run)?;
         finished.retain(|earlier| self.target_names.contains(&earlier.frame.target));
         if finished.len() == self.target_names.len() {
             // The run's background and size are known from a frame.
@@ -241,7 +241,7 @@ impl RunWriter {
         let earlier = earlier_files(&self.folder);
         match &mut self.journal {
             Some(journal) => journal.begin()?,
-            None => Journal::remove_any(&self.folder)?,
+            None => FrameJournal::remove_any(&self.folder)?,
         }
         earlier.difference(&own).try_for_each(|file| remove_if_there(&self.folder.join(file)))?;
         remove_if_there(&self.folder.join(RECORD))
@@ -313,7 +313,7 @@ impl RunWriter {
         let json = serde_json::to_vec_pretty(&record)
             .map_err(|cause| WriteError::Encode { path: path.clone(), cause: cause.into() })?;
         write_whole(&path, &json)?;
-        self.journal.map_or(Ok(()), Journal::remove)?;
+        self.journal.map_or(Ok(()), FrameJournal::remove)?;
         Ok(record)
     }
 

@@ -4,12 +4,11 @@ use super::FolderError;
 use crate::Score;
 use serde::{Deserialize, Serialize};
 use std::fmt;
-use std::fs::{self, File, TryLockError};
-use std::io::{BufReader, Write};
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
-use viewfuse_job::files::{WriteError, append_ordinary, open_ordinary, read_line};
+use viewfuse_job::files::{Journal, JournalLines, WriteError};
 
 /// The jobs of a process: those whose number modulo `count` is `index`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -141,26 +140,24 @@ mod score_lines {
 
 /// The journal of one shard. While it is open, no other process opens it.
 #[derive(Debug)]
-pub struct Journal {
+pub struct JobJournal {
     path: PathBuf,
-    file: File,
+    lines: Journal,
 }
 
-impl Journal {
-    pub(super) fn open(folder: &Path, shard: Shard) -> Result<Journal, FolderError> {
+impl JobJournal {
+    pub(super) fn open(folder: &Path, shard: Shard) -> Result<JobJournal, FolderError> {
         let path = folder.join(format!("scores-{}-of-{}.jsonl", shard.index, shard.count));
         let failed = |doing, cause| FolderError::Io { path: path.clone(), doing, cause };
-        let file = append_ordinary(&path).map_err(|cause| failed("cannot be opened", cause))?;
-        // File systems without locks still work.
-        if let Err(TryLockError::WouldBlock) = file.try_lock() {
+        let lines = Journal::append(&path).map_err(|cause| failed("cannot be opened", cause))?;
+        if !lines.lock() {
             return Err(FolderError::Busy { path });
         }
         // Nothing is cut before all of it is known to be of an evaluation.
         if let Some(whole) = check(&path)? {
-            let cut = file.set_len(whole);
-            cut.map_err(|cause| failed("its unfinished last line cannot be removed", cause))?;
+            lines.cut(whole).map_err(|cause| failed("its unfinished last line cannot be removed", cause))?;
         }
-        Ok(Journal { path, file })
+        Ok(JobJournal { path, lines })
     }
 
     /// Adds a finished job; it is on disk when this returns.
@@ -169,11 +166,9 @@ impl Journal {
     /// [`FolderError`].
     pub fn add(&mut self, finished: &Finished) -> Result<(), FolderError> {
         let path = || self.path.clone();
-        let mut line =
+        let line =
             serde_json::to_vec(finished).map_err(|cause| FolderError::Json { path: path(), line: None, cause })?;
-        line.push(b'\n');
-        let written = self.file.write_all(&line).and_then(|()| self.file.sync_data());
-        written.map_err(|cause| FolderError::Io { path: path(), doing: "cannot be written", cause })
+        self.lines.add(line).map_err(|cause| FolderError::Io { path: path(), doing: "cannot be written", cause })
     }
 }
 
@@ -197,11 +192,9 @@ pub(super) fn journals(folder: &Path) -> Result<Vec<PathBuf>, FolderError> {
 /// # Errors
 /// [`FolderError`]: above all, if it is a file of somebody else's.
 pub(super) fn check(path: &Path) -> Result<Option<u64>, FolderError> {
-    let mut whole = 0;
-    let unfinished = each_line(path, |length, _| whole += length)?;
-    let is_own = unfinished.starts_with(BEGINNING) || BEGINNING.starts_with(&unfinished);
-    if is_own {
-        Ok((!unfinished.is_empty()).then_some(whole))
+    let Some(lines) = each_line(path, drop)? else { return Ok(None) };
+    if lines.is_begun_like(BEGINNING) {
+        Ok((!lines.unfinished().is_empty()).then_some(lines.whole()))
     } else {
         Err(WriteError::NotOwn { path: path.to_path_buf() }.into())
     }
@@ -210,23 +203,19 @@ pub(super) fn check(path: &Path) -> Result<Option<u64>, FolderError> {
 /// The finished jobs of a journal. A last line without a line break is being written or is incomplete, and is ignored.
 pub(super) fn read(path: &Path) -> Result<Vec<Finished>, FolderError> {
     let mut jobs = Vec::new();
-    each_line(path, |_, finished| jobs.push(finished))?;
+    each_line(path, |finished| jobs.push(finished))?;
     Ok(jobs)
 }
 
-/// Calls `each` with the length of every whole line and what it says; returns the last line if it is not whole.
-fn each_line(path: &Path, mut each: impl FnMut(u64, Finished)) -> Result<Vec<u8>, FolderError> {
+/// Calls `each` with what every whole line says; returns the lines behind the last one, if there is a journal.
+fn each_line(path: &Path, mut each: impl FnMut(Finished)) -> Result<Option<JournalLines>, FolderError> {
     let failed = |cause| FolderError::Io { path: path.to_path_buf(), doing: "cannot be read", cause };
-    let Some(file) = open_ordinary(path).map_err(failed)? else { return Ok(Vec::new()) };
-    let mut reader = BufReader::new(file);
-    for number in 1.. {
-        let line = read_line(&mut reader, MAX_LINE).map_err(failed)?;
-        if !line.ends_with(b"\n") {
-            return Ok(line);
-        }
-        let finished = serde_json::from_slice(&line);
+    let Some(mut lines) = JournalLines::open(path, MAX_LINE).map_err(failed)? else { return Ok(None) };
+    let mut number = 1;
+    while let Some(line) = lines.next_line().map_err(failed)? {
         let of_line = |cause| FolderError::Json { path: path.to_path_buf(), line: Some(number), cause };
-        each(line.len() as u64, finished.map_err(of_line)?);
+        each(serde_json::from_slice(&line).map_err(of_line)?);
+        number += 1;
     }
-    Ok(Vec::new())
+    Ok(Some(lines))
 }

@@ -33,7 +33,7 @@ pub fn open_ordinary(path: &Path) -> io::Result<Option<File>> {
 ///
 /// # Errors
 /// As [`is_ordinary`], or what the system says.
-pub fn append_ordinary(path: &Path) -> io::Result<File> {
+pub(super) fn append_ordinary(path: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
     options.append(true).read(true);
     if is_ordinary(path)? {
@@ -50,7 +50,7 @@ pub fn append_ordinary(path: &Path) -> io::Result<File> {
 ///
 /// # Errors
 /// If it has more than `most` bytes, or what the system says.
-pub fn read_line(reader: &mut impl BufRead, most: u64) -> io::Result<Vec<u8>> {
+pub(super) fn read_line(reader: &mut impl BufRead, most: u64) -> io::Result<Vec<u8>> {
     let mut line = Vec::new();
     reader.take(most).read_until(b'\n', &mut line)?;
     let is_cut = line.len() as u64 == most && !line.ends_with(b"\n");
