@@ -30,3 +30,9 @@ export function pannedView({ pose, focus }, { lens }, across, below) {
   const offset = add(times(pose.right, -across * width), times(pose.down, -below * width));
   return { pose: { ...pose, centre: add(pose.centre, offset) }, focus: add(focus, offset) };
 }
+
+// What hands do to a view: `read` gives the view and its scene, `show` takes the view that comes of them.
+export function orbitActions(read, show) {
+  const change = (become) => (...by) => show(become(...read(), ...by));
+  return { turn: change(turnedView), move: change(movedView), pan: change(pannedView) };
+}

@@ -1,7 +1,10 @@
 // Outlines of cameras: frusta as lines.
 
+import { css } from './colours.js';
 import { inCamera } from './poses.js';
 import { add, sub, times } from './vectors.js';
+
+export const NEAR = 1e-3;           // of the cameras' distance: where lines are cut before the eye
 
 // The centre and the corners of a camera's image, at a depth.
 export function frustum({ pose: own, lens }, depth) {
@@ -35,4 +38,18 @@ export function drawFrustum(context, eye, project, points, colour, width, near) 
   }
   context.stroke();
   return seen;
+}
+
+// Cameras as frusta of a depth, coloured by their weights, the greatest last: the places and the tips of those that are drawn.
+// `distance` is the cameras' usual one; without `isOutside` the eye is among them.
+export function drawCameras(context, eye, project, { cameras, weights, depth, distance, ratio, isOutside }) {
+  const most = Math.max(...weights, 1e-9);
+  const order = weights.map((_, i) => i).sort((a, b) => weights[a] - weights[b]);
+  // Cameras beside the eye would cover everything and show nothing.
+  const isDrawn = (i) => isOutside || inCamera(eye, cameras[i].pose.centre)[2] >= 0.1 * distance;
+  return order.filter(isDrawn).map((i) => {
+    const share = weights[i] / most;
+    const points = frustum(cameras[i], depth);
+    return [i, drawFrustum(context, eye, project, points, css(share), (1 + 2 * share) * ratio, NEAR * distance)[0]];
+  });
 }

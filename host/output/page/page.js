@@ -1,9 +1,9 @@
 // A scene of Gaussians as one file: the picture, the source cameras and their weights for the view on the screen.
 
-import { css } from './colours.js';
 import { listenToHands, listenToKeys } from './hands.js';
-import { movedView, pannedView, turnedView } from './orbits.js';
+import { orbitActions } from './orbits.js';
 import { poseOf } from './poses.js';
+import { cameraButton, tellShares } from './shares.js';
 import { stageOf } from './stage.js';
 import { weightsOf } from './weights.js';
 
@@ -13,27 +13,13 @@ told.cameras = told.cameras.map((camera) => ({ ...camera, pose: poseOf(camera.po
 
 function listOf(cameras, go) {
   return cameras.map((camera) => {
-    const [item, button, name, bar, value] = ['li', 'button', 'span', 'div', 'output'].map((own) => document.createElement(own));
-    button.type = 'button';
-    button.title = `Go to the camera of ${camera.name}`;
+    const [item, name] = ['li', 'span'].map((own) => document.createElement(own));
+    const parts = cameraButton(camera.name, () => go(camera));
     name.textContent = camera.name;
-    bar.className = 'bar';
-    bar.append(document.createElement('span'));
-    button.append(name, bar, value);
-    button.addEventListener('click', () => go(camera));
-    item.append(button);
+    parts.button.append(name, parts.bar, parts.value);
+    item.append(parts.button);
     element('sources').append(item);
-    return { bar: bar.firstChild, value };
-  });
-}
-
-function tell(parts, weights) {
-  const most = Math.max(...weights, 1e-9);
-  weights.forEach((weight, i) => {
-    parts[i].value.textContent = `${(100 * weight).toFixed(1)} %`;
-    parts[i].value.dataset.weight = weight;
-    parts[i].bar.style.width = `${100 * weight / most}%`;
-    parts[i].bar.style.background = css(weight / most);
+    return parts;
   });
 }
 
@@ -57,18 +43,16 @@ async function begin() {
   const start = told.cameras[told.start];
   let view = { pose: start.pose, focus: told.focus };
   let lens = start.lens;
-  const parts = listOf(told.cameras, (camera) => show({ pose: camera.pose, focus: told.focus }, camera.lens));
+  const buttons = listOf(told.cameras, (camera) => show({ pose: camera.pose, focus: told.focus }, camera.lens));
   function show(own, through = lens) {
     [view, lens] = [own, through];
     const weights = weightsOf(told.cameras, view.pose);
-    tell(parts, weights);
+    tellShares(buttons, weights);
     stage.show(view, lens, weights);
   }
-  const change = (become) => (...by) => show(become(view, { up: told.up, distance: told.distance, lens }, ...by));
   const back = () => show({ pose: start.pose, focus: told.focus }, start.lens);
-  const actions = {
-    isReady: () => true, start() {}, turn: change(turnedView), move: change(movedView), pan: change(pannedView),
-  };
+  const read = () => [view, { up: told.up, distance: told.distance, lens }];
+  const actions = { isReady: () => true, start() {}, ...orbitActions(read, show) };
   listenToHands(element('picture'), actions);
   listenToKeys(actions, back);
   element('home').addEventListener('click', back);

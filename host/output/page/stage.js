@@ -1,9 +1,7 @@
 // The picture: the viewer's canvas, and the outlines of the source cameras over it.
 
-import { css } from './colours.js';
 import { splatData } from './gaussians.js';
-import { drawFrustum, frustum } from './outlines.js';
-import { inCamera } from './poses.js';
+import { drawCameras } from './outlines.js';
 import { sub, times } from './vectors.js';
 
 const STILL = 300;           // milliseconds after the last order of the Gaussians in which another one may come
@@ -43,15 +41,8 @@ export function stageOf(viewer, told, canvas, overlay) {
     const project = ([x, y, z]) => [
       camera.data.fx * x / z + overlay.width / 2, camera.data.fy * y / z + overlay.height / 2,
     ];
-    const most = Math.max(...weights, 1e-9);
-    const order = weights.map((_, i) => i).sort((a, b) => weights[a] - weights[b]);
-    for (const i of order) {
-      const own = told.cameras[i];
-      // Cameras beside the eye would cover everything and show nothing.
-      if (inCamera(view.pose, own.pose.centre)[2] < 0.1 * told.distance) continue;
-      const points = frustum(own, 0.12 * told.distance);
-      drawFrustum(context, view.pose, project, points, css(weights[i] / most), 1 + 2 * weights[i] / most, 1e-3 * told.distance);
-    }
+    const { cameras, distance } = told;
+    drawCameras(context, view.pose, project, { cameras, weights, depth: 0.12 * distance, distance, ratio: 1 });
   }
 
   function draw(time) {

@@ -19,14 +19,15 @@ use viewfuse_job::files::{WriteError, write_whole};
 use viewfuse_scene::gaussians::{Gaussian, GaussianScene};
 use viewfuse_scene::rig::Rig;
 
-use crate::scripts::{COLOURS, HANDS, ORBITS, OUTLINES, POSES, Script, VECTORS, joined};
+use crate::scripts::{BASE_STYLE, COLOURS, HANDS, ORBITS, OUTLINES, POSES, SHARES, Script, VECTORS, joined};
 
 /// Scripts in the order of their imports.
-const SCRIPTS: [Script; 10] = [
+const SCRIPTS: [Script; 11] = [
     VECTORS,
     POSES,
     COLOURS,
     OUTLINES,
+    SHARES,
     ORBITS,
     HANDS,
     Script { name: "weights.js", text: include_str!("../page/weights.js") },
@@ -64,7 +65,7 @@ pub fn write_html(path: &Path, page: &GaussianPage<'_>) -> Result<(), WriteError
     let [red, green, blue] = page.background.map(level);
     let values = HashMap::from([
         ("title", escaped(page.title)),
-        ("style", STYLE.to_owned()),
+        ("style", format!("{BASE_STYLE}{STYLE}")),
         ("count", page.scene.gaussians.len().to_string()),
         ("source_count", page.cameras.len().to_string()),
         ("background", format!("rgb({red} {green} {blue})")),

@@ -3,7 +3,7 @@
 import { listenToHands, listenToKeys } from './hands.js';
 import { stop } from './keyframes.js';
 import { drawMapSoon } from './map.js';
-import { movedView, pannedView, turnedView } from './orbits.js';
+import { orbitActions } from './orbits.js';
 import { turnedPose } from './poses.js';
 import { changed } from './requests.js';
 import { state } from './state.js';
@@ -20,17 +20,10 @@ export function back() {
   goTo(state.scene.start, state.scene.focus);
 }
 
-const change = (become) => (...by) => {
-  const { pose, focus } = become(state, state.scene, ...by);
-  goTo(pose, focus);
-};
-
 const ACTIONS = {
   isReady: () => state.scene !== null,
   start: stop,
-  turn: change(turnedView),
-  move: change(movedView),
-  pan: change(pannedView),
+  ...orbitActions(() => [state, state.scene], ({ pose, focus }) => goTo(pose, focus)),
 };
 
 export function listenToPicture(canvas) {

@@ -1,8 +1,8 @@
 // The map: the cameras and the subject, seen from outside.
 
 import { fitted } from './canvas.js';
-import { NEAR, drawSources } from './frusta.js';
-import { drawFrustum, frustum } from './outlines.js';
+import { drawSources } from './frusta.js';
+import { NEAR, drawFrustum, frustum } from './outlines.js';
 import { MIN_SEEN } from './picture.js';
 import { inCamera, lookAt } from './poses.js';
 import { element, state } from './state.js';

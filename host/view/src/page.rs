@@ -1,6 +1,6 @@
 //! The page's files, which are part of the program.
 
-use viewfuse_output::scripts::{COLOURS, HANDS, ORBITS, OUTLINES, POSES, Script, VECTORS};
+use viewfuse_output::scripts::{BASE_STYLE, COLOURS, HANDS, ORBITS, OUTLINES, POSES, SHARES, Script, VECTORS};
 
 /// A file that the page consists of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,19 +17,25 @@ const fn script(name: &'static str, text: &'static str) -> PageFile {
     PageFile { name, media_type: "text/javascript; charset=utf-8", text }
 }
 
+const fn style(name: &'static str, text: &'static str) -> PageFile {
+    PageFile { name, media_type: "text/css; charset=utf-8", text }
+}
+
 /// A script that pages share.
 const fn shared(own: Script) -> PageFile {
     script(own.name, own.text)
 }
 
 /// All of them. Scripts are modules in the order of their imports.
-pub(crate) const FILES: [PageFile; 25] = [
+pub(crate) const FILES: [PageFile; 27] = [
     PageFile { name: "", media_type: "text/html; charset=utf-8", text: include_str!("../page/index.html") },
-    PageFile { name: "view.css", media_type: "text/css; charset=utf-8", text: include_str!("../page/view.css") },
+    style("base.css", BASE_STYLE),
+    style("view.css", include_str!("../page/view.css")),
     shared(VECTORS),
     shared(POSES),
     shared(COLOURS),
     shared(OUTLINES),
+    shared(SHARES),
     shared(ORBITS),
     shared(HANDS),
     script("canvas.js", include_str!("../page/canvas.js")),
@@ -53,7 +59,7 @@ pub(crate) const FILES: [PageFile; 25] = [
 
 #[cfg(test)]
 mod tests {
-    use super::{COLOURS, FILES, HANDS, ORBITS, OUTLINES, POSES, VECTORS};
+    use super::{COLOURS, FILES, HANDS, ORBITS, OUTLINES, POSES, SHARES, VECTORS};
     use std::collections::BTreeSet;
 
     /// Most lines of a file of the page.
@@ -77,8 +83,9 @@ mod tests {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/page");
         let entries = std::fs::read_dir(folder).expect("the folder").map(|entry| entry.expect("a file").file_name());
         let mut there: BTreeSet<String> = entries.map(|name| name.to_string_lossy().into_owned()).collect();
-        for script in [VECTORS, POSES, COLOURS, OUTLINES, ORBITS, HANDS] {
-            assert!(there.insert(script.name.to_owned()), "{} is shared and there", script.name);
+        let scripts = [VECTORS, POSES, COLOURS, OUTLINES, SHARES, ORBITS, HANDS].map(|script| script.name);
+        for name in scripts.into_iter().chain(["base.css"]) {
+            assert!(there.insert(name.to_owned()), "{name} is shared and there");
         }
         let served = FILES.iter().map(|file| if file.name.is_empty() { "index.html" } else { file.name });
         assert_eq!(there, served.map(str::to_owned).collect());
