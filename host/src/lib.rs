@@ -23,7 +23,7 @@ pub use viewfuse_weighting as weighting;
 pub mod prelude {
     pub use crate::device::cpu::Cpu;
     pub use crate::field::On;
-    pub use crate::field::render::{Frame, RenderOptions, render, render_all};
+    pub use crate::field::render::{Frame, RenderOptions, RenderRun, render, render_all};
     pub use crate::field::training_free::TrainingFree;
     pub use crate::job::progress::{Progress, Silent};
     pub use crate::scene::Scene;

@@ -9,7 +9,7 @@ use viewfuse::device::Device;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::vulkan::Vulkan;
 use viewfuse::field::On;
-use viewfuse::field::render::{Frame, RenderError, RenderOptions, render};
+use viewfuse::field::render::{Frame, RenderError, RenderOptions, RenderRun, render};
 use viewfuse::field::training_free::TrainingFree;
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
@@ -56,7 +56,8 @@ impl Rendering {
             Ok(())
         };
         let renderer = On { device, field: &TrainingFree::default() };
-        render(&scene, &job, &weighting, &renderer, &options, &Silent, keep)?;
+        let run = RenderRun { scene: &scene, job: &job, renderer: &renderer, options: &options, progress: &Silent };
+        render(&run, &weighting, keep)?;
         Ok(rendering)
     }
 

@@ -7,7 +7,7 @@ use viewfuse::device::cpu::Cpu;
 use viewfuse::device::{Device, Memory, Transfers};
 use viewfuse::field::On;
 use viewfuse::field::pixelnerf::{Architecture, Omissions, PixelNerf, PixelNerfOptions, Sampling, test_networks};
-use viewfuse::field::render::{Frame, RenderError, RenderOptions, render};
+use viewfuse::field::render::{Frame, RenderError, RenderOptions, RenderRun, render};
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::Selection;
@@ -54,7 +54,9 @@ fn picture<D: Device + Sync>(device: &D, omissions: Omissions, targets: &str) ->
         Ok(())
     };
     let weighting = Weighting::open("error:alpha=1").expect("a scheme");
-    render(&scene, &job, &weighting, &On { device, field: &field }, &options, &Silent, keep)?;
+    let renderer = On { device, field: &field };
+    let run = RenderRun { scene: &scene, job: &job, renderer: &renderer, options: &options, progress: &Silent };
+    render(&run, &weighting, keep)?;
     Ok(colours)
 }
 

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::auto::{self, Chosen, HOLD_OUT, choose, schemes};
 use viewfuse::field::pixelnerf::{Architecture, PixelNerf, PixelNerfOptions, test_networks};
-use viewfuse::field::render::{Frame, RenderError, RenderOptions, Stage, render};
+use viewfuse::field::render::{Frame, RenderError, RenderOptions, RenderRun, Stage, render};
 use viewfuse::field::training_free::TrainingFree;
 use viewfuse::field::{Field, On};
 use viewfuse::job::progress::{Interrupted, Progress, Silent};
@@ -53,11 +53,13 @@ fn chosen(
 fn automatic(scene: &Scene) -> Result<(Vec<Frame>, Chosen), Box<dyn Error>> {
     let field = TrainingFree::default();
     let (renderer, mut frames) = (On { device: &Cpu, field: &field }, Vec::new());
-    let (_, chosen) = auto::render(scene, &middle(scene), &renderer, &options(), &Silent, |_, frame, _| {
+    let (job, options) = (middle(scene), options());
+    let run = RenderRun { scene, job: &job, renderer: &renderer, options: &options, progress: &Silent };
+    let (_, chosen) = auto::render(&run, None, |_, frame, _| {
         frames.push(frame);
         Ok::<(), RenderError>(())
     })?;
-    Ok((frames, chosen))
+    Ok((frames, chosen.ok_or("nothing was given")?))
 }
 
 #[test]
@@ -69,8 +71,9 @@ fn what_is_chosen_is_what_is_rendered() -> Result<(), Box<dyn Error>> {
     let renderer = On { device: &Cpu, field: &field };
     let (settings, mixture) = (chosen.settings.clone(), chosen.mixture.clone());
     let given = RenderOptions { settings, mixture, ..options() };
-    let mut same = Vec::new();
-    render(&scene, &middle(&scene), &chosen.weighting, &renderer, &given, &Silent, |_, frame| {
+    let (job, mut same) = (middle(&scene), Vec::new());
+    let run = RenderRun { scene: &scene, job: &job, renderer: &renderer, options: &given, progress: &Silent };
+    render(&run, &chosen.weighting, |_, frame| {
         same.push(frame);
         Ok::<(), RenderError>(())
     })?;
@@ -131,10 +134,12 @@ fn pictures_are_mixed_where_that_is_not_worse() -> Result<(), Box<dyn Error>> {
             // What is mixed is the pictures under the settings of the parts.
             let field = TrainingFree::default();
             let renderer = On { device: &Cpu, field: &field };
-            let mut levels = vec![Vec::new(); mixture.parts.len()];
+            let (job, mut levels) = (middle(&scene), vec![Vec::new(); mixture.parts.len()]);
             for (settings, levels) in mixture.parts.iter().zip(&mut levels) {
                 let given = RenderOptions { settings: settings.clone(), ..options() };
-                render(&scene, &middle(&scene), &chosen.weighting, &renderer, &given, &Silent, |_, frame| {
+                let run =
+                    RenderRun { scene: &scene, job: &job, renderer: &renderer, options: &given, progress: &Silent };
+                render(&run, &chosen.weighting, |_, frame| {
                     levels.extend(frame.colours.iter().map(|colour| colour[1]));
                     Ok::<(), RenderError>(())
                 })?;

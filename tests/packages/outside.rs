@@ -7,7 +7,7 @@ use std::sync::Arc;
 use tempfile::TempDir;
 use viewfuse::device::choice::AnyDevice;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::field::render::{Finished, Frame, RenderError, RenderOptions, Stage, render};
+use viewfuse::field::render::{Finished, Frame, RenderError, RenderOptions, RenderRun, Stage, render};
 use viewfuse::field::training_free::TrainingFree;
 use viewfuse::field::{AnyField, On, Renderer};
 use viewfuse::job::progress::Silent;
@@ -61,8 +61,9 @@ fn small() -> RenderOptions {
 
 /// The third view from the others, at 32x32.
 fn frame(renderer: &dyn Renderer, scene: &Scene, weighting: &Weighting) -> (Frame, Finished) {
-    let mut frames = Vec::new();
-    let finished = render(scene, &third(scene), weighting, renderer, &small(), &Silent, |_, frame| {
+    let (job, options, mut frames) = (third(scene), small(), Vec::new());
+    let run = RenderRun { scene, job: &job, renderer, options: &options, progress: &Silent };
+    let finished = render(&run, weighting, |_, frame| {
         frames.push(frame);
         Ok::<_, RenderError>(())
     })
@@ -93,9 +94,10 @@ fn field_layout_and_weighting_of_ones_own_render_together() {
 
     // What a run writes.
     let output = tempfile::tempdir().expect("a folder");
-    let mut writer = RunWriter::new(output.path(), &scene, "lines".to_owned(), &third(&scene), &nearest);
-    let options = small();
-    let finished = render(&scene, &third(&scene), &nearest, renderer.as_ref(), &options, &Silent, |sources, frame| {
+    let (job, options) = (third(&scene), small());
+    let mut writer = RunWriter::new(output.path(), &scene, "lines".to_owned(), &job, &nearest);
+    let run = RenderRun { scene: &scene, job: &job, renderer: renderer.as_ref(), options: &options, progress: &Silent };
+    let finished = render(&run, &nearest, |sources, frame| {
         writer.write(sources, &frame).map_err(Box::<dyn std::error::Error>::from)
     })
     .expect("a picture");

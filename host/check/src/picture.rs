@@ -13,7 +13,7 @@ use viewfuse_core::camera::Camera;
 use viewfuse_core::metrics::psnr;
 use viewfuse_device::choice::AnyDevice;
 use viewfuse_device::cpu::Cpu;
-use viewfuse_field::render::{Frame, RenderError, RenderOptions, render};
+use viewfuse_field::render::{Frame, RenderError, RenderOptions, RenderRun, render};
 use viewfuse_field::{AnyField, Renderer};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
@@ -154,7 +154,7 @@ fn rendered(
         picture = Some(frame.picture);
         Ok(())
     };
-    render(scene, job, &weighting, renderer, options, progress, keep)?;
+    render(&RenderRun { scene, job, renderer, options, progress }, &weighting, keep)?;
     let time = start.elapsed();
     Ok((picture.ok_or("the scene has no view to render")?, time))
 }

@@ -1,4 +1,23 @@
-//! The command line: what each command takes. What each does is in its own file.
+//! The command line: what each command takes. What each does is in its own file; a module uses only those above it.
+//!
+//! ```text
+//! shown            text as a terminal may get it
+//! printing         results and errors
+//! wrong            the error of arguments, and what a build lacks
+//! hints            what helps on from an error of a library
+//! threads          `--threads`
+//! environment      the environment's variables
+//! parse            values of options
+//! table            tables
+//! ending           the end of a process that was told to end
+//! terminal         progress and warnings
+//! outputs          outputs that would replace inputs
+//! options, path, weighting, model, metrics_options
+//!                  options that several commands share
+//! pose, posed      poses of photographs that have none, by themselves or on the way
+//! *                the other commands, a file each
+//! help             the help, and what is said of wrong arguments
+//! ```
 
 mod bench;
 mod check;
@@ -30,15 +49,15 @@ mod select;
 mod shown;
 mod table;
 mod terminal;
+mod threads;
 mod verify;
 mod view;
 mod weighting;
 mod weights;
+mod wrong;
 
-use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::env::args_os;
-use std::fmt::Display;
 use std::process::ExitCode;
 
 #[derive(Parser)]
@@ -102,6 +121,8 @@ pub use parse::parse_size;
 pub use printing::say;
 pub(crate) use printing::{complain, complain_of_arguments};
 pub use terminal::Terminal;
+pub use threads::on_threads;
+pub use wrong::wrong;
 
 fn long_about() -> String {
     format!(
@@ -150,31 +171,4 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
 pub fn listen() -> anyhow::Result<()> {
     terminal::silence_caught_panics();
     Ok(terminal::listen()?)
-}
-
-/// The error of arguments that do not fit the content of a file; the exit code is that of wrong arguments.
-pub fn wrong(message: impl Display) -> anyhow::Error {
-    clap::Error::raw(ErrorKind::ArgumentConflict, format_args!("{message}\n\nFor more information, try '--help'.\n"))
-        .into()
-}
-
-/// That this build lacks something, and how to get it.
-fn not_built(what: &str, feature: &str) -> String {
-    format!(
-        "this build has no {what}; in the repository `cargo run --release --features {feature} -- ...` and \
-         `cargo install --path host/cli --features {feature}` have it, elsewhere \
-         `cargo install --git {} viewfuse-cli --features {feature}`",
-        env!("CARGO_PKG_REPOSITORY")
-    )
-}
-
-/// Runs `work` on this many threads instead of all cores.
-///
-/// # Errors
-/// If the threads cannot be started.
-pub fn on_threads<T: Send>(threads: Option<u16>, work: impl FnOnce() -> T + Send) -> anyhow::Result<T> {
-    match threads {
-        None => Ok(work()),
-        Some(count) => Ok(rayon::ThreadPoolBuilder::new().num_threads(count.into()).build()?.install(work)),
-    }
 }

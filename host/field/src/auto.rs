@@ -29,7 +29,7 @@ pub use held_out::HOLD_OUT;
 
 use crate::held_out::nearest;
 use crate::mixture::NearTargets;
-use crate::render::{Finished, Frame, RenderError, RenderOptions, Stage, render_chosen};
+use crate::render::{Finished, Frame, RenderError, RenderOptions, RenderRun, Stage, render_chosen};
 use crate::standing::Measure;
 pub use crate::standing::Standing;
 use crate::{Mixture, Renderer, Setting, Tunable};
@@ -41,8 +41,6 @@ use serde::Serialize;
 use viewfuse_core::pose::Pose;
 use viewfuse_core::weighting::{Formula, Scheme};
 use viewfuse_job::progress::Progress;
-use viewfuse_scene::Scene;
-use viewfuse_scene::few_shot::FewShot;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_weighting::Weighting;
 
@@ -361,22 +359,25 @@ impl Search<'_, '_> {
     }
 }
 
-/// As [`crate::render::render`], with the choice for the scene. Each frame has its expected score.
+/// As [`crate::render::render`]; without a weighting, under what is chosen for the scene, which `deliver` gets with each frame:
+/// it knows the frame's expected score.
 ///
 /// # Errors
 /// [`RenderError`]; those of `deliver` pass through.
 pub fn render<X: From<RenderError>>(
-    scene: &Scene,
-    job: &FewShot,
-    renderer: &dyn Renderer,
-    options: &RenderOptions,
-    progress: &dyn Progress,
-    deliver: impl FnMut(&SourceImages, Frame, &Chosen) -> Result<(), X>,
-) -> Result<(Finished, Chosen), X> {
+    run: &RenderRun<'_>,
+    weighting: Option<&Weighting>,
+    mut deliver: impl FnMut(&SourceImages, Frame, Option<&Chosen>) -> Result<(), X>,
+) -> Result<(Finished, Option<Chosen>), X> {
     let choose = |stage: &mut Stage<'_>| {
-        let chosen = choose(stage, renderer, options, progress)?;
+        if let Some(given) = weighting {
+            return Ok((given.clone(), None));
+        }
+        let chosen = choose(stage, run.renderer, run.options, run.progress)?;
         stage.tune(&chosen.settings, chosen.mixture.as_ref());
-        Ok((chosen.weighting.clone(), chosen))
+        Ok((chosen.weighting.clone(), Some(chosen)))
     };
-    render_chosen(scene, job, renderer, options, progress, choose, deliver)
+    render_chosen(run, choose, |images: &SourceImages, frame: Frame, chosen: &Option<Chosen>| {
+        deliver(images, frame, chosen.as_ref())
+    })
 }

@@ -30,6 +30,21 @@ use viewfuse_scene::few_shot::FewShot;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_weighting::Weighting;
 
+/// A run of the render loop: what it reads, and what renders.
+#[derive(Clone, Copy)]
+pub struct RenderRun<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// The sources and the targets.
+    pub job: &'a FewShot,
+    /// The field, on its device.
+    pub renderer: &'a dyn Renderer,
+    /// Size, background, and what is omitted.
+    pub options: &'a RenderOptions,
+    /// Reports, and whether the run is to stop.
+    pub progress: &'a dyn Progress,
+}
+
 /// The summary of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finished {
@@ -39,35 +54,27 @@ pub struct Finished {
     pub record: Record,
 }
 
-/// Renders every target view of a job and passes each frame to `deliver` as soon as it is done.
+/// Renders every target view of a run and passes each frame to `deliver` as soon as it is done.
 ///
 /// # Errors
 /// [`RenderError`]; those of `deliver` pass through.
-#[allow(clippy::too_many_arguments)]
 pub fn render<X: From<RenderError>>(
-    scene: &Scene,
-    job: &FewShot,
+    run: &RenderRun<'_>,
     weighting: &Weighting,
-    renderer: &dyn Renderer,
-    options: &RenderOptions,
-    progress: &dyn Progress,
     mut deliver: impl FnMut(&SourceImages, Frame) -> Result<(), X>,
 ) -> Result<Finished, X> {
     let given = |_: &mut Stage<'_>| Ok((weighting.clone(), ()));
     let deliver = |images: &SourceImages, frame: Frame, (): &()| deliver(images, frame);
-    Ok(render_chosen(scene, job, renderer, options, progress, given, deliver)?.0)
+    Ok(render_chosen(run, given, deliver)?.0)
 }
 
 /// The render loop. `choose` sees the prepared sources and returns the weighting with what `deliver` gets beside each frame.
 pub(crate) fn render_chosen<C, X: From<RenderError>>(
-    scene: &Scene,
-    job: &FewShot,
-    renderer: &dyn Renderer,
-    options: &RenderOptions,
-    progress: &dyn Progress,
+    run: &RenderRun<'_>,
     choose: impl FnOnce(&mut Stage<'_>) -> Result<(Weighting, C), RenderError>,
     mut deliver: impl FnMut(&SourceImages, Frame, &C) -> Result<(), X>,
 ) -> Result<(Finished, C), X> {
+    let RenderRun { scene, job, renderer, options, progress } = *run;
     let truths = job.targets.iter().filter_map(|target| target.truth);
     let shown = job.sources.iter().copied().chain(truths);
     let (count, stage_count) = (job.targets.len(), 3 + job.targets.len());
@@ -99,7 +106,8 @@ pub fn render_all(
     options: &RenderOptions,
 ) -> Result<Vec<Frame>, RenderError> {
     let mut frames = Vec::with_capacity(job.targets.len());
-    render(scene, job, weighting, renderer, options, &Silent, |_sources, frame| {
+    let run = RenderRun { scene, job, renderer, options, progress: &Silent };
+    render(&run, weighting, |_sources, frame| {
         frames.push(frame);
         Ok::<(), RenderError>(())
     })?;

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use viewfuse::device::choice::{self, DeviceChoice, DeviceOptions};
 use viewfuse::field::auto::{self, Chosen};
 use viewfuse::field::options::FieldOptions;
-use viewfuse::field::render::{DEFAULT_EARLY_TERMINATION, Frame, RenderOptions, render};
+use viewfuse::field::render::{DEFAULT_EARLY_TERMINATION, Frame, RenderOptions, RenderRun};
 use viewfuse::field::{AnyField, rows};
 use viewfuse::job::progress::Progress;
 use viewfuse::nn::checkpoint::Checkpoint;
@@ -57,23 +57,14 @@ impl Order {
         let renderer = field.on(&device);
         let renderer = renderer.as_ref();
         let mut finished = Vec::with_capacity(job.targets.len());
-        match weighting {
-            Some(weighting) => {
-                let keep = |_: &SourceImages, frame: Frame| {
-                    finished.push(Finished { frame, scheme: weighting.to_string(), expected: None });
-                    Ok::<(), Failure>(())
-                };
-                render(scene, &job, &weighting, renderer, &options, progress, keep)?;
-            }
-            None => {
-                let keep = |_: &SourceImages, frame: Frame, chosen: &Chosen| {
-                    let (scheme, expected) = (chosen.weighting.to_string(), chosen.expected(&frame));
-                    finished.push(Finished { frame, scheme, expected });
-                    Ok::<(), Failure>(())
-                };
-                auto::render(scene, &job, renderer, &options, progress, keep)?;
-            }
-        }
+        let keep = |_: &SourceImages, frame: Frame, chosen: Option<&Chosen>| {
+            let scheme = chosen.map(|chosen| &chosen.weighting).or(weighting.as_ref()).map(ToString::to_string);
+            let expected = chosen.and_then(|chosen| chosen.expected(&frame));
+            finished.push(Finished { frame, scheme: scheme.unwrap_or_default(), expected });
+            Ok::<(), Failure>(())
+        };
+        let run = RenderRun { scene, job: &job, renderer, options: &options, progress };
+        auto::render(&run, weighting.as_ref(), keep)?;
         Ok((job.sources, finished))
     }
 

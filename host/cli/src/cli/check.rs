@@ -1,7 +1,7 @@
 //! `viewfuse check`.
 
 use super::environment::device_options;
-use super::say;
+use super::printing::say;
 use super::table::table;
 use super::terminal::Terminal;
 use clap::Args;

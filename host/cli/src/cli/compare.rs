@@ -4,7 +4,7 @@ mod pairs;
 
 use super::metrics_options::MetricOptions;
 use super::options::DeviceOptions;
-use super::say;
+use super::printing::say;
 use super::table::table;
 use super::terminal::Terminal;
 use anyhow::Context;
@@ -212,5 +212,5 @@ fn distances(predictions: &Features, truths: &Features, seed: u64) -> anyhow::Re
 /// `--fid` was rejected before ([`MetricOptions::open`]).
 #[cfg(not(feature = "fid"))]
 fn distances(_: &Features, _: &Features, _: u64) -> anyhow::Result<[f64; 2]> {
-    Err(super::wrong(super::not_built("FID and KID", "fid")))
+    Err(super::wrong::wrong(super::wrong::not_built("FID and KID", "fid")))
 }

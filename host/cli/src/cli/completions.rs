@@ -1,6 +1,6 @@
 //! `viewfuse completions`: what a shell completes, and manual pages, from the command line itself.
 
-use super::say;
+use super::printing::say;
 use clap::{Args, Command, ValueEnum};
 use clap_complete::{Shell, generate};
 use clap_mangen::Man;

@@ -1,7 +1,7 @@
 //! `viewfuse convert`.
 
 use super::outputs::keep_input;
-use super::say;
+use super::printing::say;
 use super::table::table;
 use super::terminal::Terminal;
 use anyhow::{bail, ensure};

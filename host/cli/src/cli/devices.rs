@@ -1,7 +1,7 @@
 //! `viewfuse devices`.
 
 use super::environment::instance_options;
-use super::say;
+use super::printing::say;
 use super::table::table;
 use clap::Args;
 use serde_json::json;

@@ -1,7 +1,7 @@
 //! `viewfuse export`.
 
 use super::outputs::keep_folder_apart;
-use super::say;
+use super::printing::say;
 use super::terminal::Terminal;
 use clap::Args;
 use std::path::PathBuf;

@@ -4,7 +4,7 @@ mod quality;
 
 use super::outputs::keep_file_apart;
 use super::posed::PoseOption;
-use super::say;
+use super::printing::say;
 use super::table::table;
 use super::terminal::Terminal;
 use clap::Args;

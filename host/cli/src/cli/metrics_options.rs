@@ -1,6 +1,6 @@
 //! The metrics, and the files of their networks' parameters.
 
-use super::{not_built, wrong};
+use super::wrong::{not_built, wrong};
 use anyhow::Context;
 use clap::Args;
 use std::path::{Path, PathBuf};

@@ -11,7 +11,7 @@ mod name;
 pub(crate) use flags::{Flags, SEQUENCE};
 
 use super::options::EFFORTS;
-use super::wrong;
+use super::wrong::wrong;
 use anyhow::Context;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};

@@ -1,10 +1,11 @@
 //! `viewfuse optimise`.
 
-use super::on_threads;
+use super::ending::INTERRUPTED;
 use super::options::{DeviceOptions, PictureOptions, SourceOptions};
 use super::outputs::keep_file_apart;
+use super::printing::say;
 use super::terminal::Terminal;
-use super::{INTERRUPTED, say};
+use super::threads::on_threads;
 use anyhow::bail;
 use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};

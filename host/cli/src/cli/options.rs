@@ -2,7 +2,7 @@
 
 use super::environment::device_options;
 use super::parse::{parse_count, parse_error, parse_seconds, parse_share, parse_size};
-use super::wrong;
+use super::wrong::wrong;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, Command};
 use std::collections::BTreeMap;

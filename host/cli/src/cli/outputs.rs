@@ -1,6 +1,6 @@
 //! Outputs that would replace inputs are refused before work begins.
 
-use super::wrong;
+use super::wrong::wrong;
 use std::fs::canonicalize;
 use std::path::Path;
 use viewfuse_scene::Scene;

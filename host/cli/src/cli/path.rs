@@ -1,7 +1,7 @@
 //! Options of targets along a path.
 
-use super::complain;
 use super::parse::parse_count;
+use super::printing::complain;
 use clap::Args;
 use std::path::PathBuf;
 use viewfuse_core::camera::Camera;

@@ -1,10 +1,10 @@
 //! `viewfuse points`.
 
-use super::on_threads;
 use super::options::{DeviceOptions, PictureOptions, SourceOptions};
 use super::outputs::keep_file_apart;
-use super::say;
+use super::printing::say;
 use super::terminal::Terminal;
+use super::threads::on_threads;
 use anyhow::bail;
 use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};

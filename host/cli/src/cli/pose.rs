@@ -3,8 +3,9 @@
 mod solvers;
 
 use super::outputs::keep_folder_apart;
+use super::printing::say;
 use super::terminal::Terminal;
-use super::{on_threads, say};
+use super::threads::on_threads;
 use anyhow::{Context, bail};
 use clap::Args;
 use image::DynamicImage;

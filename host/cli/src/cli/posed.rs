@@ -2,8 +2,8 @@
 //!
 //! The scene is written beside the photographs, and used again as long as the photographs are the same.
 
-use super::complain;
 use super::pose::find_with_defaults;
+use super::printing::complain;
 use anyhow::bail;
 use clap::Args;
 use std::ffi::OsString;

@@ -1,7 +1,7 @@
 //! `viewfuse verify`.
 
 use super::options::DeviceOptions;
-use super::say;
+use super::printing::say;
 use super::table::table;
 use super::terminal::Terminal;
 use clap::Args;

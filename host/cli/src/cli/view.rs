@@ -3,9 +3,10 @@
 use super::model::ModelOptions;
 use super::options::{BoundOptions, DeviceOptions, PictureOptions, SourceOptions};
 use super::posed::PoseOption;
+use super::printing::say;
 use super::terminal::Terminal;
+use super::threads::on_threads;
 use super::weighting::choice_help;
-use super::{on_threads, say};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};

@@ -1,10 +1,10 @@
 //! `viewfuse weights`.
 
-use super::complain;
 use super::options::SourceOptions;
 use super::outputs::keep_file_apart;
 use super::path::PathOptions;
-use super::say;
+use super::printing::complain;
+use super::printing::say;
 use super::table::table;
 use super::weighting::{many_help, open_all, or_every_scheme};
 use clap::Args;

@@ -1,6 +1,6 @@
 //! Tables of an evaluation on the terminal.
 
-use crate::cli::say;
+use crate::cli::printing::say;
 use crate::cli::table::table;
 use std::io;
 use viewfuse_evaluate::protocol::Published;

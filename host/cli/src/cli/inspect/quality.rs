@@ -1,6 +1,6 @@
 //! The quality to expect, from photographs that are left out, one at a time, and rendered from the others.
 
-use crate::cli::say;
+use crate::cli::printing::say;
 use serde::Serialize;
 use std::time::Instant;
 use viewfuse_device::cpu::Cpu;

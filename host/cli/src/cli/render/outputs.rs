@@ -1,6 +1,6 @@
 //! Options of what a render writes.
 
-use crate::cli::not_built;
+use crate::cli::wrong::not_built;
 use clap::Args;
 use viewfuse_output::depth::{DepthFormat, UnknownDepthFormat};
 use viewfuse_output::rate::FrameRate;

@@ -1,17 +1,16 @@
 //! `viewfuse render -o -`: the pictures as y4m on standard output, one after the other, and no files.
 
+use super::Arguments;
+use super::prepare::Prepared;
+use crate::cli::threads::on_threads;
 use anyhow::Context;
 use image::RgbImage;
 use std::io::{self, BufWriter, StdoutLock, Write};
-use viewfuse_field::Renderer;
 use viewfuse_field::auto;
-use viewfuse_field::render::{Frame, RenderOptions, render};
+use viewfuse_field::render::Frame;
 use viewfuse_job::progress::Progress;
 use viewfuse_output::rate::FrameRate;
 use viewfuse_output::y4m::Y4m;
-use viewfuse_scene::Scene;
-use viewfuse_scene::few_shot::FewShot;
-use viewfuse_weighting::Weighting;
 
 /// What is written, and the size of its frames.
 type Video = (Y4m<BufWriter<StdoutLock<'static>>>, (u32, u32));
@@ -44,29 +43,17 @@ impl Stream {
     }
 }
 
-/// Renders the targets; no scheme stands for the best one.
-pub(super) fn render_to_stdout(
-    scene: &Scene,
-    job: &FewShot,
-    weighting: Option<&Weighting>,
-    renderer: &dyn Renderer,
-    options: &RenderOptions,
-    rate: FrameRate,
-    progress: &dyn Progress,
-) -> anyhow::Result<()> {
-    let mut stream = Stream { rate, video: None };
-    match weighting {
-        Some(weighting) => {
-            let write = |_: &_, frame: Frame| stream.write(&frame.picture);
-            render(scene, job, weighting, renderer, options, progress, write)?;
+/// Renders the targets, and writes nothing else.
+pub(super) fn to_stdout(arguments: &Arguments, prepared: &Prepared, progress: &dyn Progress) -> anyhow::Result<()> {
+    let stream = || {
+        let renderer = prepared.field.on(&prepared.device.device);
+        let mut stream = Stream { rate: prepared.rate, video: None };
+        let write = |_: &_, frame: Frame, _: Option<&_>| stream.write(&frame.picture);
+        auto::render(&prepared.run(renderer.as_ref(), progress), prepared.weighting.as_ref(), write)?;
+        match stream.video {
+            Some((video, _)) => Ok(video.finish().and_then(|mut output| output.flush()).context("standard output")?),
+            None => Ok(()),
         }
-        None => {
-            let write = |_: &_, frame: Frame, _: &auto::Chosen| stream.write(&frame.picture);
-            auto::render(scene, job, renderer, options, progress, write)?;
-        }
-    }
-    match stream.video {
-        Some((video, _)) => Ok(video.finish().and_then(|mut output| output.flush()).context("standard output")?),
-        None => Ok(()),
-    }
+    };
+    on_threads(arguments.picture.threads, stream)?
 }

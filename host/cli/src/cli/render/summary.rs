@@ -1,0 +1,123 @@
+//! What is printed of a run.
+
+use crate::cli::printing::say;
+use std::path::Path;
+use viewfuse_field::auto::{Candidate, Expected, PixelErrors};
+use viewfuse_field::budget::{Estimate, Kept};
+use viewfuse_field::render::Seen;
+use viewfuse_output::record::{ChosenRecord, FrameRecord, RunRecord};
+use viewfuse_output::run::RECORD;
+
+/// From which share on a picture that few photographs show is said to be one.
+const MIN_FEW: f32 = 0.2;
+/// Share of pixels that are expected to be poor from which on a person is told.
+const MIN_POOR: f32 = 0.1;
+
+/// Prints the summary of a run.
+pub(super) fn print(record: &RunRecord, folder: &Path) -> std::io::Result<()> {
+    for frame in &record.frames {
+        say(format_args!("{}", summary(frame, &record.sources, folder)))?;
+    }
+    say(format_args!(
+        "{} from {} sources, {}, {} on {}: {:.2} s",
+        if record.frames.len() == 1 { "1 view".to_owned() } else { format!("{} views", record.frames.len()) },
+        record.sources.len(),
+        record.weighting,
+        record.field,
+        record.device,
+        record.times.total
+    ))?;
+    if record.continued > 0 {
+        say(format_args!("continued: {} of them were there", record.continued))?;
+    }
+    if let Some(chosen) = &record.chosen {
+        say(format_args!("{}", choice(chosen, &record.weighting)))?;
+    }
+    if let Some(largest) = record.kernels.iter().max_by(|a, b| a.share.total_cmp(&b.share)) {
+        let seconds: f64 = record.kernels.iter().map(|kernel| kernel.seconds).sum();
+        let (name, share) = (largest.kernel, 100.0 * largest.share);
+        say(format_args!("kernels took {seconds:.2} s, {share:.0} % of it {name}; all in {RECORD}"))?;
+    }
+    say(format_args!("device: {}, {}", record.device, record.device_reason))
+}
+
+/// What was chosen for the scene, and what it gained.
+fn choice(chosen: &ChosenRecord, weighting: &str) -> String {
+    let ChosenRecord { settings, mixture, candidates, left_out, .. } = chosen;
+    if left_out.is_empty() {
+        return format!("chosen: {weighting}, the default: too few sources to leave one out");
+    }
+    let of = |candidate: &Candidate| candidate.weighting == weighting && candidate.settings == *settings;
+    // A mixture is tried last.
+    let own = match mixture {
+        Some(_) => candidates.last(),
+        None => candidates.iter().find(|candidate| of(candidate)),
+    };
+    let own = own.and_then(|candidate| candidate.psnr).unwrap_or(0.0);
+    let gain = own - candidates.first().and_then(|first| first.psnr).unwrap_or(own);
+    let with = match mixture {
+        Some(mixture) => format!(", {} pictures under different settings mixed by region", mixture.parts.len()),
+        None if settings.is_empty() => String::new(),
+        None => " with settings for these photographs".to_owned(),
+    };
+    let more = if gain > 0.0 { format!(", {gain:.2} dB more than by default") } else { String::new() };
+    let count = left_out.len();
+    format!(
+        "chosen: {weighting}{with}: {count} photographs that were left out have {own:.1} dB{more} (what was tried: {RECORD})"
+    )
+}
+
+fn summary(frame: &FrameRecord, sources: &[String], folder: &Path) -> String {
+    let score = match (frame.psnr, frame.ssim) {
+        (Some(psnr), Some(ssim)) => format!("  PSNR {psnr:.2} dB  SSIM {ssim:.3}"),
+        (Some(psnr), None) => format!("  PSNR {psnr:.2} dB"),
+        _ => String::new(),
+    };
+    let expected = frame.expected.map_or_else(String::new, |Expected { psnr, interval: [low, high], pixels }| {
+        let poor =
+            pixels.filter(|pixels| pixels.poor >= MIN_POOR).map_or_else(String::new, |PixelErrors { poor, .. }| {
+                format!(", {:.0} % of it off by more than a tenth of the range", 100.0 * poor)
+            });
+        format!("  expected PSNR {psnr:.1} dB (80 %: {low:.1} to {high:.1}){poor}")
+    });
+    let left_out = match frame.left_out.len() {
+        0 => String::new(),
+        1 => format!("  1 source left out (weight {:.4})", frame.left_out_weight),
+        count => format!("  {count} sources left out (weight {:.4})", frame.left_out_weight),
+    };
+    let kept = frame.kept.as_ref().map_or_else(String::new, kept);
+    let few = few_photographs(frame, sources).unwrap_or_default();
+    format!("{}{score}{expected}{few}{left_out}{kept}", folder.join(format!("{}.png", frame.target)).display())
+}
+
+/// What a picture lacks, and where to photograph: between the two sources that matter most to it.
+fn few_photographs(frame: &FrameRecord, sources: &[String]) -> Option<String> {
+    let Seen { by_none, by_one } = frame.seen_by.filter(|seen| seen.by_none + seen.by_one >= MIN_FEW)?;
+    let mut order: Vec<usize> = (0..sources.len().min(frame.weights.len())).collect();
+    order.sort_by(|a, b| frame.weights[*b].total_cmp(&frame.weights[*a]));
+    let [first, second, ..] = order[..] else { return None };
+    Some(format!(
+        "  {:.0} % of it seen by fewer than two photographs, {:.0} % by none: photograph from between {} and {}",
+        100.0 * (by_none + by_one),
+        100.0 * by_none,
+        sources[first],
+        sources[second]
+    ))
+}
+
+/// How a frame keeps its bound.
+fn kept(kept: &Kept) -> String {
+    let decibels = |error: f64| -20.0 * error.max(1.0e-6).log10();
+    let error = match kept.error {
+        Some(Estimate { value: 0.0, .. }) | None => String::new(),
+        Some(Estimate { value, upper, .. }) => {
+            format!(", about {:.1} dB from exact (at least {:.1})", decibels(value), decibels(upper))
+        }
+    };
+    let missed = match (kept.is_kept, kept.most_seconds) {
+        (false, Some(most)) => format!("; MORE than the {most} s that were asked for"),
+        (false, None) => "; MORE error than was asked for".to_owned(),
+        (true, _) => String::new(),
+    };
+    format!("  {}{error}, {:.2} s{missed}", kept.effort, kept.seconds)
+}

@@ -1,0 +1,116 @@
+//! The pictures of a render, in a folder with their record and videos.
+
+use super::Arguments;
+use super::identity::run_identity;
+use super::prepare::Prepared;
+use super::summary::print;
+use crate::cli::printing::{complain, say};
+use crate::cli::terminal::Terminal;
+use crate::cli::threads::on_threads;
+use std::collections::BTreeMap;
+use std::path::Path;
+use viewfuse_field::auto::{self, Chosen};
+use viewfuse_field::render::Frame;
+use viewfuse_job::progress::{Part, Progress};
+use viewfuse_output::rate::FrameRate;
+use viewfuse_output::record::RunRecord;
+use viewfuse_output::run::{Circumstances, RunWriter};
+use viewfuse_output::video::VideoFormat;
+use viewfuse_scene::photographs::SourceImages;
+use viewfuse_weighting::Weighting;
+
+/// `values` are all options and their values; `warning` is of the whole run.
+pub(super) fn to_folder(
+    arguments: &Arguments,
+    values: &BTreeMap<String, String>,
+    mut prepared: Prepared,
+    warning: Option<String>,
+    progress: Terminal,
+) -> anyhow::Result<()> {
+    let formats = progress.aside(|| video_formats(arguments));
+    let before = prepared.weighting.clone().unwrap_or_else(Weighting::default_scheme);
+    let label = prepared.folder.display().to_string();
+    let mut writer = RunWriter::new(&arguments.output, &prepared.scene, label, &prepared.job, &before);
+    writer.lock()?;
+    writer.set_outputs(arguments.outputs.outputs());
+    warning.into_iter().for_each(|warning| writer.warn(warning));
+    // Frames that follow from one another are not continued.
+    if arguments.sequence.is_empty() {
+        let files: Vec<&Path> = arguments.files().chain(before.file()).collect();
+        let device = prepared.device.device.name();
+        let run = run_identity(values, &device, &prepared.scene, &prepared.job, &files)?;
+        let finished = writer.resume(&run)?;
+        prepared.job.targets.retain(|target| !finished.contains(&target.name));
+    }
+    let written = || written(arguments, &prepared, writer, &formats, &progress);
+    let (record, videos) = on_threads(arguments.picture.threads, written)??;
+    drop(progress);
+    print(&record, &arguments.output)?;
+    videos.iter().try_for_each(say)?;
+    Ok(())
+}
+
+/// The record of a run whose pictures and videos are written, with a line about each video.
+fn written(
+    arguments: &Arguments,
+    prepared: &Prepared,
+    mut writer: RunWriter,
+    formats: &[VideoFormat],
+    progress: &dyn Progress,
+) -> anyhow::Result<(RunRecord, Vec<String>)> {
+    let renderer = prepared.field.on(&prepared.device.device);
+    // A frame of a video takes a part of the time that it took to render.
+    let frames = 10 * prepared.job.targets.len().max(1);
+    let of = frames + prepared.job.targets.len() * formats.len();
+    let part = Part::begin(progress, "", 0..frames, of);
+    let write = |sources: &SourceImages, frame: Frame, chosen: Option<&Chosen>| {
+        chosen.into_iter().for_each(|chosen| writer.set_chosen(chosen));
+        anyhow::Ok(writer.write(sources, &frame)?)
+    };
+    let run = prepared.run(renderer.as_ref(), &part);
+    let (finished, _) = auto::render(&run, prepared.weighting.as_ref(), write)?;
+    let videos = videos(&writer, formats, prepared.rate, &Part::begin(progress, "", frames..of, of))?;
+    let circumstances = Circumstances {
+        program: env!("CARGO_PKG_VERSION"),
+        device_reason: prepared.device.reason.clone(),
+        model: arguments.model.label(),
+        exact: arguments.model.exact,
+        seed: arguments.seed,
+        open_time: prepared.open_time,
+        total_time: prepared.start.elapsed(),
+    };
+    Ok((writer.finish(renderer.as_ref(), &prepared.options, finished, circumstances)?, videos))
+}
+
+/// The formats of videos, y4m in place of MP4 where there is no ffmpeg: a person learns it before the work.
+fn video_formats(arguments: &Arguments) -> Vec<VideoFormat> {
+    let mut formats = Vec::new();
+    for format in &arguments.outputs.video {
+        let format = if format.is_possible() {
+            *format
+        } else {
+            let path = arguments.output.join("video.y4m");
+            complain(format_args!("{}, not mp4, is written: there is no ffmpeg on the path", path.display()));
+            VideoFormat::Y4m
+        };
+        if !formats.contains(&format) {
+            formats.push(format);
+        }
+    }
+    formats
+}
+
+/// Writes the pictures as videos; returns a line about each.
+fn videos(
+    writer: &RunWriter,
+    formats: &[VideoFormat],
+    rate: FrameRate,
+    progress: &dyn Progress,
+) -> anyhow::Result<Vec<String>> {
+    let mut lines = Vec::new();
+    for (index, format) in formats.iter().enumerate() {
+        progress.stage(&format!("writing video.{format}"), index..index + 1, formats.len());
+        lines.push(writer.write_video(*format, rate, progress)?.display().to_string());
+    }
+    Ok(lines)
+}
