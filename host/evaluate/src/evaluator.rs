@@ -14,6 +14,7 @@ use viewfuse_field::auto::choose;
 use viewfuse_field::budget::Kept;
 use viewfuse_field::held_out::nearest;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, open_album};
+use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_job::progress::{Part, Progress};
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{Selection, SelectionError, target_of, view_list};
@@ -40,6 +41,16 @@ pub enum EvaluateError {
     /// A picture could not be scored.
     #[error(transparent)]
     Metric(#[from] MetricError),
+}
+
+impl Hinted for EvaluateError {
+    fn hint(&self) -> Option<Hint> {
+        match self {
+            EvaluateError::Selection(error) => error.hint(),
+            EvaluateError::Render(error) => error.hint(),
+            _ => None,
+        }
+    }
 }
 
 /// Name of the peak signal to noise ratio in decibels, of 8-bit values; infinite for equal pictures. Names of metrics are

@@ -19,6 +19,7 @@ pub use settings::{SceneSettings, Settings};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use viewfuse_job::files::{WriteError, read_at_most, write_whole};
+use viewfuse_job::hint::{Hint, Hinted};
 
 /// Name of the file of settings.
 pub const SETTINGS: &str = "run.json";
@@ -88,6 +89,15 @@ pub enum FolderError {
         /// The journal.
         path: PathBuf,
     },
+}
+
+impl Hinted for FolderError {
+    fn hint(&self) -> Option<Hint> {
+        match self {
+            FolderError::Busy { .. } => Some(Hint::Shard),
+            _ => None,
+        }
+    }
 }
 
 /// The folder of an evaluation.

@@ -20,6 +20,14 @@ pub struct NotFinite {
     pub value: f32,
 }
 
+/// The visual hull of the silhouettes is empty.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the silhouettes of the sources have no common object: no point lies inside all of them; check the poses and the \
+     background"
+)]
+pub struct NoObject;
+
 /// A value in front of what it is not.
 fn known(value: f32) -> String {
     if value.is_nan() { String::new() } else { format!("{value}, ") }

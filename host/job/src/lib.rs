@@ -6,6 +6,7 @@
 //! ```text
 //! text       text of files, in messages                    in_line
 //! shell      words as a shell takes them                  quoted
+//! hint       what helps on from an error, as a code       Hint, Hinted
 //! progress   progress reports and cancellation                Progress, Silent, Interrupted
 //! panics     panics of other libraries as errors              caught
 //! files      output files, completely or not at all           write_whole, WholeFile, WholeFolder
@@ -15,6 +16,7 @@
 
 pub mod digest;
 pub mod files;
+pub mod hint;
 pub mod panics;
 pub mod progress;
 pub mod shell;

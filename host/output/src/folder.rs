@@ -4,6 +4,7 @@ use crate::earlier::{earlier_files, files_of, recorded_targets};
 use crate::record::{RECORD, SUFFIXES};
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
+use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_scene::few_shot::Target;
 
 /// Why pictures cannot be written to a folder.
@@ -37,6 +38,15 @@ pub enum OutputError {
         /// The file's name.
         file: String,
     },
+}
+
+impl Hinted for OutputError {
+    fn hint(&self) -> Option<Hint> {
+        match self {
+            OutputError::OtherRun { .. } => Some(Hint::OtherRun),
+            _ => None,
+        }
+    }
 }
 
 /// The background that the run of a folder used, red green blue in `[0, 1]`; `Some(None)` if it had none, `None` if the folder

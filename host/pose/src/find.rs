@@ -7,6 +7,7 @@ use crate::solution::{Solver, SolverError};
 use crate::verdict::{Refusal, Verdict, VerdictError, verdict};
 use std::path::Path;
 use viewfuse_field::render::RenderError;
+use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_job::progress::{Part, Progress};
 use viewfuse_scene::SceneError;
 
@@ -65,6 +66,16 @@ pub enum PoseError {
     /// A photograph that was left out could not be rendered.
     #[error(transparent)]
     Render(#[from] RenderError),
+}
+
+impl Hinted for PoseError {
+    fn hint(&self) -> Option<Hint> {
+        match self {
+            PoseError::Intake(error) => error.hint(),
+            PoseError::Solver(error) => error.hint(),
+            _ => None,
+        }
+    }
 }
 
 impl From<VerdictError> for PoseError {

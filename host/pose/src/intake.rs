@@ -13,6 +13,7 @@ use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
+use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_job::progress::{Interrupted, Progress};
 use viewfuse_scene::reader::{ImageFile, list};
 use viewfuse_scene::{SceneError, encode_png, read_picture};
@@ -132,6 +133,15 @@ pub enum IntakeError {
     /// The person stopped the work.
     #[error("interrupted")]
     Interrupted(#[from] Interrupted),
+}
+
+impl Hinted for IntakeError {
+    fn hint(&self) -> Option<Hint> {
+        match self {
+            IntakeError::Many { .. } => Some(Hint::FewerPhotographs),
+            _ => None,
+        }
+    }
 }
 
 /// Whether a file is, by its name, a photograph that is read or of a format that cameras write.

@@ -4,6 +4,7 @@ use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 use std::fmt::{self, Display, Formatter};
 use std::path::{Path, PathBuf};
+use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_job::progress::{Interrupted, Progress};
 
 /// A kind of features.
@@ -201,6 +202,15 @@ pub enum SolverError {
     /// The person stopped the work.
     #[error("interrupted")]
     Interrupted(#[from] Interrupted),
+}
+
+impl Hinted for SolverError {
+    fn hint(&self) -> Option<Hint> {
+        match self {
+            SolverError::Missing { solver, .. } => Some(Hint::Solver(solver)),
+            _ => None,
+        }
+    }
 }
 
 impl SolverError {

@@ -16,6 +16,7 @@ use std::path::PathBuf;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::pose::PoseError;
 use viewfuse_core::sources::MAX_SOURCES;
+use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_job::text::nearest;
 
 /// Why a selection of views is invalid.
@@ -135,6 +136,20 @@ pub enum SelectionError {
         /// The name.
         name: String,
     },
+}
+
+impl Hinted for SelectionError {
+    fn hint(&self) -> Option<Hint> {
+        match self {
+            SelectionError::BadStep { .. } | SelectionError::BadRange { .. } => Some(Hint::ViewList),
+            SelectionError::TargetIsSource { .. } => Some(Hint::SourceOrTarget),
+            SelectionError::TooManySources { .. } => Some(Hint::FewerSources),
+            SelectionError::NoTargets { .. } => Some(Hint::Targets),
+            SelectionError::NoOrbit { .. } => Some(Hint::NoOrbit),
+            SelectionError::NoSpiral { .. } => Some(Hint::NoSpiral),
+            _ => None,
+        }
+    }
 }
 
 /// Names that an error suggests at most.

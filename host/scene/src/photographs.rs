@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, PinholeError};
+use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_job::progress::{Interrupted, Progress};
 
 /// Why photographs could not be prepared.
@@ -49,6 +50,15 @@ pub enum PhotographsError {
     /// The person stopped the work.
     #[error("interrupted")]
     Interrupted(#[from] Interrupted),
+}
+
+impl Hinted for PhotographsError {
+    fn hint(&self) -> Option<Hint> {
+        match self {
+            PhotographsError::NoSilhouette { .. } => Some(Hint::Background),
+            _ => None,
+        }
+    }
 }
 
 /// One source at working size.

@@ -20,6 +20,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
 use std::thread;
 use std::time::Duration;
+use viewfuse_job::hint::{Hint, Hinted};
 
 /// The port that an address need not name.
 const USUAL_PORT: u16 = 80;
@@ -57,6 +58,15 @@ pub enum ListenError {
     /// The system gives no random numbers.
     #[error("the system gives no random numbers: {0}")]
     Random(getrandom::Error),
+}
+
+impl Hinted for ListenError {
+    fn hint(&self) -> Option<Hint> {
+        match self {
+            ListenError::Port { .. } => Some(Hint::Port),
+            _ => None,
+        }
+    }
 }
 
 /// A route and what it needs.

@@ -3,6 +3,7 @@
 use super::{Benchmark, CLOSE_DEGREES, CLOSE_SOURCES, COUNTS, Protocol, RANDOM_SOURCES};
 use std::fmt;
 use std::str::FromStr;
+use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_scene::few_shot::SelectionError;
 use viewfuse_weighting::sources::MAX_SOURCES;
 
@@ -67,6 +68,16 @@ pub enum ProtocolError {
     /// The lists do not fit a scene.
     #[error(transparent)]
     Selection(#[from] SelectionError),
+}
+
+impl Hinted for ProtocolError {
+    /// Of a selection only what is wrong with a list: the views of a protocol are not those of options.
+    fn hint(&self) -> Option<Hint> {
+        match self {
+            ProtocolError::Selection(error) => error.hint().filter(|hint| *hint == Hint::ViewList),
+            _ => None,
+        }
+    }
 }
 
 impl fmt::Display for Protocol {

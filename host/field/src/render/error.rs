@@ -1,8 +1,10 @@
 //! Errors of the render loop.
 
 use crate::FieldError;
+use crate::error::NoObject;
 use viewfuse_core::camera::PinholeError;
 use viewfuse_core::sources::SourcesError;
+use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_scene::photographs::PhotographsError;
 use viewfuse_scene::{Scene, SceneError};
 
@@ -72,5 +74,16 @@ impl RenderError {
     /// Whether the error is a device failure.
     pub fn is_of_device(&self) -> bool {
         matches!(self, RenderError::Field(FieldError::Device(_)))
+    }
+}
+
+impl Hinted for RenderError {
+    fn hint(&self) -> Option<Hint> {
+        match self {
+            RenderError::Shape { .. } | RenderError::Size { .. } => Some(Hint::PictureSize),
+            RenderError::Unsuitable { reason, .. } if reason.is::<NoObject>() => Some(Hint::NoObject),
+            RenderError::Photographs(error) => error.hint(),
+            _ => None,
+        }
     }
 }

@@ -39,13 +39,7 @@ impl Default for Hull {
     }
 }
 
-/// The visual hull of the silhouettes is empty.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "the silhouettes of the sources have no common object: no point lies inside all of them; check the poses and the \
-     background"
-)]
-pub struct NoObject;
+pub use crate::error::NoObject;
 
 /// A view was encoded, or a target rendered, before a weighting began.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

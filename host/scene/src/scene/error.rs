@@ -4,9 +4,12 @@
 
 use std::path::PathBuf;
 
+use image::error::ImageFormatHint;
+use image::{ImageError, ImageFormat};
 use thiserror::Error;
 use viewfuse_core::lens::LensError;
 use viewfuse_core::pose::{MAX_COORDINATE, PoseError};
+use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_job::panics::Panicked;
 use viewfuse_job::text::in_line;
 
@@ -440,6 +443,20 @@ pub enum SceneError {
         /// Number of views.
         view_count: usize,
     },
+}
+
+impl Hinted for SceneError {
+    fn hint(&self) -> Option<Hint> {
+        match self {
+            SceneError::BarePhotographs { .. } => Some(Hint::Poses),
+            SceneError::Image { cause: ImageError::Unsupported(problem), .. }
+                if problem.format_hint() == ImageFormatHint::Exact(ImageFormat::Tiff) =>
+            {
+                Some(Hint::BuildWithTiff)
+            }
+            _ => None,
+        }
+    }
 }
 
 /// Most characters of what a decoder says.
