@@ -3,7 +3,8 @@
 //! The list is the first `text` block of the crate's documentation that names a module: a line begins with the names of
 //! modules between commas, and two spaces end them; a line that is further in goes on with the text of the one before.
 //! A line of `*` stands for all modules that are not named: several of one kind, none of which uses another.
-//! What stands in the crate's root itself (types that several modules share) may be used by all.
+//! What stands in the crate's root itself (types that several modules share) may be used by all. The command's modules are all
+//! in one, `cli`, which is their root.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -28,6 +29,9 @@ const CRATES: [&str; 15] = [
     "host/lab",
     "host/python",
 ];
+
+/// A crate whose modules are in one of its modules, and that module.
+const NESTED: [(&str, &str); 1] = [("host/cli", "cli")];
 
 /// What stands in a list for all modules that it does not name.
 const OTHERS: &str = "*";
@@ -141,8 +145,8 @@ fn list_faults(listed: &[String], modules: &BTreeSet<String>) -> Vec<String> {
 }
 
 /// Which modules of its crate a file uses, with the line of each; `depth` modules lie between it and the root, itself
-/// included.
-fn uses(code: &str, depth: usize, root: &Root) -> Vec<(usize, String)> {
+/// included. The root is the crate's, or the module `inside` it.
+fn uses(code: &str, depth: usize, root: &Root, inside: Option<&str>) -> Vec<(usize, String)> {
     let mut found = Vec::new();
     for (place, _) in code.match_indices("::") {
         // The start of a path: `crate::` or as many `super::` as lead to the root.
@@ -151,7 +155,14 @@ fn uses(code: &str, depth: usize, root: &Root) -> Vec<(usize, String)> {
             before.rfind(|character: char| !character.is_alphanumeric() && character != '_').map_or(0, |at| at + 1);
         let is_macro = before[..start].ends_with('$');
         let path = match &before[start..] {
-            "crate" if !is_macro => &code[place + 2..],
+            "crate" if !is_macro => match inside {
+                None => &code[place + 2..],
+                Some(module) => {
+                    let path = code[place + 2..].strip_prefix(module).and_then(|rest| rest.strip_prefix("::"));
+                    let Some(path) = path else { continue };
+                    path
+                }
+            },
             "super" if !before[..start].ends_with("::") => {
                 let rest = code[place + 2..].trim_start_matches("super::");
                 let steps = 1 + (code.len() - place - 2 - rest.len()) / "super::".len();
@@ -174,27 +185,33 @@ fn uses(code: &str, depth: usize, root: &Root) -> Vec<(usize, String)> {
 
 /// What a crate's files use that stands behind them, and what is wrong with the list.
 fn faults(folder: &Path) -> Vec<String> {
-    let source = folder.join("src");
-    let text = std::fs::read_to_string(source.join("lib.rs")).expect("the root");
+    faults_inside(folder, None)
+}
+
+/// The same of the modules of a module.
+fn faults_inside(folder: &Path, inside: Option<&str>) -> Vec<String> {
+    let source = inside.map_or_else(|| folder.join("src"), |module| folder.join("src").join(module));
+    let file = inside.map_or_else(|| source.join("lib.rs"), |_| source.with_extension("rs"));
+    let text = std::fs::read_to_string(file).expect("the root");
     let root = root(&Source::new(text.split("\n#[cfg(test)]\nmod tests {").next().unwrap_or_default()).code);
     let listed = listed(&text, &root.modules);
     let mut faults = list_faults(&listed, &root.modules);
     let place_of = |name: &str| listed.iter().position(|listed| listed == name);
     let place = |module: &str| place_of(module).or_else(|| place_of(OTHERS));
     for path in files(&source, "rs") {
-        let inside = path.strip_prefix(&source).expect("inside").with_extension("");
-        let parts: Vec<String> = inside.iter().map(|part| part.to_string_lossy().into_owned()).collect();
+        let file = path.strip_prefix(&source).expect("inside").with_extension("");
+        let parts: Vec<String> = file.iter().map(|part| part.to_string_lossy().into_owned()).collect();
         // Unit tests may use everything.
         let is_test = parts.last().is_some_and(|name| name == "tests") || !root.modules.contains(&parts[0]);
         if parts == ["lib"] || is_test {
             continue;
         }
-        for (line, used) in uses(&Source::read(&path).code, parts.len(), &root) {
+        for (line, used) in uses(&Source::read(&path).code, parts.len(), &root, inside) {
             if let (Some(own), Some(other)) = (place(&parts[0]), place(&used))
                 && (other > own || other == own && used != parts[0])
             {
                 let place = if other > own { "listed behind" } else { "of the same kind as" };
-                faults.push(format!("{}:{line} uses {used}, which is {place} {}", inside.display(), parts[0]));
+                faults.push(format!("{}:{line} uses {used}, which is {place} {}", file.display(), parts[0]));
             }
         }
     }
@@ -206,6 +223,10 @@ fn modules_stand_in_the_order_of_the_data() {
     let mut wrong = Vec::new();
     for name in CRATES {
         wrong.extend(faults(&repository().join(name)).into_iter().map(|fault| format!("{name}: {fault}")));
+    }
+    for (name, module) in NESTED {
+        let found = faults_inside(&repository().join(name), Some(module));
+        wrong.extend(found.into_iter().map(|fault| format!("{name}: {fault}")));
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
@@ -245,6 +266,31 @@ fn a_module_that_uses_a_later_one_is_found() {
     write("second.rs", "");
     write("first/inner.rs", "use super::super::second;");
     assert_eq!(faults(folder.path()), ["first/inner:1 uses second, which is listed behind first"]);
-    write("lib.rs", &library.replacen("third ", "fourth", 1));
-    assert!(faults(folder.path()).starts_with(&["third is not listed".to_owned(), "fourth is no module".to_owned()]));
+    write("first/inner.rs", "");
+    // Modules that are not named.
+    write("lib.rs", &library.replacen("third ", "* ", 1).replace("mod first;", "mod first;\nmod fourth;"));
+    for (text, fault) in [
+        ("use crate::{first, third};", &[][..]),
+        ("use super::fourth;", &["third:1 uses fourth, which is of the same kind as third"]),
+    ] {
+        write("third.rs", text);
+        assert_eq!(faults(folder.path()), fault, "{text}");
+    }
+    write("third.rs", "");
+    // Modules of a module.
+    write("own.rs", "//! ```text\n//! first  what it does\n//! second  more\n//! ```\nmod first;\nmod second;");
+    write("own/second.rs", "use crate::own::first::a; use super::first;");
+    for (text, count) in [("use crate::second;", 0), ("use crate::own::second::a;", 1), ("use super::second;", 1)] {
+        write("own/first.rs", text);
+        assert_eq!(faults_inside(folder.path(), Some("own")).len(), count, "{text}");
+    }
+    // Lists that are wrong.
+    for (from, to, fault) in [
+        ("third ", "fourth", ["third is not listed", "fourth is no module"].as_slice()),
+        ("first, second", "first, second, first", &["first is listed 2 times"]),
+        ("//! ```text", "//! ```rust", &["first is not listed", "second is not listed", "third is not listed"]),
+    ] {
+        write("lib.rs", &library.replacen(from, to, 1));
+        assert_eq!(faults(folder.path()), fault, "{from}");
+    }
 }
