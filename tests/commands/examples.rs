@@ -1,7 +1,7 @@
 //! What documents show beside commands that `readme.rs` runs to their end: the viewer, commands on photographs of a person, trainings
 //! that take hours, commands in the text, and what is printed.
 
-use super::{BINARY, lab};
+use super::{BINARY, binary, lab};
 use std::fs;
 use std::path::{Path, PathBuf};
 use viewfuse_tests::command::{self, command, killed_when, toy};
@@ -76,13 +76,15 @@ fn spans(text: &str) -> impl Iterator<Item = &str> {
 fn commands_in_the_text_have_these_options() {
     let mut count = 0;
     for path in readmes() {
-        for span in spans(&read(&path)).filter(|span| span.starts_with("viewfuse ")) {
+        for span in
+            spans(&read(&path)).filter(|span| ["viewfuse ", "viewfuse-lab "].iter().any(|own| span.starts_with(own)))
+        {
             let mut words = span.split_whitespace().skip(1);
             let name = words.next().expect("a word");
             if !name.starts_with(|first: char| first.is_ascii_lowercase()) {
                 continue;
             }
-            let help = command::run(BINARY, &repository(), &format!("{name} --help"));
+            let help = command::run(binary(name), &repository(), &format!("{name} --help"));
             assert_eq!(help.code, Some(0), "{}: {span}", path.display());
             for option in words.filter(|word| word.starts_with('-')) {
                 let option = option.split('=').next().unwrap_or(option);

@@ -51,10 +51,10 @@ fn the_sample_scene_is_made_again() {
 fn wrong_arguments_are_told() {
     let folder = Folder::new();
     let wrong = |arguments: &str, parts: &[&str]| assert_wrong_arguments(lab(), folder.path(), arguments, parts);
-    wrong("scenes make lorries out", &["lorries", "cars"]);
+    wrong("scenes make lorries out", &["lorries", "KIND"]);
     wrong("scenes make cars out --size 100", &["the size must be 64 or 128"]);
     wrong("scenes make cars out --views 0", &["--views"]);
-    wrong("scenes photograph moon out", &["moon", "room"]);
+    wrong("scenes photograph moon out", &["moon", "PLACE"]);
     wrong("scenes make cars out --train 2000000", &["--train"]);
 }
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Steps of training a PixelNeRF in plain PyTorch, to compare viewfuse's with: the same network, and batches of the same sizes.
 
-As `viewfuse train pixelnerf`: of each of some objects a few views are sources, rays of the others targets; a first pass without
+As `viewfuse-lab train pixelnerf`: of each of some objects a few views are sources, rays of the others targets; a first pass without
 gradients places the samples of the second; mean square error; gradients limited to a norm of 1; Adam; constant batch norms. The
 network is that of pixelnerf.py, for all objects of a batch at once; the first thing that this program does is to compare the two.
 

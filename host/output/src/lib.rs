@@ -15,7 +15,7 @@
 //! gaussian_page  a scene of Gaussians as one page
 //! rate     frames per second
 //! webp     animated pictures
-//! gif      the same for who takes no WebP (feature `gif`)
+//! gif      the same for who takes no WebP
 //! y4m      video without compression
 //! video    the frames of a run as one file of any format
 //! weights  the weights of many targets: JSON, NumPy's arrays
