@@ -1,4 +1,5 @@
-# Reads what `cargo test` printed and says at the end, one line each, what was ignored and why and what failed; the last line is
+# Reads what `cargo test` printed, and from the file `times` what each binary took ("NAME SECONDS USER SYSTEM"), and says at the
+# end, one line each, what each binary took, what was ignored and why and what failed; the last line is
 # "N passed, N failed, N skipped".
 
 # Which binary speaks: "Running path (target/release/deps/NAME-HASH)", "Doc-tests NAME".
@@ -41,6 +42,18 @@ END {
     failed[++failed_lines] = "failed: cargo test, exit code " code ": see above"; count["failed"]++
   }
   print "\n== summary"
+  while ((getline line < times) > 0) {
+    split(line, words, " "); seconds[words[1]] += words[2]; cpu[words[1]] += words[3] + words[4]; all += words[2]; all_cpu += words[3] + words[4]
+  }
+  # Those that took longer than a second, the longest first.
+  while (all > 0) {
+    longest = ""
+    for (name in seconds) if (seconds[name] >= 1 && (longest == "" || seconds[name] > seconds[longest])) longest = name
+    if (longest == "") break
+    printf "%6.0f s, %6.0f s of CPU: %s\n", seconds[longest], cpu[longest], longest
+    delete seconds[longest]
+  }
+  if (all > 0) printf "%6.0f s, %6.0f s of CPU: all\n", all, all_cpu
   for (i = 1; i <= ignored_lines; i++) print ignored[i]
   for (i = 1; i <= failed_lines; i++) print failed[i]
   print count["passed"] + 0 " passed, " count["failed"] + 0 " failed, " count["ignored"] + 0 " skipped"

@@ -11,15 +11,13 @@ use std::{env, fs};
 use viewfuse_core::fuse::FuseBlock;
 use viewfuse_tests::command::Outcome;
 use viewfuse_tests::devices::vulkan_devices;
-use viewfuse_vulkan::kernel::{Kernel, WORKGROUP};
+use viewfuse_vulkan::kernel::Kernel;
 use viewfuse_vulkan::{Adapter, Gpu, GpuOptions, Instance, VulkanError};
 
 /// Kernels that depend on one another.
 pub(crate) const WITH_BARRIERS: &str = "with_barriers";
 /// The same without anything that keeps them apart.
 pub(crate) const WITHOUT_BARRIERS: &str = "without_barriers";
-/// A dispatch of more workgroups than the device allows.
-pub(crate) const TOO_MANY_WORKGROUPS: &str = "too_many_workgroups";
 /// A kernel that still runs when its device is given up.
 pub(crate) const LEFT_ALONE: &str = "left_alone";
 
@@ -58,12 +56,6 @@ fn do_work(work: &str, instance: &std::sync::Arc<Instance>, adapter: &Adapter) -
         WITHOUT_BARRIERS => {
             dependent_kernels(&Gpu::open(instance, adapter, &GpuOptions { barriers: false, ..usual })?)?
         }
-        TOO_MANY_WORKGROUPS => {
-            // The adapter promises one more than it has.
-            let mut boastful = adapter.clone();
-            boastful.limits.workgroup_count += 1;
-            many_workgroups(&Gpu::open(instance, &boastful, &usual)?, boastful.limits.workgroup_count)?;
-        }
         LEFT_ALONE => {
             let times = times_that_take(&Gpu::open(instance, adapter, &usual)?, Duration::from_millis(500))?;
             let limit = Duration::from_millis(1);
@@ -91,16 +83,6 @@ fn dependent_kernels(gpu: &Gpu) -> Result<(), VulkanError> {
         let block = FuseBlock { view_count: 1, stride: 4096, ..FuseBlock::default() };
         gpu.dispatch(Kernel::FuseViews, bytes_of(&block), 0..4096, &[weight.bind(), from.bind(), to.bind()])?;
     }
-    gpu.wait()
-}
-
-/// A dispatch whose elements do not exist: every invocation ends at once.
-fn many_workgroups(gpu: &Gpu, workgroup_count: u32) -> Result<(), VulkanError> {
-    let nothing = gpu.zeros::<f32>(0)?;
-    let written = gpu.zeros::<f32>(0)?;
-    let block = FuseBlock::default();
-    let elements = 0..workgroup_count.saturating_mul(WORKGROUP);
-    gpu.dispatch(Kernel::FuseViews, bytes_of(&block), elements, &[nothing.bind(), nothing.bind(), written.bind()])?;
     gpu.wait()
 }
 

@@ -2,8 +2,8 @@
 
 use std::error::Error;
 use std::path::Path;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{LazyLock, Mutex};
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::auto::{self, Chosen, HOLD_OUT, choose, schemes};
 use viewfuse::field::pixelnerf::{Architecture, PixelNerf, PixelNerfOptions, test_networks};
@@ -62,17 +62,32 @@ fn automatic(scene: &Scene) -> Result<(Vec<Frame>, Chosen), Box<dyn Error>> {
     Ok((frames, chosen.ok_or("nothing was given")?))
 }
 
+/// A room of six photographs, and what is chosen and rendered for its middle view: several tests look at it.
+struct Six {
+    scene: Scene,
+    frames: Vec<Frame>,
+    chosen: Chosen,
+}
+
+static SIX: LazyLock<Six> = LazyLock::new(|| {
+    // Nothing of a static is removed at the end.
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("auto");
+    std::fs::remove_dir_all(&folder).ok();
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let scene = room(&folder, 6);
+    let (frames, chosen) = automatic(&scene).expect("a picture");
+    Six { scene, frames, chosen }
+});
+
 #[test]
 fn what_is_chosen_is_what_is_rendered() -> Result<(), Box<dyn Error>> {
-    let folder = tempfile::tempdir()?;
-    let scene = room(folder.path(), 6);
-    let (frames, chosen) = automatic(&scene)?;
+    let Six { scene, frames, chosen } = &*SIX;
     let field = TrainingFree::default();
     let renderer = On { device: &Cpu, field: &field };
     let (settings, mixture) = (chosen.settings.clone(), chosen.mixture.clone());
     let given = RenderOptions { settings, mixture, ..options() };
-    let (job, mut same) = (middle(&scene), Vec::new());
-    let run = RenderRun { scene: &scene, job: &job, renderer: &renderer, options: &given, progress: &Silent };
+    let (job, mut same) = (middle(scene), Vec::new());
+    let run = RenderRun { scene, job: &job, renderer: &renderer, options: &given, progress: &Silent };
     render(&run, &chosen.weighting, |_, frame| {
         same.push(frame);
         Ok::<(), RenderError>(())
@@ -88,10 +103,8 @@ fn what_is_chosen_is_what_is_rendered() -> Result<(), Box<dyn Error>> {
 
 #[test]
 fn the_choice_is_the_best_that_was_tried_or_the_default() -> Result<(), Box<dyn Error>> {
-    let folder = tempfile::tempdir()?;
-    let scene = room(folder.path(), 6);
-    let (frames, chosen) = automatic(&scene)?;
-    let Chosen { candidates, held_out, weighting, settings, .. } = &chosen;
+    let Six { frames, chosen, .. } = &*SIX;
+    let Chosen { candidates, held_out, weighting, settings, .. } = chosen;
     assert_eq!(held_out.len(), 5.min(HOLD_OUT.max_views));
     assert!(candidates.len() > schemes().len(), "the field's scalars are tried as well");
     assert!(candidates.iter().all(|candidate| candidate.scores.iter().all(|score| *score > 5.0)));
@@ -111,9 +124,7 @@ fn the_choice_is_the_best_that_was_tried_or_the_default() -> Result<(), Box<dyn 
 
 #[test]
 fn pictures_are_mixed_where_that_is_not_worse() -> Result<(), Box<dyn Error>> {
-    let folder = tempfile::tempdir()?;
-    let scene = room(folder.path(), 6);
-    let (frames, chosen) = automatic(&scene)?;
+    let Six { scene, frames, chosen } = &*SIX;
     let tried = chosen.candidates.last().ok_or("candidates")?;
     assert_eq!(tried.settings.last().map(|setting| setting.name), Some("mixed pictures"), "a mixture is tried last");
     let mixed = tried.psnr.ok_or("a mixture is not given up")?;

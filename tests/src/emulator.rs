@@ -57,38 +57,43 @@ impl Emulator {
         !matches!(self.library, Library::Installed)
     }
 
-    /// Builds all programs with a profile and returns the folder that they are in.
+    /// The folder with the programs of a profile.
+    pub fn programs(&self, profile: &str) -> PathBuf {
+        self.folder.join(self.board.target).join(profile)
+    }
+
+    /// Builds all programs with a profile, for these boards at once.
     ///
     /// # Errors
     /// What the compiler said.
-    pub fn build(&self, repository: &Path, profile: &str) -> Result<PathBuf, String> {
+    pub fn build(boards: &[&Emulator], repository: &Path, profile: &str) -> Result<(), String> {
+        let Some(first) = boards.first() else { return Ok(()) };
         let mut cargo = Command::new(env!("CARGO"));
-        cargo
-            .args(["build", "--quiet", "--locked", "--target", self.board.target, "--profile", profile, "--target-dir"])
-            .arg(&self.folder)
-            .current_dir(repository.join("tests/firmware"));
-        // Flags for the host's processor are none for this one.
+        cargo.args(["build", "--quiet", "--locked", "--profile", profile, "--target-dir"]).arg(&first.folder);
+        cargo.current_dir(repository.join("tests/firmware"));
+        // Flags for the host's processor are none for these.
         for name in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_BUILD_TARGET"] {
             cargo.env_remove(name);
         }
-        let sources = match &self.library {
-            Library::Installed => None,
-            Library::Component => Some(None),
-            Library::Sources(folder) => Some(Some(folder.clone())),
-            Library::Archive(archive) => Some(Some(self.unpacked(archive)?)),
-        };
-        if let Some(folder) = sources {
+        let mut is_compiled = false;
+        for own in boards {
+            cargo.args(["--target", own.board.target]);
+            is_compiled |= own.compiles_the_library();
+            match &own.library {
+                Library::Installed | Library::Component => {}
+                Library::Sources(folder) => _ = cargo.env("__CARGO_TESTS_ONLY_SRC_ROOT", folder),
+                Library::Archive(archive) => _ = cargo.env("__CARGO_TESTS_ONLY_SRC_ROOT", own.unpacked(archive)?),
+            }
+        }
+        if is_compiled {
             // Building the library is not a stable option, and the sources' place not even an official one.
             cargo.arg("-Zbuild-std=core").env("RUSTC_BOOTSTRAP", "1");
-            if let Some(folder) = folder {
-                cargo.env("__CARGO_TESTS_ONLY_SRC_ROOT", folder);
-            }
         }
         let output = cargo.output().map_err(|error| format!("cargo does not start: {error}"))?;
         if !output.status.success() {
             return Err(String::from_utf8_lossy(&output.stderr).into_owned());
         }
-        Ok(self.folder.join(self.board.target).join(profile))
+        Ok(())
     }
 
     /// Unpacks the library's sources, once, and returns their folder.

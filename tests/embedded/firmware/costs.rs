@@ -5,7 +5,6 @@ use super::{Firmware, PROFILES};
 use libtest_mimic::Failed;
 use rayon::prelude::*;
 use std::path::PathBuf;
-use std::sync::Arc;
 use viewfuse_core::attention::quantised::QuantisedAttention;
 use viewfuse_list::rig::measured_schemes;
 use viewfuse_tests::emulator::image::Image;
@@ -78,43 +77,39 @@ fn all_measured(runs: &[(&Firmware, &'static str, &str)]) -> Result<Vec<Vec<Call
     runs.par_iter().map(of).collect::<Vec<_>>().into_iter().collect()
 }
 
-pub(super) fn what_the_calls_take(boards: &[Arc<Firmware>]) -> Result<(), Failed> {
-    let first: &Firmware = &boards[0];
-    let [for_size, for_speed] = PROFILES;
-    let twice_and_fast = [(first, for_size, "calls"), (first, for_speed, "calls")];
-    let with_an_fpu = WITH_AN_FPU.iter().flat_map(|(program, _)| PROFILES.map(|profile| (first, profile, *program)));
-    let runs = boards.iter().map(|board| (&**board, for_size, "calls")).chain(twice_and_fast).chain(with_an_fpu);
-    let mut small = all_measured(&runs.collect::<Vec<_>>())?;
-    let mut others = small.split_off(boards.len()).into_iter();
-    let mut next = || others.next().ok_or("a run for each");
-    assert_eq!(small[0], next()?, "the counts repeat exactly");
-    let fast = next()?;
-    within_limits(&small[0])?;
-
+/// What the first board's calls take, and the rows of a table: of every board the first so many numbers of each call.
+fn costs(boards: &[Firmware], profile: &'static str, columns: usize) -> Result<(Vec<Call>, Vec<Row>), Failed> {
+    let first = &boards[0];
+    let with_an_fpu = WITH_AN_FPU.iter().map(|(program, _)| (first, profile, *program));
+    let runs = boards.iter().map(|board| (board, profile, "calls")).chain(with_an_fpu);
+    let mut everywhere = all_measured(&runs.collect::<Vec<_>>())?;
+    let on_the_first = everywhere.split_off(boards.len());
     let mut weighed = measured_schemes().into_iter().map(|(name, _)| name);
-    let (mut three, mut speed) = (Vec::new(), Vec::new());
-    for (index, call) in small[0].iter().enumerate() {
+    let mut rows = Vec::new();
+    for (index, call) in everywhere[0].iter().enumerate() {
         let title = title(call, &mut weighed).ok_or("a call without a title")?;
-        assert!(small.iter().chain([&fast]).all(|calls| calls[index].name == call.name));
-        three.push((title.clone(), small.iter().flat_map(|calls| numbers(&calls[index])).collect()));
-        // Not the code: what the compiler copies into its callers changes with every version.
-        speed.push((title, numbers(&fast[index])[..2].to_vec()));
+        assert!(everywhere.iter().all(|calls| calls[index].name == call.name));
+        rows.push((title, everywhere.iter().flat_map(|calls| numbers(&calls[index])[..columns].to_vec()).collect()));
     }
     assert_eq!(weighed.next(), None, "every scheme was measured");
-
-    for (_, named_calls) in WITH_AN_FPU {
-        let (small_floats, fast_floats) = (next()?, next()?);
-        for (name, title) in named_calls {
-            let nothing = [None; 3].repeat(boards.len() - 1);
-            let row = numbers(named(&small_floats, name)?).into_iter().chain(nothing).collect();
-            three.push(((*title).to_owned(), row));
-            speed.push(((*title).to_owned(), numbers(named(&fast_floats, name)?)[..2].to_vec()));
+    for ((_, named_calls), calls) in WITH_AN_FPU.iter().zip(&on_the_first) {
+        for (name, title) in *named_calls {
+            let mut row = numbers(named(calls, name)?)[..columns].to_vec();
+            row.resize(columns * boards.len(), None);
+            rows.push(((*title).to_owned(), row));
         }
     }
+    Ok((everywhere.swap_remove(0), rows))
+}
 
+/// The table for speed is written with the other and not compared: nothing is promised of it, and its traces take as long.
+pub(super) fn what_the_calls_take(boards: &[Firmware]) -> Result<(), Failed> {
+    let [for_size, for_speed] = PROFILES;
+    let (calls, mut three) = costs(boards, for_size, 3)?;
+    within_limits(&calls)?;
     let mut whole = Vec::new();
     for board in boards {
-        let image = Image::open(&board.folder(PROFILES[0])?.join("formulas"))?;
+        let image = Image::open(&board.folder(for_size)?.join("formulas"))?;
         println!("{}, all without attention: {} bytes: {:?}", board.board.processor, image.bytes(), image.sections);
         whole.extend([None, None, Some(image.bytes())]);
     }
@@ -125,7 +120,11 @@ pub(super) fn what_the_calls_take(boards: &[Arc<Firmware>]) -> Result<(), Failed
     let processors: Vec<&str> = boards.iter().map(|board| board.board.processor).collect();
     let columns = processors.iter().map(|name| format!(" {name}: instructions | stack | code |")).collect::<String>();
     the_results_say_so(&format!("| for size |{columns}"), &three, is_small)?;
-    the_results_say_so(&format!("| for speed | {}: instructions | stack |", processors[0]), &speed, is_small)
+    if writes_tables() {
+        let (_, speed) = costs(&boards[..1], for_speed, 2)?;
+        the_results_say_so(&format!("| for speed | {}: instructions | stack |", processors[0]), &speed, is_small)?;
+    }
+    Ok(())
 }
 
 /// The limits of the first board.
@@ -155,6 +154,10 @@ fn markdown(heading: &str, rows: &[Row]) -> String {
     [format!("{heading}\n"), line].into_iter().chain(rows.iter().map(row)).collect()
 }
 
+fn writes_tables() -> bool {
+    std::env::var("VIEWFUSE_WRITE_TABLES").is_ok_and(|value| value == "1")
+}
+
 fn results() -> PathBuf {
     repository().join("host/results/firmware.md")
 }
@@ -169,7 +172,7 @@ fn the_results_say_so(heading: &str, rows: &[Row], library_is_small: bool) -> Re
     let text = std::fs::read_to_string(results())?;
     let (before, behind) = text.split_once(&format!("{heading}\n")).ok_or_else(|| format!("no table {heading}"))?;
     let (old, rest) = behind.split_once("\n\n").ok_or("the table does not end")?;
-    if std::env::var("VIEWFUSE_WRITE_TABLES").is_ok_and(|value| value == "1") {
+    if writes_tables() {
         std::fs::write(results(), [before, table.trim_end(), "\n\n", rest].concat())?;
         return Ok(());
     }
