@@ -1,12 +1,8 @@
 //! GeNVS's family of networks: sizes are read off the tensors, and what is no member is refused.
 
 use std::collections::BTreeMap;
-use viewfuse::field::genvs::{
-    Architecture, Block, Denoiser, DenoiserLevel, DenoiserStep, Encoder, Estimate, Level, Resampling, group_count,
-    test_networks,
-};
-use viewfuse::job::progress::Silent;
-use viewfuse::nn::checkpoint::{Checkpoint, Precision, TensorShape};
+use viewfuse::field::genvs::{Architecture, Denoiser, DenoiserLevel, Encoder, Estimate, Level, test_networks};
+use viewfuse::nn::checkpoint::{Checkpoint, TensorShape};
 use viewfuse::nn::initialisation;
 
 /// The tensors of a made network, without values as long as nobody changes them.
@@ -165,95 +161,6 @@ fn sizes_come_from_the_checkpoint() {
         let count: usize = checkpoint.shapes().values().map(|shape| shape.iter().product::<usize>()).sum();
         assert_eq!(architecture.parameter_count(), count);
     }
-}
-
-#[test]
-fn made_of_the_formula_with_two_gains() {
-    let checkpoint = test_networks::deterministic(&Architecture::small());
-    for (name, gain) in [
-        ("pixel_nerf_net.encoder.volume_head.reshape_conv.weight", 8.0),
-        ("pixel_nerf_net.mlp.layers.2.weight", 4.0),
-        ("pixel_nerf_net.mlp.layers.2.bias", 1.0),
-        ("denoiser.model.enc.64x64_conv.weight", 1.0),
-        ("denoiser.model.enc.64x64_block0.norm0.weight", 1.0),
-    ] {
-        let plain = initialisation::tensor(name, &checkpoint.shapes()[name]);
-        let gained: Vec<f32> = plain.iter().map(|value| gain * value).collect();
-        assert_eq!(checkpoint.tensor(name).expect(name), gained, "{name}");
-    }
-    // Written and read again it is the same network.
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("small.safetensors");
-    checkpoint.write_safetensors(&path, Precision::Kept, &Silent).expect("a file");
-    let read = Checkpoint::open(&path).expect("a checkpoint");
-    assert_eq!(Architecture::of(&read).expect("a member of the family"), Architecture::small());
-}
-
-/// What joins on the way up is what was kept on the way down, all of it, newest first, at its side.
-#[test]
-fn the_way_up_uses_what_the_way_down_kept() {
-    for architecture in [Architecture::published(), Architecture::small()] {
-        let denoiser = architecture.denoiser.expect("a denoiser");
-        let (mut kept, mut channels, mut side, mut residual) =
-            (Vec::new(), denoiser.in_channels, denoiser.image_side, denoiser.in_channels);
-        for step in denoiser.down() {
-            match step {
-                DenoiserStep::Convolution(convolution) => {
-                    assert_eq!((convolution.in_channels, convolution.side), (channels, side));
-                    channels = convolution.out_channels;
-                    kept.push((channels, side));
-                }
-                DenoiserStep::Block(block) => {
-                    side /= if block.resampling == Resampling::Down { 2 } else { 1 };
-                    assert_eq!((block.in_channels, block.joined_channels, block.side), (channels, 0, side));
-                    channels = block.out_channels;
-                    kept.push((channels, side));
-                }
-                DenoiserStep::Residual(convolution) => {
-                    assert_eq!(convolution.in_channels, residual);
-                    assert_eq!(kept.last(), Some(&(convolution.out_channels, convolution.side)), "replaces the last");
-                    residual = convolution.out_channels;
-                }
-            }
-        }
-        for block in denoiser.up() {
-            side *= if block.resampling == Resampling::Up { 2 } else { 1 };
-            if block.joined_channels > 0 {
-                assert_eq!(kept.pop(), Some((block.joined_channels, side)), "{}", block.name);
-            }
-            assert_eq!((block.in_channels, block.side), (channels + block.joined_channels, side), "{}", block.name);
-            channels = block.out_channels;
-        }
-        assert_eq!(kept, []);
-        let (norm, convolution) = denoiser.exit();
-        assert!(norm.ends_with("_aux_norm"));
-        assert_eq!(
-            (convolution.in_channels, convolution.out_channels, convolution.side),
-            (channels, 3, denoiser.image_side)
-        );
-    }
-}
-
-#[test]
-fn where_the_published_denoiser_attends() {
-    let denoiser = Architecture::published().denoiser.expect("a denoiser");
-    let attends =
-        |block: &Block| block.has_attention.then(|| block.name.trim_start_matches("denoiser.model.").to_owned());
-    let down = denoiser.down().into_iter().filter_map(|step| match step {
-        DenoiserStep::Block(block) => attends(&block),
-        _ => None,
-    });
-    let names: Vec<String> = down.chain(denoiser.up().iter().filter_map(attends)).collect();
-    let expected: [&str; 6] = [
-        "enc.16x16_block0",
-        "enc.16x16_block1",
-        "enc.16x16_block2",
-        "enc.16x16_block3",
-        "dec.8x8_in0",
-        "dec.16x16_block4",
-    ];
-    assert_eq!(names, expected);
-    assert_eq!([4, 8, 96, 128, 256, 512].map(group_count), [1, 2, 24, 32, 32, 32]);
 }
 
 #[test]

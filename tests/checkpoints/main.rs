@@ -1,9 +1,9 @@
 //! Checkpoints: what is read, what is written, and what is refused with which words.
 
 mod damage;
-mod fuzz;
 mod genvs;
 mod malice;
+mod memory;
 mod pixelnerf;
 mod reading;
 mod snapshots;

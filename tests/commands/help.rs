@@ -9,7 +9,6 @@ use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![
     the_short_help_has_what_is_needed_first,
-    options_of_networks_need_one,
     what_was_nearly_written_is_suggested,
     commands_of_the_laboratory_are_told,
     shells_complete_and_pages_tell,
@@ -44,16 +43,6 @@ fn the_short_help_has_what_is_needed_first() {
             assert!(long.contains(heading), "{command}: {heading}");
         }
     }
-}
-
-fn options_of_networks_need_one() {
-    let folder = toy();
-    let refused = |arguments: &str, parts: &[&str]| {
-        assert_wrong_arguments(BINARY, folder.path(), &format!("render toy --targets 20 -o out {arguments}"), parts);
-    };
-    refused("--steps 3", &["--steps is an option of a GeNVS", "--model FILE"]);
-    refused("--probe-step=3", &["--probe-step is an option of a PixelNeRF", "--model FILE"]);
-    refused("--model formula:8 --steps 3", &["--steps", "--model formula:8"]);
 }
 
 fn what_was_nearly_written_is_suggested() {

@@ -90,7 +90,6 @@ fn main() -> ExitCode {
         convert::trials(),
         devices::trials(),
         errors::trials(),
-        examples::trials(),
         folders::trials(),
         genvs::trials(),
         help::trials(),

@@ -17,7 +17,6 @@ viewfuse_tests::trials![
     the_number_follows_the_pixels,
     ctrl_c_keeps_what_there_is,
     after_a_kill_it_goes_on_from_the_file,
-    its_files_are_rendered,
     options_of_the_field_are_those_of_the_command,
     what_it_refuses,
     hostile_files_are_errors_of_every_command,
@@ -123,19 +122,6 @@ fn after_a_kill_it_goes_on_from_the_file() {
     let psnr = rendered.split("PSNR ").nth(1).and_then(|rest| rest.split(' ').next()).expect("a score");
     assert!(first.0[1].1 > psnr.parse().expect("a number"), "{rendered} {:?}", first.0);
     assert!(fs::read(&path).expect("a file") == before, "the file that it goes on from has changed");
-}
-
-fn its_files_are_rendered() {
-    let folder = toy();
-    done(folder.path(), &format!("{OPTIMISE} -o toy.ply"));
-    done(folder.path(), "render toy --gaussians toy.ply --orbit 5 --size 40x40 --video webp --device cpu -o orbit");
-    let pictures = names_in(&folder.path().join("orbit")).into_iter().filter(|name| {
-        let is_picture = name.starts_with("orbit-") && name.len() == "orbit-001.png".len();
-        is_picture && image::open(folder.path().join("orbit").join(name)).expect("a picture").width() == 40
-    });
-    assert_eq!(pictures.count(), 5);
-    let record = fs::read_to_string(folder.path().join("orbit/run.json")).expect("a record");
-    assert!(record.contains("\"gaussians\""), "{record}");
 }
 
 /// `--model gaussians` optimises on the way.

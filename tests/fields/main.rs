@@ -10,5 +10,4 @@ mod posed;
 mod rows;
 mod sampling;
 mod scales;
-mod surveyed;
 mod visual_hull;

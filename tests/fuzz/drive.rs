@@ -53,53 +53,6 @@ pub(crate) fn short(target: &str, executions: u64) {
     assert!(found.read > 0 && found.kinds > 1, "both ways are tried: {found:?}");
 }
 
-/// Executions of a target whose speed is looked at before a run of so many executions is spread.
-const LOOK: u64 = 2000;
-/// Executions of a piece of a long run: from its seed it can be repeated.
-const PIECE: u64 = 1_000_000;
-
-/// The run of so many executions, of all targets or those that are named, each of which has at least a million of them, or its
-/// share if there are fewer. What remains goes to the fast ones, so that it takes the least time.
-pub(crate) fn spread(executions: u64, names: &[String]) -> ExitCode {
-    let (start, first) = (Instant::now(), first_seed());
-    let chosen: Vec<&str> = named(names);
-    let speed = |name: &&str| {
-        let found = run(&order(name, first, LOOK, f64::MAX));
-        found.executions as f64 / found.seconds.max(1.0e-9)
-    };
-    let speeds: Vec<f64> = chosen.iter().map(speed).collect();
-    let counts = shares(executions, &speeds);
-    println!("{HEADING}");
-    let mut all = Found { target: "all".to_owned(), ..Found::default() };
-    for (name, count) in chosen.into_iter().zip(counts) {
-        let mut whole = Found { target: name.to_owned(), ..Found::default() };
-        for piece in 0..count.div_ceil(PIECE) {
-            add(&mut whole, run(&order(name, first + piece, PIECE.min(count - piece * PIECE), f64::MAX)));
-        }
-        tell(&whole);
-        add(&mut all, whole);
-    }
-    end(&all, start, first)
-}
-
-/// How many executions each target has, by its speed: a million, or an equal share of fewer, and of the rest a share by the
-/// square of its speed: those of a slow one cost more.
-fn shares(executions: u64, speeds: &[f64]) -> Vec<u64> {
-    let count = speeds.len().max(1) as u64;
-    let least = PIECE.min(executions / count);
-    let rest = executions - least * count;
-    let total: f64 = speeds.iter().map(|speed| speed * speed).sum();
-    speeds.iter().map(|speed| least + (rest as f64 * speed * speed / total) as u64).collect()
-}
-
-/// No target has too few.
-pub(crate) fn no_target_has_too_few_executions() {
-    let counts = shares(100_000_000, &[100.0, 20_000.0, 1_000_000.0]);
-    assert!(counts.iter().all(|count| *count >= 1_000_000) && counts.is_sorted(), "{counts:?}");
-    assert!((99_999_990..=100_000_000).contains(&counts.iter().sum::<u64>()), "{counts:?}");
-    assert_eq!(shares(30, &[1.0, 2.0, 3.0]), [10, 10, 10]);
-}
-
 /// The targets of these names, or all.
 fn named(names: &[String]) -> Vec<&'static str> {
     let is_chosen = |name: &&str| names.is_empty() || names.iter().any(|own| own == name);
@@ -115,19 +68,6 @@ fn order(target: &str, seed: u64, executions: u64, seconds: f64) -> Order {
     Order { target, seed, executions, seconds, limit, folder: folder(), careful: false }
 }
 
-fn tell(found: &Found) {
-    println!("{}", row(found));
-    for (path, reason) in &found.fell {
-        println!("  FELL {}: {reason}", path.display());
-    }
-}
-
-fn end(all: &Found, start: Instant, first: u64) -> ExitCode {
-    println!("{}", row(all));
-    println!("{:.2} hours, first seed {first}, {} fell", start.elapsed().as_secs_f64() / 3600.0, all.fell.len());
-    ExitCode::from(u8::from(!all.fell.is_empty()))
-}
-
 /// The run of so many seconds for each target, or each named one; in pieces, so that a piece can be repeated.
 pub(crate) fn long(seconds: f64, names: &[String]) -> ExitCode {
     let (start, pieces) = (Instant::now(), if seconds > 120.0 { (seconds / 60.0) as u64 } else { 1 });
@@ -139,10 +79,15 @@ pub(crate) fn long(seconds: f64, names: &[String]) -> ExitCode {
         for piece in 0..pieces {
             add(&mut whole, run(&order(name, first + piece, u64::MAX, seconds / pieces as f64)));
         }
-        tell(&whole);
+        println!("{}", row(&whole));
+        for (path, reason) in &whole.fell {
+            println!("  FELL {}: {reason}", path.display());
+        }
         add(&mut all, whole);
     }
-    end(&all, start, first)
+    println!("{}", row(&all));
+    println!("{:.2} hours, first seed {first}, {} fell", start.elapsed().as_secs_f64() / 3600.0, all.fell.len());
+    ExitCode::from(u8::from(!all.fell.is_empty()))
 }
 
 fn add(whole: &mut Found, found: Found) {

@@ -9,8 +9,6 @@
 //! that ends a process, or takes too long, is found and kept like one that panics. The generator draws from a seed, so that
 //! a run can be repeated; an input that leads to a new kind of message is kept and changed further.
 //!
-//! `VIEWFUSE_FUZZ_EXECUTIONS=100000000` in the place of the seconds runs so many in all, at least a million of each target.
-//!
 //! ```text
 //! memory    the allocator that counts
 //! change    how inputs are changed
@@ -44,10 +42,6 @@ fn main() -> ExitCode {
         let names: Vec<String> = env::args().skip(1).filter(|name| !name.starts_with('-')).collect();
         return drive::long(seconds.parse().expect("VIEWFUSE_FUZZ_SECONDS is a number"), &names);
     }
-    if let Ok(executions) = env::var("VIEWFUSE_FUZZ_EXECUTIONS") {
-        let names: Vec<String> = env::args().skip(1).filter(|name| !name.starts_with('-')).collect();
-        return drive::spread(executions.parse().expect("VIEWFUSE_FUZZ_EXECUTIONS is a number"), &names);
-    }
     let trial = |(name, _): &(&'static str, _)| {
         let name = *name;
         Trial::test(name, move || {
@@ -56,10 +50,6 @@ fn main() -> ExitCode {
         })
     };
     let mut trials: Vec<Trial> = targets::ALL.iter().map(trial).collect();
-    trials.push(Trial::test("no_target_has_too_few_executions", || {
-        drive::no_target_has_too_few_executions();
-        Ok(())
-    }));
     trials.push(Trial::test("what_falls_is_found", || {
         drive::what_falls_is_found();
         Ok(())

@@ -3,7 +3,6 @@
 mod arrays;
 mod colmap;
 mod coverage;
-mod damaged;
 mod datasets;
 mod errors;
 mod formats;

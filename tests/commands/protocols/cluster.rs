@@ -1,5 +1,5 @@
-//! The recipes of host/evaluate/README.md for many machines, run as they stand there: GNU parallel, and Slurm on one node;
-//! the manifest for Kubernetes against the types of its API. A worker that is killed is noticed, and the same recipe goes on.
+//! The recipes of host/evaluate/README.md for many machines, run as they stand there: GNU parallel, and Slurm on one node.
+//! A worker that is killed is noticed, and the same recipe goes on.
 //!
 //! Where GNU parallel or Slurm are missing, these tests are ignored and say so; with `VIEWFUSE_REQUIRE_CLUSTER=1` they fail.
 
@@ -35,8 +35,6 @@ pub(crate) fn trials() -> Vec<Trial> {
     });
     let module = |name: &str| format!("{}::{name}", module_path!());
     vec![
-        trial(&module("the_manifest_is_a_job_of_kubernetes"), the_manifest_is_a_job_of_kubernetes),
-        trial(&module("a_wrong_manifest_is_rejected"), a_wrong_manifest_is_rejected),
         needing(missing(&["parallel"]), is_required(REQUIRED), trial(&module("gnu_parallel"), gnu_parallel)),
         needing(slurm, is_required(REQUIRED), trial(&module("slurm"), slurm_on_one_node)),
     ]
@@ -238,89 +236,4 @@ fn slurm_on_one_node() {
     let again = slurm.submitted(&workspace, &script);
     assert_eq!(slurm.ended(&workspace, &again), [8, 0]);
     workspace.assert_whole("runs/slurm", &expected);
-}
-
-/// The part of Kubernetes' API (`batch/v1`, Job) that the manifest uses, by its reference: no other field is accepted.
-mod kubernetes {
-    use serde::Deserialize;
-
-    macro_rules! objects {
-        ($($Object:ident { $($field:ident: $Type:ty),+ $(,)? })+) => {$(
-            #[derive(Debug, Deserialize)]
-            #[serde(deny_unknown_fields, rename_all = "camelCase")]
-            #[allow(dead_code, reason = "a field that is only required has no reader")]
-            pub(super) struct $Object { $(pub(super) $field: $Type),+ }
-        )+};
-    }
-
-    objects! {
-        Job { api_version: ApiVersion, kind: Kind, metadata: Metadata, spec: JobSpec }
-        Metadata { name: String }
-        JobSpec { completion_mode: String, completions: u32, parallelism: u32, template: Template }
-        Template { spec: PodSpec }
-        PodSpec { restart_policy: String, containers: Vec<Container>, volumes: Vec<Volume> }
-        Container { name: String, image: String, command: Vec<String>, volume_mounts: Vec<Mount> }
-        Volume { name: String, persistent_volume_claim: Claim }
-        Claim { claim_name: String }
-    }
-
-    #[derive(Debug, Deserialize)]
-    #[serde(deny_unknown_fields, rename_all = "camelCase")]
-    #[allow(dead_code, reason = "a field that is only required has no reader")]
-    pub(super) struct Mount {
-        pub(super) name: String,
-        pub(super) mount_path: String,
-        #[serde(default)]
-        read_only: bool,
-    }
-
-    #[derive(Debug, Deserialize)]
-    pub(super) enum ApiVersion {
-        #[serde(rename = "batch/v1")]
-        Batch,
-    }
-
-    #[derive(Debug, Deserialize)]
-    pub(super) enum Kind {
-        Job,
-    }
-}
-
-/// A manifest, where every field is one that the API knows.
-fn manifest(text: &str) -> Result<kubernetes::Job, String> {
-    serde_norway::from_str(text).map_err(|error| error.to_string())
-}
-
-fn the_manifest_is_a_job_of_kubernetes() {
-    let text = recipe("# Kubernetes");
-    let job = manifest(&text).unwrap_or_else(|error| panic!("{error}"));
-    // What the API's server checks beyond the types.
-    assert_eq!(job.spec.completion_mode, "Indexed");
-    let pod = job.spec.template.spec;
-    assert!(["OnFailure", "Never"].contains(&pod.restart_policy.as_str()), "a Job's pods are not always restarted");
-    let container = &pod.containers[0];
-    let command = container.command.join(" ");
-    let count = job.spec.completions;
-    assert!(command.contains(&format!("--shard \"$JOB_COMPLETION_INDEX/{count}\"")), "{command}");
-    let volumes: Vec<&str> = pod.volumes.iter().map(|volume| volume.name.as_str()).collect();
-    let mounts = &container.volume_mounts;
-    assert!(mounts.iter().all(|mount| volumes.contains(&mount.name.as_str())) && mounts.len() == 2, "{volumes:?}");
-    assert!(mounts.iter().all(|mount| command.contains(&mount.mount_path)), "{command}");
-}
-
-fn a_wrong_manifest_is_rejected() {
-    let right = recipe("# Kubernetes");
-    for (from, to, said) in [
-        ("completionMode", "completionsMode", "completionsMode"),
-        ("completions: 8", "completions: eight", "eight"),
-        ("kind: Job", "kind: Jobs", "Jobs"),
-        ("apiVersion: batch/v1", "apiVersion: v1", "v1"),
-        ("restartPolicy", "restart", "restart"),
-        ("      containers:", "      container:", "container"),
-        ("mountPath: /runs", "path: /runs", ""),
-    ] {
-        assert!(right.contains(from), "{from}");
-        let error = manifest(&right.replacen(from, to, 1)).expect_err(to);
-        assert!(error.contains(said), "{to}: {error}");
-    }
 }

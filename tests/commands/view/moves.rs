@@ -5,14 +5,13 @@ use super::super::{done, numbers};
 use super::devtools::{Chromium, Tab};
 use super::{COUNT, keep, room, start, weights};
 use libtest_mimic::Trial;
-use serde_json::{Value, json};
+use serde_json::json;
 use viewfuse_tests::command::toy;
 use viewfuse_tests::patience::wait_until;
 use viewfuse_tests::places::repository;
-use viewfuse_tests::trials::{needing, trial};
-use viewfuse_tests::viewer::{Program, request};
+use viewfuse_tests::viewer::Program;
 
-/// So many moves are sent in the tests of memory, unless `VIEWFUSE_VIEW_MOVES` says otherwise.
+/// So many moves are sent in the test of memory, unless `VIEWFUSE_VIEW_MOVES` says otherwise.
 const MOVES: usize = 400;
 
 /// Longest sides of coarse pictures as 16ths of the finest: late ones are coarser.
@@ -22,19 +21,16 @@ const SIXTEENTHS: [f64; 6] = [16.0, 13.0, 10.0, 8.0, 6.0, 4.0];
 const PICTURES: f64 = 30.0;
 
 pub(super) fn trials() -> Vec<Trial> {
-    let mut trials = Vec::new();
-    let no_count = (!cfg!(target_os = "linux")).then(|| "the system does not say what a process takes".to_owned());
-    trials.push(needing(no_count, false, trial("commands::view::memory_does_not_grow", memory_does_not_grow)));
-    if cfg!(target_os = "linux") {
-        let tests: [(&str, InBrowser); 4] = [
-            ("view::browser::pictures_of_gaussians_follow_the_hand", pictures_of_gaussians_follow_the_hand),
-            ("view::browser::pictures_of_the_room_follow_the_hand", pictures_of_the_room_follow_the_hand),
-            ("view::browser::pictures_of_the_lorry_follow_the_hand", pictures_of_the_lorry_follow_the_hand),
-            ("view::browser::many_moves_of_a_hand_take_no_memory", many_moves_of_a_hand_take_no_memory),
-        ];
-        trials.extend(browser::trials(tests));
+    if cfg!(not(target_os = "linux")) {
+        // The system does not say what a process takes.
+        return Vec::new();
     }
-    trials
+    let tests: [(&str, InBrowser); 3] = [
+        ("view::browser::pictures_of_gaussians_follow_the_hand", pictures_of_gaussians_follow_the_hand),
+        ("view::browser::pictures_of_the_room_follow_the_hand", pictures_of_the_room_follow_the_hand),
+        ("view::browser::many_moves_of_a_hand_take_no_memory", many_moves_of_a_hand_take_no_memory),
+    ];
+    browser::trials(tests).into()
 }
 
 fn moves() -> usize {
@@ -43,10 +39,6 @@ fn moves() -> usize {
 
 fn pictures_of_the_room_follow_the_hand(browser: &Browser) {
     pictures_follow_the_hand(browser, "tests/data/room", [160.0, 120.0], "room.png");
-}
-
-fn pictures_of_the_lorry_follow_the_hand(browser: &Browser) {
-    pictures_follow_the_hand(browser, "tests/data/toy", [128.0, 128.0], "lorry.png");
 }
 
 fn pictures_of_gaussians_follow_the_hand(browser: &Browser) {
@@ -146,31 +138,4 @@ fn many_moves_of_a_hand_take_no_memory(browser: &Browser) {
     assert!(after[0] < before[0] + 4096.0, "{before:?} KiB became {after:?} over {moves} moves");
     assert!(after[1] < before[1] + 4.0e6, "{before:?} bytes became {after:?} over {moves} moves");
     assert_eq!(tab.console(), [""; 0]);
-}
-
-/// The same by requests alone, each of which gets a picture.
-fn memory_does_not_grow() {
-    let moves = moves();
-    let program = room("--sources 003..006 --weights error:alpha=1");
-    let (scene, empty) = (program.scene(), program.memory());
-    let (start, focus): (&Value, _) = (&scene["start"], numbers(&scene["focus"]));
-    let mut connection = program.connect();
-    let mut move_on = |index: usize| {
-        // Around the focus, a bit further each time.
-        let mut pose = start.clone();
-        for (axis, own) in focus.iter().enumerate() {
-            let centre = start[axis][3].as_f64().expect("a number");
-            pose[axis][3] = json!(centre + 0.02 * ((index % 50) as f64 / 50.0) * (own - centre));
-        }
-        let mut request = request("a", &pose, true);
-        request["side"] = json!(32);
-        connection.picture(&request).unpacked();
-    };
-    let tenth = moves / 10;
-    (0..tenth).for_each(&mut move_on);
-    let before = program.memory();
-    (tenth..moves).for_each(&mut move_on);
-    let after = program.memory();
-    println!("{moves} moves: {empty} KiB at first, {before} KiB after a tenth, {after} KiB at last");
-    assert!(after < before + (4 << 10), "{before} KiB became {after} KiB over {moves} moves");
 }

@@ -1,6 +1,7 @@
 //! Checkpoints of every format, and learned attention.
 
 use super::{OneFile, Target, Verdict, verdict};
+use crate::memory;
 use viewfuse::nn::checkpoint::Checkpoint;
 use viewfuse::weighting::attention::AttentionModel;
 use viewfuse_tests::checkpoints::{Claim, Pickle, archive, legacy, safetensors, snapshot, state_dict};
@@ -8,6 +9,19 @@ use viewfuse_tests::places::data;
 
 /// Tensors of files that ask for more are not read here.
 const MAX_READ: u64 = 64 << 20;
+/// What opening may take: so many bytes for each of the file, and something for every file.
+const PER_BYTE: usize = 160;
+const ALWAYS: usize = 256 << 10;
+/// Bytes of a container around a pickle.
+const CONTAINER: usize = 4096;
+/// What reading a tensor may take beside its estimate.
+const MESSAGE: u64 = 4096;
+
+/// Whether no more memory was taken than may be since so much was.
+fn within(before: usize, most: u64, what: &str) -> Result<(), String> {
+    let taken = memory::since_start()[0].saturating_sub(before) as u64;
+    if taken <= most { Ok(()) } else { Err(format!("{what} took {taken} bytes, of at most {most}")) }
+}
 
 pub(crate) struct Checkpoints {
     file: OneFile,
@@ -96,11 +110,17 @@ impl Target for Checkpoints {
             (true, 0) => self.file.write(&archive(bytes, &claims())),
             (true, _) => self.file.write(&legacy(bytes, &claims())),
         };
+        let before = memory::start();
         let opened = Checkpoint::open(path);
+        within(before, (PER_BYTE * (bytes.len() + CONTAINER) + ALWAYS) as u64, "opening")?;
         if let Ok(checkpoint) = &opened {
             for name in checkpoint.shapes().keys() {
-                if checkpoint.byte_estimate([name.as_str()]) <= MAX_READ {
-                    verdict(checkpoint.tensor(name), path)?;
+                let estimate = checkpoint.byte_estimate([name.as_str()]);
+                if estimate <= MAX_READ {
+                    let before = memory::start();
+                    let outcome = checkpoint.tensor(name);
+                    within(before, estimate + MESSAGE, "reading")?;
+                    verdict(outcome, path)?;
                 }
             }
         }
