@@ -1,5 +1,5 @@
-# Reads what `cargo test` printed, and from the file `times` what each binary took ("NAME SECONDS USER SYSTEM"), and says at the
-# end, one line each, what each binary took, what was ignored and why and what failed; the last line is
+# Reads what `cargo test` printed, and from the file `times` what each binary took ("NAME SECONDS USER SYSTEM"), and
+# says at the end, one line each, what each binary took, what was ignored and why and what failed; the last line is
 # "N passed, N failed, N skipped".
 
 # Which binary speaks: "Running path (target/release/deps/NAME-HASH)", "Doc-tests NAME".
@@ -43,7 +43,8 @@ END {
   }
   print "\n== summary"
   while ((getline line < times) > 0) {
-    split(line, words, " "); seconds[words[1]] += words[2]; cpu[words[1]] += words[3] + words[4]; all += words[2]; all_cpu += words[3] + words[4]
+    split(line, words, " ")
+    seconds[words[1]] += words[2]; cpu[words[1]] += words[3] + words[4]; all += words[2]; all_cpu += words[3] + words[4]
   }
   # Those that took longer than a second, the longest first.
   while (all > 0) {

@@ -1,5 +1,5 @@
-//! What opening a checkpoint takes of memory, for files that are made of what grows most: no more than their bytes say. Files
-//! that are broken at random are a target of `fuzz`.
+//! What opening a checkpoint takes of memory, for files that are made of what grows most: no more than their bytes say.
+//! Files that are broken at random are a target of `fuzz`.
 //!
 //! Memory is counted for the whole process, so that this is one test, in a process of its own.
 

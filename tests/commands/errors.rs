@@ -29,7 +29,8 @@ viewfuse_tests::trials![
 
 const RENDER: &str = "render toy --targets 20 --size 32x32 -o out";
 
-/// A sample scene with something broken is refused by every command that reads it. What else may be broken is in `scenes`.
+/// A sample scene with something broken is refused by every command that reads it. What else may be broken is in
+/// `scenes`.
 #[track_caller]
 fn assert_scene_refused(folder: &Folder, parts: &[&str]) {
     for arguments in [RENDER, "evaluate toy --targets 20 --weights mean --size 32x32 -o scores.csv"] {

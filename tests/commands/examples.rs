@@ -1,5 +1,5 @@
-//! What documents show beside commands that `readme.rs` runs to their end: the viewer, commands on photographs of a person, and trainings
-//! that take hours.
+//! What documents show beside commands that `readme.rs` runs to their end: the viewer, commands on photographs of a
+//! person, and trainings that take hours.
 
 use super::{BINARY, lab};
 use std::fs;

@@ -1,5 +1,5 @@
-//! The READMEs: their commands are run as they stand there, their links and those of the results' reports lead somewhere, and
-//! every published package has its own.
+//! The READMEs: their commands are run as they stand there, their links and those of the results' reports lead
+//! somewhere, and every published package has its own.
 
 use super::{BINARY, examples, lab};
 use serde_json::Value;

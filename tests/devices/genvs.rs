@@ -1,5 +1,6 @@
 //! A small GeNVS on each device: whole pictures with everything and with nothing left out. Its reference
-//! values take minutes on a software driver: the CPU has them (`fields/genvs/values.rs`), and these pictures are the CPU's.
+//! values take minutes on a software driver: the CPU has them (`fields/genvs/values.rs`), and these pictures are the
+//! CPU's.
 
 use crate::candidate::{Candidate, Test};
 use libtest_mimic::Failed;

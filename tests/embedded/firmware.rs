@@ -50,8 +50,8 @@ static FIRMWARE: LazyLock<[Firmware; 3]> = LazyLock::new(|| {
     BOARDS.map(|board| Firmware { board, emulator: Emulator::find(board, folder) })
 });
 
-/// All programs of all boards, built by whichever test comes first. For speed those of the first board alone: what is compared
-/// are the compiler's choices, not the processor's.
+/// All programs of all boards, built by whichever test comes first. For speed those of the first board alone: what is
+/// compared are the compiler's choices, not the processor's.
 static BUILT: LazyLock<Result<(), String>> = LazyLock::new(|| {
     let found: Vec<&Emulator> = FIRMWARE.iter().filter_map(|firmware| firmware.emulator.as_ref().ok()).collect();
     let first: Vec<&Emulator> = FIRMWARE[0].emulator.as_ref().into_iter().collect();

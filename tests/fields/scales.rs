@@ -1,6 +1,7 @@
 //! A scene at ten scales from 1e-9 to 1e9: every scheme gives the same weights and every field the same pictures as at scale 1.
 //!
-//! Prints a table. `VIEWFUSE_ALL_SCALES=1` renders with every scheme at every scale; the tests do it with one, at two: weights are compared with all.
+//! Prints a table. `VIEWFUSE_ALL_SCALES=1` renders with every scheme at every scale; the tests do it with one, at two:
+//! weights are compared with all.
 
 use std::path::Path;
 use tempfile::TempDir;

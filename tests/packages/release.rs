@@ -1,5 +1,5 @@
-//! The oldest compiler that a release promises. Licences, several versions of one crate, registries and known advisories are
-//! `cargo deny check`'s, with `.cargo/deny.toml`.
+//! The oldest compiler that a release promises. Licences, several versions of one crate, registries and known
+//! advisories are `cargo deny check`'s, with `.cargo/deny.toml`.
 
 use super::{cargo, list, text};
 use serde_json::Value;
@@ -11,8 +11,8 @@ fn version(text: &str) -> (u32, u32) {
     (numbers.next().unwrap_or(0), numbers.next().unwrap_or(0))
 }
 
-/// Every package promises the same, no dependency needs a newer one, and the README names it. A machine with that compiler
-/// tests the promise by building.
+/// Every package promises the same, no dependency needs a newer one, and the README names it. A machine with that
+/// compiler tests the promise by building.
 #[test]
 fn the_oldest_compiler() {
     let metadata = cargo(&["metadata", "--all-features", "--format-version", "1"]);

@@ -29,8 +29,8 @@ fn is_declared(path: &Path, room: &Path) -> bool {
     Source::read(&above).code.lines().any(|line| line == format!("mod {name};"))
 }
 
-/// A file that no module declares is not compiled, and in a binary without the harness the attribute `test` does nothing but
-/// hide its function. Neither is a warning.
+/// A file that no module declares is not compiled, and in a binary without the harness the attribute `test` does
+/// nothing but hide its function. Neither is a warning.
 #[test]
 fn every_test_is_run() {
     let rooms = rooms();

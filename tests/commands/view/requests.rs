@@ -20,13 +20,11 @@ pub(super) fn trials() -> Vec<Trial> {
     vec![
         needing(missing, is_required("VIEWFUSE_REQUIRE_VULKAN"), on_vulkan),
         trial("commands::view::other_hosts_and_addresses_get_nothing", other_hosts_and_addresses_get_nothing),
-        trial("commands::view::every_module_of_the_page_is_served", every_module_of_the_page_is_served),
         trial("commands::view::how_much_was_photographed_is_told", how_much_was_photographed_is_told),
         trial("commands::view::full_pictures_are_those_of_render", full_pictures_are_those_of_render),
         trial("commands::view::no_view_is_an_error_of_the_server", no_view_is_an_error_of_the_server),
         trial("commands::view::the_scheme_can_be_chosen_for_the_scene", the_scheme_can_be_chosen_for_the_scene),
         trial("commands::view::the_newest_request_wins", the_newest_request_wins),
-        trial("commands::view::many_connections_at_once_are_answered", many_connections_at_once_are_answered),
         trial("commands::view::ctrl_c_ends_it_and_nothing_is_written", ctrl_c_ends_it_and_nothing_is_written),
         trial("commands::view::a_taken_port_is_an_error", a_taken_port_is_an_error),
         trial("commands::view::learned_fields_are_shown", learned_fields_are_shown),
@@ -72,28 +70,6 @@ fn other_hosts_and_addresses_get_nothing() {
     // After all of that it goes on.
     let (answer, picture) = program.connect().picture(&request("a", start, false)).unpacked();
     assert_eq!((answer["full"].as_bool(), picture.dimensions()), (Some(true), (24, 24)));
-}
-
-/// From the page on, along the imports.
-fn every_module_of_the_page_is_served() {
-    let program = start(&repository(), &format!("{} --size 24x24", data("toy").display()));
-    let mut modules = vec!["view.js".to_owned()];
-    let mut place = 0;
-    while let Some(name) = modules.get(place).cloned() {
-        place += 1;
-        let answer = program.get(&name);
-        assert_eq!(answer.status, 200, "{name}");
-        assert!(answer.head.contains("Content-Type: text/javascript"), "{name}: {}", answer.head);
-        assert!(answer.head.contains("script-src 'self'"), "{name}: {}", answer.head);
-        let text = String::from_utf8(answer.body).expect("text");
-        for rest in text.split("from './").skip(1) {
-            let imported = rest.split('\'').next().expect("a name").to_owned();
-            if !modules.contains(&imported) {
-                modules.push(imported);
-            }
-        }
-    }
-    assert!(modules.len() > 10, "{modules:?}");
 }
 
 /// The ring around the subject, and a picture from its other side.
@@ -247,22 +223,6 @@ fn the_newest_request_wins() {
         request("a", &start, true).to_string().as_bytes(),
     );
     assert_eq!(numbers(&weights.json()).len(), 11);
-}
-
-/// Browsers open several connections at once and keep them.
-fn many_connections_at_once_are_answered() {
-    let folder = toy();
-    let program = start(folder.path(), "toy --size 24x24");
-    let path = format!("{}status", program.path);
-    let mut connections = Vec::new();
-    for _ in 0..10 {
-        let mut new: Vec<_> = (0..6).map(|_| program.connect()).collect();
-        new.iter_mut().for_each(|own| own.send("GET", &path, &[("Host", &program.host)], b""));
-        connections.extend(new);
-    }
-    for connection in &mut connections {
-        assert_eq!(connection.receive().status, 200);
-    }
 }
 
 fn ctrl_c_ends_it_and_nothing_is_written() {

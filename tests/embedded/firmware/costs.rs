@@ -102,7 +102,8 @@ fn costs(boards: &[Firmware], profile: &'static str, columns: usize) -> Result<(
     Ok((everywhere.swap_remove(0), rows))
 }
 
-/// The table for speed is written with the other and not compared: nothing is promised of it, and its traces take as long.
+/// The table for speed is written with the other and not compared: nothing is promised of it, and its traces take as
+/// long.
 pub(super) fn what_the_calls_take(boards: &[Firmware]) -> Result<(), Failed> {
     let [for_size, for_speed] = PROFILES;
     let (calls, mut three) = costs(boards, for_size, 3)?;
