@@ -6,19 +6,18 @@
 //! sampler is a few functions from levels to coefficients, and pictures are combined by one kernel ([`mixed_element`]).
 //!
 //! ```text
-//! euler       order 1   D + n / s (x - D), the same as DDIM
-//! heun        order 2   algorithm 1 of Karras et al.: Euler, then a second call at the level reached
-//! dpm++2m     order 2   Lu et al., "DPM-Solver++" (2022), algorithm 2
-//! dpm++3m     order 3   the same with three results
-//! unipc       order 4   Zhao et al., "UniPC" (2023): the same as a predictor, and a corrector that uses the call at the
-//!                       level reached, which the next step needs anyway, as a fourth result
+//! heun        order 2   algorithm 1 of Karras et al.: Euler's step, then a second call at the level reached
+//! unipc       order 4   Zhao et al., "UniPC" (2023): three results as a predictor, and a corrector that uses the call at
+//!                       the level reached, which the next step needs anyway, as a fourth result
 //! ipndm       order 2   Zhang and Chen (2022), as on EDM's levels in Zhou et al. (2024): Adams and Bashforth's four
 //!                       coefficients for even steps, although the steps are not (on even ones it has order 4)
-//! ipndm-v     order 4   the same with the coefficients of the steps that are taken
 //! ```
 //!
+//! `heun` is the published run. Of the samplers that were tried, `ipndm` has the least error up to 25 calls and `unipc` with
+//! more (`host/research/results/speed.md` has the table).
+//!
 //! Multistep samplers begin with lower orders until they have enough results. What they put a polynomial through is the
-//! denoised picture over the logarithm of the level, for `ipndm` and `ipndm-v` the direction `(x - D) / s` over the level
+//! denoised picture over the logarithm of the level, for `ipndm` the direction `(x - D) / s` over the level
 //! itself. No subtraction cancels: the coefficients are accurate to a few units of `f32`, so the state may be
 //! `f32` too.
 //!
@@ -26,9 +25,9 @@
 //!
 //! ```text
 //! mix             the linear combination, and noise
-//! heun            euler, heun                      results are denoised pictures, steps are straight
-//! exponential     dpm++2m, dpm++3m, unipc          results are denoised pictures
-//! directions      ipndm, ipndm-v                   results are directions
+//! heun            heun                             results are denoised pictures, steps are straight
+//! exponential     unipc                            results are denoised pictures
+//! directions      ipndm                            results are directions
 //! interpolation   integrals of interpolating polynomials
 //! churn           noise added between the steps
 //! control         step size and early stop
@@ -142,16 +141,6 @@ macro_rules! samplers {
 }
 
 samplers! {
-    /// `euler`: order 1.
-    Euler {
-        name: "euler",
-        order: 1,
-        results: 1,
-        keeps: denoised,
-        step: heun::euler_step,
-        corrected: Corrected::Never,
-        correction: none,
-    }
     /// `heun`: order 2, two calls a step.
     Heun {
         name: "heun",
@@ -161,26 +150,6 @@ samplers! {
         step: heun::euler_step,
         corrected: Corrected::ByAnotherCall,
         correction: heun::correction,
-    }
-    /// `dpm++2m`: DPM-Solver++ with two results.
-    DpmPlus2 {
-        name: "dpm++2m",
-        order: 2,
-        results: 2,
-        keeps: denoised,
-        step: exponential::second_order,
-        corrected: Corrected::Never,
-        correction: none,
-    }
-    /// `dpm++3m`: DPM-Solver++ with three results.
-    DpmPlus3 {
-        name: "dpm++3m",
-        order: 3,
-        results: 3,
-        keeps: denoised,
-        step: exponential::predictor,
-        corrected: Corrected::Never,
-        correction: none,
     }
     /// `unipc`: three results, corrected by a fourth.
     UniPc {
@@ -200,16 +169,6 @@ samplers! {
         results: 4,
         keeps: directions::direction,
         step: directions::even_steps,
-        corrected: Corrected::Never,
-        correction: none,
-    }
-    /// `ipndm-v`: four directions, coefficients of the steps that are taken.
-    IpndmUneven {
-        name: "ipndm-v",
-        order: 4,
-        results: 4,
-        keeps: directions::direction,
-        step: directions::uneven_steps,
         corrected: Corrected::Never,
         correction: none,
     }

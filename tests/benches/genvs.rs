@@ -36,7 +36,7 @@ fn main() {
         }
         encoder.push(start.elapsed().as_secs_f64());
         let [short, long] = LEVELS.map(|level_count| {
-            let steps = Steps::Fixed { sampler: Sampler::Euler, level_count };
+            let steps = Steps::Fixed { sampler: Sampler::Ipndm, level_count };
             let plan = Plan { steps, ..Plan::published(0) };
             let start = Instant::now();
             reference.sampled(&latents, &features, [SIDE; 2], &plan).expect("a picture");

@@ -2,10 +2,10 @@
 //!
 //! Sources: Zhang and Chen, "Fast sampling of diffusion models with exponential integrator" (2022), for the method and its
 //! start with lower orders; Zhou et al., "Fast ODE-based sampling for diffusion models in around 5 steps" (2024), and their
-//! code, for its form on EDM's levels and for the coefficients of uneven steps.
+//! code, for its form on EDM's levels.
 
 use super::Mix;
-use super::interpolation::{EVEN_MOMENTS, Row, weights};
+use super::interpolation::Row;
 use crate::math::min;
 
 /// The direction at level `sigma` from the state and the denoised picture. Levels below 1e-38 count as that.
@@ -25,17 +25,6 @@ pub(super) fn even_steps(levels: &Row, count: u32, next: f32) -> Mix {
         _ => [55.0 / 24.0, -59.0 / 24.0, 37.0 / 24.0, -9.0 / 24.0],
     };
     stepped(next - levels[0], &weights)
-}
-
-/// The step by the polynomial in the level through `count` directions. To level 0 as [`even_steps`].
-pub(super) fn uneven_steps(levels: &Row, count: u32, next: f32) -> Mix {
-    let step = next - levels[0];
-    if !(next > 0.0) {
-        return stepped(step, &[1.0, 0.0, 0.0, 0.0]);
-    }
-    let place = |level: f32| (level - levels[0]) / step;
-    let places = [0.0, place(levels[1]), place(levels[2]), place(levels[3])];
-    stepped(step, &weights(&places, count, &EVEN_MOMENTS))
 }
 
 fn stepped(step: f32, weights: &Row) -> Mix {

@@ -1,11 +1,10 @@
-//! DPM-Solver++ and UniPC: results are denoised pictures.
+//! UniPC: results are denoised pictures.
 //!
 //! With `l = -ln s` and the step's length `h = ln(s / n)` the flow is `x_n = n / s x_s + integral of exp(l - l_n) D dl`
 //! exactly; a polynomial in `l` through the known results replaces `D`.
 //!
-//! Sources: Lu et al., "DPM-Solver++" (2022), and their code; Zhao et al., "UniPC" (2023), and theirs, with data
-//! prediction. Where these solve for their coefficients exactly, as for three results and more, they are the integrals of
-//! that polynomial, for any function `B(h)`.
+//! Source: Zhao et al., "UniPC" (2023), and their code, with data prediction. Where it solves for its coefficients exactly,
+//! as for three results and more, they are the integrals of that polynomial, for any function `B(h)`.
 
 use super::Mix;
 use super::interpolation::{Row, exponential_moments, places, weights};
@@ -17,22 +16,7 @@ fn prepared(from: f32, next: f32) -> (f32, f32, Row) {
     (next / from, h, exponential_moments(h, (from - next) / from))
 }
 
-/// DPM-Solver++(2M): the denoised picture in the middle of the step, from two results. With one result, and to level 0,
-/// the first-order step.
-pub(super) fn second_order(levels: &Row, count: u32, next: f32) -> Mix {
-    let share = (levels[0] - next) / levels[0];
-    let ahead = if count < 2 || !(next > 0.0) {
-        0.0
-    } else {
-        0.5 * share * (ln_ratio(levels[0], next) / ln_ratio(levels[1], levels[0]))
-    };
-    Mix { state: next / levels[0], results: [share + ahead, -ahead, 0.0, 0.0] }
-}
-
-/// DPM-Solver++(3M) and UniPC's predictor: the polynomial through `count` results. To level 0 the newest result.
-///
-/// The published DPM-Solver++(3M) halves the term of the second difference, with which it is no longer of third order
-/// (`tests/numerics/sampler.rs` measures 2); this is the third-order one.
+/// UniPC's predictor: the polynomial through `count` results, of third order for three. To level 0 the newest result.
 pub(super) fn predictor(levels: &Row, count: u32, next: f32) -> Mix {
     if !(next > 0.0) {
         return Mix::NEWEST;

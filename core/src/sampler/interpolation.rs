@@ -3,7 +3,7 @@
 use super::MAX_RESULTS;
 use crate::math::ln_ratio;
 
-/// Numbers of a step in the logarithm of the level, or of one in the level itself.
+/// Numbers of a step in the logarithm of the level.
 pub(super) type Row = [f32; MAX_RESULTS];
 
 /// `integral over t in [0, 1] of h exp(-h (1 - t)) t^k`, for `k` of 0 to 3: the contribution to the state of a result
@@ -33,9 +33,6 @@ pub(super) fn exponential_moments(h: f32, first: f32) -> Row {
     }
     moments
 }
-
-/// The integrals of `t^k` alone.
-pub(super) const EVEN_MOMENTS: Row = [1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0];
 
 /// The weight of each of `count` results at different `places` in the integral of the polynomial through them, with the
 /// integrals of `t^k` given as `moments`. The sum is exactly the first moment to a rounding: a result that does not change

@@ -26,7 +26,7 @@ impl Progress for StopsAfter {
 fn a_person_need_not_wait_for_the_picture() {
     let plan = Plan {
         early_termination: None,
-        steps: Steps::Fixed { sampler: Sampler::Euler, level_count: 100_000 },
+        steps: Steps::Fixed { sampler: Sampler::Ipndm, level_count: 100_000 },
         ..Plan::published(0)
     };
     let field = made(GenvsOptions { plan, ..exact() });

@@ -47,8 +47,8 @@ flags! {
     near_far: [f32; 2] = "near-far", "NEAR,FAR", parse_near_far, Picture, &[], NEAR_FAR;
     noise: NoiseSchedule = "noise", "MAX,MIN", parse_noise, Picture, &[], "Largest and smallest noise level [default: \
         80,0.002]";
-    sampler: Sampler = "sampler", "NAME", parse_sampler, Effort, BOUNDS, "Sampler: euler, heun, dpm++2m, dpm++3m, unipc, \
-        ipndm, ipndm-v [default: ipndm; heun where nothing is left out]";
+    sampler: Sampler = "sampler", "NAME", parse_sampler, Effort, BOUNDS, "Sampler: heun, unipc, ipndm [default: ipndm; heun \
+        where nothing is left out]";
     steps: u32 = "steps", "N", parse_steps, Effort, BOUNDS, "Noise levels. Each takes one call of the denoiser; with heun \
         two, except the last [default: 10; 25 where nothing is left out]";
     tolerance: f32 = "tolerance", "ERROR", parse_tolerance, Effort, &["max_error", "max_time", "sampler", "steps"], "Choose \
