@@ -14,7 +14,7 @@
 //! ```
 //!
 //! `heun` is the published run. Of the samplers that were tried, `ipndm` has the least error up to 25 calls and `unipc` with
-//! more (`host/research/results/speed.md` has the table).
+//! more (`host/results/speed.md` has the table).
 //!
 //! Multistep samplers begin with lower orders until they have enough results. What they put a polynomial through is the
 //! denoised picture over the logarithm of the level, for `ipndm` the direction `(x - D) / s` over the level

@@ -30,12 +30,11 @@
 mod formulas;
 mod scheme;
 
-pub use scheme::{Choice, Parameter, Row, Scheme, SchemeBlock, SchemeError};
+pub use scheme::{Choice, Parameter, Row, Scheme, SchemeError};
 
 use crate::pose::Pose;
 use crate::sources::Sources;
 use crate::weights::Weights;
-use bytemuck::{Pod, Zeroable};
 use scheme::Limits;
 
 /// Added to every error before the reciprocal, as in the published code.
@@ -167,17 +166,4 @@ pub enum AngleKind {
     PrincipalAxis = 0,
     /// Of the full relative rotation, roll included, as the published code computes it.
     FullRotation = 1,
-}
-
-/// The most sources of the kernels that weigh on a device: rows of weights there have this length.
-pub const MAX_WEIGHED: usize = 32;
-
-/// A dispatch of [`weigh`], as plain data.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct WeighBlock {
-    /// The scheme.
-    pub scheme: SchemeBlock,
-    /// How many sources there are.
-    pub source_count: u32,
 }

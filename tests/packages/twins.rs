@@ -1,5 +1,4 @@
-//! The marks of kernels' rows that no compiler checks: `definition` and `measured` say that no production code calls a
-//! kernel, `twin` that the CPU does not call its body.
+//! The marks of kernels' rows that no compiler checks: `measured` says that no production code calls a kernel, `twin` that the CPU does not call its body.
 
 use viewfuse_kernels::rows::Kernel;
 use viewfuse_kernels::{for_each_kernel, has_mark};
@@ -15,7 +14,7 @@ macro_rules! marks {
         /// Kernels that production code does not call, by their rows.
         fn without_caller(kernel: Kernel) -> bool {
             match kernel {
-                $(Kernel::$Kernel => has_mark!(definition: $($mark)*) || has_mark!(measured: $($mark)*),)+
+                $(Kernel::$Kernel => has_mark!(measured: $($mark)*),)+
             }
         }
     };
@@ -48,7 +47,7 @@ fn calls(sources: &[Source], method: &str) -> bool {
 /// What is wrong with the mark of a kernel.
 fn fault(sources: &[Source], method: &str, is_marked: bool) -> Option<String> {
     match (calls(sources, method), is_marked) {
-        (true, true) => Some(format!("{method} is marked definition or measured, but production code calls it")),
+        (true, true) => Some(format!("{method} is marked measured, but production code calls it")),
         (false, false) => Some(format!("{method} has no caller in production, and no mark that says so")),
         _ => None,
     }

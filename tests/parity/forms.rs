@@ -43,9 +43,11 @@ pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> 
     let mut trials: Vec<Trial> = tiled.clone().map(in_pieces).collect();
     trials.extend(tiled.flat_map(others).map(|(kernel, form)| of_form(kernel, form)));
     let (instance, adapter) = (instance.clone(), adapter.clone());
-    let name = format!("{}::a_form_is_measured_and_remembered", adapter.name);
-    let measured = (instance.clone(), adapter.clone());
-    trials.push(ready(Trial::test(name, move || measured_and_remembered(&measured.0, &measured.1))));
+    if has_subgroups {
+        let name = format!("{}::a_form_is_measured_and_remembered", adapter.name);
+        let measured = (instance.clone(), adapter.clone());
+        trials.push(ready(Trial::test(name, move || measured_and_remembered(&measured.0, &measured.1))));
+    }
     if has_subgroups && adapter.name.starts_with("llvmpipe") {
         trials.push(ready(Trial::test(format!("{}::of_wider_subgroups", adapter.name), of_wider_subgroups)));
     }

@@ -15,7 +15,7 @@ use viewfuse_tests::places::repository;
 
 /// Kernels with loops that keep rust-gpu's shape, and how many: a `break` or an early `return` in the body ends them, so
 /// that what decides at their end is known in the body alone.
-const LEFT_BY_THEIR_BODY: [(&str, usize); 10] = [
+const LEFT_BY_THEIR_BODY: [(&str, usize); 9] = [
     ("blend_gradient", 2),
     ("find_non_finite", 1),
     ("fine_depths", 1),
@@ -25,14 +25,12 @@ const LEFT_BY_THEIR_BODY: [(&str, usize); 10] = [
     ("march_rays", 2),
     ("match_cost", 1),
     ("sample_mask", 3),
-    ("weigh", 1),
 ];
 
 /// Kernels with arrays of an invocation's own that a loop's counter indexes. rust-gpu unrolls nothing: until a driver does,
 /// these arrays are memory and not registers.
-const INDEXED_BY_A_COUNTER: [&str; 26] = [
+const INDEXED_BY_A_COUNTER: [&str; 23] = [
     "add_noise",
-    "attend",
     "blend_gradient",
     "blend_planes",
     "blend_splats",
@@ -41,7 +39,6 @@ const INDEXED_BY_A_COUNTER: [&str; 26] = [
     "compare_views",
     "composite",
     "embed_points",
-    "embed_pose",
     "follow_paths",
     "front_cost",
     "hull_entry",
@@ -55,7 +52,6 @@ const INDEXED_BY_A_COUNTER: [&str; 26] = [
     "project_gradients",
     "random_draws",
     "row_sums",
-    "weigh",
     "window_cost",
 ];
 

@@ -4,7 +4,7 @@ use crate::buffer::{Array, Bound, ranges};
 use crate::error::VulkanError;
 use crate::forms::Class;
 use crate::gpu::{Gpu, State, WIDEST_PAGED, barrier};
-use crate::kernel::{Access, Form, Kernel, Layout, Piece, WORKGROUP};
+use crate::kernel::{Access, Form, Kernel, Layout, Piece, WORKGROUP, tile_elements};
 use crate::pipelines::Pipeline;
 use crate::submissions::Submission;
 use ash::vk;
@@ -63,7 +63,7 @@ impl Gpu {
             let (form, of_form) = match kernel.shape(parameters) {
                 Some(shape) => {
                     let form = gpu.form(state, &job, &Class::new(kernel, shape))?;
-                    (form, 0..form.elements(shape.row_count, shape.column_count))
+                    (form, 0..tile_elements(shape.row_count, shape.column_count))
                 }
                 None => {
                     let own = kernel.invocations();

@@ -3,7 +3,7 @@
 //! A form is measured at the first use of a kernel for products of a class, sizes to within a factor of two. All forms give the
 //! same bits, which is compared then, so a choice changes nothing but the time.
 
-use crate::kernel::{Form, Kernel, TILE, WORKGROUP};
+use crate::kernel::{Form, Kernel, TILE, WORKGROUP, tile_elements};
 use std::collections::BTreeMap;
 use viewfuse_kernels::network::tile::Shape;
 
@@ -35,35 +35,18 @@ impl Class {
         Class { shape, key: (kernel.name().to_owned(), sizes) }
     }
 
-    /// The forms that come into question, [`Form::Single`] first: none that would leave half of its tiles empty, none that
-    /// the device cannot run, and none that does not pay on a device of its kind.
-    pub(crate) fn candidates(&self, is_software: bool, has_subgroups: bool) -> Vec<Form> {
+    /// The forms that come into question, [`Form::Single`] first: one for little work, and none that the device cannot run.
+    pub(crate) fn candidates(&self, has_subgroups: bool) -> &'static [Form] {
         let Shape { row_count, inner_count, column_count } = self.shape;
         let work = u64::from(row_count) * u64::from(inner_count) * u64::from(column_count);
-        if work < MIN_WORK {
-            return vec![Form::Single];
-        }
-        let comes_into_question = |form: &Form| {
-            let [rows, columns] = form.tiles();
-            let is_filled = (rows == 1 || row_count > TILE) && (columns == 1 || column_count > TILE);
-            let is_able = match form {
-                Form::Subgroup => has_subgroups,
-                // A processor has nothing to do while it waits for a fetch: a second buffer is only work.
-                Form::Buffered => !is_software,
-                // Compiling it costs a software driver seconds, and it gains a tenth on the forms that remain.
-                Form::Quadruple => !(is_software && has_subgroups),
-                Form::Single | Form::Double => true,
-            };
-            is_filled && is_able
-        };
-        Form::ALL.into_iter().filter(comes_into_question).collect()
+        if work >= MIN_WORK && has_subgroups { &Form::ALL } else { &[Form::Single] }
     }
 
-    /// Elements of a measurement: the first rows, whole groups of tiles of every form.
-    pub(crate) fn measured_elements(&self, form: Form, is_software: bool) -> u32 {
+    /// Elements of a measurement: the first rows.
+    pub(crate) fn measured_elements(&self, is_software: bool) -> u32 {
         let tiles = if is_software { MEASURED_TILES_OF_SOFTWARE } else { MEASURED_TILES };
-        let bands = tiles.div_ceil(2 * self.shape.column_count.div_ceil(TILE)).max(1);
-        form.elements(self.shape.row_count.min(2 * TILE * bands), self.shape.column_count)
+        let bands = tiles.div_ceil(self.shape.column_count.div_ceil(TILE)).max(1);
+        tile_elements(self.shape.row_count.min(TILE * bands), self.shape.column_count)
     }
 }
 
@@ -138,48 +121,31 @@ mod tests {
     }
 
     #[test]
-    fn empty_tiles_and_little_work_are_no_candidates() {
-        let candidates = |rows, inner, columns| class(rows, inner, columns).candidates(false, true);
-        assert_eq!(candidates(4096, 512, 512), Form::ALL);
-        assert_eq!(candidates(4096, 512, 64), [Form::Single, Form::Subgroup]);
-        assert_eq!(candidates(64, 4096, 512), [Form::Single, Form::Double, Form::Buffered, Form::Subgroup]);
-        assert_eq!(candidates(128, 128, 128), [Form::Single]);
+    fn little_work_and_a_device_without_subgroups_have_one_candidate() {
+        assert_eq!(class(4096, 512, 512).candidates(true), Form::ALL);
+        assert_eq!(class(4096, 512, 512).candidates(false), [Form::Single]);
+        assert_eq!(class(128, 128, 128).candidates(true), [Form::Single]);
     }
 
     #[test]
-    fn candidates_depend_on_the_device() {
-        let all = Form::ALL.map(|form| form.name());
-        let names = |is_software, has_subgroups| -> Vec<&str> {
-            let candidates = class(4096, 512, 512).candidates(is_software, has_subgroups);
-            candidates.into_iter().map(Form::name).collect()
-        };
-        assert_eq!(names(false, true), all);
-        assert_eq!(names(false, false), ["single", "double", "quadruple", "buffered"]);
-        assert_eq!(names(true, true), ["single", "double", "subgroup"]);
-        assert_eq!(names(true, false), ["single", "double", "quadruple"]);
-    }
-
-    #[test]
-    fn a_measurement_has_the_same_outputs_in_every_form() {
-        // Five tiles of columns: four bands of two tiles of rows.
+    fn a_measurement_is_of_the_first_rows() {
+        // Five tiles of columns: four bands of tiles.
         let class = class(10_000, 64, 300);
-        let groups = Form::ALL.map(|form| class.measured_elements(form, true) / WORKGROUP);
-        assert_eq!(groups, [4 * 5, 4 * 3, 2 * 3, 4 * 3, 4 * 5]);
-        let whole = class.measured_elements(Form::Single, false);
-        assert_eq!(whole, Form::Single.elements(10_000, 300));
+        assert_eq!(class.measured_elements(true) / WORKGROUP, 4 * 5);
+        assert_eq!(class.measured_elements(false), tile_elements(10_000, 300));
     }
 
     #[test]
     fn choices_are_kept_by_class() {
         let mut choices = Choices::default();
-        choices.set(&class(1000, 64, 128), Form::Double);
-        choices.set(&class(1000, 512, 512), Form::Quadruple);
-        assert_eq!(choices.get(&class(600, 60, 100)), Some(Form::Double));
-        assert_eq!(choices.get(&class(600, 512, 512)), Some(Form::Quadruple));
+        choices.set(&class(1000, 64, 128), Form::Subgroup);
+        choices.set(&class(1000, 512, 512), Form::Single);
+        assert_eq!(choices.get(&class(600, 60, 100)), Some(Form::Subgroup));
+        assert_eq!(choices.get(&class(600, 512, 512)), Some(Form::Single));
         assert_eq!(choices.get(&class(2000, 64, 128)), None);
         let parsed = Choices::parse(&choices.text()).expect("choices");
-        assert_eq!((parsed.get(&class(600, 60, 100)), parsed.has_new()), (Some(Form::Double), false));
-        for broken in ["linear 1 2 3", "lines 1 2 3 double", "linear 1 2 3 triple", "linear 1 b 3 double", "\n"] {
+        assert_eq!((parsed.get(&class(600, 60, 100)), parsed.has_new()), (Some(Form::Subgroup), false));
+        for broken in ["linear 1 2 3", "lines 1 2 3 single", "linear 1 2 3 triple", "linear 1 b 3 single", "\n"] {
             assert_eq!(Choices::parse(broken), None, "{broken}");
         }
     }

@@ -28,7 +28,7 @@ impl Gpu {
                 }),
             };
         }
-        let candidates = class.candidates(self.is_software, self.handle.subgroup_size().is_some());
+        let candidates = class.candidates(self.handle.subgroup_size().is_some());
         if candidates.len() == 1 {
             return Ok(candidates[0]);
         }
@@ -46,7 +46,7 @@ impl Gpu {
             Err(VulkanError::OutOfMemory { .. }) => return Ok(Form::Single),
             before => before?,
         };
-        let form = self.fastest(state, job, class, &candidates, &outputs)?;
+        let form = self.fastest(state, job, class, candidates, &outputs)?;
         self.write_starts(state, &outputs, &before)?;
         state.choices.set(class, form);
         Ok(form)
@@ -81,7 +81,7 @@ impl Gpu {
                 continue;
             }
             self.spoil_starts(state, outputs)?;
-            let elements = class.measured_elements(form, self.is_software);
+            let elements = class.measured_elements(self.is_software);
             self.record_job(state, job, form, 0..elements, 0)?;
             let written = self.read_starts(state, outputs)?;
             if expected.is_none() && written.iter().all(|bytes| words(bytes).all(|word| word == SPOILT)) {

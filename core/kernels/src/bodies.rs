@@ -18,7 +18,6 @@ mod tiled;
 pub mod together;
 mod visual_hull;
 mod volumes;
-mod weighting;
 
 pub use gaussians::*;
 pub use layers::*;
@@ -30,4 +29,3 @@ pub use rays::*;
 pub use tiled::*;
 pub use visual_hull::*;
 pub use volumes::*;
-pub use weighting::*;

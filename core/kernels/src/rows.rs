@@ -7,7 +7,7 @@
 //! ```text
 //! /// What it computes, and what an element is.
 //! Variant name(block: Parameters; count, ...) for element in [first..end; N a core], mark, ... {
-//!     kind array[place]: Element as EntryElement,
+//!     kind array[place]: Element as vectors,
 //! }
 //! ```
 //!
@@ -16,8 +16,8 @@
 //! - `tiles [rows, inner, columns]` in the place of `for`: the kernel is a matrix product of this shape, and a workgroup
 //!   computes a tile together, in memory that it shares. There is an entry point for each [`Form`] of a tile, with the same
 //!   bits in its outputs; a device takes the fastest. The body is the definition.
-//! - Arrays stand in the order of their bindings. `Element` is what a buffer on the host holds. `as EntryElement`: the
-//!   entry point takes several of them at once; `as vectors`: it loads and stores each as vectors of four numbers. `place`
+//! - Arrays stand in the order of their bindings. `Element` is what a buffer on the host holds. `as vectors`: the
+//!   entry point loads and stores each as vectors of four numbers. `place`
 //!   is the index of the first value that an element writes, where it is not the element's own number.
 //!
 //! The marks are
@@ -29,7 +29,6 @@
 //! | `serial` | elements write where others do: the CPU runs them one after the other |
 //! | `together` | on a GPU a workgroup computes an element, by the function of the kernel's name in [`bodies::together`](crate::bodies::together); the body is its definition, and what the CPU calls. All arrays that it reads are `filled` |
 //! | `wide` | the CPU's loop is compiled for the widest vectors of the machine, too |
-//! | `definition` | no production code calls it: it defines what the host computes with the functions of `viewfuse-core` |
 //! | `measured` | no production code calls it: it measures what a device can do at most |
 //!
 //! The kinds of arrays are
@@ -85,14 +84,11 @@ pub use crate::sample_mask::{RaysBlock, SampleMaskBlock};
 pub use crate::visual_hull::ObjectBlock;
 pub use crate::visual_hull::ray_marching::MarchBlock;
 pub use crate::visual_hull::sweep::SweepBlock;
-pub use viewfuse_core::attention::{EMBEDDING, FourierEmbedding};
 pub use viewfuse_core::camera::CameraBlock;
 pub use viewfuse_core::composite::CompositeBlock;
 pub use viewfuse_core::depths::{CoarseBlock, FineBlock};
 pub use viewfuse_core::fuse::FuseBlock;
 pub use viewfuse_core::gaussian::{GaussianBlock, ProjectedGaussian};
 pub use viewfuse_core::half_precision::word_count;
-pub use viewfuse_core::pose::PoseBlock;
 pub use viewfuse_core::rays::{CastBlock, PlaceBlock, RayPoint, TargetRay};
 pub use viewfuse_core::sampler::{Mix, NoiseBlock};
-pub use viewfuse_core::weighting::{MAX_WEIGHED, WeighBlock};

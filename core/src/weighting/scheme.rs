@@ -1,15 +1,13 @@
-//! A scheme: what its row says, its checks, its text, and its form for kernels.
+//! A scheme: what its row says, its checks, and its text.
 
 use super::{AngleKind, Formula, ROWS};
-use crate::math::clamp;
-use bytemuck::{Pod, Zeroable};
 use core::fmt;
 
 /// The properties of a scheme, one row each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Row {
-    /// The formula, whose number kernels and the C face know it by.
+    /// The formula, whose number the C face knows it by.
     pub formula: Formula,
     /// The formula's name in [`Formula`].
     pub variant: &'static str,
@@ -228,12 +226,6 @@ impl Scheme {
     pub fn parameter(&self) -> f32 {
         self.parameter
     }
-
-    /// The scheme as plain data for kernels.
-    pub fn block(&self) -> SchemeBlock {
-        let Scheme { formula, choice, parameter } = *self;
-        SchemeBlock { formula: formula as u32, choice, parameter, padding: 0 }
-    }
 }
 
 impl fmt::Display for Scheme {
@@ -251,39 +243,5 @@ impl fmt::Display for Scheme {
             write!(f, "{}{key}={option}", if parameter.is_some() { ',' } else { ':' })?;
         }
         Ok(())
-    }
-}
-
-/// A scheme as plain data: what a kernel reads from a buffer. Made from a [`Scheme`] by [`Scheme::block`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct SchemeBlock {
-    /// Number of the formula; unknown ones are the mean.
-    pub formula: u32,
-    /// The choice.
-    pub choice: u32,
-    /// The parameter.
-    pub parameter: f32,
-    /// Zero.
-    pub padding: u32,
-}
-
-const _: () = assert!(size_of::<SchemeBlock>() == 16);
-
-impl SchemeBlock {
-    /// The scheme that the block was made from. Values out of range are clamped.
-    #[inline]
-    pub fn scheme(&self) -> Scheme {
-        let formula = Formula::numbered_or_mean(self.formula);
-        let Limits { least, most, first, last, .. } = formula.limits();
-        // Not `clamp`, which would bring its assertion into the kernel.
-        let choice = if self.choice < first {
-            first
-        } else if self.choice > last {
-            last
-        } else {
-            self.choice
-        };
-        Scheme { formula, choice, parameter: clamp(self.parameter, least, most) }
     }
 }

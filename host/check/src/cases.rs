@@ -1,6 +1,5 @@
 //! The cases, one for each kernel and with its name, and the mapping from a kernel to its case.
 
-mod attend;
 mod blend_planes;
 mod census_cost;
 mod compare_views;
@@ -8,7 +7,6 @@ mod composite;
 mod convolutions;
 mod depths;
 mod depthwise;
-mod embed_pose;
 mod feature_image;
 mod fine_depths;
 mod front;
@@ -33,7 +31,6 @@ mod rays;
 mod resample;
 mod sample_mask;
 mod volumes;
-mod weigh;
 mod window;
 mod window_cost;
 

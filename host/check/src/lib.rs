@@ -8,7 +8,7 @@
 //! ```text
 //! compare, bounded, agreement   differences of numbers, and whether they are within their bounds
 //! half                          half precision from its definition
-//! oracle, attention_oracle,     expected outputs in f64
+//! oracle,                       expected outputs in f64
 //!   camera_oracle, hull_oracle,
 //!   ray_oracle, compositing_oracle,
 //!   winograd_oracle,
@@ -28,7 +28,6 @@
 #![forbid(unsafe_code)]
 
 pub mod agreement;
-pub mod attention_oracle;
 pub mod bounded;
 pub mod camera_oracle;
 pub mod case;

@@ -28,7 +28,6 @@ use super::memory::{Element, KernelTime, Memory};
 use crate::argument;
 use crate::parallel::{Rest, for_each_piece};
 use blend::*;
-use bytemuck::{Pod, cast_slice_mut};
 use census::*;
 use fusion::*;
 use group_norm::*;
@@ -93,12 +92,6 @@ impl Memory for Cpu {
     }
 }
 
-/// Numbers as elements of several of them, as far as they are whole.
-fn whole_elements<H: Pod, E: Pod>(values: &mut [H]) -> &mut [E] {
-    let count = size_of_val(values) / size_of::<E>();
-    cast_slice_mut(&mut values[..count * size_of::<E>() / size_of::<H>()])
-}
-
 /// How what is written by hand takes an array: as a slice.
 macro_rules! lend {
     (optional $array:ident) => {
@@ -124,7 +117,6 @@ macro_rules! compute {
     ({ wide } $method:ident $block:tt $counts:tt $arrays:tt $elements:tt) => {
         parallel!(wide $method $block $arrays $elements)
     };
-    ({ definition $($mark:ident)* } $($row:tt)*) => { compute!({ $($mark)* } $($row)*) };
     ({ measured $($mark:ident)* } $($row:tt)*) => { compute!({ $($mark)* } $($row)*) };
     ({} $method:ident $block:tt $counts:tt $arrays:tt $elements:tt) => {
         parallel!(plain $method $block $arrays $elements)
@@ -203,7 +195,6 @@ macro_rules! split {
     (write_paged $array:ident $Host:ty) => { let mut $array = Rest::new(&mut $array[..]); };
     (write $array:ident $Host:ty, vectors) => { split!(write $array $Host) };
     (write_paged $array:ident $Host:ty, vectors) => { split!(write $array $Host) };
-    (write $array:ident $Host:ty, $Entry:ty) => { let mut $array = Rest::new(whole_elements::<$Host, $Entry>($array)); };
     ($kind:ident $array:ident $Host:ty $(, $entry:tt)?) => { let $array = &$array[..]; };
 }
 

@@ -304,7 +304,6 @@ mod tests {
                 let spec: WeightingSpec = text.parse()?;
                 let Kind::Formula(scheme) = spec.kind else { panic!("{text} is no formula") };
                 assert_eq!((scheme.formula(), scheme.to_string().as_str()), (row.formula, *text));
-                assert_eq!(scheme.block().scheme(), scheme);
             }
         }
         assert!(scheme_names().len() >= 12);

@@ -186,38 +186,26 @@ macro_rules! entry {
         }
         [$($parameters:tt)*] [] [$($arguments:tt)*] [] $bindings:tt
     ) => {
-        form! {
-            [$($doc)*] $method: Single { rows: Shared, columns: Shared }
-            $method { $block: $Block } [$row_count, $inner_count, $column_count]
-            [$($parameters)*] [$($arguments)*]
+        $($doc)*
+        #[spirv(compute(threads(64)))]
+        #[allow(clippy::too_many_arguments)]
+        pub fn $method(
+            #[spirv(global_invocation_id)] id: UVec3,
+            #[spirv(push_constant)] push: &Push<$Block>,
+            $($parameters)*
+            #[spirv(workgroup)] rows: &mut Shared,
+            #[spirv(workgroup)] columns: &mut Shared,
+        ) {
+            let $block = &push.parameters;
+            let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
+            bodies::$method($block, shape, $($arguments)* Single { rows, columns }, push.piece.first + id.x);
         }
 
-        /// The other forms.
+        /// The other form.
         pub mod $method {
             use super::*;
 
-            form! {
-                [#[doc = "Two tiles beside each other."]]
-                double: Double { rows: Shared, columns: Shared, more_columns: Shared }
-                $method { $block: $Block } [$row_count, $inner_count, $column_count]
-                [$($parameters)*] [$($arguments)*]
-            }
-            form! {
-                [#[doc = "Two by two tiles."]]
-                quadruple: Quadruple {
-                    rows: ShortShared, more_rows: ShortShared, columns: ShortShared, more_columns: ShortShared
-                }
-                $method { $block: $Block } [$row_count, $inner_count, $column_count]
-                [$($parameters)*] [$($arguments)*]
-            }
-            form! {
-                [#[doc = "Two tiles beside each other, double-buffered."]]
-                buffered: Buffered { rows: Shared, columns: Shared, more_columns: Shared }
-                $method { $block: $Block } [$row_count, $inner_count, $column_count]
-                [$($parameters)*] [$($arguments)*]
-            }
-
-            /// One tile, by subgroups.
+            /// By subgroups.
             #[spirv(compute(threads(64)))]
             #[allow(clippy::too_many_arguments)]
             pub fn subgroup(
@@ -233,29 +221,6 @@ macro_rules! entry {
                 let tiles = Subgroup { size, subgroup, lane };
                 bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
             }
-        }
-    };
-}
-
-/// An entry point of a tiled kernel in a form that has these arrays in the workgroup's memory.
-macro_rules! form {
-    (
-        [$($doc:tt)*] $name:ident: $Form:ident { $($memory:ident: $Memory:ty),* }
-        $method:ident { $block:ident: $Block:ty } [$row_count:expr, $inner_count:expr, $column_count:expr]
-        [$($parameters:tt)*] [$($arguments:tt)*]
-    ) => {
-        $($doc)*
-        #[spirv(compute(threads(64)))]
-        #[allow(clippy::too_many_arguments)]
-        pub fn $name(
-            #[spirv(global_invocation_id)] id: UVec3,
-            #[spirv(push_constant)] push: &Push<$Block>,
-            $($parameters)*
-            $(#[spirv(workgroup)] $memory: &mut $Memory,)*
-        ) {
-            let $block = &push.parameters;
-            let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
-            bodies::$method($block, shape, $($arguments)* $Form { $($memory),* }, push.piece.first + id.x);
         }
     };
 }
@@ -285,17 +250,11 @@ macro_rules! bound {
     (one $Host:ty) => {
         &$Host
     };
-    (one $Host:ty, $Entry:ty) => {
-        &$Entry
-    };
     (write $Host:ty) => {
         &mut [$Host]
     };
     (write $Host:ty, vectors) => {
         &mut [<$Host as InVectors>::Vectors]
-    };
-    (write $Host:ty, $Entry:ty) => {
-        &mut [$Entry]
     };
     ($kind:ident $Host:ty) => {
         &[$Host]
@@ -325,7 +284,7 @@ macro_rules! lent {
     ($kind:ident $array:ident, vectors) => {
         &Vectors($array)
     };
-    ($kind:ident $array:ident $(, $entry:tt)?) => {
+    ($kind:ident $array:ident) => {
         $array
     };
 }

@@ -4,7 +4,7 @@
 //! as push constants. It checks whether its element exists and calls the kernel's body ([`viewfuse_kernels::bodies`]).
 //! Arrays that may be longer than a device can bind at once come as four pages; arrays `as vectors` are loaded and stored
 //! as vectors (`loads`). A tiled kernel has an entry point for each form of a tile: the first of the kernel's name, the
-//! others in a module of that name. What devices do otherwise than the CPU is here: matrix products are summed in workgroup
+//! other in a module of that name. What devices do otherwise than the CPU is here: matrix products are summed in workgroup
 //! memory or by subgroups (`tile`), and a workgroup computes an element `together`, both without a panic (`unchecked`).
 //!
 //! On the host the same entry points are plain functions, which tests call.
@@ -21,7 +21,7 @@ pub use viewfuse_kernels::rows::Piece;
 use loads::{InVectors, Vectors, VectorsMut};
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
-use tile::{Buffered, Double, Quadruple, Shared, ShortShared, Single, Subgroup};
+use tile::{Shared, Single, Subgroup};
 use unchecked::{Endless, Together, Unchecked};
 use viewfuse_kernels::bodies;
 use viewfuse_kernels::for_each_kernel;

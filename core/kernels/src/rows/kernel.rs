@@ -11,44 +11,27 @@ pub const WORKGROUP: u32 = 64;
 /// Bytes of memory that every device has for a workgroup.
 pub const SHARED_BYTES: usize = 16 << 10;
 
-/// Elements of a tiled kernel with so many outputs, in [`Form::Single`].
+/// Elements of a tiled kernel with so many outputs: whole tiles, each invocation 8 times 8 outputs.
 pub const fn tile_elements(row_count: u32, column_count: u32) -> u32 {
-    Form::Single.elements(row_count, column_count)
+    row_count.div_ceil(TILE) * column_count.div_ceil(TILE) * WORKGROUP
 }
 
-/// How many of a matrix product's tiles a workgroup computes at once. The sums of an output run along the inner index in
-/// every form: the results are the same bits.
+/// How a workgroup computes a tile of a matrix product, 64 rows and 64 columns. The sums of an output run along the inner
+/// index in every form: the results are the same bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[repr(u32)]
 pub enum Form {
-    /// One tile: 64 rows, 64 columns, 64 sums an invocation. The definition of the others, and what small products take.
+    /// Rows and columns go through the workgroup's memory. The definition of the others, and what small products take.
     #[default]
     Single,
-    /// Two tiles beside each other: 64 rows, 128 columns, 128 sums an invocation.
-    Double,
-    /// Two by two tiles: 128 rows, 128 columns, 256 sums an invocation, more than a GPU keeps in registers. For drivers on
-    /// a CPU, where loads are dear.
-    Quadruple,
-    /// Two tiles beside each other as [`Form::Double`], double-buffered: while a step is multiplied, the next one is fetched
-    /// into the other half of the workgroup's memory. There is one barrier a step instead of two.
-    Buffered,
-    /// One tile, whose rows pass between the invocations of a subgroup instead of through the workgroup's memory. There are
-    /// no barriers. Only for devices with [subgroups that fit](Form::needs_subgroups).
+    /// Rows pass between the invocations of a subgroup instead of through the workgroup's memory. There are no barriers. Only
+    /// for devices with [subgroups that fit](Form::needs_subgroups).
     Subgroup,
 }
 
 impl Form {
     /// Every form.
-    pub const ALL: [Form; 5] = [Form::Single, Form::Double, Form::Quadruple, Form::Buffered, Form::Subgroup];
-
-    /// Rows and columns in tiles.
-    pub const fn tiles(self) -> [u32; 2] {
-        match self {
-            Form::Single | Form::Subgroup => [1, 1],
-            Form::Double | Form::Buffered => [1, 2],
-            Form::Quadruple => [2, 2],
-        }
-    }
+    pub const ALL: [Form; 2] = [Form::Single, Form::Subgroup];
 
     /// Whether it passes numbers between the invocations of a subgroup. Its entry points are in a module of their own, which
     /// only devices with these operations take. A subgroup is full and has 8 to 64 invocations, a power of two.
@@ -56,19 +39,10 @@ impl Form {
         matches!(self, Form::Subgroup)
     }
 
-    /// Elements of a tiled kernel with so many outputs: whole groups of tiles, each invocation 8 times 8 outputs of a tile.
-    pub const fn elements(self, row_count: u32, column_count: u32) -> u32 {
-        let [rows, columns] = self.tiles();
-        row_count.div_ceil(TILE * rows) * column_count.div_ceil(TILE * columns) * WORKGROUP
-    }
-
     /// Its name in records.
     pub const fn name(self) -> &'static str {
         match self {
             Form::Single => "single",
-            Form::Double => "double",
-            Form::Quadruple => "quadruple",
-            Form::Buffered => "buffered",
             Form::Subgroup => "subgroup",
         }
     }
@@ -147,15 +121,10 @@ macro_rules! array {
     (optional $name:ident $host:ty) => { array!(read $name $host).not_empty() };
     (paged $name:ident $host:ty) => { Array::new::<$host>(stringify!($name), Access::Read, Layout::Pages) };
     (write $name:ident $host:ty) => { Array::new::<$host>(stringify!($name), Access::Write, Layout::Whole) };
-    (write $name:ident $host:ty, $entry:ty) => {{
-        const { assert!(size_of::<$entry>() % size_of::<$host>() == 0) };
-        Array::new::<$entry>(stringify!($name), Access::Write, Layout::Whole)
-    }};
     (write_paged $name:ident $host:ty) => { Array::new::<$host>(stringify!($name), Access::Write, Layout::Pages) };
-    (one $name:ident $host:ty) => { array!(one $name $host, $host) };
-    (one $name:ident $host:ty, $entry:ty) => {
+    (one $name:ident $host:ty) => {
         Array {
-            least_bytes: size_of::<$entry>(),
+            least_bytes: size_of::<$host>(),
             ..Array::new::<$host>(stringify!($name), Access::Read, Layout::One)
         }
     };
@@ -224,15 +193,6 @@ macro_rules! list {
             pub const fn entry_point(self, form: Form) -> &'static str {
                 match form {
                     Form::Single => self.name(),
-                    Form::Double => match self {
-                        $(Kernel::$Kernel => concat!(stringify!($method), "::double"),)+
-                    },
-                    Form::Quadruple => match self {
-                        $(Kernel::$Kernel => concat!(stringify!($method), "::quadruple"),)+
-                    },
-                    Form::Buffered => match self {
-                        $(Kernel::$Kernel => concat!(stringify!($method), "::buffered"),)+
-                    },
                     Form::Subgroup => match self {
                         $(Kernel::$Kernel => concat!(stringify!($method), "::subgroup"),)+
                     },

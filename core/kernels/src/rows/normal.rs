@@ -9,7 +9,7 @@
 ///     doc { #[doc = ...] ... }
 ///     block { block: Parameters }                   or { }
 ///     counts { count ... }
-///     arrays { { kind array: Element, as { EntryElement } at { place } unless { other block flag } } ... }
+///     arrays { { kind array: Element, as { vectors } at { place } unless { other block flag } } ... }
 ///     elements { for element in [first..end] at_least [N] }      or { tiles [rows, inner, columns] }
 ///     marks { mark ... }
 /// }
@@ -65,7 +65,6 @@ macro_rules! elements {
 macro_rules! has_mark {
     (twin: twin $($rest:ident)*) => { true };
     (looped: looped $($rest:ident)*) => { true };
-    (definition: definition $($rest:ident)*) => { true };
     (measured: measured $($rest:ident)*) => { true };
     (together: together $($rest:ident)*) => { true };
     ($mark:ident:) => { false };

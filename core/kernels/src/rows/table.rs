@@ -7,26 +7,6 @@
 macro_rules! for_each_kernel {
     ($callback:ident) => {
         $crate::normal_rows! { $callback
-            /// Weights of the sources for targets, by formula: `weights[target][MAX_WEIGHED]`, zeros beyond the sources.
-            /// An element is a target.
-            Weigh weigh(block: WeighBlock; target_count) for target in [0..target_count; 16 a core], definition {
-                read sources: PoseBlock,
-                read targets: PoseBlock,
-                write weights: f32 as [f32; MAX_WEIGHED],
-            }
-            /// Embeddings of poses: `embedded[pose][EMBEDDING]`. An element is a pose.
-            EmbedPose embed_pose(; pose_count) for pose in [0..pose_count], looped, definition {
-                one embedding: f32 as FourierEmbedding,
-                read poses: PoseBlock,
-                write embedded: f32 as [f32; EMBEDDING],
-            }
-            /// Weights of the sources for targets, by attention: `weights[target][MAX_WEIGHED]` from
-            /// `queries[target][EMBEDDING]` and `keys[source][EMBEDDING]`. An element is a target.
-            Attend attend(source_count: u32; target_count) for target in [0..target_count; 16 a core], definition {
-                read queries: f32,
-                read keys: f32,
-                write weights: f32 as [f32; MAX_WEIGHED],
-            }
             /// Rays of a target's pixels. An element is a ray.
             CastRays cast_rays(block: CastBlock; ray_count) for ray in [0..ray_count; 1024 a core] {
                 read pixels: u32,

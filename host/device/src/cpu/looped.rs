@@ -2,17 +2,8 @@
 
 use crate::parallel::for_each_row;
 use pulp::Arch;
-use viewfuse_core::attention::{EMBEDDING, FourierEmbedding, PoseEmbedding};
 use viewfuse_core::depths::{FineBlock, merged_depth};
-use viewfuse_core::pose::PoseBlock;
 use viewfuse_kernels::network::attend::{softmax_scale, softmax_value};
-
-pub(super) fn embed_pose(pose_count: u32, embedding: &[f32], poses: &[PoseBlock], embedded: &mut [f32]) {
-    let embedding = FourierEmbedding::from_flat(embedding);
-    for_each_row(&mut embedded[..pose_count as usize * EMBEDDING], EMBEDDING, 4 * EMBEDDING, |pose, row| {
-        row.copy_from_slice(&embedding.embed(&poses[pose].pose()));
-    });
-}
 
 pub(super) fn softmax_rows(column_count: &u32, row_count: u32, scores: &[f32], weights: &mut [f32]) {
     let columns = *column_count as usize;

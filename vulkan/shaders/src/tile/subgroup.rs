@@ -1,4 +1,4 @@
-//! One tile, whose rows pass between the invocations of a subgroup ([`Form::Subgroup`]).
+//! One tile, whose rows pass between the invocations of a subgroup ([`Form::Subgroup`](viewfuse_kernels::rows::Form::Subgroup)).
 //!
 //! Eight neighbours of a subgroup need the same eight rows and different columns. Each of them loads one of these rows,
 //! eight inner indices at once, and gets the other rows from the others. The columns come straight from the buffer: neighbours
@@ -11,12 +11,11 @@ use super::{InvocationTile, store_sums};
 use spirv_std::arch::{subgroup_broadcast_const, subgroup_shuffle};
 use spirv_std::glam::Vec4;
 use viewfuse_kernels::network::tile::{Shape, Sums, TILE, Tiles};
-use viewfuse_kernels::rows::Form;
 
 /// Invocations that need the same rows, and inner indices that each of them loads at once.
 const CLUSTER: u32 = Sums::SIDE;
 
-/// Where an invocation is in its workgroup: what [`Form::Subgroup`] has in the place of memory.
+/// Where an invocation is in its workgroup: what this form has in the place of memory.
 #[derive(Clone, Copy)]
 pub(crate) struct Subgroup {
     /// Invocations of a subgroup.
@@ -39,7 +38,7 @@ impl Tiles for Subgroup {
     ) {
         // Which invocations are in a subgroup is the driver's choice: the number in the workgroup follows from that.
         let own = (self.subgroup * self.size + self.lane) % TILE;
-        let place = InvocationTile::of(invocation / TILE, own, shape, Form::Subgroup);
+        let place = InvocationTile::of(invocation / TILE, own, shape);
         let row = (place.first_row + Sums::place(place.own_row, place.own_column)).min(shape.row_count - 1);
         let column = place.first_column + Sums::place(place.own_column, 0);
         let left = move |inner: u32| left(row, inner.min(shape.inner_count - 1));
@@ -68,7 +67,7 @@ impl Tiles for Subgroup {
             }
             start += CLUSTER;
         }
-        store_sums(sums, place, place.first_row, place.first_column, shape, &mut store);
+        store_sums(sums, place, shape, &mut store);
     }
 }
 
