@@ -36,7 +36,11 @@ fn write(path: &Path, bytes: &[u8]) {
 /// Makes the copy, and returns its places.
 pub fn make() -> Vec<Place> {
     let (from, to) = (repository(), copy());
-    let listed = Command::new("git").args(["ls-files"]).current_dir(&from).output().expect("git");
+    let listed = Command::new("git")
+        .args(["ls-files", "--cached", "--others", "--exclude-standard"])
+        .current_dir(&from)
+        .output()
+        .expect("git");
     let listed = String::from_utf8(listed.stdout).expect("names");
     // What is in the index may be deleted in the folder.
     let paths: Vec<&str> = listed.lines().filter(|path| from.join(path).is_file()).collect();
