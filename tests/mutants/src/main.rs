@@ -3,6 +3,7 @@
 //!
 //! ```text
 //! cargo run --manifest-path tests/mutants/Cargo.toml -- make                  compiles, lists what each test reaches
+//! cargo run --manifest-path tests/mutants/Cargo.toml -- list BINARY...         lists those of some binaries alone, in less time
 //! cargo run --manifest-path tests/mutants/Cargo.toml -- ask NAME [MINUTES]    asks; goes on where it was left
 //! cargo run --manifest-path tests/mutants/Cargo.toml -- table NAME NAME       the answers of two runs side by side
 //! ```
@@ -16,6 +17,7 @@ mod places;
 mod runs;
 mod table;
 
+use copy::Binary;
 use places::Place;
 use runs::{Outcome, Test};
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,17 +30,18 @@ use std::time::{Duration, Instant};
 
 /// Changes of a body and kind.
 const MAX_CHANGES: usize = 2;
-/// Groups of tests, which are asked one after the other: the cases on the CPU and of the bodies themselves, and others.
-const GROUPS: [&str; 4] = ["case", "bodies", "numerics", "entry points"];
+/// Groups of tests, which are asked one after the other: the cases on the CPU, those of the bodies themselves, and others.
+const GROUPS: [&str; 4] = ["case", "bodies", "numerics", "removed"];
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     match &arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["make"] => make(),
+        ["list", names @ ..] => list(names),
         ["ask", name] => ask(name, 24 * 60),
         ["ask", name, minutes] => ask(name, minutes.parse().expect("minutes")),
-        ["table", before, after] => print!("{}", table::table(before, after)),
-        _ => eprintln!("make, ask NAME [MINUTES], or table BEFORE AFTER"),
+        ["table", name] => print!("{}", table::table(name)),
+        _ => eprintln!("make, list BINARY..., ask NAME [MINUTES], or table NAME"),
     }
 }
 
@@ -51,7 +54,21 @@ fn make() {
     let places = copy::make();
     let lines = places.iter().map(|Place { body, kind, text }| format!("{body}\t{kind}\t{text}\n"));
     fs::write(file("places"), lines.collect::<String>()).expect("a list of places");
-    fs::write(file("tests"), runs::list(&copy::build())).expect("a list of tests");
+    let binaries = copy::build();
+    let lines = binaries.iter().map(|Binary { name, path }| format!("{name}\t{}\n", path.display()));
+    fs::write(file("binaries"), lines.collect::<String>()).expect("a list of binaries");
+    list(&copy::BINARIES);
+}
+
+/// Lists what the tests of some binaries reach.
+fn list(names: &[&str]) {
+    let text = fs::read_to_string(file("binaries")).expect("binaries: make comes first");
+    let binary = |line: &str| {
+        let (name, path) = line.split_once('\t').expect("a binary");
+        Binary { name: name.to_owned(), path: PathBuf::from(path) }
+    };
+    let binaries: Vec<Binary> = text.lines().map(binary).filter(|own| names.contains(&own.name.as_str())).collect();
+    fs::write(file("tests"), runs::list(&binaries)).expect("a list of tests");
 }
 
 /// Places that are changed: some of each kind in a body, of the kernels' crate and of what cases reach in core.
@@ -65,11 +82,18 @@ fn chosen(places: &[Place], tests: &[Test]) -> Vec<u32> {
             of_bodies.entry((body, kind)).or_default().push(number);
         }
     }
-    let spread = |numbers: Vec<u32>| {
+    // Some of each body come first, then more of each.
+    let mut rounds: Vec<Vec<u32>> = vec![Vec::new(); 3 * MAX_CHANGES];
+    let mut of_body: BTreeMap<&str, usize> = BTreeMap::new();
+    for ((body, _), numbers) in of_bodies {
         let count = numbers.len().min(MAX_CHANGES);
-        (0..count).map(|index| numbers[index * numbers.len() / count]).collect::<Vec<u32>>()
-    };
-    of_bodies.into_values().flat_map(spread).collect()
+        for index in 0..count {
+            let round = of_body.entry(body).or_default();
+            rounds[*round].push(numbers[index * numbers.len() / count]);
+            *round += 1;
+        }
+    }
+    rounds.concat()
 }
 
 /// Asks until the time is over, and keeps each answer in the journal of the run: place, then an answer of each group.

@@ -28,34 +28,33 @@ fn count(changes: &BTreeMap<String, Vec<String>>, groups: &[usize]) -> usize {
     changes.values().filter(|answers| groups.iter().any(|group| is_noticed(&answers[*group]))).count()
 }
 
-/// A line a body, then the changes that no test of the second run notices.
-pub fn table(before: &str, after: &str) -> String {
-    let (before, after) = (read(before), read(after));
+/// A line a body, then the changes that no test notices which is still there.
+pub fn table(name: &str) -> String {
     let mut text = String::from(
-        "| body | changes | before: case | numerics | entry points | any | after: case | bodies | numerics | any |\n\
-         |---|---|---|---|---|---|---|---|---|---|\n",
+        "| body | changes | case | bodies | numerics | removed | before | after |\n|---|---|---|---|---|---|---|---|\n",
     );
-    let (mut sums, mut unnoticed, mut lost) = ([0; 9], String::new(), Vec::new());
-    for (body, changes) in &after {
-        let none = BTreeMap::new();
-        let old = before.get(body).unwrap_or(&none);
-        let before = [&[0][..], &[2], &[3], &[0, 2, 3]].map(|groups| count(old, groups));
-        let after = [&[0][..], &[1], &[2], &[0, 1, 2]].map(|groups| count(changes, groups));
-        let row: Vec<usize> = [&[changes.len()][..], &before, &after].concat();
+    let answers = read(name);
+    let (mut sums, mut unnoticed, mut lost) = ([0; 7], String::new(), Vec::new());
+    for (body, changes) in &answers {
+        let groups = [&[0][..], &[1], &[2], &[3], &[0, 2, 3], &[0, 1, 2]];
+        let counts: Vec<usize> = groups.iter().map(|groups| count(changes, groups)).collect();
+        let row = [&[changes.len()][..], &counts].concat();
         row.iter().zip(&mut sums).for_each(|(own, sum)| *sum += own);
         let cells: Vec<String> = row.iter().map(usize::to_string).collect();
         writeln!(text, "| `{body}` | {} |", cells.join(" | ")).expect("a text");
-        if after[3] == 0 {
+        if row[6] == 0 {
             lost.push(body.as_str());
         }
-        for (change, answers) in changes.iter().filter(|(_, answers)| !answers.iter().any(|own| is_noticed(own))) {
-            let reach =
-                if answers.iter().all(|own| own == "not reached") { "reached by none" } else { "noticed by none" };
+        for (change, answers) in changes.iter().filter(|(_, answers)| !answers[..3].iter().any(|own| is_noticed(own))) {
+            let reach = match answers[..3].iter().all(|own| own == "not reached") {
+                true => "reached by none",
+                false => "noticed by none",
+            };
             writeln!(unnoticed, "| `{body}` | {} | {reach} |", change.replace('|', "\\|")).expect("a text");
         }
     }
     let cells: Vec<String> = sums.iter().map(usize::to_string).collect();
-    writeln!(text, "| all {} | {} |", after.len(), cells.join(" | ")).expect("a text");
+    writeln!(text, "| all {} | {} |", answers.len(), cells.join(" | ")).expect("a text");
     writeln!(text, "\nBodies of which no change is noticed: {lost:?}\n").expect("a text");
     text + "| body | kind, line, expression | |\n|---|---|---|\n" + &unnoticed
 }
