@@ -7,7 +7,7 @@
 //! other in a module of that name. What devices do otherwise than the CPU is here: matrix products are summed in workgroup
 //! memory or by subgroups (`tile`), and a workgroup computes an element `together`, both without a panic (`unchecked`).
 //!
-//! On the host the same entry points are plain functions, which tests call.
+//! On the host the same entry points are plain functions, which are compiled and not called.
 #![cfg_attr(target_arch = "spirv", no_std)]
 
 #[macro_use]
