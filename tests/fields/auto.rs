@@ -9,7 +9,7 @@ use viewfuse::field::auto::{self, Chosen, HOLD_OUT, choose, schemes};
 use viewfuse::field::pixelnerf::{Architecture, PixelNerf, PixelNerfOptions, test_networks};
 use viewfuse::field::render::{Frame, RenderError, RenderOptions, RenderRun, Stage, render};
 use viewfuse::field::training_free::TrainingFree;
-use viewfuse::field::{Field, On};
+use viewfuse::field::{AnyOptions, Field, On};
 use viewfuse::job::progress::{Interrupted, Progress, Silent};
 use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::{FewShot, Selection};
@@ -84,8 +84,7 @@ fn what_is_chosen_is_what_is_rendered() -> Result<(), Box<dyn Error>> {
     let Six { scene, frames, chosen } = &*SIX;
     let field = TrainingFree::default();
     let renderer = On { device: &Cpu, field: &field };
-    let (settings, mixture) = (chosen.settings.clone(), chosen.mixture.clone());
-    let given = RenderOptions { settings, mixture, ..options() };
+    let given = RenderOptions { field: Some(chosen.options.clone()), mixture: chosen.mixture.clone(), ..options() };
     let (job, mut same) = (middle(scene), Vec::new());
     let run = RenderRun { scene, job: &job, renderer: &renderer, options: &given, progress: &Silent };
     render(&run, &chosen.weighting, |_, frame| {
@@ -104,14 +103,16 @@ fn what_is_chosen_is_what_is_rendered() -> Result<(), Box<dyn Error>> {
 #[test]
 fn the_choice_is_the_best_that_was_tried_or_the_default() -> Result<(), Box<dyn Error>> {
     let Six { frames, chosen, .. } = &*SIX;
-    let Chosen { candidates, held_out, weighting, settings, .. } = chosen;
+    let Chosen { candidates, held_out, weighting, options, .. } = chosen;
     assert_eq!(held_out.len(), 5.min(HOLD_OUT.max_views));
     assert!(candidates.len() > schemes().len(), "the field's scalars are tried as well");
     assert!(candidates.iter().all(|candidate| candidate.scores.iter().all(|score| *score > 5.0)));
     let given_up = |candidate: &&auto::Candidate| candidate.scores.len() < held_out.len();
     assert!(candidates.iter().filter(given_up).all(|candidate| candidate.psnr.is_none()), "{candidates:?}");
     let score = |candidate: &auto::Candidate| candidate.psnr;
-    let own = candidates.iter().find(|one| one.weighting == weighting.to_string() && &one.settings == settings);
+    let own = candidates
+        .iter()
+        .find(|one| one.weighting == weighting.to_string() && one.options.settings() == options.settings());
     let own = own.map(score).ok_or("the choice was tried")?;
     assert!(own >= score(&candidates[0]), "{own:?} is below the default");
     let expected = chosen.expected(&frames[0]).ok_or("a score to expect")?;
@@ -126,7 +127,11 @@ fn the_choice_is_the_best_that_was_tried_or_the_default() -> Result<(), Box<dyn 
 fn pictures_are_mixed_where_that_is_not_worse() -> Result<(), Box<dyn Error>> {
     let Six { scene, frames, chosen } = &*SIX;
     let tried = chosen.candidates.last().ok_or("candidates")?;
-    assert_eq!(tried.settings.last().map(|setting| setting.name), Some("mixed pictures"), "a mixture is tried last");
+    assert_eq!(
+        tried.options.settings().last().map(|setting| setting.name),
+        Some("mixed pictures"),
+        "a mixture is tried last"
+    );
     let mixed = tried.psnr.ok_or("a mixture is not given up")?;
     let best = |candidates: &[auto::Candidate]| candidates.iter().filter_map(|one| one.psnr).fold(f64::MIN, f64::max);
     let single = best(&chosen.candidates[..chosen.candidates.len() - 1]);
@@ -137,7 +142,7 @@ fn pictures_are_mixed_where_that_is_not_worse() -> Result<(), Box<dyn Error>> {
         Some(mixture) => {
             // Three of the plane sweep, and the Gaussians.
             assert_eq!((mixture.parts.len(), mixture.constants.len(), frames[0].shares.len()), (4, 3, 4));
-            let settings = mixture.parts.iter().flatten();
+            let settings = mixture.parts.iter().flat_map(AnyOptions::settings);
             let of_gaussians = settings.filter(|setting| setting.name == "gaussians" && setting.value > 0.0);
             assert_eq!(of_gaussians.count(), 1, "{:?}", mixture.parts);
             assert!(mixed > single - 0.2, "{mixed} against {single}");
@@ -146,8 +151,8 @@ fn pictures_are_mixed_where_that_is_not_worse() -> Result<(), Box<dyn Error>> {
             let field = TrainingFree::default();
             let renderer = On { device: &Cpu, field: &field };
             let (job, mut levels) = (middle(&scene), vec![Vec::new(); mixture.parts.len()]);
-            for (settings, levels) in mixture.parts.iter().zip(&mut levels) {
-                let given = RenderOptions { settings: settings.clone(), ..options() };
+            for (part, levels) in mixture.parts.iter().zip(&mut levels) {
+                let given = RenderOptions { field: Some(part.clone()), ..options() };
                 let run =
                     RenderRun { scene: &scene, job: &job, renderer: &renderer, options: &given, progress: &Silent };
                 render(&run, &chosen.weighting, |_, frame| {
@@ -175,7 +180,7 @@ fn two_sources_give_the_default_and_no_expectation() -> Result<(), Box<dyn Error
     let scene = room(folder.path(), 3);
     let (frames, chosen) = automatic(&scene)?;
     assert!(chosen.mixture.is_none() && frames[0].shares.is_empty());
-    assert!(chosen.candidates.is_empty() && chosen.settings.is_empty() && chosen.held_out.is_empty());
+    assert!(chosen.candidates.is_empty() && chosen.options.settings().is_empty() && chosen.held_out.is_empty());
     assert_eq!(chosen.expected(&frames[0]), None);
     Ok(())
 }
@@ -216,7 +221,7 @@ fn a_field_without_scalars_has_its_scheme_chosen() -> Result<(), Box<dyn Error>>
     let network = test_networks::body(&Architecture::small(16));
     let field = PixelNerf::new(&network, PixelNerfOptions::default())?;
     let chosen = chosen(&scene, &[0, 1, 2], &field, &Silent)?;
-    assert_eq!((chosen.candidates.len(), chosen.settings.len()), (schemes().len(), 0));
+    assert_eq!((chosen.candidates.len(), chosen.options.settings().len()), (schemes().len(), 0));
     Ok(())
 }
 

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 use viewfuse::device::choice::AnyDevice;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::budget::{Bound, Kept};
-use viewfuse::field::options::FieldOptions;
+use viewfuse::field::options::Given;
 use viewfuse::field::render::{Frame, RenderOptions, Stage, open_album};
 use viewfuse::field::rows::{self, ROWS};
 use viewfuse::field::{AnyField, Renderer};
@@ -42,7 +42,7 @@ fn network(name: &str, seed: u64) -> AnyField {
         }
         None => Checkpoint::open(&places::data("../../host/models").join(name)).expect("a checkpoint"),
     };
-    rows::open(checkpoint, &FieldOptions { seed, ..FieldOptions::default() }).expect("a network")
+    rows::open(checkpoint, &Given { seed, ..Given::default() }).expect("a network")
 }
 
 /// A field with its subject.

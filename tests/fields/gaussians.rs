@@ -78,9 +78,9 @@ fn cheaper_efforts_are_farther_from_the_exact_picture() {
         assert_eq!(frame(stage, last).colours, exact.colours, "the exact picture after others");
         // Efforts are listed with what they do.
         assert!(
-            efforts[0].name.contains("100 iterations") && efforts[0].name.contains("32 pixels"),
+            efforts[0].label.contains("100 iterations") && efforts[0].label.contains("32 pixels"),
             "{}",
-            efforts[0].name
+            efforts[0].label
         );
     });
 }
@@ -139,7 +139,8 @@ fn the_hull_is_mixed_with_gaussians_where_sources_that_are_left_out_gain() {
         with_stage(AnyField::new(TrainingFree::default()), sources, &options, |stage, _, renderer| {
             assert!(stage.images.has_silhouettes);
             let chosen = auto::choose(stage, renderer, &options, &Silent).expect("a choice");
-            let mixed = chosen.candidates.last().expect("candidates").settings.last().map(|setting| setting.value);
+            let mixed =
+                chosen.candidates.last().expect("candidates").options.settings().last().map(|setting| setting.value);
             assert_eq!(mixed, Some(2.0), "a mixture was tried: {:?}", chosen.candidates);
             chosen.mixture.map(|mixture| mixture.parts.len())
         })

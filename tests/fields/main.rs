@@ -10,4 +10,5 @@ mod posed;
 mod rows;
 mod sampling;
 mod scales;
+mod variants;
 mod visual_hull;

@@ -8,7 +8,7 @@ use tempfile::TempDir;
 use viewfuse::device::choice::AnyDevice;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::AnyField;
-use viewfuse::field::options::FieldOptions;
+use viewfuse::field::options::Given;
 use viewfuse::field::render::{RenderOptions, Stage, open_album};
 use viewfuse::field::rows;
 use viewfuse::job::progress::Silent;
@@ -120,7 +120,7 @@ fn assert_same_pictures(field: &str, name: &str, [sources, target]: [&str; 2], s
         "training-free" => AnyField::default(),
         model => {
             let checkpoint = Checkpoint::open(&repository().join("host/models").join(model)).expect("a checkpoint");
-            rows::open(checkpoint, &FieldOptions::default()).expect("a network")
+            rows::open(checkpoint, &Given::default()).expect("a network")
         }
     };
     let (scales, schemes) = match all() {

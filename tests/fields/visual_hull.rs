@@ -28,7 +28,7 @@ fn pictures_do_not_depend_on_the_bands() {
     let sources = lorry_views(48);
     let with_values = |most_band_values| {
         let run = Run {
-            field: TrainingFree { hull: Hull { most_band_values }, ..TrainingFree::default() },
+            field: TrainingFree { hull: Hull { most_band_values, ..Hull::default() }, ..TrainingFree::default() },
             ..Run::default()
         };
         run.picture(&sources, &target(48)).expect("a picture")

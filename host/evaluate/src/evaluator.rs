@@ -160,7 +160,7 @@ impl Evaluator<'_> {
                 OpenedChoice::Given(weighting) => weighting.clone(),
                 OpenedChoice::Auto => {
                     let chosen = choose(&stage, renderer, options, progress)?;
-                    stage.tune(&chosen.settings, chosen.mixture.as_ref());
+                    stage.vary(Some(&chosen.options), chosen.mixture.as_ref(), progress)?;
                     chosen.weighting
                 }
             };
@@ -183,7 +183,7 @@ impl Evaluator<'_> {
                 }
             }
             kept_in_words(&bounded).iter().for_each(|words| progress.note(&format!("{name}: {words}")));
-            stage.tune(&options.settings, options.mixture.as_ref());
+            stage.vary(options.field.as_ref(), options.mixture.as_ref(), progress)?;
         }
         let share = shared / (scores.len() - first).max(1) as u32;
         scores[first..].iter_mut().for_each(|score: &mut Score| score.time += share);

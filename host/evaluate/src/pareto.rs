@@ -19,7 +19,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use viewfuse_device::choice::AnyDevice;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, working_side};
-use viewfuse_field::row::Preset;
+use viewfuse_field::row::Drawn;
 use viewfuse_field::{Record, Renderer};
 use viewfuse_job::progress::{Progress, Quiet};
 use viewfuse_scene::Scene;
@@ -93,15 +93,15 @@ impl Subject<'_> {
     pub fn measure(
         &self,
         device: &AnyDevice,
-        settings: &[Preset],
+        settings: &[Drawn],
         round_count: u32,
         progress: &dyn Progress,
     ) -> Result<Measured, RenderError> {
         let of = settings.len() * (round_count as usize + 1);
         let begin = |round: usize, index: usize| {
             let place = round * settings.len() + index;
-            let words = &settings[index].words;
-            let name = if round == 0 { words.clone() } else { format!("{words}, round {round} of {round_count}") };
+            let label = &settings[index].label;
+            let name = if round == 0 { label.clone() } else { format!("{label}, round {round} of {round_count}") };
             progress.stage(&name, place..place + 1, of);
             progress.expect(self.job.targets.len());
         };
@@ -114,9 +114,10 @@ impl Subject<'_> {
         let mut firsts: Vec<First> = Vec::new();
         for (index, (setting, images)) in settings.iter().zip(&images).enumerate() {
             begin(0, index);
-            let renderer = setting.field.on(device);
+            let (field, options) = &setting.options;
+            let renderer = field.on(device);
             let Round { frames, record, .. } =
-                self.round(renderer.as_ref(), &setting.options, images, &self.job.targets, progress)?;
+                self.round(renderer.as_ref(), options, images, &self.job.targets, progress)?;
             if exact.is_empty() {
                 exact = frames.iter().map(|frame| frame.colours.clone()).collect();
                 size = frames.first().map_or(size, |frame| frame.picture.dimensions().into());
@@ -127,23 +128,24 @@ impl Subject<'_> {
         for round in 1..=round_count as usize {
             for (index, (setting, images)) in settings.iter().zip(&images).enumerate() {
                 begin(round, index);
-                let renderer = setting.field.on(device);
-                let round = self.round(renderer.as_ref(), &setting.options, images, &without_truth, progress)?;
+                let (field, options) = &setting.options;
+                let renderer = field.on(device);
+                let round = self.round(renderer.as_ref(), options, images, &without_truth, progress)?;
                 times[index].push(round.seconds_a_target());
                 firsts[index].is_repeatable &= fingerprint(&round.frames) == firsts[index].fingerprint;
             }
         }
         let points = settings.iter().zip(firsts).zip(&times);
-        let points = points.map(|((setting, first), times)| first.point(&setting.words, times)).collect();
+        let points = points.map(|((setting, first), times)| first.point(&setting.label, times)).collect();
         Ok(Measured { points, exact, size })
     }
 
     /// The sources for each setting; sources of the same size are prepared once.
-    fn images(&self, settings: &[Preset], progress: &dyn Progress) -> Result<Vec<Arc<SourceImages>>, RenderError> {
+    fn images(&self, settings: &[Drawn], progress: &dyn Progress) -> Result<Vec<Arc<SourceImages>>, RenderError> {
         let Subject { scene, album, job, .. } = self;
         let mut known: Vec<(u32, Arc<SourceImages>)> = Vec::new();
         let mut images = Vec::new();
-        for Preset { field, options, .. } in settings {
+        for (field, options) in settings.iter().map(|setting| &setting.options) {
             let about = field.about();
             let side = about.source_side.of(working_side(scene, options, about.longest_side)?);
             if !known.iter().any(|(known_side, _)| *known_side == side) {
@@ -218,13 +220,13 @@ impl First {
     }
 
     /// `times[round]`: in total and for encoding.
-    fn point(self, words: &str, times: &[[f64; 2]]) -> Point {
+    fn point(self, label: &str, times: &[[f64; 2]]) -> Point {
         let First { difference, truth_psnr, record, is_repeatable, .. } = self;
         let all = sorted(times.iter().map(|[all, _]| *all));
         let encode = sorted(times.iter().map(|[_, encode]| *encode));
         let end = |time: Option<&f64>| time.copied().unwrap_or(f64::NAN);
         Point {
-            setting: words.to_owned(),
+            setting: label.to_owned(),
             seconds: median(&all),
             seconds_range: [end(all.first()), end(all.last())],
             encode_seconds: median(&encode),

@@ -15,10 +15,6 @@ trait OnAnyDevice: Any + Send + Sync {
     fn about(&self) -> About;
 
     fn on<'a>(&'a self, device: &'a AnyDevice) -> Box<dyn Renderer + 'a>;
-
-    fn preview(&self) -> Option<AnyField>;
-
-    fn is_live(&self) -> bool;
 }
 
 impl<F: Field + Send + Sync + 'static> OnAnyDevice for F {
@@ -31,14 +27,6 @@ impl<F: Field + Send + Sync + 'static> OnAnyDevice for F {
             AnyDevice::Cpu(device) => Box::new(On { device, field: self }),
             AnyDevice::Vulkan(device) => Box::new(On { device: device.as_ref(), field: self }),
         }
-    }
-
-    fn preview(&self) -> Option<AnyField> {
-        Field::preview(self).map(AnyField::new)
-    }
-
-    fn is_live(&self) -> bool {
-        Field::is_live(self)
     }
 }
 
@@ -56,16 +44,6 @@ impl AnyField {
     /// The field on a device.
     pub fn on<'a>(&'a self, device: &'a AnyDevice) -> Box<dyn Renderer + 'a> {
         self.0.on(device)
-    }
-
-    /// Its cheaper form for a moving camera, if there is one.
-    pub fn preview(&self) -> Option<AnyField> {
-        self.0.preview()
-    }
-
-    /// Whether a picture takes milliseconds ([`Field::is_live`]).
-    pub fn is_live(&self) -> bool {
-        self.0.is_live()
     }
 
     /// The field, if it is of this type.

@@ -1,4 +1,4 @@
-//! Chooses the weighting scheme and the field's scalars for a scene, and estimates the expected score, from the sources
+//! Chooses the weighting scheme and the field's options for a scene, and estimates the expected score, from the sources
 //! alone: some of them are held out, one at a time, and rendered coarsely from the others.
 //!
 //! ```text
@@ -10,7 +10,7 @@
 //! expectation   from these scores to a target's
 //! ```
 //!
-//! The choice is a coordinate search: the scheme first, then each of the field's scalars. All candidates are rendered
+//! The choice is a coordinate search: the scheme first, then each step of the field's candidates. All candidates are rendered
 //! from one encoding, under the first scheme. A candidate replaces the current choice only if its gain exceeds the
 //! noise; of an object with silhouettes, a scheme also where a held-out source is nearest to the others. At last,
 //! pictures under several settings are mixed by region, where that is not worse. With too few sources to hold one out,
@@ -32,7 +32,7 @@ use crate::mixture::NearTargets;
 use crate::render::{Finished, Frame, RenderError, RenderOptions, RenderRun, Stage, render_chosen};
 use crate::standing::Measure;
 pub use crate::standing::Standing;
-use crate::{Mixture, Renderer, Setting, Tunable};
+use crate::{AnyOptions, Mixture, Renderer, Setting};
 use expectation::decibels;
 use gain::{gain_where_nearest, is_better, is_lost, mean_score, median_gain};
 use held_out::{HeldOutSources, Outcome, coarse, coarse_side};
@@ -64,7 +64,7 @@ const MIN_GAIN: f64 = 0.1;
 /// A mixture is taken unless its score on held-out sources is lower than that of the best single picture by more than
 /// this, decibels (`host/results/front_to_back.md`, "Mixtures by region").
 const MAX_LOSS: f64 = 0.05;
-/// The name in [`Candidate::settings`] of the number of pictures that are mixed.
+/// The name in the settings of [`Candidate::options`] of the number of pictures that are mixed.
 const MIXED: &str = "mixed pictures";
 
 /// A scheme and settings that were tried.
@@ -72,8 +72,9 @@ const MIXED: &str = "mixed pictures";
 pub struct Candidate {
     /// The scheme.
     pub weighting: String,
-    /// The field's scalars that are not at their defaults.
-    pub settings: Vec<Setting>,
+    /// The field's options, in a record their scalars that are not at their defaults.
+    #[serde(rename = "settings")]
+    pub options: AnyOptions,
     /// Mean score of the held-out sources, decibels; null if it was given up before the last of them.
     pub psnr: Option<f64>,
     /// The score of each; of the first ones alone where so many of these do not gain that the median cannot.
@@ -100,8 +101,8 @@ pub struct HeldOutSource {
 pub struct Chosen {
     /// The scheme.
     pub weighting: Weighting,
-    /// The field's scalars that are not at their defaults.
-    pub settings: Vec<Setting>,
+    /// The field's options.
+    pub options: AnyOptions,
     /// Pictures under other settings that are mixed in place of one under these; `None` if that is worse.
     pub mixture: Option<Mixture>,
     /// All candidates, in the order in which they were tried.
@@ -187,7 +188,7 @@ pub fn choose(
     options: &RenderOptions,
     progress: &dyn Progress,
 ) -> Result<Chosen, RenderError> {
-    choose_of(schemes(), Some(stage.tunables()), stage, renderer, options, progress)
+    choose_of(schemes(), true, stage, renderer, options, progress)
 }
 
 /// As [`choose`] without a choice: the baseline alone is tried. For the scores of the held-out sources, in a
@@ -201,12 +202,12 @@ pub fn estimate(
     options: &RenderOptions,
     progress: &dyn Progress,
 ) -> Result<Chosen, RenderError> {
-    choose_of(schemes().into_iter().take(1).collect(), None, stage, renderer, options, progress)
+    choose_of(schemes().into_iter().take(1).collect(), false, stage, renderer, options, progress)
 }
 
 fn choose_of(
     schemes: Vec<Scheme>,
-    tunables: Option<&[Tunable]>,
+    varies: bool,
     stage: &Stage<'_>,
     renderer: &dyn Renderer,
     options: &RenderOptions,
@@ -219,7 +220,7 @@ fn choose_of(
     let cameras: Vec<_> = stage.images.images.iter().map(|image| image.camera).collect();
     let mut chosen = Chosen {
         weighting: Weighting::default_scheme(),
-        settings: Vec::new(),
+        options: renderer.options(),
         mixture: None,
         candidates: Vec::new(),
         held_out: Vec::new(),
@@ -232,28 +233,31 @@ fn choose_of(
         return Ok(chosen);
     }
     chosen.weighting = first;
-    let (is_mixed, tunables) = (tunables.is_some(), tunables.unwrap_or(&[]));
-    let others: usize = tunables.iter().map(|tunable| tunable.others.len()).sum();
+    let candidates = |chosen: &AnyOptions, step: usize| {
+        if varies { stage.session.prepared.candidates(chosen, step) } else { Vec::new() }
+    };
+    let others: usize = (0..).map(|step| candidates(&chosen.options, step).len()).take_while(|count| *count > 0).sum();
     progress.expect(held_out.len() * (1 + schemes.len() + others));
     let mut search = Search { held_out: &mut held_out, candidates: Vec::new(), progress };
-    let mut best = search.outcomes(&chosen.weighting, &[], &[])?;
+    let mut best = search.outcomes(&chosen.weighting, &chosen.options, &[])?;
     let has_silhouettes = stage.images.has_silhouettes;
-    if let Some((outcomes, weighting)) = search.scheme(schemes, &best, has_silhouettes)? {
+    if let Some((outcomes, weighting)) = search.scheme(schemes, &chosen.options, &best, has_silhouettes)? {
         (best, chosen.weighting) = (outcomes, weighting);
     }
-    for tunable in tunables {
-        let (before, kept) = (best.clone(), chosen.settings.clone());
-        for &value in tunable.others {
-            let mut settings = kept.clone();
-            settings.push(Setting { name: tunable.name, value });
-            let outcomes = search.outcomes(&chosen.weighting, &settings, &before)?;
+    for step in 0.. {
+        let (before, others) = (best.clone(), candidates(&chosen.options, step));
+        if others.is_empty() {
+            break;
+        }
+        for options in others {
+            let outcomes = search.outcomes(&chosen.weighting, &options, &before)?;
             if is_better(&outcomes, &best, &before) {
-                (best, chosen.settings) = (outcomes, settings);
+                (best, chosen.options) = (outcomes, options);
             }
         }
     }
-    let parts = if is_mixed { search.held_out.parts(&chosen.settings) } else { Vec::new() };
-    if let Some(Mixed { mixture, outcomes, .. }) = search.mixed(&chosen.weighting, &chosen.settings, parts)?
+    let parts = if varies { stage.session.prepared.parts(&chosen.options) } else { Vec::new() };
+    if let Some(Mixed { mixture, outcomes, .. }) = search.mixed(&chosen.weighting, &chosen.options, parts)?
         && mean_score(&outcomes) > mean_score(&best) - MAX_LOSS
         && !(has_silhouettes && gain_where_nearest(&outcomes, &best) < -MAX_LOSS)
     {
@@ -296,7 +300,7 @@ impl Search<'_, '_> {
     fn outcomes(
         &mut self,
         weighting: &Weighting,
-        settings: &[Setting],
+        options: &AnyOptions,
         replaced: &[Outcome],
     ) -> Result<Vec<Outcome>, RenderError> {
         let mut outcomes = Vec::new();
@@ -304,12 +308,12 @@ impl Search<'_, '_> {
             if is_lost(&outcomes, replaced) {
                 self.progress.step();
             } else {
-                outcomes.extend(self.held_out.outcomes(source..source + 1, weighting, settings, self.progress)?);
+                outcomes.extend(self.held_out.outcomes(source..source + 1, weighting, options, self.progress)?);
             }
         }
         let scores: Vec<f64> = outcomes.iter().map(|outcome| outcome.psnr).collect();
         let psnr = (outcomes.len() == self.held_out.len()).then(|| mean_score(&outcomes));
-        self.candidates.push(Candidate { weighting: weighting.to_string(), settings: settings.to_vec(), psnr, scores });
+        self.candidates.push(Candidate { weighting: weighting.to_string(), options: options.clone(), psnr, scores });
         Ok(outcomes)
     }
 
@@ -317,6 +321,7 @@ impl Search<'_, '_> {
     fn scheme(
         &mut self,
         schemes: impl Iterator<Item = Weighting>,
+        options: &AnyOptions,
         first: &[Outcome],
         has_silhouettes: bool,
     ) -> Result<Option<(Vec<Outcome>, Weighting)>, RenderError> {
@@ -327,7 +332,7 @@ impl Search<'_, '_> {
                 (0..self.held_out.len()).for_each(|_| self.progress.step());
                 continue;
             }
-            let outcomes = self.outcomes(&weighting, &[], first)?;
+            let outcomes = self.outcomes(&weighting, options, first)?;
             has_lost = number == LEADER && median_gain(&outcomes, first) < -0.5 * MIN_GAIN;
             let before = best.as_ref().map_or(first, |(outcomes, _)| outcomes);
             let is_for_targets = !has_silhouettes || gain_where_nearest(&outcomes, first) > MIN_GAIN;
@@ -342,18 +347,17 @@ impl Search<'_, '_> {
     fn mixed(
         &mut self,
         weighting: &Weighting,
-        chosen: &[Setting],
-        parts: Vec<Vec<Setting>>,
+        chosen: &AnyOptions,
+        parts: Vec<AnyOptions>,
     ) -> Result<Option<Mixed>, RenderError> {
         let count = parts.len();
         self.progress.expect(self.held_out.len() * count);
         let mixed = regions::mixed(self.held_out, weighting, parts, self.progress)?;
         if let Some(Mixed { outcomes, .. }) = &mixed {
-            let mut settings = chosen.to_vec();
-            settings.push(Setting { name: MIXED, value: count as f32 });
+            let options = chosen.also_stating(Setting { name: MIXED, value: count as f32 });
             let scores = outcomes.iter().map(|outcome| outcome.psnr).collect();
             let psnr = Some(mean_score(outcomes));
-            self.candidates.push(Candidate { weighting: weighting.to_string(), settings, psnr, scores });
+            self.candidates.push(Candidate { weighting: weighting.to_string(), options, psnr, scores });
         }
         Ok(mixed)
     }
@@ -374,7 +378,7 @@ pub fn render<X: From<RenderError>>(
             return Ok((given.clone(), None));
         }
         let chosen = choose(stage, run.renderer, run.options, run.progress)?;
-        stage.tune(&chosen.settings, chosen.mixture.as_ref());
+        stage.vary(Some(&chosen.options), chosen.mixture.as_ref(), run.progress)?;
         Ok((chosen.weighting.clone(), Some(chosen)))
     };
     render_chosen(run, choose, |images: &SourceImages, frame: Frame, chosen: &Option<Chosen>| {

@@ -1,5 +1,5 @@
-//! A bound on a picture's error or on its time: chooses how much of a field's work is needed, from cheap measurements on
-//! this scene, like the step-size controller of a solver for stiff equations.
+//! A bound on a picture's error or on its time: chooses how much of a field's work is needed, from cheap measurements
+//! on this scene, like the step-size controller of a solver for stiff equations.
 //!
 //! ```text
 //! check        the difference of a picture from the exact one, estimated from few pixels
@@ -9,10 +9,10 @@
 //! controller   the search, and what it keeps from picture to picture
 //! ```
 //!
-//! The search begins at the cheapest [`Effort`](crate::Effort) whose typical error, scaled by what the pictures before had, is below the
-//! bound. The picture is then checked on pixels drawn for this purpose, which chose nothing; where the check fails the next
-//! effort follows. The error is the root mean square over pixels and channels of the difference from the picture of the
-//! exact effort, before rounding, colours from 0 to 1.
+//! The search begins at the cheapest effort ([`Prepared::efforts`](crate::Prepared::efforts)) whose typical error,
+//! scaled by what the pictures before had, is below the bound. The picture is then checked on pixels drawn for this
+//! purpose, which chose nothing; where the check fails the next effort follows. The error is the root mean square over
+//! pixels and channels of the difference from the picture of the exact effort, before rounding, colours from 0 to 1.
 
 mod check;
 mod controller;

@@ -1,80 +1,10 @@
-//! Previews: a field's pictures rendered smaller and enlarged.
+//! Pictures that are rendered smaller, enlarged.
 
-use super::{About, Encoding, Field, FieldError, Geometry, Prepared, Record, Rendered, Request, Tuned, Weighted};
-use viewfuse_core::camera::Camera;
-use viewfuse_device::Device;
-use viewfuse_job::progress::Progress;
-use viewfuse_scene::photographs::SourceImages;
+use super::Rendered;
 
-/// A field whose pictures are rendered with a fraction of the requested rows and columns and then enlarged.
-#[derive(Clone, Debug)]
-pub struct Enlarged<F> {
-    /// The field.
-    pub field: F,
-    /// Rows and columns are divided by this; 1 changes nothing.
-    pub factor: u32,
-}
-
-/// The field's prepared views.
-struct Views<'a> {
-    inner: Box<dyn Prepared + 'a>,
-    factor: u32,
-}
-
-impl<F: Field> Field for Enlarged<F> {
-    fn about(&self) -> About {
-        self.field.about()
-    }
-
-    fn prepare<'a, D: Device>(
-        &'a self,
-        device: &'a D,
-        sources: &SourceImages,
-        progress: &dyn Progress,
-    ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
-        Ok(Box::new(Views { inner: self.field.prepare(device, sources, progress)?, factor: self.factor }))
-    }
-}
-
-impl Prepared for Views<'_> {
-    fn encoding(&self) -> Encoding {
-        self.inner.encoding()
-    }
-
-    fn encode(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
-        self.inner.encode(view, progress)
-    }
-
-    fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
-        let target = request.camera;
-        let (width, height) = (target.pinhole.width(), target.pinhole.height());
-        // A camera that cannot be made so small is not changed.
-        let pinhole = target.pinhole.resized(width.div_ceil(self.factor), height.div_ceil(self.factor));
-        let small = Camera { pinhole: pinhole.unwrap_or(target.pinhole), ..*target };
-        let rendered = self.inner.render(&Request { camera: &small, ..*request }, progress)?;
-        Ok(enlarged(rendered, [width, height]))
-    }
-
-    fn record(&self) -> Record {
-        self.inner.record()
-    }
-
-    fn weighted(&mut self) -> Option<&mut dyn Weighted> {
-        self.inner.weighted()
-    }
-
-    fn tuned(&mut self) -> Option<&mut dyn Tuned> {
-        self.inner.tuned()
-    }
-
-    fn geometry(&self) -> Option<&dyn Geometry> {
-        self.inner.geometry()
-    }
-}
-
-/// A picture of `[width, height]` pixels, each the bilinear mean of the four nearest ones of a smaller picture; depths and confidences
-/// are those of the nearest one, since the mean of two depths is not on a surface.
-fn enlarged(rendered: Rendered, [width, height]: [u32; 2]) -> Rendered {
+/// A picture of `[width, height]` pixels, each the bilinear mean of the four nearest ones of a smaller picture; depths
+/// and confidences are those of the nearest one, since the mean of two depths is not on a surface.
+pub(crate) fn enlarged(rendered: Rendered, [width, height]: [u32; 2]) -> Rendered {
     if [rendered.width, rendered.height] == [width, height] {
         return rendered;
     }

@@ -1,16 +1,14 @@
-//! The traits of a field: [`Field`] states its requirements and takes source views to a device; [`Prepared`] encodes views
-//! and renders. A [`Stage`](crate::render::Stage) calls both: it alone decides when a view is encoded.
+//! The traits of a field: [`Field`] states its requirements and takes source views to a device; [`Prepared`] encodes
+//! views and renders. A [`Stage`](crate::render::Stage) calls both: it alone decides when a view is encoded.
 //!
-//! What is left out for speed is an [`Effort`]: what it leaves out, its share of the exact picture's time, its typical
-//! error. Its parts are [`Omission`](crate::Omission)s, which have names of their own, and what the render loop leaves out
-//! of any field's work: sources of least weight and samples behind surfaces
-//! ([`RenderOptions`](crate::render::RenderOptions)). A [`Bound`](crate::budget::Bound) chooses among the efforts that a
-//! field lists; trials and previews have efforts of their own. A [`Tunable`] is none: it leaves nothing out, and is chosen
-//! for a scene because pictures become better.
+//! A field renders in more than one way by values of its own options: a [`Variant`](crate::variant::Variant) is one of
+//! them. Its efforts are what a [`Bound`](crate::budget::Bound) chooses from; its candidates are tried on held-out
+//! sources, and its parts mixed, because pictures become better. What the render loop omits of any field's work,
+//! sources of least weight and samples behind surfaces, is in [`RenderOptions`](crate::render::RenderOptions).
 
 use super::error::FieldError;
 use super::record::Record;
-use serde::Serialize;
+use super::variant::{AnyOptions, Variant};
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_device::Device;
@@ -23,8 +21,13 @@ pub const LONGEST_DEFAULT_SIDE: u32 = 512;
 
 /// Renders target views from source views, on any device.
 pub trait Field {
-    /// Its requirements and properties, with its settings.
+    /// Its requirements and properties.
     fn about(&self) -> About;
+
+    /// Its options.
+    fn options(&self) -> AnyOptions {
+        AnyOptions::new(())
+    }
 
     /// Takes the photographs, and its parameters if it has any, to a device. Nothing is encoded yet.
     ///
@@ -36,20 +39,6 @@ pub trait Field {
         sources: &SourceImages,
         progress: &dyn Progress,
     ) -> Result<Box<dyn Prepared + 'a>, FieldError>;
-
-    /// A cheaper form of the field, for pictures while a camera moves; `None` where its pictures are made smaller instead.
-    fn preview(&self) -> Option<Self>
-    where
-        Self: Sized,
-    {
-        None
-    }
-
-    /// Whether a picture takes milliseconds once the sources are prepared, because the scene is there and is only drawn: a
-    /// moving camera then gets larger pictures, and more of them.
-    fn is_live(&self) -> bool {
-        false
-    }
 }
 
 /// Source views on a device, with their encodings so far. What not every field can do is a capability: a value that is
@@ -82,14 +71,61 @@ pub trait Prepared {
         None
     }
 
-    /// Several efforts, if the field can render in more than one way.
-    fn efforts(&mut self) -> Option<&mut dyn Efforts> {
-        None
+    /// Renders what follows under these options; those of another field change nothing. Views are encoded again where
+    /// [`Options::encodes_alike`](crate::variant::Options::encodes_alike) says that they have to be.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    fn set(&mut self, _options: &AnyOptions) -> Result<(), FieldError> {
+        Ok(())
     }
 
-    /// Scalars that can be chosen for a scene.
-    fn tuned(&mut self) -> Option<&mut dyn Tuned> {
-        None
+    /// The efforts of these options, the cheapest first, the exact one last: what a bound on the error or on the time
+    /// chooses from. None for a field with one way to render. Labels, errors and times are the same for the life of the
+    /// prepared views.
+    fn efforts(&self, _options: &AnyOptions) -> Vec<Variant<AnyOptions>> {
+        Vec::new()
+    }
+
+    /// How the error of a picture is found.
+    fn check(&self) -> Check {
+        Check::Comparison
+    }
+
+    /// For [`Check::Pixels`]: colours and opacities of some pixels of a target, row-major indices, as
+    /// [`Prepared::render`] would give them with the exact effort. All [`Request::views`] are encoded.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    fn exact_pixels(
+        &mut self,
+        _request: &Request<'_>,
+        _pixels: &[u32],
+        _progress: &dyn Progress,
+    ) -> Result<Vec<[f32; 4]>, FieldError> {
+        Ok(Vec::new())
+    }
+
+    /// For [`Check::Steps`]: the root mean square difference of the last picture from the exact one, colours from 0 to
+    /// 1.
+    fn error(&self) -> f32 {
+        f32::INFINITY
+    }
+
+    /// These options with less resolution, for a purpose.
+    fn reduced(&self, options: &AnyOptions, _purpose: Purpose) -> AnyOptions {
+        options.clone()
+    }
+
+    /// What a step of the search for a scene's options tries in place of those chosen so far; nothing after the last
+    /// step. What is tried may encode views otherwise: a trial keeps the encodings that are there.
+    fn candidates(&self, _chosen: &AnyOptions, _step: usize) -> Vec<AnyOptions> {
+        Vec::new()
+    }
+
+    /// Options whose pictures are worth mixing where these were chosen.
+    fn parts(&self, _chosen: &AnyOptions) -> Vec<AnyOptions> {
+        Vec::new()
     }
 
     /// What is known of where the surfaces are.
@@ -107,73 +143,24 @@ pub trait Weighted {
     fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError>;
 }
 
-/// The efforts with which a field can render.
-pub trait Efforts {
-    /// The efforts, the cheapest first, the exact one last: what a bound on the error or on the time chooses from. The
-    /// same for the life of the prepared views.
-    fn list(&self) -> Vec<Effort>;
-
-    /// Renders what follows with an effort of the list, by index.
-    ///
-    /// # Errors
-    /// [`FieldError`].
-    fn set(&mut self, effort: usize) -> Result<Encodings, FieldError>;
-
-    /// Whether an effort goes on from where a cheaper one ended: both together take the time of the dearer one. The same for the
-    /// life of the prepared views.
-    fn goes_on(&self) -> bool {
-        false
-    }
-
-    /// Renders what follows with the effort of trials: pictures that are only compared with one another, and may have less
-    /// resolution where that changes the comparison little. Before views are encoded.
-    fn set_trial(&mut self) {}
-
-    /// How the error of a picture is found; the same kind for the life of the prepared views.
-    fn check(&mut self) -> Check<'_> {
-        Check::Comparison
-    }
-}
-
 /// How the error of a picture of an effort is found.
-pub enum Check<'a> {
-    /// By pixels of the exact picture: pixels are independent of one another.
-    Pixels(&'a mut dyn ExactPixels),
-    /// By the field's own steps: the root mean square difference of the last picture from the exact one, colours from 0
-    /// to 1.
-    Steps(f32),
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Check {
+    /// By [`Prepared::exact_pixels`]: pixels are independent of one another.
+    Pixels,
+    /// By the field's own steps: [`Prepared::error`].
+    Steps,
     /// By comparing pictures of two efforts.
     Comparison,
 }
 
-/// Pixels of the exact picture, alone.
-pub trait ExactPixels {
-    /// Colours and opacities of some pixels of a target, row-major indices: what [`Prepared::render`] would give with the
-    /// last of [`Efforts::list`]. All [`Request::views`] are encoded.
-    ///
-    /// # Errors
-    /// [`FieldError`].
-    fn exact_pixels(
-        &mut self,
-        request: &Request<'_>,
-        pixels: &[u32],
-        progress: &dyn Progress,
-    ) -> Result<Vec<[f32; 4]>, FieldError>;
-}
-
-/// Scalars that can be chosen for a scene.
-pub trait Tuned {
-    /// The scalars, for these sources.
-    fn tunables(&self) -> &'static [Tunable];
-
-    /// Sets scalars for the views and targets that follow; those that are not named take their defaults. Encoded views stay
-    /// as they are. Names that are none of [`Tuned::tunables`] are ignored.
-    fn tune(&mut self, settings: &[Setting]);
-
-    /// Settings whose pictures are worth mixing where these were chosen; none by default.
-    fn parts(&mut self, _chosen: &[Setting]) -> Vec<Vec<Setting>> {
-        Vec::new()
-    }
+/// For what pictures have less resolution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// They are only compared with one another, where that changes the comparison little.
+    Trial,
+    /// A camera moves; for fields that say so ([`About::has_previews`]).
+    Preview,
 }
 
 /// Where the surfaces are.
@@ -188,59 +175,6 @@ pub trait Geometry {
     /// # Errors
     /// [`FieldError`].
     fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError>;
-}
-
-/// An effort: how a field renders, between the cheapest picture and the exact one.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Effort {
-    /// What it leaves out, or what it keeps, in a few words.
-    pub name: String,
-    /// The root mean square difference of its pictures from the exact ones that is typical of it, colours from 0 to 1: where
-    /// a search begins. 0 for the exact one.
-    pub typical_error: f32,
-    /// Its share of the exact one's time, likewise.
-    pub typical_share: f32,
-}
-
-impl Effort {
-    /// An effort that leaves something out.
-    pub fn new(name: impl Into<String>, typical_error: f32, typical_share: f32) -> Effort {
-        Effort { name: name.into(), typical_error, typical_share }
-    }
-
-    /// The one that leaves nothing out.
-    pub fn exact() -> Effort {
-        Effort { name: "exact".to_owned(), typical_error: 0.0, typical_share: 1.0 }
-    }
-}
-
-/// Whether the encodings of views serve another effort.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Encodings {
-    /// They do.
-    Kept,
-    /// Views must be encoded again.
-    Dropped,
-}
-
-/// A scalar of a field that can be chosen for a scene.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tunable {
-    /// Its name.
-    pub name: &'static str,
-    /// Its default.
-    pub default: f32,
-    /// Other values that are worth a trial.
-    pub others: &'static [f32],
-}
-
-/// A value of a [`Tunable`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Setting {
-    /// The scalar's name.
-    pub name: &'static str,
-    /// Its value.
-    pub value: f32,
 }
 
 /// What is known of where the surfaces of a scene are, in the form of [`SourceImages`].
@@ -269,8 +203,8 @@ const MAX_BEHIND: f32 = 0.05;
 const MIN_CONFIDENCE: f32 = 0.5;
 
 impl DepthMap {
-    /// Whether the view shows a point, world coordinates: it lies in the image, and not behind a surface that can be relied on. Maps without
-    /// confidences are taken to be sure.
+    /// Whether the view shows a point, world coordinates: it lies in the image, and not behind a surface that can be
+    /// relied on. Maps without confidences are taken to be sure.
     pub(crate) fn shows(&self, point: Vec3) -> bool {
         let there = self.camera.project(point);
         let hides = |at: usize| {
@@ -297,6 +231,11 @@ pub struct About {
     pub longest_side: u32,
     /// Whether it supports early termination of rays ([`Request::early_termination`]).
     pub ends_rays: bool,
+    /// Whether its options can be reduced while a camera moves; otherwise its pictures are made smaller.
+    pub has_previews: bool,
+    /// Whether a picture takes milliseconds once the sources are prepared, because the scene is there and is only
+    /// drawn: a moving camera then gets larger pictures, and more of them.
+    pub is_live: bool,
 }
 
 impl About {
@@ -308,6 +247,8 @@ impl About {
             source_side: SourceSide::Share(1.0),
             longest_side: LONGEST_DEFAULT_SIDE,
             ends_rays: false,
+            has_previews: false,
+            is_live: false,
         }
     }
 }
@@ -338,8 +279,8 @@ pub enum Encoding {
     All,
     /// Each when a target first gives it a weight. Views without a weight do not contribute to a picture.
     Used,
-    /// As `Used`, and where something may be left out, only so many views of greatest weight contribute to a picture: views of less
-    /// weight add more errors than they show. Views of equal weight stay together.
+    /// As `Used`, and where something may be left out, only so many views of greatest weight contribute to a picture:
+    /// views of less weight add more errors than they show. Views of equal weight stay together.
     Greatest(usize),
 }
 

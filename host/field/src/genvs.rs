@@ -1,23 +1,23 @@
-//! GeNVS with weighted views, on any device: volumes of features, a feature image, a diffusion denoiser; the mathematics is
-//! in [`viewfuse_kernels::genvs`], [`viewfuse_kernels::network`], [`viewfuse_core::schedule`] and [`viewfuse_core::sampler`].
+//! GeNVS with weighted views, on any device: volumes of features, a feature image, a diffusion denoiser; the
+//! mathematics is in [`viewfuse_kernels::genvs`], [`viewfuse_kernels::network`], [`viewfuse_core::schedule`] and
+//! [`viewfuse_core::sampler`].
 //!
 //! Source: Chan et al., "Generative novel view synthesis with 3D-aware diffusion models" (2023), and the code of "Pay
 //! Attention to Where You Looked". The views are combined with weights; the published network takes their mean.
 
 mod architecture;
 mod denoiser;
-mod efforts;
 mod encoder;
 mod feature_image;
 mod memory;
 mod open;
 mod options;
 mod parts;
-mod presets;
 mod ray_sampling;
 pub mod reference;
 pub mod sampling;
 pub mod test_networks;
+mod variants;
 mod views;
 mod volume;
 
@@ -31,7 +31,7 @@ pub(crate) use open::ROW;
 pub use options::{GenvsOptions, Omissions, Rays};
 
 use super::learned::{NoDepths, default_near_far};
-use super::{About, Field, FieldError, Prepared, SourceSide};
+use super::{About, AnyOptions, Field, FieldError, Prepared, SourceSide};
 use encoder::SIDE_STEP;
 use parts::Parts;
 use std::sync::Arc;
@@ -91,23 +91,22 @@ impl Genvs {
     /// Takes photographs and parameters to a device.
     fn views<'a, D: Device>(&'a self, device: &'a D, sources: &SourceImages) -> Result<Views<'a, D>, FieldError> {
         let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
-        let near_far = self.options.rays.near_far.unwrap_or_else(|| default_near_far(&cameras));
+        let usual_near_far = default_near_far(&cameras);
+        // A volume of no depth has no nodes to look up.
+        NoDepths::check(self.options.rays.near_far.unwrap_or(usual_near_far)).map_err(FieldError::unsuitable)?;
         let images: Vec<SourceView> = sources.images.iter().map(padded).collect();
         let side = images.iter().map(|image| image.size.height.min(image.size.width)).min().unwrap_or(SIDE_STEP);
         let size = |image: &SourceImage| [image.camera.pinhole.width(), image.camera.pinhole.height()];
-        let sizes: Vec<[u32; 2]> = sources.images.iter().map(size).collect();
         Ok(Views {
             field: self,
             device,
             parts: Parts::load(device, &self.checkpoint, &self.architecture, side)?,
             volumes: images.iter().map(|_| None).collect(),
             images,
-            // A volume of no depth has no nodes to look up.
-            near_far: NoDepths::check(near_far).map_err(FieldError::unsuitable)?,
-            memory_estimate: self.memory_estimate(device, &sizes),
+            usual_near_far,
+            source_sizes: sources.images.iter().map(size).collect(),
             earlier: None,
-            plan: self.options.plan,
-            effort: None,
+            options: self.options,
             error: f32::INFINITY,
             features: None,
             counts: Counts::default(),
@@ -119,6 +118,10 @@ impl Field for Genvs {
     fn about(&self) -> About {
         let side = self.architecture.image_side as u32;
         About { source_side: SourceSide::Pixels(side), longest_side: side, ..About::new(ROW.name) }
+    }
+
+    fn options(&self) -> AnyOptions {
+        AnyOptions::new(self.options)
     }
 
     fn prepare<'a, D: Device>(

@@ -3,6 +3,7 @@
 //! ```text
 //! error             the errors of a field
 //! finite            NaN and infinity are found at the stage that produced them
+//! variant           a value of a field's options: efforts, candidates, pictures that are mixed
 //! record            what a field may leave out, and the record of its work
 //! field             the traits of a field: it prepares, encodes and renders
 //! renderer          a field on a device, with types erased
@@ -17,7 +18,7 @@
 //! point_cloud       the sources' depths as one cloud of points
 //! gaussians         Gaussians optimised for the sources
 //! auto              the scheme and the field's scalars for a scene, and the score to expect
-//! enlarged          previews: small pictures, enlarged
+//! enlarged          small pictures, enlarged
 //! options           a person's options of a field, and the flags that take them
 //! row               what a field states of itself
 //! learned           common parts of learned fields
@@ -25,14 +26,14 @@
 //! rows              one row a field
 //! ```
 //!
-//! A field of your own implements [`Field`] and [`Prepared`]; [`On`] puts it on a device, and [`render::render`] renders
-//! with it as with the fields of this crate.
+//! A field of your own implements [`Field`] and [`Prepared`]; [`On`] puts it on a device, and [`render::render`]
+//! renders with it as with the fields of this crate.
 #![forbid(unsafe_code)]
 
 pub mod any;
 pub mod auto;
 pub mod budget;
-pub mod enlarged;
+mod enlarged;
 pub mod error;
 pub mod field;
 pub mod finite;
@@ -53,16 +54,18 @@ pub mod scores;
 mod session;
 mod standing;
 pub mod training_free;
+pub mod variant;
 
 pub use any::AnyField;
 pub use error::FieldError;
 pub use field::{
-    About, Check, DepthMap, Effort, Efforts, Encoding, Encodings, ExactPixels, Field, Geometry, LONGEST_DEFAULT_SIDE,
-    Prepared, Rendered, Request, Setting, SourceSide, Surfaces, Tunable, Tuned, Weighted,
+    About, Check, DepthMap, Encoding, Field, Geometry, LONGEST_DEFAULT_SIDE, Prepared, Purpose, Rendered, Request,
+    SourceSide, Surfaces, Weighted,
 };
 pub use mixture::Mixture;
 pub use record::{Denoising, LeftOut, Omission, Record, VIEWS};
 pub use renderer::{On, Renderer};
+pub use variant::{AnyOptions, Options, Setting, Variant};
 
 /// The examples of the README, compiled and run.
 #[cfg(doctest)]

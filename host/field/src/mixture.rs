@@ -15,7 +15,7 @@
 
 mod near;
 
-use crate::{Rendered, Setting};
+use crate::{AnyOptions, Rendered};
 pub use near::NearTargets;
 use serde::Serialize;
 use viewfuse_core::pose::Pose;
@@ -37,7 +37,7 @@ const MAX_DIFFERENCE: f32 = 2.0;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Mixture {
     /// The settings of each picture.
-    pub parts: Vec<Vec<Setting>>,
+    pub parts: Vec<AnyOptions>,
     /// The constants `c_i` of each picture but the first.
     pub constants: Vec<Vec<f32>>,
     /// Targets whose picture is only partly the mixture; none if all are.
@@ -52,12 +52,12 @@ pub(crate) fn term_count(parts: usize) -> usize {
 
 impl Mixture {
     /// With these constants.
-    pub fn new(parts: Vec<Vec<Setting>>, constants: Vec<Vec<f32>>) -> Mixture {
+    pub fn new(parts: Vec<AnyOptions>, constants: Vec<Vec<f32>>) -> Mixture {
         Mixture { parts, constants, near: None }
     }
 
     /// The plain mean.
-    pub fn mean(parts: Vec<Vec<Setting>>) -> Mixture {
+    pub fn mean(parts: Vec<AnyOptions>) -> Mixture {
         let constants = vec![vec![0.0; term_count(parts.len())]; parts.len().saturating_sub(1)];
         Mixture::new(parts, constants)
     }
@@ -215,7 +215,7 @@ mod tests {
     #[test]
     fn without_constants_it_is_the_plain_mean() {
         let parts = [flat(0.2, 0.1, 1.0), flat(0.5, 0.3, 2.0), flat(0.8, 0.8, 4.0)];
-        let (mixed, shares) = Mixture::mean(vec![Vec::new(); 3]).mixed(&parts);
+        let (mixed, shares) = Mixture::mean(vec![AnyOptions::new(()); 3]).mixed(&parts);
         assert!(mixed.colours.iter().all(|colour| near(colour[0], 0.5) && near(colour[3], 1.0)));
         // The colours are 0.3, 0 and 0.3 from the mean, so that the spread is the square root of 0.06.
         let confidence = 0.4 / (1.0 + 0.06_f32.sqrt() / USUAL_SPREAD);
@@ -225,7 +225,7 @@ mod tests {
 
     #[test]
     fn the_surer_picture_gets_the_greater_share() {
-        let mut mixture = Mixture::mean(vec![Vec::new(); 2]);
+        let mut mixture = Mixture::mean(vec![AnyOptions::new(()); 2]);
         mixture.constants[0] = vec![0.0, 0.0, 1.0, 0.0];
         let (mixed, shares) = mixture.mixed(&[flat(0.0, 0.3, 1.0), flat(1.0, 0.5, 2.0)]);
         assert!(near(shares[1], 0.7) && near(shares[0], 0.3), "{shares:?}");
@@ -243,7 +243,7 @@ mod tests {
         assert!(picture.colours.iter().all(|colour| near(colour[0], 0.3)));
         assert_eq!(picture.depths, [1.0; 24], "the depth of the picture with the greater share");
         // As with a constant that no term of the pixels changes.
-        let mixture = Mixture::new(vec![Vec::new(); 2], vec![vec![0.25 - 0.5, 0.0, 0.0, 0.0]]);
+        let mixture = Mixture::new(vec![AnyOptions::new(()); 2], vec![vec![0.25 - 0.5, 0.0, 0.0, 0.0]]);
         assert_eq!(picture, mixture.mixed(&[first, second]).0);
     }
 

@@ -1,38 +1,46 @@
-//! A person's options of a field, as text by the flags of its row. A field has defaults for missing options, and rejects
-//! options that it does not have.
+//! What a person gives of a field's options, as text by the flags of its row. A field has defaults for what is not
+//! given, and rejects what it does not have.
 
-use std::collections::BTreeMap;
+use super::record::Omission;
 use viewfuse_job::files::WriteError;
 use viewfuse_nn::checkpoint::CheckpointError;
 
-/// Options of a field as a person gives them.
+/// What a person gives of a field's options, as text by the names of its row. Opening the field makes a value of its
+/// own options of it, once.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct FieldOptions {
+pub struct Given {
     /// Seed of every random draw.
     pub seed: u64,
-    /// Leave nothing out.
+    /// Omit nothing.
     pub exact: bool,
-    /// Omissions that are switched off, by names of the row's list.
+    /// Names of the row's omissions that are switched off.
     pub compute: Vec<String>,
-    /// Values by the names of the row's flags; those of switches are empty.
-    pub flags: BTreeMap<String, String>,
+    /// Names of the row's flags with their values; those of switches are empty.
+    pub flags: Vec<(String, String)>,
 }
 
-impl FieldOptions {
-    /// These options with a flag; the value of a switch is empty.
-    pub fn with(mut self, flag: impl Into<String>, value: impl Into<String>) -> FieldOptions {
-        self.flags.insert(flag.into(), value.into());
+impl Given {
+    /// The same with a flag; the value of a switch is empty.
+    pub fn with(mut self, flag: impl Into<String>, value: impl Into<String>) -> Given {
+        self.flags.push((flag.into(), value.into()));
         self
     }
 
     /// The value of a flag, if it is given. Opening a field has checked it: `parse` is that of the row.
     pub(crate) fn value<T>(&self, flag: &str, parse: impl Fn(&str) -> Result<T, String>) -> Option<T> {
-        self.flags.get(flag).and_then(|text| parse(text).ok())
+        self.flags.iter().rfind(|(name, _)| name == flag).and_then(|(_, text)| parse(text).ok())
+    }
+
+    /// Does something with the value of a flag, if it is given.
+    pub(crate) fn take<T>(&self, flag: &str, parse: impl Fn(&str) -> Result<T, String>, set: impl FnOnce(T)) {
+        if let Some(value) = self.value(flag, parse) {
+            set(value);
+        }
     }
 
     /// Whether an omission is switched off.
-    pub(crate) fn computes(&self, what: &str) -> bool {
-        self.exact || self.compute.iter().any(|name| name == what)
+    pub(crate) fn computes(&self, omission: &Omission) -> bool {
+        self.exact || self.compute.iter().any(|name| name == omission.name)
     }
 }
 
@@ -69,33 +77,34 @@ pub(crate) const BOUNDS: &[&str] = &["max_error", "max_time"];
 /// The same, and the option that leaves nothing out.
 pub(crate) const BOUNDS_OR_EXACT: &[&str] = &["max_error", "max_time", "exact"];
 
-/// Declares a field's flags: the type of a value, name, form, parser, what it is about, conflicts, help. Makes the list for
-/// the row (`Given::FLAGS`) and the values that are given (`Given::of`).
+/// Declares a field's flags: name, form, parser, what it is about, conflicts, help, and what a value does to the
+/// field's options. Makes the list for the row (`FLAGS`), and `taken`, the options with what is given, in the order of
+/// the list.
 macro_rules! flags {
-    ($($field:ident: $Type:ty = $name:literal, $form:literal, $parse:ident, $About:ident, $conflicts:expr, $help:expr;)+) => {
-        /// The flags that are given.
-        struct Given {
-            $($field: Option<$Type>,)+
-        }
+    ($Options:ty; $($name:literal, $form:literal, $parse:path, $About:ident, $conflicts:expr, $help:expr, $set:expr;)+) => {
+        const FLAGS: &[$crate::options::Flag] = &[$($crate::options::Flag {
+            name: $name,
+            form: $form,
+            help: $help,
+            check: |text| $parse(text).map(drop),
+            about: $crate::options::FlagAbout::$About,
+            conflicts: $conflicts,
+        },)+];
 
-        impl Given {
-            const FLAGS: &'static [Flag] = &[$(Flag {
-                name: $name,
-                form: $form,
-                help: $help,
-                check: |text| $parse(text).map(drop),
-                about: FlagAbout::$About,
-                conflicts: $conflicts,
-            },)+];
-
-            fn of(options: &FieldOptions) -> Given {
-                Given { $($field: options.value($name, $parse),)+ }
-            }
+        /// The options with the flags that are given.
+        fn taken(given: &$crate::options::Given, mut options: $Options) -> $Options {
+            $(given.take($name, $parse, |value| $crate::options::apply(&mut options, value, $set));)+
+            options
         }
     };
 }
 
 pub(crate) use flags;
+
+/// Does to options what a flag of this value does: the form in which a closure knows both types.
+pub(crate) fn apply<O, T>(options: &mut O, value: T, set: impl FnOnce(&mut O, T)) {
+    set(options, value);
+}
 
 /// Why a field cannot be opened.
 #[derive(Debug, thiserror::Error)]

@@ -1,11 +1,10 @@
 //! PixelNeRF with weighted views, on any device; the mathematics is in [`viewfuse_kernels::pixelnerf`] and
 //! [`viewfuse_kernels::network`].
 //!
-//! Source: Yu, Ye, Tancik, Kanazawa: "pixelNeRF", CVPR 2021, and its official code. The views are combined with weights;
-//! the published network takes their mean.
+//! Source: Yu, Ye, Tancik, Kanazawa: "pixelNeRF", CVPR 2021, and its official code. The views are combined with
+//! weights; the published network takes their mean.
 
 pub mod architecture;
-mod efforts;
 mod encoder;
 mod grid;
 mod memory;
@@ -17,10 +16,10 @@ mod options;
 mod parameters;
 mod pass;
 mod picture;
-mod presets;
 mod probes;
 pub mod reference;
 pub mod test_networks;
+mod variants;
 mod visibility;
 
 pub use architecture::{Architecture, Level, Pass};
@@ -28,9 +27,10 @@ pub(crate) use open::ROW;
 pub use options::{MIN_OPACITY, MIN_SHARE, Omissions, PixelNerfOptions, Sampling};
 
 use super::learned::{default_near_far, in_network_unit, over_white, warn_of_unit};
+use super::variant::erased;
 use super::{
-    About, Check, Effort, Efforts, Encoding, Encodings, ExactPixels, Field, FieldError, LeftOut, Prepared, Record,
-    Rendered, Request, SourceSide,
+    About, AnyOptions, Check, Encoding, Field, FieldError, LeftOut, Prepared, Record, Rendered, Request, SourceSide,
+    Variant,
 };
 use encoder::{ViewLatents, encode};
 use grid::Grid;
@@ -67,11 +67,10 @@ struct Views<'a, D: Device> {
     cameras: Vec<CameraBlock>,
     /// `[view]`: none before it is encoded.
     latents: Vec<Option<ViewLatents<D>>>,
-    near_far: [f32; 2],
+    /// The bounds where the options state none, in the network's unit.
+    usual_near_far: [f32; 2],
     background: [f32; 3],
-    memory_estimate: u64,
     counts: Counts,
-    /// The field's own, or those of an effort.
     options: PixelNerfOptions,
 }
 
@@ -125,9 +124,6 @@ impl PixelNerf {
     /// Takes photographs and parameters to a device.
     fn views<'a, D: Device>(&'a self, device: &'a D, sources: &SourceImages) -> Result<Views<'a, D>, DeviceError> {
         let (unit, cameras) = in_network_unit(sources);
-        let given = self.options.sampling.near_far.map(|bounds| bounds.map(|depth| depth / unit.length()));
-        let size = |image: &SourceImage| [image.camera.pinhole.width(), image.camera.pinhole.height()];
-        let sizes: Vec<[u32; 2]> = sources.images.iter().map(size).collect();
         Ok(Views {
             field: self,
             device,
@@ -135,10 +131,9 @@ impl PixelNerf {
             images: sources.images.iter().map(|image| upload_image(device, image)).collect::<Result<_, _>>()?,
             cameras: cameras.iter().map(|camera| camera.block(0)).collect(),
             latents: cameras.iter().map(|_| None).collect(),
-            near_far: given.unwrap_or_else(|| default_near_far(&cameras)),
+            usual_near_far: default_near_far(&cameras),
             unit,
             background: sources.background,
-            memory_estimate: self.memory_estimate(device, &sizes),
             counts: Counts::default(),
             options: self.options,
         })
@@ -149,6 +144,10 @@ impl Field for PixelNerf {
     fn about(&self) -> About {
         let source_side = SourceSide::Pixels(self.architecture.source_side);
         About { source_side, ends_rays: true, ..About::new(ROW.name) }
+    }
+
+    fn options(&self) -> AnyOptions {
+        AnyOptions::new(self.options)
     }
 
     fn prepare<'a, D: Device>(
@@ -171,7 +170,7 @@ impl<D: Device> Views<'_, D> {
             device: self.device,
             architecture: &self.field.architecture,
             layers: &self.parameters.networks[index],
-            grids: self.field.options.omissions.latent_layers.then_some(index),
+            grids: self.options.omissions.latent_layers.then_some(index),
         }
     }
 
@@ -184,7 +183,7 @@ impl<D: Device> Views<'_, D> {
     ) -> Result<network::Views<'_, D>, DeviceError> {
         let cameras: Vec<CameraBlock> = views.iter().map(|view| self.cameras[*view]).collect();
         let visibility = Visibility { cameras, weights: weights.to_vec() };
-        let target = target.filter(|_| self.field.options.omissions.unseen_points);
+        let target = target.filter(|_| self.options.omissions.unseen_points);
         Ok(network::Views {
             cameras: self.device.upload(&visibility.cameras)?,
             weights: self.device.upload(weights)?,
@@ -193,9 +192,15 @@ impl<D: Device> Views<'_, D> {
         })
     }
 
+    /// Near and far bounds in the network's unit.
+    fn near_far(&self) -> [f32; 2] {
+        let given = self.options.sampling.near_far;
+        given.map_or(self.usual_near_far, |bounds| bounds.map(|depth| depth / self.unit.length()))
+    }
+
     /// A target's rays.
     fn cast(&self, request: &Request<'_>) -> CastBlock {
-        let ([near, far], camera) = (self.near_far, self.unit.camera(request.camera).block(0));
+        let ([near, far], camera) = (self.near_far(), self.unit.camera(request.camera).block(0));
         CastBlock { camera, near, far, pixel_centre: self.field.architecture.pixel_centre, along_axis: 0 }
     }
 
@@ -224,12 +229,12 @@ impl<D: Device> Views<'_, D> {
 
     /// Buffers for a target's points.
     fn workspace(&self, request: &Request<'_>, most_points: usize) -> Result<Workspace<D>, DeviceError> {
-        let PixelNerf { architecture, options, .. } = self.field;
-        Workspace::new(self.device, architecture, request.views.len(), most_points, options.omissions.latent_layers)
+        let (architecture, maps) = (&self.field.architecture, self.options.omissions.latent_layers);
+        Workspace::new(self.device, architecture, request.views.len(), most_points, maps)
     }
 
     fn encode_view(&mut self, view: usize) -> Result<(), DeviceError> {
-        let PixelNerf { architecture, options: PixelNerfOptions { omissions, .. }, .. } = self.field;
+        let (architecture, omissions) = (&self.field.architecture, &self.options.omissions);
         let encoded = encode(self.device, architecture, &self.parameters, &self.images[view], omissions)?;
         for [kept, whole] in encoded.grids.iter().flatten().map(Grid::bytes) {
             self.counts.kept_bytes += kept;
@@ -242,7 +247,7 @@ impl<D: Device> Views<'_, D> {
 
 impl<D: Device> Prepared for Views<'_, D> {
     fn encoding(&self) -> Encoding {
-        if self.field.options.omissions.unused_views { Encoding::Used } else { Encoding::All }
+        if self.options.omissions.unused_views { Encoding::Used } else { Encoding::All }
     }
 
     fn encode(&mut self, view: usize, _progress: &dyn Progress) -> Result<(), FieldError> {
@@ -278,14 +283,42 @@ impl<D: Device> Prepared for Views<'_, D> {
         if !self.unit.is_world() {
             rendered.depths.iter_mut().for_each(|depth| *depth *= self.unit.length());
         }
-        let PixelNerf { architecture, options, .. } = self.field;
-        let views_and_layers = [request.views.len(), architecture.injected_count].map(|count| count as u64);
-        self.counts.add(views_and_layers, options.omissions.latent_layers, &evaluated);
+        let views_and_layers = [request.views.len(), self.field.architecture.injected_count].map(|count| count as u64);
+        self.counts.add(views_and_layers, omissions.latent_layers, &evaluated);
         Ok(rendered)
     }
 
-    fn efforts(&mut self) -> Option<&mut dyn Efforts> {
-        Some(self)
+    fn set(&mut self, options: &AnyOptions) -> Result<(), FieldError> {
+        if let Some(options) = options.of() {
+            self.options = PixelNerfOptions::checked(*options);
+        }
+        Ok(())
+    }
+
+    fn efforts(&self, options: &AnyOptions) -> Vec<Variant<AnyOptions>> {
+        erased(options.of().map_or_else(Vec::new, variants::efforts))
+    }
+
+    fn check(&self) -> Check {
+        Check::Pixels
+    }
+
+    fn exact_pixels(
+        &mut self,
+        request: &Request<'_>,
+        pixels: &[u32],
+        progress: &dyn Progress,
+    ) -> Result<Vec<[f32; 4]>, FieldError> {
+        // Nothing less than exact: what leaves out empty parts of rays misses mist in its own check.
+        let options = variants::exact(&self.options);
+        let most_points = pixels.len() * options.sampling.coarse_count as usize;
+        let views = self.used(request.views, &request.view_weights(), Some(&self.cast(request)))?;
+        let renderer = self.renderer(&views, request, options, progress);
+        let mut workspace = self.workspace(request, most_points)?;
+        let mut evaluated = [Evaluated::default(); 2];
+        let (colours, _) = renderer.pixels_at(&mut workspace, pixels, None, &mut evaluated)?;
+        workspace.check(self.device)?;
+        Ok(colours)
     }
 
     fn record(&self) -> Record {
@@ -320,46 +353,10 @@ impl<D: Device> Prepared for Views<'_, D> {
             SPACE.left_out(first, omitted(coarse), coarse.samples),
             RAYS.left_out(second, omitted(fine), fine.samples),
         ];
-        let (memory_estimate, near_far) =
-            (Some(self.memory_estimate), Some(self.near_far.map(|depth| depth * self.unit.length())));
+        let sizes: Vec<[u32; 2]> = self.images.iter().map(|image| [image.size.width, image.size.height]).collect();
+        let memory_estimate = Some(memory::estimate(self.device, &self.field.architecture, &self.options, &sizes));
+        let near_far = Some(self.near_far().map(|depth| depth * self.unit.length()));
         Record { left_out, memory_estimate, near_far, ..Record::default() }
-    }
-}
-
-impl<D: Device> Efforts for Views<'_, D> {
-    fn list(&self) -> Vec<Effort> {
-        efforts::of(&self.field.options).into_iter().map(|(effort, _)| effort).collect()
-    }
-
-    fn set(&mut self, effort: usize) -> Result<Encodings, FieldError> {
-        if let Some((_, options)) = efforts::of(&self.field.options).get(effort) {
-            self.options = *options;
-        }
-        Ok(Encodings::Kept)
-    }
-
-    fn check(&mut self) -> Check<'_> {
-        Check::Pixels(self)
-    }
-}
-
-impl<D: Device> ExactPixels for Views<'_, D> {
-    fn exact_pixels(
-        &mut self,
-        request: &Request<'_>,
-        pixels: &[u32],
-        progress: &dyn Progress,
-    ) -> Result<Vec<[f32; 4]>, FieldError> {
-        // Nothing less than exact: what leaves out empty parts of rays misses mist in its own check.
-        let options = efforts::exact(&self.field.options);
-        let most_points = pixels.len() * options.sampling.coarse_count as usize;
-        let views = self.used(request.views, &request.view_weights(), Some(&self.cast(request)))?;
-        let renderer = self.renderer(&views, request, options, progress);
-        let mut workspace = self.workspace(request, most_points)?;
-        let mut evaluated = [Evaluated::default(); 2];
-        let (colours, _) = renderer.pixels_at(&mut workspace, pixels, None, &mut evaluated)?;
-        workspace.check(self.device)?;
-        Ok(colours)
     }
 }
 

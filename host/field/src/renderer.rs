@@ -3,6 +3,7 @@
 
 use super::error::FieldError;
 use super::field::{About, Field, Prepared};
+use super::variant::AnyOptions;
 use viewfuse_device::{Device, DeviceError, KernelTime, Transfers};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
@@ -11,6 +12,9 @@ use viewfuse_scene::photographs::SourceImages;
 pub trait Renderer: Sync {
     /// The field's requirements and properties.
     fn about(&self) -> About;
+
+    /// The field's options.
+    fn options(&self) -> AnyOptions;
 
     /// The device's name in the run record.
     fn device_name(&self) -> String;
@@ -50,6 +54,10 @@ pub struct On<'a, D, F> {
 impl<D: Device + Sync, F: Field + Sync> Renderer for On<'_, D, F> {
     fn about(&self) -> About {
         self.field.about()
+    }
+
+    fn options(&self) -> AnyOptions {
+        self.field.options()
     }
 
     fn device_name(&self) -> String {

@@ -2,9 +2,10 @@
 //! [`rows`](crate::rows).
 
 use super::any::AnyField;
-use super::options::{FieldOptions, Flag, OpenError};
+use super::options::{Flag, Given, OpenError};
 use super::record::{Omission, VIEWS};
 use super::render::RenderOptions;
+use super::variant::Variant;
 use viewfuse_nn::checkpoint::Checkpoint;
 
 /// A field's row.
@@ -22,9 +23,9 @@ pub struct Row {
     pub flags: &'static [Flag],
     /// What may be left out of its work, besides [`VIEWS`].
     pub omissions: &'static [Omission],
-    /// Settings to compare for a field of this row, the exact one first; empty if it is of another, or for the exact one
-    /// and the default alone. The options say what is left out by default; the number is that of the targets.
-    pub presets: fn(&AnyField, &RenderOptions, usize) -> Vec<Preset>,
+    /// Variants to draw of a field of this row, the exact one first; empty if it is of another, or for the exact one
+    /// and the default alone. The options say what is omitted by default; the number is that of the targets.
+    pub drawn: fn(&AnyField, &RenderOptions, usize) -> Vec<Drawn>,
 }
 
 /// How a field is opened.
@@ -33,7 +34,7 @@ pub enum Origin {
     /// It has no learned parameters.
     TrainingFree {
         /// Opens it.
-        open: fn(&FieldOptions) -> Result<AnyField, OpenError>,
+        open: fn(&Given) -> Result<AnyField, OpenError>,
     },
     /// From a checkpoint.
     Learned {
@@ -42,24 +43,14 @@ pub enum Origin {
         /// Its test networks, with deterministic initialisation.
         test_networks: &'static [TestNetwork],
         /// Opens it.
-        open: fn(Checkpoint, &FieldOptions) -> Result<AnyField, OpenError>,
+        open: fn(Checkpoint, &Given) -> Result<AnyField, OpenError>,
     },
 }
 
-/// A setting to compare with others: a field with its options.
-#[derive(Clone)]
-pub struct Preset {
-    /// It in a few words.
-    pub words: String,
-    /// The field.
-    pub field: AnyField,
-    /// What the render loop leaves out.
-    pub options: RenderOptions,
-}
+/// What `pareto` draws: a field, and what the render loop omits.
+pub type Drawn = Variant<(AnyField, RenderOptions)>;
 
-/// Words of the preset that leaves nothing out.
-pub const EXACT: &str = "exact";
-/// Words of the preset that leaves out everything that is left out by default.
+/// Label of the variant that omits everything that is omitted by default.
 pub const ALL: &str = "all";
 
 /// A network with deterministic initialisation: for measuring, and for checks against other implementations.
@@ -103,10 +94,10 @@ impl Row {
     ///
     /// # Errors
     /// [`OpenError`] if it is a learned one, or does not accept an option.
-    pub fn open(&self, options: &FieldOptions) -> Result<AnyField, OpenError> {
-        self.check(options)?;
+    pub fn open(&self, given: &Given) -> Result<AnyField, OpenError> {
+        self.check(given)?;
         match self.origin {
-            Origin::TrainingFree { open } => open(options),
+            Origin::TrainingFree { open } => open(given),
             Origin::Learned { .. } => Err(OpenError::Refused {
                 option: self.name.to_owned(),
                 problem: "needs a checkpoint".to_owned(),
@@ -119,13 +110,13 @@ impl Row {
     ///
     /// # Errors
     /// [`OpenError::Refused`].
-    pub(crate) fn check(&self, options: &FieldOptions) -> Result<(), OpenError> {
+    pub(crate) fn check(&self, given: &Given) -> Result<(), OpenError> {
         let is = || format!("is a {}", self.title);
         let knows = |name: &str| name == VIEWS.name || self.omissions.iter().any(|own| own.name == name);
-        if let Some(unknown) = options.compute.iter().find(|name| !knows(name)) {
+        if let Some(unknown) = given.compute.iter().find(|name| !knows(name)) {
             return Err(OpenError::cannot(format!("compute {unknown}"), is()));
         }
-        for (name, value) in &options.flags {
+        for (name, value) in &given.flags {
             let flag = self.flags.iter().find(|flag| flag.name == name.as_str());
             let flag = flag.ok_or_else(|| OpenError::cannot(name.as_str(), is()))?;
             (flag.check)(value).map_err(|form| OpenError::Refused {

@@ -1,7 +1,7 @@
 //! The table of fields: one row each. The names of a checkpoint's tensors tell its row.
 
 use super::any::AnyField;
-use super::options::{FieldOptions, OpenError};
+use super::options::{Given, OpenError};
 use super::row::{Origin, Row};
 use super::{genvs, pixelnerf, training_free};
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
@@ -37,12 +37,12 @@ pub fn row_of(checkpoint: &Checkpoint) -> Result<&'static Row, CheckpointError> 
 ///
 /// # Errors
 /// [`OpenError`] if the checkpoint is of no row or cannot be read, or if the field does not accept an option.
-pub fn open(checkpoint: Checkpoint, options: &FieldOptions) -> Result<AnyField, OpenError> {
+pub fn open(checkpoint: Checkpoint, given: &Given) -> Result<AnyField, OpenError> {
     let row = row_of(&checkpoint)?;
-    row.check(options)?;
+    row.check(given)?;
     match row.origin {
-        Origin::Learned { open, .. } => open(checkpoint, options),
-        Origin::TrainingFree { open } => open(options),
+        Origin::Learned { open, .. } => open(checkpoint, given),
+        Origin::TrainingFree { open } => open(given),
     }
 }
 
@@ -57,7 +57,8 @@ impl Default for AnyField {
 mod tests {
     use super::*;
     use crate::render::RenderOptions;
-    use crate::row::{ALL, EXACT};
+    use crate::row::ALL;
+    use crate::variant::EXACT;
     use std::collections::BTreeMap;
 
     #[test]
@@ -80,20 +81,20 @@ mod tests {
     }
 
     /// Opens a row's field with these options: a learned one is its first test network.
-    fn opened(row: &Row, options: &FieldOptions) -> Result<AnyField, OpenError> {
+    fn opened(row: &Row, given: &Given) -> Result<AnyField, OpenError> {
         match row.test_networks().first() {
-            Some(network) => open((network.checkpoint)(Some(8)), options),
-            None => row.open(options),
+            Some(network) => open((network.checkpoint)(Some(8)), given),
+            None => row.open(given),
         }
     }
 
     #[test]
-    fn a_field_has_the_name_of_its_row_and_its_presets() {
+    fn a_field_has_the_name_of_its_row_and_its_variants() {
         for row in ROWS {
-            let field = opened(row, &FieldOptions::default()).expect(row.name);
+            let field = opened(row, &Given::default()).expect(row.name);
             assert_eq!((field.about().name, named(row.name).map(|row| row.title)), (row.name, Some(row.title)));
-            let presets = (row.presets)(&field, &RenderOptions::default(), 2);
-            let words: Vec<&str> = presets.iter().map(|preset| preset.words.as_str()).collect();
+            let drawn = (row.drawn)(&field, &RenderOptions::default(), 2);
+            let words: Vec<&str> = drawn.iter().map(|variant| variant.label.as_str()).collect();
             assert!(words.is_empty() || words[0] == EXACT && words.contains(&ALL), "{words:?}");
         }
     }
@@ -101,10 +102,10 @@ mod tests {
     #[test]
     fn options_of_another_field_are_refused() {
         for row in ROWS {
-            let computing = FieldOptions { compute: vec!["everything".to_owned()], ..FieldOptions::default() };
+            let computing = Given { compute: vec!["everything".to_owned()], ..Given::default() };
             let foreign = ROWS.iter().flat_map(|row| row.flags);
             let foreign = foreign.filter(|flag| row.flags.iter().all(|own| own.name != flag.name));
-            let foreign = foreign.map(|flag| FieldOptions::default().with(flag.name, ""));
+            let foreign = foreign.map(|flag| Given::default().with(flag.name, ""));
             for options in foreign.chain([computing]) {
                 let refused = matches!(opened(row, &options), Err(OpenError::Refused { .. }));
                 assert!(refused, "{} takes {options:?}", row.name);

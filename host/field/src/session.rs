@@ -1,26 +1,16 @@
 //! The life cycle of source views, the same for all fields: prepared, encoded when needed, used for rendering.
 
 use super::error::FieldError;
-use super::field::{Check, Effort, Encoding, Encodings, Prepared, Rendered, Request, Setting, Tunable};
+use super::field::{Encoding, Prepared, Purpose, Rendered, Request};
 use super::mixture::{Mixture, between};
 use super::record::{Record, VIEWS};
 use super::renderer::Renderer;
+use super::variant::{AnyOptions, Variant};
 use viewfuse_core::camera::Camera;
 use viewfuse_core::weights::Weights;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_weighting::sources::{MAX_SOURCES, SourceWeights};
-
-/// How errors are found, without the means: see [`Check`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Judge {
-    /// From exact pixels.
-    Pixels,
-    /// By the field, from its own steps.
-    Steps,
-    /// By comparing two pictures.
-    Comparison,
-}
 
 /// Source views on a renderer's device, with the set of encoded views (for the current weighting, if encodings depend
 /// on it).
@@ -32,14 +22,15 @@ pub(crate) struct Session<'a> {
     is_weighted: bool,
     /// The weights of the weighting that began, if encodings depend on it.
     relevance: Option<Vec<SourceWeights>>,
-    /// The field's efforts; none for a field with one way to render.
-    pub(crate) efforts: Vec<Effort>,
-    pub(crate) judge: Judge,
-    /// Whether an effort goes on from where a cheaper one ended.
-    pub(crate) goes_on: bool,
-    pub(crate) tunables: &'static [Tunable],
+    /// The field's own options, or those in their place.
+    options: AnyOptions,
+    /// Their efforts; none for a field with one way to render.
+    pub(crate) efforts: Vec<Variant<AnyOptions>>,
     effort: Option<usize>,
-    settings: Vec<Setting>,
+    /// For what pictures have less resolution, if they have.
+    purpose: Option<Purpose>,
+    /// What the prepared views are set to.
+    current: AnyOptions,
     mixture: Option<Mixture>,
     /// The mean share of each part in the last picture; empty without a mixture.
     pub(crate) shares: Vec<f32>,
@@ -53,49 +44,71 @@ impl<'a> Session<'a> {
         progress: &dyn Progress,
     ) -> Result<Session<'a>, FieldError> {
         let mut prepared = renderer.prepare(sources, progress)?;
-        let judge = match prepared.efforts().map(|efforts| efforts.check()) {
-            Some(Check::Pixels(_)) => Judge::Pixels,
-            Some(Check::Steps(_)) => Judge::Steps,
-            Some(Check::Comparison) | None => Judge::Comparison,
-        };
-        let efforts = prepared.efforts().map_or_else(Vec::new, |efforts| efforts.list());
-        let goes_on = prepared.efforts().is_some_and(|efforts| efforts.goes_on());
-        let tunables = prepared.tuned().map_or(&[][..], |tuned| tuned.tunables());
+        let options = renderer.options();
         let (is_weighted, encoded) = (prepared.weighted().is_some(), vec![false; sources.images.len()]);
         Ok(Session {
             renderer,
-            prepared,
             encoded,
             is_weighted,
             relevance: None,
-            efforts,
-            judge,
-            goes_on,
-            tunables,
+            efforts: prepared.efforts(&options),
+            prepared,
+            current: options.clone(),
+            options,
             effort: None,
-            settings: Vec::new(),
+            purpose: None,
             mixture: None,
             shares: Vec::new(),
         })
     }
 
-    /// Sets the field's scalars for what follows, and a mixture of pictures under settings of its own, if there is one.
-    pub(crate) fn tune(&mut self, settings: &[Setting], mixture: Option<&Mixture>) {
-        self.settings = settings.to_vec();
+    /// Renders what follows under other options than the field's own, if there are some, and mixes pictures, if there
+    /// is a mixture. Trials keep what is encoded: they compare all candidates from one encoding.
+    pub(crate) fn vary(
+        &mut self,
+        options: Option<&AnyOptions>,
+        mixture: Option<&Mixture>,
+        progress: &dyn Progress,
+    ) -> Result<(), FieldError> {
+        self.options = options.cloned().unwrap_or_else(|| self.renderer.options());
+        self.efforts = self.prepared.efforts(&self.options);
         self.mixture = mixture.filter(|mixture| !mixture.parts.is_empty()).cloned();
         self.shares = Vec::new();
-        self.set(settings);
+        let is_stale = self.apply(&self.options.clone())?;
+        self.encode_again(is_stale && self.purpose != Some(Purpose::Trial), progress)
     }
 
-    /// The settings whose pictures are worth mixing where these were chosen.
-    pub(crate) fn parts(&mut self, chosen: &[Setting]) -> Vec<Vec<Setting>> {
-        self.prepared.tuned().map_or_else(Vec::new, |tuned| tuned.parts(chosen))
+    /// Renders what follows with less resolution. Before views are encoded.
+    pub(crate) fn reduce(&mut self, purpose: Purpose) -> Result<(), FieldError> {
+        self.purpose = Some(purpose);
+        self.apply(&self.options.clone()).map(drop)
     }
 
-    fn set(&mut self, settings: &[Setting]) {
-        if let Some(tuned) = self.prepared.tuned() {
-            tuned.tune(settings);
+    /// Sets the prepared views to what these options are under the current effort. Returns whether views are encoded
+    /// otherwise then.
+    fn apply(&mut self, options: &AnyOptions) -> Result<bool, FieldError> {
+        let reduced = self.purpose.map(|purpose| self.prepared.reduced(options, purpose));
+        let options = reduced.unwrap_or_else(|| options.clone());
+        let effort = self.effort.and_then(|effort| self.prepared.efforts(&options).into_iter().nth(effort));
+        let options = effort.map_or(options, |effort| effort.options);
+        if options == self.current {
+            return Ok(false);
         }
+        self.prepared.set(&options)?;
+        let is_alike = self.current.encodes_alike(&options);
+        self.current = options;
+        Ok(!is_alike)
+    }
+
+    /// Forgets what is encoded, if it is stale, and goes on with the weighting.
+    fn encode_again(&mut self, is_stale: bool, progress: &dyn Progress) -> Result<(), FieldError> {
+        if is_stale {
+            self.encoded.fill(false);
+            if let Some(relevance) = self.relevance.take() {
+                self.weigh(&relevance, progress)?;
+            }
+        }
+        Ok(())
     }
 
     /// Begins a weighting: encodes all views, if all of them contribute to each picture. `relevance[view]` are the
@@ -155,11 +168,11 @@ impl<'a> Session<'a> {
         self.shares.clear();
         let Some(mixture) = self.mixture.clone() else { return self.prepared.render(&request, progress) };
         let mut parts = Vec::with_capacity(mixture.parts.len());
-        for settings in &mixture.parts {
-            self.set(settings);
+        for options in &mixture.parts {
+            self.go_on_with(options, weights, progress)?;
             parts.push(self.prepared.render(&request, progress)?);
         }
-        self.set(&self.settings.clone());
+        self.go_on_with(&self.options.clone(), weights, progress)?;
         let (mixed, part_shares) = mixture.mixed(&parts);
         let share = mixture.share_at(&camera.pose);
         self.shares = part_shares.into_iter().map(|part| share * part).collect();
@@ -169,41 +182,39 @@ impl<'a> Session<'a> {
         Ok(between(self.prepared.render(&request, progress)?, mixed, share))
     }
 
+    /// Renders the same target under other options.
+    fn go_on_with(
+        &mut self,
+        options: &AnyOptions,
+        weights: &SourceWeights,
+        progress: &dyn Progress,
+    ) -> Result<(), FieldError> {
+        let is_stale = self.apply(options)?;
+        self.encode_again(is_stale, progress)?;
+        self.encode(weights, progress)
+    }
+
     /// Renders what follows with one of the efforts. Views that this effort needs otherwise are encoded again.
     pub(crate) fn set_effort(&mut self, effort: usize, progress: &dyn Progress) -> Result<(), FieldError> {
-        if self.effort == Some(effort) || effort >= self.efforts.len() {
-            return Ok(());
-        }
-        let Some(efforts) = self.prepared.efforts() else { return Ok(()) };
-        self.effort = Some(effort);
-        if efforts.set(effort)? == Encodings::Dropped {
-            self.encoded.fill(false);
-            if let Some(relevance) = self.relevance.take() {
-                self.weigh(&relevance, progress)?;
-            }
+        if effort < self.efforts.len() {
+            self.effort = Some(effort);
+            let is_stale = self.apply(&self.options.clone())?;
+            self.encode_again(is_stale, progress)?;
         }
         Ok(())
     }
 
-    /// How the error of the last picture is found.
-    pub(crate) fn check(&mut self) -> Check<'_> {
-        self.prepared.efforts().map_or(Check::Comparison, |efforts| efforts.check())
-    }
-
-    /// Exact colours of some pixels; `None` if the field's pixels are not independent.
+    /// Exact colours of some pixels, for fields whose pixels are independent.
     pub(crate) fn exact_pixels(
         &mut self,
         camera: &Camera,
         weights: &SourceWeights,
         pixels: &[u32],
         progress: &dyn Progress,
-    ) -> Result<Option<Vec<[f32; 4]>>, FieldError> {
+    ) -> Result<Vec<[f32; 4]>, FieldError> {
         self.encode(weights, progress)?;
         let request = Request { camera, weights, views: &self.views(weights), early_termination: 0.0 };
-        match self.check() {
-            Check::Pixels(exact) => exact.exact_pixels(&request, pixels, progress).map(Some),
-            Check::Steps(_) | Check::Comparison => Ok(None),
-        }
+        self.prepared.exact_pixels(&request, pixels, progress)
     }
 
     /// The record of the work so far.

@@ -8,24 +8,24 @@
 //! splats     Gaussians that begin with the depths of the hull or the sweep
 //! mixed      pictures of the hull or the sweep, and those of Gaussians to mix with them
 //! gaussians  the field of Gaussians alone
-//! presets    settings to compare
+//! variants   what `pareto` draws
 //! ```
 
 mod exposure;
 mod gaussians;
 pub mod hull;
 mod mixed;
-mod presets;
 mod space;
 mod splats;
 mod sweep;
+mod variants;
 
 use self::mixed::Mixed;
 use self::splats::SourceDepths;
 use super::gaussians::Recipe;
-use super::options::{FieldOptions, Flag, FlagAbout, OpenError, flags};
+use super::options::{Given, OpenError, flags};
 use super::row::{Origin, Row};
-use super::{About, AnyField, Field, FieldError, Prepared, SourceSide};
+use super::{About, AnyField, AnyOptions, Field, FieldError, Options, Prepared, Setting, SourceSide};
 use std::path::PathBuf;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
@@ -34,11 +34,12 @@ use viewfuse_scene::photographs::SourceImages;
 pub use gaussians::Gaussians;
 pub(crate) use gaussians::ROW as GAUSSIANS;
 pub use hull::NoObject;
+pub use mixed::Shown;
 pub(crate) use sweep::ROW as SWEEP;
 pub use sweep::{Cache, Sweep};
 
 /// Depths from the consensus of the photographs, colour by weighted fusion with visibility. Nothing is learned.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TrainingFree {
     /// Settings for sources with silhouettes.
     pub hull: hull::Hull,
@@ -46,6 +47,8 @@ pub struct TrainingFree {
     pub sweep: Sweep,
     /// The optimisation of the Gaussians whose pictures may be mixed with these.
     pub recipe: Recipe,
+    /// What pictures show.
+    pub shown: Shown,
     /// Side of the sources as a share of the pictures', above 0: smaller sources take less time to match.
     pub source_share: f32,
     /// Where what is found of sources without silhouettes is kept.
@@ -59,9 +62,32 @@ impl Default for TrainingFree {
             hull: hull::Hull::default(),
             sweep: Sweep::default(),
             recipe: Recipe::default(),
+            shown: Shown::default(),
             source_share: 1.0,
             cache: None,
         }
+    }
+}
+
+impl TrainingFree {
+    /// With other settings for sources with silhouettes.
+    fn with_hull(&self, hull: hull::Hull) -> TrainingFree {
+        TrainingFree { hull, ..self.clone() }
+    }
+
+    /// With other settings for sources without.
+    fn with(&self, sweep: Sweep) -> TrainingFree {
+        TrainingFree { sweep, ..self.clone() }
+    }
+}
+
+impl Options for TrainingFree {
+    fn encodes_alike(&self, other: &TrainingFree) -> bool {
+        self.hull.encodes_alike(&other.hull) && self.sweep.encodes_alike(&other.sweep)
+    }
+
+    fn settings(&self) -> Vec<Setting> {
+        self.sweep.settings().into_iter().chain(self.shown.setting()).collect()
     }
 }
 
@@ -71,22 +97,25 @@ pub(crate) const ROW: Row = Row {
     title: "training-free field",
     heading: "Options of the training-free field",
     origin: Origin::TrainingFree { open },
-    flags: Given::FLAGS,
+    flags: FLAGS,
     omissions: &[],
-    presets: presets::of,
+    drawn: variants::drawn,
 };
 
 flags! {
-    cache: PathBuf = "cache", "FOLDER", parse_folder, Picture, &[], "Keep what is found of the sources in this folder, and start from \
-        what is there: it may be deleted at any time";
+    Option<PathBuf>;
+    "cache", "FOLDER", parse_folder, Picture, &[],
+        "Keep what is found of the sources in this folder, and start from what is there: it may be deleted at any \
+         time",
+        |own, folder| *own = Some(folder);
 }
 
 fn parse_folder(text: &str) -> Result<PathBuf, String> {
     if text.is_empty() { Err("a folder".to_owned()) } else { Ok(PathBuf::from(text)) }
 }
 
-fn open(options: &FieldOptions) -> Result<AnyField, OpenError> {
-    let cache = Given::of(options).cache.map(|folder| Cache::open(&folder)).transpose()?;
+fn open(given: &Given) -> Result<AnyField, OpenError> {
+    let cache = taken(given, None).map(|folder| Cache::open(&folder)).transpose()?;
     Ok(AnyField::new(TrainingFree { cache, ..TrainingFree::default() }))
 }
 
@@ -97,8 +126,13 @@ impl Field for TrainingFree {
             least_sources: 2,
             source_side: SourceSide::Share(self.source_share),
             ends_rays: true,
+            has_previews: true,
             ..About::new(ROW.name)
         }
+    }
+
+    fn options(&self) -> AnyOptions {
+        AnyOptions::new(self.clone())
     }
 
     fn prepare<'a, D: Device>(
@@ -109,10 +143,6 @@ impl Field for TrainingFree {
     ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
         let (fields, cache) = ((&self.hull, &self.sweep), self.cache.as_ref());
         let depths = SourceDepths::prepare(device, fields, cache, sources, progress)?;
-        Ok(Box::new(Mixed::new(depths, self.recipe)))
-    }
-
-    fn preview(&self) -> Option<TrainingFree> {
-        Some(TrainingFree { sweep: self.sweep.cheaper(), ..self.clone() })
+        Ok(Box::new(Mixed::new(depths, self)))
     }
 }

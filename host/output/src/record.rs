@@ -113,7 +113,8 @@ pub struct ChosenRecord {
 
 impl From<Chosen> for ChosenRecord {
     fn from(chosen: Chosen) -> ChosenRecord {
-        let Chosen { settings, mixture, candidates, held_out, calibration, .. } = chosen;
+        let Chosen { options, mixture, candidates, held_out, calibration, .. } = chosen;
+        let settings = options.settings().to_vec();
         ChosenRecord { settings, mixture, candidates, left_out: held_out, calibration }
     }
 }

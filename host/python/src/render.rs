@@ -6,7 +6,7 @@ use crate::request::Request;
 use std::path::PathBuf;
 use viewfuse::device::choice::{self, DeviceChoice, DeviceOptions};
 use viewfuse::field::auto::{self, Chosen};
-use viewfuse::field::options::FieldOptions;
+use viewfuse::field::options::Given;
 use viewfuse::field::render::{DEFAULT_EARLY_TERMINATION, Frame, RenderOptions, RenderRun};
 use viewfuse::field::{AnyField, rows};
 use viewfuse::job::progress::Progress;
@@ -40,9 +40,7 @@ impl Order {
         let weighting = self.weighting()?;
         let field = match &self.model {
             None => AnyField::default(),
-            Some(path) => {
-                rows::open(Checkpoint::open(path)?, &FieldOptions { seed: self.seed, ..FieldOptions::default() })?
-            }
+            Some(path) => rows::open(Checkpoint::open(path)?, &Given { seed: self.seed, ..Given::default() })?,
         };
         let about = field.about();
         let job = self.request.resolve(scene, about.least_sources)?;

@@ -1,8 +1,8 @@
-//! The scheme and the field's scalars that suit the scene, chosen beside the pictures: while no request waits.
+//! The scheme and the field's options that suit the scene, chosen beside the pictures: while no request waits.
 
 use crate::Viewed;
 use viewfuse_field::auto::Chosen;
-use viewfuse_field::{Mixture, Setting};
+use viewfuse_field::{AnyOptions, Mixture};
 
 /// What is known of the choice.
 #[derive(Debug, Default)]
@@ -29,9 +29,9 @@ impl Choice {
         }
     }
 
-    /// The field's scalars under a scheme: those that were chosen along with it, or those of the options.
-    pub(crate) fn settings<'a>(&'a self, scheme: &str, viewed: &Viewed<'a>) -> &'a [Setting] {
-        self.made(scheme).map_or(&viewed.options.settings, |chosen| &chosen.settings)
+    /// The field's options under a scheme: those that were chosen along with it, or those of the render's options.
+    pub(crate) fn options<'a>(&'a self, scheme: &str, viewed: &Viewed<'a>) -> Option<&'a AnyOptions> {
+        self.made(scheme).map(|chosen| &chosen.options).or(viewed.options.field.as_ref())
     }
 
     /// The pictures that are mixed under a scheme, if that was chosen along with it. Coarse pictures are not mixed.

@@ -1,8 +1,8 @@
-//! What makes a picture coarse beside a cheaper form of the field: smaller sources.
+//! What makes a picture coarse beside reduced options of the field: smaller sources.
 
 use std::sync::Arc;
 use viewfuse_field::render::{RenderError, RenderOptions, Stage};
-use viewfuse_field::{Renderer, Surfaces};
+use viewfuse_field::{Purpose, Renderer, Surfaces};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
 use viewfuse_scene::photographs::{Album, SourceImages};
@@ -55,5 +55,7 @@ pub(crate) fn stage<'a>(
         let Surfaces { points, near_far } = scout.surfaces();
         (images.points, images.near_far) = (points, near_far);
     }
-    Stage::of_images(scene, album, sources, Arc::new(images), renderer, options, progress)
+    let mut stage = Stage::of_images(scene, album, sources, Arc::new(images), renderer, options, progress)?;
+    stage.reduce(Purpose::Preview)?;
+    Ok(stage)
 }

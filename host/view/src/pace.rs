@@ -28,7 +28,7 @@ pub(crate) struct Pace {
 }
 
 impl Pace {
-    /// The largest pictures at first; those of a live field ([`viewfuse_field::AnyField::is_live`]) are larger, and more.
+    /// The largest pictures at first; those of a live field ([`viewfuse_field::About::is_live`]) are larger, and more.
     pub(crate) fn of(is_live: bool) -> Pace {
         let (aim, largest) =
             if is_live { (TIME_OF_A_LIVE_PICTURE, LIVE_SIDE) } else { (TIME_OF_A_PICTURE, COARSE_SIDE) };

@@ -1,11 +1,11 @@
 //! The render loop: takes requests, renders coarse and full pictures, answers.
 //!
-//! It runs on the thread of its caller and owns what is on the device. A coarse picture comes from smaller sources and a
-//! cheaper form of the field, or, for fields without such a form, is a smaller picture from the same sources. A full
+//! It runs on the thread of its caller and owns what is on the device. A coarse picture comes from smaller sources and
+//! reduced options of the field, or, for fields without previews, is a smaller picture from the same sources. A full
 //! picture has the size and the values of `viewfuse_field::render` for the same camera and weighting. It makes way for
 //! coarse ones, at the points where the field checks for cancellation, and is begun again later; sources that are
-//! encoded by then stay encoded. While nothing is requested, the scheme that suits the scene is chosen, if that is left to
-//! the scene.
+//! encoded by then stay encoded. While nothing is requested, the scheme that suits the scene is chosen, if that is left
+//! to the scene.
 
 use crate::answer;
 use crate::choice::Choice;
@@ -22,7 +22,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::Camera;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, open_album, working_side};
-use viewfuse_field::{FieldError, Mixture, Renderer, Setting, auto};
+use viewfuse_field::{AnyOptions, FieldError, Mixture, Renderer, auto};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
 use viewfuse_scene::coverage::Coverage;
@@ -109,10 +109,11 @@ impl Progress for Watch<'_> {
     }
 }
 
-/// A stage, and the scheme, scalars and mixture that its sources are encoded under; none before the first.
+/// A stage, and the scheme, the field's options and the mixture that its sources are encoded under; none before the
+/// first.
 struct Weighed<'a> {
     stage: Stage<'a>,
-    under: Option<(String, Vec<Setting>, Option<Mixture>)>,
+    under: Option<(String, Option<AnyOptions>, Option<Mixture>)>,
 }
 
 impl<'a> Weighed<'a> {
@@ -121,23 +122,27 @@ impl<'a> Weighed<'a> {
     }
 
     /// Whether this weighting has begun.
-    fn is_under(&self, scheme: &str, settings: &[Setting], mixture: Option<&Mixture>) -> bool {
-        let under = self.under.as_ref();
-        under.is_some_and(|(own, scalars, mixed)| own == scheme && scalars == settings && mixed.as_ref() == mixture)
+    fn is_under(&self, scheme: &str, options: Option<&AnyOptions>, mixture: Option<&Mixture>) -> bool {
+        let is_same = |(own, varied, mixed): &(String, Option<AnyOptions>, Option<Mixture>)| {
+            own == scheme && varied.as_ref() == options && mixed.as_ref() == mixture
+        };
+        self.under.as_ref().is_some_and(is_same)
     }
 
-    /// Begins a weighting, unless it has begun. Sources that it does not encode are encoded by the frames that use them.
+    /// Begins a weighting, unless it has begun. Sources that it does not encode are encoded by the frames that use
+    /// them.
     fn weigh(
         &mut self,
         weighting: &Weighting,
-        settings: &[Setting],
+        options: Option<&AnyOptions>,
         mixture: Option<&Mixture>,
         progress: &dyn Progress,
     ) -> Result<(), RenderError> {
         let scheme = weighting.to_string();
-        if !self.is_under(&scheme, settings, mixture) {
-            self.stage.tune(settings, mixture);
-            self.under = Some((scheme, settings.to_vec(), mixture.cloned()));
+        if !self.is_under(&scheme, options, mixture) {
+            self.under = None;
+            self.stage.vary(options, mixture, progress)?;
+            self.under = Some((scheme, options.cloned(), mixture.cloned()));
             self.stage.weigh(weighting, progress)?;
         }
         Ok(())
@@ -153,7 +158,7 @@ struct RenderLoop<'a> {
     coverage: Coverage,
     images: Arc<SourceImages>,
     renderer: &'a dyn Renderer,
-    /// For fields with a cheaper form.
+    /// For fields with previews.
     coarse: Option<Weighed<'a>>,
     full: Option<Weighed<'a>>,
     pace: Pace,
@@ -190,9 +195,7 @@ pub(crate) fn run(viewer: &Viewer<'_>, shared: &Shared, outer: &dyn Progress) ->
     let about = field.about();
     let source_side = about.source_side.of(working_side(scene, options, about.longest_side)?);
     let renderer = field.on(device);
-    let cheaper = field.preview();
     let coarse_options = coarse::options(options);
-    let cheap_renderer = cheaper.as_ref().map(|field| field.on(device));
     stopped((|| {
         shared.status.begin("reading photographs");
         let album = open_album(scene, sources.iter().copied(), renderer.as_ref(), options, &watch)?;
@@ -214,26 +217,25 @@ pub(crate) fn run(viewer: &Viewer<'_>, shared: &Shared, outer: &dyn Progress) ->
             renderer: renderer.as_ref(),
             coarse: None,
             full: None,
-            pace: Pace::of(field.is_live()),
+            pace: Pace::of(about.is_live),
             full_time: None,
             choice: Choice::of(&viewer.viewed),
         };
-        match &cheap_renderer {
-            Some(renderer) => {
-                shared.status.begin("preparing coarse pictures");
-                let stage = coarse::stage(scene, &album, sources, small, renderer.as_ref(), &coarse_options, &watch)?;
-                let mut coarse = Weighed::new(stage);
-                coarse.weigh(weighting, &options.settings, None, &watch)?;
-                pictures.coarse = Some(coarse);
-            }
-            None => pictures.prepare(&watch)?,
+        if about.has_previews {
+            shared.status.begin("preparing coarse pictures");
+            let stage = coarse::stage(scene, &album, sources, small, renderer.as_ref(), &coarse_options, &watch)?;
+            let mut coarse = Weighed::new(stage);
+            coarse.weigh(weighting, options.field.as_ref(), None, &watch)?;
+            pictures.coarse = Some(coarse);
+        } else {
+            pictures.prepare(&watch)?;
         }
         pictures.serve()
     })())
 }
 
-/// The answer to a request whose picture failed: 503 if the device did, with which the program ends; else 422, for another
-/// view, scheme or size may well have a picture.
+/// The answer to a request whose picture failed: 503 if the device did, with which the program ends; else 422, for
+/// another view, scheme or size may well have a picture.
 fn refusal(error: &RenderError) -> Answer {
     match error.is_of_device() {
         true => Answer::error(503, &format!("the device failed, and the program ends: {error}")),
@@ -290,8 +292,8 @@ impl<'a> RenderLoop<'a> {
         }
     }
 
-    /// Chooses the scheme for the scene, if that is due and full pictures are prepared. Makes way for every request; then it
-    /// is begun again later.
+    /// Chooses the scheme for the scene, if that is due and full pictures are prepared. Makes way for every request;
+    /// then it is begun again later.
     fn choose(&mut self) -> Result<(), RenderError> {
         let (Choice::Due, Some(full)) = (&self.choice, &self.full) else { return Ok(()) };
         self.shared.status.begin("choosing the scheme for the scene");
@@ -317,9 +319,9 @@ impl<'a> RenderLoop<'a> {
         let watch = Watch { shared: self.shared, outer: self.outer, makes_way: MakesWay::Never };
         let is_fast = !self.pace.is_live() && self.full_time.is_some_and(|time| time < TIME_OF_A_PICTURE);
         let scheme = request.weighting.to_string();
-        let settings = self.choice.settings(&scheme, &self.viewer.viewed);
+        let options = self.choice.options(&scheme, &self.viewer.viewed);
         let mixture = self.choice.mixture(&scheme);
-        let is_ready = self.full.as_ref().is_some_and(|full| full.is_under(&scheme, settings, mixture));
+        let is_ready = self.full.as_ref().is_some_and(|full| full.is_under(&scheme, options, mixture));
         if is_fast && is_ready {
             return Ok((self.full_frame(request, &watch)?, true));
         }
@@ -341,8 +343,8 @@ impl<'a> RenderLoop<'a> {
         let watch = Watch { shared: self.shared, outer: self.outer, makes_way: MakesWay::ToPressing };
         if let Some(coarse) = &mut self.coarse {
             self.shared.status.begin("encoding sources for coarse pictures");
-            let settings = self.choice.settings(&request.weighting.to_string(), &self.viewer.viewed);
-            coarse.weigh(&request.weighting, settings, None, &watch)?;
+            let options = self.choice.options(&request.weighting.to_string(), &self.viewer.viewed);
+            coarse.weigh(&request.weighting, options, None, &watch)?;
             // A frame that has to encode sources first would come late.
             coarse.stage.encode_all(&watch)?;
         }
@@ -370,8 +372,8 @@ impl<'a> RenderLoop<'a> {
         };
         self.shared.status.begin("encoding sources");
         let scheme = request.weighting.to_string();
-        let settings = self.choice.settings(&scheme, &self.viewer.viewed);
-        full.weigh(&request.weighting, settings, self.choice.mixture(&scheme), watch)?;
+        let options = self.choice.options(&scheme, &self.viewer.viewed);
+        full.weigh(&request.weighting, options, self.choice.mixture(&scheme), watch)?;
         self.shared.status.begin("rendering");
         let start = Instant::now();
         let frame = full.stage.frame(&request.weighting, &target, watch)?;

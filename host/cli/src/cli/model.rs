@@ -18,7 +18,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use flags::{EFFORT, NETWORK, PICTURE};
 use name::{Model, model_help};
 use std::path::Path;
-use viewfuse_field::options::{FieldOptions, OpenError};
+use viewfuse_field::options::{Given, OpenError};
 use viewfuse_field::rows::ROWS;
 use viewfuse_field::{AnyField, Omission, VIEWS};
 
@@ -72,13 +72,13 @@ impl NetworkOptions {
 
     /// Opens the field with its default efforts.
     pub(crate) fn open(&self, seed: u64) -> anyhow::Result<AnyField> {
-        self.open_with(FieldOptions { seed, ..FieldOptions::default() })
+        self.open_with(Given { seed, ..Given::default() })
     }
 
     /// Opens the field, with further options.
-    fn open_with(&self, options: FieldOptions) -> anyhow::Result<AnyField> {
+    fn open_with(&self, given: Given) -> anyhow::Result<AnyField> {
         let model = self.model.clone().unwrap_or(Model::TrainingFree(ROWS[0]));
-        match model.open(&self.flags.given_to(options)) {
+        match model.open(&self.flags.add_to(given)) {
             Err(OpenError::Refused { option, problem, reason }) => {
                 Err(wrong(format_args!("--{option} {problem} with '--model {model}', which {reason}")))
             }
@@ -100,9 +100,11 @@ impl ModelOptions {
 
     /// Opens the field, for pictures of their own or for a sequence of them.
     pub(crate) fn open(&self, seed: u64, sequence: Option<&Flags<SEQUENCE>>) -> anyhow::Result<AnyField> {
-        let options =
-            FieldOptions { seed, exact: self.exact, compute: self.compute.clone(), ..FieldOptions::default() };
-        let options = self.flags.given_to(options);
-        self.network.open_with(sequence.map_or(options.clone(), |sequence| sequence.given_to(options)))
+        let given = Given { seed, exact: self.exact, compute: self.compute.clone(), flags: Vec::new() };
+        let given = self.flags.add_to(given);
+        self.network.open_with(match sequence {
+            Some(sequence) => sequence.add_to(given),
+            None => given,
+        })
     }
 }

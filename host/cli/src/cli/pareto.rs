@@ -18,7 +18,8 @@ use viewfuse_evaluate::pareto::front::{MAX_LOSS, SAME_LOOK};
 use viewfuse_evaluate::pareto::record::{DeviceRecord, DifferenceRecord, ParetoRecord, PointRecord, csv_of};
 use viewfuse_evaluate::pareto::{Measured, Subject, plot, settings};
 use viewfuse_field::render::RenderOptions;
-use viewfuse_field::row::{EXACT, Preset};
+use viewfuse_field::row::Drawn;
+use viewfuse_field::variant::EXACT;
 use viewfuse_field::{AnyField, LeftOut};
 use viewfuse_job::files::{check_writable, write_whole};
 use viewfuse_job::progress::{Part, Progress};
@@ -182,15 +183,15 @@ struct Sweep<'a> {
 impl Sweep<'_> {
     fn on(&self, device: &AnyDevice, field: &AnyField, progress: &dyn Progress) -> Result<Measured, Failure> {
         let settings = settings::of(field, self.options, self.subject.job.targets.len());
-        let begins = |setting: &Preset, words: &String| setting.words.starts_with(words.as_str());
+        let begins = |setting: &Drawn, words: &String| setting.label.starts_with(words.as_str());
         if let Some(none) = self.only.iter().find(|words| !settings.iter().any(|setting| begins(setting, words))) {
-            let all: Vec<&str> = settings.iter().map(|setting| setting.words.as_str()).collect();
+            let all: Vec<&str> = settings.iter().map(|setting| setting.label.as_str()).collect();
             let message = format!("--only {none}: no setting begins with it; the settings are: {}", all.join("; "));
             return Err(Failure::Other(wrong(message)));
         }
-        let is_exact = |setting: &Preset| setting.words == EXACT;
-        let is_asked = |setting: &Preset| self.only.iter().any(|words| begins(setting, words));
-        let settings: Vec<Preset> = settings
+        let is_exact = |setting: &Drawn| setting.label == EXACT;
+        let is_asked = |setting: &Drawn| self.only.iter().any(|words| begins(setting, words));
+        let settings: Vec<Drawn> = settings
             .into_iter()
             .filter(|setting| self.only.is_empty() || is_exact(setting) || is_asked(setting))
             .collect();

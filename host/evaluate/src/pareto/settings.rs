@@ -1,31 +1,33 @@
-//! The settings tried for each field: the presets of its row, and bounds on the error. The first one leaves nothing out.
+//! The settings tried for each field: the variants that its row draws, and bounds on the error. The first one omits
+//! nothing.
 
-use super::Preset;
 use viewfuse_field::AnyField;
 use viewfuse_field::budget::Bound;
 use viewfuse_field::render::RenderOptions;
-use viewfuse_field::row::{ALL, EXACT};
+use viewfuse_field::row::{ALL, Drawn};
 use viewfuse_field::rows;
+use viewfuse_field::variant::Variant;
 
 /// The settings whose names begin with this leave the choice to a bound on the error.
 pub const BOUNDED: &str = "at most ";
 /// The bounds, decibels from the exact pictures.
 const BOUNDS: [u32; 6] = [25, 30, 35, 40, 45, 50];
 
-/// The settings of a field for this many targets: its row's presets, and bounds on the error for which it chooses what to
-/// leave out. `options` give what `all` leaves out, the size and the background. A field without presets has two: nothing
-/// left out, and `options` as they are.
-pub fn of(field: &AnyField, options: &RenderOptions, target_count: usize) -> Vec<Preset> {
-    let preset = |words: String, options| Preset { words, field: field.clone(), options };
+/// The settings of a field for this many targets: its row's variants, and bounds on the error for which it chooses what
+/// to omit. `options` give what `all` omits, the size and the background. A field that draws none has two: nothing
+/// omitted, and `options` as they are.
+pub fn of(field: &AnyField, options: &RenderOptions, target_count: usize) -> Vec<Drawn> {
     let row = rows::named(field.about().name);
-    let mut presets = row.map_or_else(Vec::new, |row| (row.presets)(field, options, target_count));
-    if presets.is_empty() {
+    let mut drawn = row.map_or_else(Vec::new, |row| (row.drawn)(field, options, target_count));
+    if drawn.is_empty() {
         let exact = RenderOptions { leave_out: 0.0, early_termination: 0.0, ..options.clone() };
-        presets = vec![preset(EXACT.to_owned(), exact), preset(ALL.to_owned(), options.clone())];
+        drawn.push(Variant::exact((field.clone(), exact)));
+        drawn.push(Variant::to_measure(ALL, (field.clone(), options.clone())));
     }
-    presets.extend(BOUNDS.map(|decibels| {
+    drawn.extend(BOUNDS.map(|decibels| {
         let bound = Some(Bound::Error(10.0_f32.powf(-(decibels as f32) / 20.0)));
-        preset(format!("{BOUNDED}{decibels} dB"), RenderOptions { bound, ..options.clone() })
+        let options = RenderOptions { bound, ..options.clone() };
+        Variant::to_measure(format!("{BOUNDED}{decibels} dB"), (field.clone(), options))
     }));
-    presets
+    drawn
 }

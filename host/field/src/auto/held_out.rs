@@ -2,13 +2,12 @@
 //! truth.
 
 use super::calibration::Sample;
-use crate::Setting;
 use crate::budget::Bound;
 use crate::held_out::{HeldOut, HoldOut, Photographs};
 use crate::render::{Frame, RenderError, RenderOptions, SceneSources, Stage};
 use crate::renderer::Renderer;
-use crate::session::Judge;
 use crate::standing::{Measure, Standing};
+use crate::{AnyOptions, Check, Purpose};
 use image::{Rgb, RgbImage};
 use std::ops::Range;
 use viewfuse_core::pose::Pose;
@@ -59,8 +58,8 @@ pub(super) struct Outcome {
 pub(super) fn coarse(options: &RenderOptions, stage: &Stage<'_>) -> RenderOptions {
     let camera = stage.scene().and_then(|of| of.scene.views.first()).map(|view| view.camera);
     let size = camera.map(|camera| scaled_size(&camera, HOLD_OUT.side.min(stage.side())).into());
-    let bound = (stage.session.judge == Judge::Pixels).then_some(Bound::Error(MAX_ERROR));
-    RenderOptions { size, settings: Vec::new(), mixture: None, bound, ..options.clone() }
+    let bound = (stage.session.prepared.check() == Check::Pixels).then_some(Bound::Error(MAX_ERROR));
+    RenderOptions { size, field: None, mixture: None, bound, ..options.clone() }
 }
 
 /// The longest side of coarse pictures.
@@ -69,7 +68,7 @@ pub(super) fn coarse_side(coarse: &RenderOptions) -> u32 {
 }
 
 impl<'a> HeldOutSources<'a> {
-    /// Holds out sources of `stage` and encodes the others, weighted by `weighting`, with the default settings. Empty
+    /// Holds out sources of `stage` and encodes the others, weighted by `weighting`, with the field's own options. Empty
     /// if there are too few sources. A source without which the field finds no object is skipped.
     pub(super) fn prepare(
         stage: &Stage<'a>,
@@ -101,7 +100,7 @@ impl<'a> HeldOutSources<'a> {
             others.sort_unstable();
             let standing = measure.standing(&poses[source], others.iter().map(|&other| &poses[other]));
             let prepared = photographs.hold_out(source, others, renderer, options, quiet).and_then(|mut held_out| {
-                held_out.stage.set_trial();
+                held_out.stage.reduce(Purpose::Trial)?;
                 held_out.stage.weigh(weighting, quiet)?;
                 held_out.stage.encode_all(quiet)?;
                 Ok(held_out)
@@ -137,22 +136,17 @@ impl<'a> HeldOutSources<'a> {
         self.sources.iter().map(|source| source.target.name.as_str())
     }
 
-    /// Renders these of the held-out sources with this weighting and these settings.
+    /// Renders these of the held-out sources with this weighting and these options.
     pub(super) fn outcomes(
         &mut self,
         which: Range<usize>,
         weighting: &Weighting,
-        settings: &[Setting],
+        options: &AnyOptions,
         progress: &dyn Progress,
     ) -> Result<Vec<Outcome>, RenderError> {
-        let frames = self.frames(which.clone(), weighting, settings, progress)?;
+        let frames = self.frames(which.clone(), weighting, options, progress)?;
         let outcome = |(index, frame): (usize, &Frame)| self.outcome(index, &frame.picture, &frame.confidences);
         Ok(which.zip(&frames).map(outcome).collect())
-    }
-
-    /// The settings whose pictures are worth mixing where these were chosen.
-    pub(super) fn parts(&mut self, chosen: &[Setting]) -> Vec<Vec<Setting>> {
-        self.sources.first_mut().map_or_else(Vec::new, |source| source.held_out.stage.parts(chosen))
     }
 
     /// The pictures of these of the held-out sources.
@@ -160,13 +154,13 @@ impl<'a> HeldOutSources<'a> {
         &mut self,
         which: Range<usize>,
         weighting: &Weighting,
-        settings: &[Setting],
+        options: &AnyOptions,
         progress: &dyn Progress,
     ) -> Result<Vec<Frame>, RenderError> {
         let mut frames = Vec::with_capacity(which.len());
         for Source { held_out, target, .. } in &mut self.sources[which] {
             progress.check().map_err(stopped)?;
-            held_out.stage.tune(settings, None);
+            held_out.stage.vary(Some(options), None, progress)?;
             frames.push(held_out.stage.frame(weighting, target, &Quiet(progress))?);
             progress.step();
         }

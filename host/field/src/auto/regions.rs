@@ -10,7 +10,7 @@ use super::held_out::{HeldOutSources, Outcome};
 use super::{MAX_LOSS, mean_score};
 use crate::mixture::{Mixture, term_count, terms};
 use crate::render::{Frame, RenderError};
-use crate::{Rendered, Setting};
+use crate::{AnyOptions, Rendered};
 use image::RgbImage;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::{GroundTruth, to_rgb8};
@@ -49,14 +49,14 @@ struct Example {
     seen: Vec<bool>,
 }
 
-/// Mixes the pictures under these settings. `None` if there are too few sources or pictures.
+/// Mixes the pictures under these options. `None` if there are too few sources or pictures.
 ///
 /// # Errors
 /// [`RenderError`].
 pub(super) fn mixed(
     held_out: &mut HeldOutSources<'_>,
     weighting: &Weighting,
-    parts: Vec<Vec<Setting>>,
+    parts: Vec<AnyOptions>,
     progress: &dyn Progress,
 ) -> Result<Option<Mixed>, RenderError> {
     if parts.len() < 2 || held_out.len() < MIN_SOURCES {
@@ -76,8 +76,8 @@ pub(super) fn mixed(
         .collect();
     let count = examples.len();
     let cheap = if parts.len() < 3 { parts.len() } else { parts.len() - 1 };
-    for settings in &parts[..cheap] {
-        add(&mut examples, held_out.frames(0..count, weighting, settings, progress)?);
+    for options in &parts[..cheap] {
+        add(&mut examples, held_out.frames(0..count, weighting, options, progress)?);
     }
     let without_last = fitted(held_out, &mut examples, &parts[..cheap]);
     let Some(last) = parts.get(cheap) else { return Ok(Some(without_last)) };
@@ -104,7 +104,7 @@ fn add(examples: &mut [Example], frames: Vec<Frame>) {
 }
 
 /// The mean share of an example's last picture, mixed by its own errors.
-fn first_share(example: &mut Example, parts: &[Vec<Setting>]) -> f32 {
+fn first_share(example: &mut Example, parts: &[AnyOptions]) -> f32 {
     example.terms = terms(&example.parts);
     let constants = solved([Sums::of(example)].iter(), parts.len());
     let (_, shares) = Mixture::new(parts.to_vec(), constants).mixed(&example.parts);
@@ -112,7 +112,7 @@ fn first_share(example: &mut Example, parts: &[Vec<Setting>]) -> f32 {
 }
 
 /// The mixture of the examples' pictures.
-fn fitted(held_out: &HeldOutSources<'_>, examples: &mut [Example], parts: &[Vec<Setting>]) -> Mixed {
+fn fitted(held_out: &HeldOutSources<'_>, examples: &mut [Example], parts: &[AnyOptions]) -> Mixed {
     for example in &mut *examples {
         example.terms = terms(&example.parts);
     }
@@ -254,7 +254,7 @@ mod tests {
     fn the_fit_finds_the_picture_that_is_right_in_each_region() {
         let examples = [example(1), example(2), example(3)];
         let sums: Vec<Sums> = examples.iter().map(Sums::of).collect();
-        let parts = vec![Vec::new(); 2];
+        let parts = vec![AnyOptions::new(()); 2];
         let fitted = Mixture::new(parts.clone(), solved(sums.iter(), 2));
         let error = |mixture: &Mixture| {
             let (mixed, _) = mixture.mixed(&examples[0].parts);

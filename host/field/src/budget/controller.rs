@@ -4,15 +4,15 @@ use super::check::{Sample, draw};
 use super::deadline::Deadline;
 use super::expected::Expected;
 use super::{Bound, Estimate, Kept, Tried, embedded};
-use crate::session::{Judge, Session};
-use crate::{Check, Effort, FieldError, Rendered};
+use crate::session::Session;
+use crate::{Check, FieldError, Rendered, Variant};
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::Camera;
 use viewfuse_job::progress::Progress;
 use viewfuse_weighting::sources::SourceWeights;
 
-/// Exact pixels of a round of a check: as many as take this share of the picture's work, in these bounds; and the most rounds
-/// until a check is decided.
+/// Exact pixels of a round of a check: as many as take this share of the picture's work, in these bounds; and the most
+/// rounds until a check is decided.
 const CHECK_WORK: f64 = 0.1;
 const ROUND: [usize; 2] = [24, 256];
 const ROUNDS: usize = 3;
@@ -20,8 +20,8 @@ const ROUNDS: usize = 3;
 const EXPECTED_DRAWS: usize = 8;
 /// Pictures that keep another picture's choice have this much more error at most.
 const OTHER_PICTURES: f64 = 1.3;
-/// The most work of two pictures that are compared, as a share of the exact one's: where the comparison fails, it was for nothing, unless
-/// an effort goes on from where a cheaper one ended.
+/// The most work of two pictures that are compared, as a share of the exact one's: where the comparison fails, it was
+/// for nothing, unless both render from the same encodings.
 const MAX_COMPARED: f32 = 0.7;
 /// A picture whose error is below the bound by this factor lets the next one begin with less effort.
 const FAR_LESS: f64 = 1.6;
@@ -47,7 +47,7 @@ pub(crate) struct View<'a> {
 pub(crate) struct Controller {
     bound: Bound,
     expected: Expected,
-    judge: Judge,
+    check: Check,
     /// The effort that was chosen by comparing two, for the whole run, and its estimate.
     compared: Option<(usize, Estimate)>,
     /// The effort of the last picture that was checked alone, and its estimate.
@@ -70,13 +70,14 @@ struct Search<'s, 'a> {
 impl Controller {
     /// For the efforts of a session's field. Without any, the field has a single way to render.
     pub(crate) fn new(bound: Bound, session: &Session<'_>) -> Controller {
-        let safety = match session.judge {
-            Judge::Pixels => 1.0,
-            Judge::Steps => embedded::SAFETY,
-            Judge::Comparison => OTHER_PICTURES * embedded::SAFETY,
+        let check = session.prepared.check();
+        let safety = match check {
+            Check::Pixels => 1.0,
+            Check::Steps => embedded::SAFETY,
+            Check::Comparison => OTHER_PICTURES * embedded::SAFETY,
         };
         let expected = Expected::new(session.efforts.clone(), safety);
-        Controller { bound, expected, judge: session.judge, compared: None, last: None, pictures: 0 }
+        Controller { bound, expected, check, compared: None, last: None, pictures: 0 }
     }
 
     /// The effort that the first picture begins with, so that sources that are encoded before are encoded for it.
@@ -87,8 +88,8 @@ impl Controller {
         }
     }
 
-    /// Renders a picture within the bound. An error that is too large is never delivered: at worst the picture is exact. A
-    /// time that is too short gives the cheapest picture.
+    /// Renders a picture within the bound. An error that is too large is never delivered: at worst the picture is
+    /// exact. A time that is too short gives the cheapest picture.
     pub(crate) fn render(
         &mut self,
         session: &mut Session<'_>,
@@ -98,7 +99,7 @@ impl Controller {
         self.pictures += 1;
         let (start, encode) = (Instant::now(), Duration::ZERO);
         let mut search = Search { session, view, start, encode, tried: Vec::new() };
-        if self.judge == Judge::Steps {
+        if self.check == Check::Steps {
             // The field's steps do not tell what leaving out views costs.
             search.view.used = view.all;
         }
@@ -114,7 +115,7 @@ impl Controller {
             Bound::Time(most) => (None, Some(most.as_secs_f64())),
         };
         let seconds = search.start.elapsed().as_secs_f64();
-        let (effort, tried) = (self.expected.efforts[effort].name.clone(), search.tried);
+        let (effort, tried) = (self.expected.efforts[effort].label.clone(), search.tried);
         Ok((rendered, Kept { most_error, most_seconds, effort, error, seconds, is_kept, tried }, search.encode))
     }
 
@@ -126,7 +127,7 @@ impl Controller {
     ) -> Result<(Rendered, usize, Estimate), FieldError> {
         // A quarter of the bound is left to early termination, at most.
         let termination = search.view.early_termination.min(0.25 * most as f32);
-        if self.judge == Judge::Comparison {
+        if self.check == Check::Comparison {
             return self.by_comparison(search, most, termination, progress);
         }
         let mut effort = self.begin(most);
@@ -136,8 +137,8 @@ impl Controller {
                 self.last = Some((effort, Estimate::EXACT));
                 return Ok((rendered, effort, Estimate::EXACT));
             }
-            let estimate = match self.judge {
-                Judge::Steps => by_steps(search.session, termination),
+            let estimate = match self.check {
+                Check::Steps => by_steps(search.session, termination),
                 _ => self.check(search, &rendered, effort, ROUNDS, most, progress)?,
             };
             self.expected.learn(effort, estimate);
@@ -150,8 +151,9 @@ impl Controller {
         }
     }
 
-    /// For fields that tell no errors and whose pixels cannot be computed alone: compares pictures of two efforts. Another effort
-    /// encodes the sources of such fields again or optimises further, so the first comparison chooses for the whole run.
+    /// For fields that tell no errors and whose pixels cannot be computed alone: compares pictures of two efforts.
+    /// Another effort encodes the sources of such fields again or optimises further, so the first comparison chooses
+    /// for the whole run.
     fn by_comparison(
         &mut self,
         search: &mut Search<'_, '_>,
@@ -168,7 +170,7 @@ impl Controller {
         let mut effort = self.expected.cheapest_within(most).clamp(1.min(exact), exact);
         let mut below = self.expected.below(effort);
         let work: f32 = [below, effort].iter().map(|effort| self.expected.efforts[*effort].typical_share).sum();
-        if effort == exact || (work > MAX_COMPARED && !search.session.goes_on) {
+        if effort == exact || (work > MAX_COMPARED && !self.expected.encode_alike(below, effort)) {
             let rendered = self.picture(search, exact, termination, progress)?;
             self.compared = Some((exact, Estimate::EXACT));
             return Ok((rendered, exact, Estimate::EXACT));
@@ -234,11 +236,11 @@ impl Controller {
             return Ok((rendered, effort, Some(Estimate::EXACT), is_kept));
         }
         let mut estimate = None;
-        if self.judge == Judge::Steps {
+        if self.check == Check::Steps {
             // A picture that was interrupted left no estimate.
             estimate = Some(by_steps(search.session, search.view.early_termination));
         }
-        if self.judge == Judge::Pixels && left() > CHECK_SHARE * most.as_secs_f64() {
+        if self.check == Check::Pixels && left() > CHECK_SHARE * most.as_secs_f64() {
             match self.check(search, &rendered, effort, 1, 0.0, &deadline) {
                 Ok(found) => estimate = Some(found),
                 Err(FieldError::Interrupted(_)) if !progress.is_cancelled() => {}
@@ -269,7 +271,8 @@ impl Controller {
         Ok(rendered)
     }
 
-    /// Estimates the error of an effort's picture from exact pixels, in rounds until it is clearly on one side of `most`.
+    /// Estimates the error of an effort's picture from exact pixels, in rounds until it is clearly on one side of
+    /// `most`.
     fn check(
         &self,
         search: &mut Search<'_, '_>,
@@ -279,7 +282,7 @@ impl Controller {
         most: f64,
         progress: &dyn Progress,
     ) -> Result<Estimate, FieldError> {
-        let Effort { typical_error, typical_share, .. } = self.expected.efforts[effort];
+        let Variant { typical_error, typical_share, .. } = self.expected.efforts[effort];
         let affordable = CHECK_WORK * f64::from(typical_share) * rendered.colours.len() as f64;
         let count = (affordable as usize).clamp(ROUND[0], ROUND[1]);
         let mut sample = Sample::default();
@@ -289,7 +292,7 @@ impl Controller {
             let draws = draw(rendered, count, self.pictures * ROUNDS as u64 + round as u64);
             let pixels: Vec<u32> = draws.iter().map(|draw| draw.pixel).collect();
             let Search { session, view, .. } = search;
-            let Some(exact) = session.exact_pixels(view.camera, view.all, &pixels, progress)? else { break };
+            let exact = session.exact_pixels(view.camera, view.all, &pixels, progress)?;
             sample.add(rendered, &draws, &exact);
             estimate = sample.estimate();
             if estimate.upper <= most || estimate.value > most {
@@ -299,8 +302,8 @@ impl Controller {
         Ok(Estimate { pixels: estimate.pixels.saturating_sub(EXPECTED_DRAWS), ..estimate })
     }
 
-    /// The effort that a picture's search begins with: that of the picture before, or one less if that had far less error than
-    /// the bound.
+    /// The effort that a picture's search begins with: that of the picture before, or one less if that had far less
+    /// error than the bound.
     fn begin(&self, most: f64) -> usize {
         match self.last {
             None => self.expected.cheapest_within(most),
@@ -314,15 +317,12 @@ impl Controller {
     }
 
     fn tried(&self, effort: usize, error: Option<Estimate>) -> Tried {
-        Tried { effort: self.expected.efforts[effort].name.clone(), error }
+        Tried { effort: self.expected.efforts[effort].label.clone(), error }
     }
 }
 
 /// The error of the last picture by the field's own steps. `termination` is what early termination may cost.
-fn by_steps(session: &mut Session<'_>, termination: f32) -> Estimate {
-    let value = match session.check() {
-        Check::Steps(error) => f64::from(error),
-        Check::Pixels(_) | Check::Comparison => f64::INFINITY,
-    };
+fn by_steps(session: &Session<'_>, termination: f32) -> Estimate {
+    let value = f64::from(session.prepared.error());
     Estimate { value, upper: embedded::SAFETY * value + f64::from(termination), pixels: 0 }
 }

@@ -1,13 +1,14 @@
 //! The errors and times that efforts are expected to have in this scene: the typical ones, scaled by what was found.
 
 use super::Estimate;
-use crate::Effort;
+use crate::{AnyOptions, Variant};
 
 /// Errors are expected to be larger than the scaled typical ones by this factor: most first checks then succeed.
 const MARGIN: f64 = 1.15;
 /// The least scale: few draws often miss the few largest differences, so that low estimates prove little.
 const MIN_SCALE: f64 = 0.9;
-/// Trials of so little work may skip this many efforts at most: typical errors tell little of scenes that are not typical.
+/// Trials of so little work may skip this many efforts at most: typical errors tell little of scenes that are not
+/// typical.
 const CHEAP: f32 = 0.1;
 const MAX_SKIPPED: usize = 3;
 /// Pictures are compared whose typical errors differ by at least this factor.
@@ -17,7 +18,7 @@ const TIME_SHARE: f64 = 0.75;
 
 /// The efforts of a field, the cheapest first, and what was found of them.
 pub(super) struct Expected {
-    pub(super) efforts: Vec<Effort>,
+    pub(super) efforts: Vec<Variant<AnyOptions>>,
     /// Factor on all errors.
     margin: f64,
     /// Estimated over typical errors in this scene.
@@ -28,9 +29,9 @@ pub(super) struct Expected {
 
 impl Expected {
     /// Nothing is known yet. `safety` is that of the estimates by which efforts will be judged.
-    pub(super) fn new(mut efforts: Vec<Effort>, safety: f64) -> Expected {
+    pub(super) fn new(mut efforts: Vec<Variant<AnyOptions>>, safety: f64) -> Expected {
         if efforts.is_empty() {
-            efforts.push(Effort::exact());
+            efforts.push(Variant::exact(AnyOptions::new(())));
         }
         let seconds = vec![None; efforts.len()];
         Expected { efforts, margin: MARGIN * safety, scale: None, seconds }
@@ -44,8 +45,13 @@ impl Expected {
     /// The cheapest effort whose error is expected to be below the bound.
     pub(super) fn cheapest_within(&self, most: f64) -> usize {
         let scale = self.margin * self.scale.unwrap_or(1.0);
-        let is_within = |effort: &Effort| scale * f64::from(effort.typical_error) <= most;
+        let is_within = |effort: &Variant<AnyOptions>| scale * f64::from(effort.typical_error) <= most;
         self.efforts.iter().position(is_within).unwrap_or(self.efforts.len() - 1)
+    }
+
+    /// Whether two efforts render from the same encodings: the second one then takes what the first one did not do.
+    pub(super) fn encode_alike(&self, first: usize, second: usize) -> bool {
+        self.efforts[first].options.encodes_alike(&self.efforts[second].options)
     }
 
     /// The effort to try after one whose error is too large.
@@ -89,8 +95,8 @@ mod tests {
 
     fn efforts() -> Expected {
         let some = [(0.04, 0.02), (0.02, 0.03), (0.01, 0.05), (0.002, 0.3)];
-        let some = some.map(|(error, work)| Effort::new("", error, work));
-        Expected::new(some.into_iter().chain([Effort::exact()]).collect(), 1.0)
+        let some = some.map(|(error, work)| Variant::new("", AnyOptions::new(()), error, work));
+        Expected::new(some.into_iter().chain([Variant::exact(AnyOptions::new(()))]).collect(), 1.0)
     }
 
     fn found(value: f64) -> Estimate {

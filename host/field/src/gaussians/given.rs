@@ -44,8 +44,9 @@ struct Uploaded<D: Device> {
 }
 
 impl Field for GivenGaussians {
+    /// The Gaussians are only drawn.
     fn about(&self) -> About {
-        About::new("gaussians")
+        About { is_live: true, ..About::new("gaussians") }
     }
 
     fn prepare<'a, D: Device>(
@@ -57,11 +58,6 @@ impl Field for GivenGaussians {
         let near = NEAR * self.median_depth(sources);
         let background = behind(sources);
         Ok(Box::new(Prepare { device, scene: &self.scene, near, background, uploaded: None }))
-    }
-
-    /// The Gaussians are only drawn.
-    fn is_live(&self) -> bool {
-        true
     }
 }
 
@@ -85,8 +81,8 @@ impl GivenGaussians {
 }
 
 impl<D: Device> Prepare<'_, D> {
-    /// The Gaussians on the device with the colours that a camera at this point sees. Those of one colour in all directions are
-    /// taken there once.
+    /// The Gaussians on the device with the colours that a camera at this point sees. Those of one colour in all
+    /// directions are taken there once.
     fn uploaded(&mut self, centre_world: Vec3) -> Result<&Uploaded<D>, DeviceError> {
         let is_there = |own: &Uploaded<D>| self.scene.degree == 0 || own.centre_world == centre_world;
         let kept = self.uploaded.take().filter(is_there);

@@ -1,5 +1,6 @@
 //! The settings of an optimisation. What was measured of them is in `host/results/gaussians.md`.
 
+use crate::Purpose;
 use crate::point_cloud::CloudOptions;
 use viewfuse_scene::photographs::SourceImages;
 
@@ -10,6 +11,9 @@ pub const MAX_ITERATIONS: u32 = 100_000;
 
 /// Most sources whose points count without a second view that confirms them: so few leave too few that are.
 const MAX_UNCONFIRMED: usize = 3;
+
+/// Part of the iterations that are made for pictures of held-out sources.
+const TRIAL_DIVISOR: u32 = 2;
 
 /// Settings of an optimisation. Lengths are in footprints: the size of a level's pixel at the median depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,7 +34,8 @@ pub struct Recipe {
     pub random_count: u32,
     /// Opacity of the Gaussians from points, and of those at random.
     pub opacities: [f32; 2],
-    /// Thickness of the Gaussians from points along the surface's normal, relative to the surface's directions; 1 for balls.
+    /// Thickness of the Gaussians from points along the surface's normal, relative to the surface's directions; 1 for
+    /// balls.
     pub flatness: f32,
     /// Share of `1 - SSIM` in the loss; the rest is the mean absolute difference.
     pub structure_share: f32,
@@ -81,9 +86,9 @@ impl Recipe {
         if source_count <= MAX_UNCONFIRMED { CloudOptions { least_views: 1 } } else { own }
     }
 
-    /// The recipe for pictures that are mixed with the field's own. Where there are silhouettes the hull's pictures have the
-    /// detail and a ragged outline: the Gaussians begin on surfaces alone and are few and large, opaque only where that gains, and
-    /// the outline has twice the weight. Alone they would be too soft.
+    /// The recipe for pictures that are mixed with the field's own. Where there are silhouettes the hull's pictures
+    /// have the detail and a ragged outline: the Gaussians begin on surfaces alone and are few and large, opaque only
+    /// where that gains, and the outline has twice the weight. Alone they would be too soft.
     pub fn mixed_with(self, images: &SourceImages) -> Recipe {
         if !images.has_silhouettes {
             return self;
@@ -98,7 +103,19 @@ impl Recipe {
         }
     }
 
-    /// The recipe with so many iterations at each level that has some, and at most so many Gaussians, whatever the sources' size.
+    /// Iterations at all sizes.
+    pub(crate) fn all_iterations(&self) -> u32 {
+        self.iterations.iter().sum()
+    }
+
+    /// The recipe for trials, which are small and only compared. Previews have no Gaussians of their own.
+    pub(crate) fn reduced(self, purpose: Purpose) -> Recipe {
+        let divisor = if purpose == Purpose::Trial { TRIAL_DIVISOR } else { 1 };
+        Recipe { iterations: self.iterations.map(|count| count / divisor), ..self }
+    }
+
+    /// The recipe with so many iterations at each level that has some, and at most so many Gaussians, whatever the
+    /// sources' size.
     pub fn with(mut self, iterations: Option<u32>, count: Option<u32>) -> Recipe {
         if let Some(iterations) = iterations {
             self.iterations.iter_mut().filter(|own| **own > 0).for_each(|own| *own = iterations);

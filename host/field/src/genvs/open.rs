@@ -1,16 +1,13 @@
 //! The row of GeNVS, and how its network is opened with a person's options.
 
 use super::sampling::{Plan, Steps};
-use super::{Genvs, GenvsOptions, Omissions, Rays, presets, test_networks};
+use super::{Genvs, GenvsOptions, test_networks, variants};
 use crate::AnyField;
 use crate::learned::{NEAR_FAR, parse_near_far};
-use crate::options::{
-    BOUNDS, BOUNDS_OR_EXACT, FieldOptions, Flag, FlagAbout, OpenError, count, flags, list, number, switch,
-};
+use crate::options::{BOUNDS, BOUNDS_OR_EXACT, Given, OpenError, count, flags, list, number, switch};
 use crate::record::{Omission, VIEWS};
 use crate::row::{Origin, Row, Small, TestNetwork};
 use viewfuse_core::sampler::Sampler;
-use viewfuse_core::sampler::churn::Churn;
 use viewfuse_core::schedule::NoiseSchedule;
 use viewfuse_nn::checkpoint::Checkpoint;
 
@@ -28,9 +25,9 @@ pub(crate) const ROW: Row = Row {
         }],
         open,
     },
-    flags: Given::FLAGS,
+    flags: FLAGS,
     omissions: &[ROWS, CALLS],
-    presets: presets::of,
+    drawn: variants::drawn,
 };
 
 pub(super) const ROWS: Omission =
@@ -43,23 +40,40 @@ pub(super) const CALLS: Omission = Omission {
 };
 
 flags! {
-    samples: u32 = "samples", "N,N,N|N", parse_samples, Picture, &[], "Samples on a ray of a GeNVS [default: 64]";
-    near_far: [f32; 2] = "near-far", "NEAR,FAR", parse_near_far, Picture, &[], NEAR_FAR;
-    noise: NoiseSchedule = "noise", "MAX,MIN", parse_noise, Picture, &[], "Largest and smallest noise level [default: \
-        80,0.002]";
-    sampler: Sampler = "sampler", "NAME", parse_sampler, Effort, BOUNDS, "Sampler: heun, unipc, ipndm [default: ipndm; heun \
-        where nothing is left out]";
-    steps: u32 = "steps", "N", parse_steps, Effort, BOUNDS, "Noise levels. Each takes one call of the denoiser; with heun \
-        two, except the last [default: 10; 25 where nothing is left out]";
-    tolerance: f32 = "tolerance", "ERROR", parse_tolerance, Effort, &["max_error", "max_time", "sampler", "steps"], "Choose \
-        the levels adaptively, with each step's error below this (root mean square, of values between -1 and 1); 0.01 is \
-        just visible";
-    churn: f32 = "churn", "AMOUNT", parse_churn, Effort, &["tolerance"], "Add this amount of noise between steps over the \
-        whole run; multistep samplers start again each time, so use heun";
-    half_volumes: () = "half-volumes", "", switch, Effort, BOUNDS_OR_EXACT, "Keep views' features in half precision (f16): \
-        half the memory, but every row of them is computed";
-    reuse: f32 = "reuse", "LEVEL", parse_level, Sequence, BOUNDS_OR_EXACT, "Start each frame from the one before with noise \
-        of this level, about the size of the differences between frames: for orbits";
+    GenvsOptions;
+    "samples", "N,N,N|N", parse_samples, Picture, &[],
+        "Samples on a ray of a GeNVS [default: 64]",
+        |own, count| own.rays.sample_count = count;
+    "near-far", "NEAR,FAR", parse_near_far, Picture, &[], NEAR_FAR, |own, bounds| own.rays.near_far = Some(bounds);
+    "noise", "MAX,MIN", parse_noise, Picture, &[],
+        "Largest and smallest noise level [default: 80,0.002]",
+        |own, schedule| own.plan.schedule = schedule;
+    "sampler", "NAME", parse_sampler, Effort, BOUNDS,
+        "Sampler: heun, unipc, ipndm [default: ipndm; heun where nothing is left out]",
+        |own, given| if let Steps::Fixed { sampler, .. } = &mut own.plan.steps {
+            *sampler = given;
+        };
+    "steps", "N", parse_steps, Effort, BOUNDS,
+        "Noise levels. Each takes one call of the denoiser; with heun two, except the last [default: 10; 25 where \
+         nothing is left out]",
+        |own, given| if let Steps::Fixed { level_count, .. } = &mut own.plan.steps {
+            *level_count = given;
+        };
+    "tolerance", "ERROR", parse_tolerance, Effort, &["max_error", "max_time", "sampler", "steps"],
+        "Choose the levels adaptively, with each step's error below this (root mean square, of values between -1 \
+         and 1); 0.01 is just visible",
+        |own, tolerance| own.plan.steps = Steps::within(tolerance);
+    "churn", "AMOUNT", parse_churn, Effort, &["tolerance"],
+        "Add this amount of noise between steps over the whole run; multistep samplers start again each time, so \
+         use heun",
+        |own, amount| own.plan.churn.amount = amount;
+    "half-volumes", "", switch, Effort, BOUNDS_OR_EXACT,
+        "Keep views' features in half precision (f16): half the memory, but every row of them is computed",
+        |own, ()| own.omissions.half_volumes = true;
+    "reuse", "LEVEL", parse_level, Sequence, BOUNDS_OR_EXACT,
+        "Start each frame from the one before with noise of this level, about the size of the differences between \
+         frames: for orbits",
+        |own, level| own.omissions.reuse = Some(level);
 }
 
 /// The flags that say nothing of the denoiser or of sequences of pictures.
@@ -97,44 +111,20 @@ fn parse_level(text: &str) -> Result<f32, String> {
     number(text, |level| level > 0.0 && level.is_finite(), "a number above 0")
 }
 
-/// Opens the network with these options.
-fn open(checkpoint: Checkpoint, options: &FieldOptions) -> Result<AnyField, OpenError> {
-    let (given, default) = (Given::of(options), Rays::default());
-    let sample_count = given.samples.unwrap_or(default.sample_count);
-    let rays = Rays { sample_count, near_far: given.near_far, ..default };
-    let omissions = Omissions {
-        unused_views: !options.computes(VIEWS.name),
-        unseen_rows: !options.computes(ROWS.name),
-        reuse: given.reuse,
-        half_volumes: given.half_volumes.is_some(),
-    };
-    let field = Genvs::new(checkpoint, GenvsOptions { rays, plan: plan(options, &given), omissions })?;
-    let of_denoiser = options.flags.keys().find(|flag| !OF_FEATURES.contains(&flag.as_str()));
-    match (of_denoiser, &field.architecture().denoiser) {
+/// Opens the network with what is given: the published run if nothing may be omitted, otherwise the fast one.
+fn open(checkpoint: Checkpoint, given: &Given) -> Result<AnyField, OpenError> {
+    let plan = if given.exact { Plan::published(given.seed) } else { Plan::fast(given.seed) };
+    let mut options = taken(given, GenvsOptions { plan, ..GenvsOptions::default() });
+    options.omissions.unused_views = !given.computes(&VIEWS);
+    options.omissions.unseen_rows = !given.computes(&ROWS);
+    if given.computes(&CALLS) {
+        options.plan.early_termination = None;
+    }
+    let field = Genvs::new(checkpoint, options)?;
+    let of_denoiser = given.flags.iter().map(|(flag, _)| flag).filter(|flag| !OF_FEATURES.contains(&flag.as_str()));
+    match (of_denoiser.min(), &field.architecture().denoiser) {
         (Some(flag), None) => Err(OpenError::cannot(flag, "has no denoiser")),
         _ => Ok(AnyField::new(field)),
-    }
-}
-
-/// The published run if nothing may be left out, otherwise the fast one; given options take precedence.
-fn plan(options: &FieldOptions, given: &Given) -> Plan {
-    let seed = options.seed;
-    let plan = if options.exact { Plan::published(seed) } else { Plan::fast(seed) };
-    let steps = match (given.tolerance, Plan::careful(seed).steps, plan.steps) {
-        (Some(tolerance), Steps::Chosen { most_calls, .. }, _) => Steps::Chosen { tolerance, most_calls },
-        (_, _, Steps::Fixed { sampler, level_count }) => {
-            Steps::Fixed { sampler: given.sampler.unwrap_or(sampler), level_count: given.steps.unwrap_or(level_count) }
-        }
-        (_, _, steps) => steps,
-    };
-    Plan {
-        steps,
-        schedule: given.noise.unwrap_or_else(NoiseSchedule::published),
-        from_colours: false,
-        compares_orders: false,
-        churn: Churn { amount: given.churn.unwrap_or(0.0), ..Churn::NONE },
-        early_termination: plan.early_termination.filter(|_| !options.computes(CALLS.name)),
-        seed,
     }
 }
 

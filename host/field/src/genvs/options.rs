@@ -1,7 +1,8 @@
-//! Settings of a GeNVS render, and its omissions.
+//! The options of a GeNVS: its rays, the denoiser's run, and its omissions.
 
 use super::super::Denoising;
 use super::sampling::{Plan, Steps};
+use crate::variant::Options;
 use viewfuse_core::sampler::Sampler;
 
 /// Samples on a ray.
@@ -12,8 +13,8 @@ pub struct Rays {
     /// Jitter of the samples, in halves of their distance: 1 as published, 0 (the default) for none, so that
     /// neighbouring frames have the same error.
     pub jitter: f32,
-    /// Near and far bounds, depths along the target's principal axis; `None`: from the sources' distance to the point that
-    /// they look at. The near bound must be smaller.
+    /// Near and far bounds, depths along the target's principal axis; `None`: from the sources' distance to the point
+    /// that they look at. The near bound must be smaller.
     pub near_far: Option<[f32; 2]>,
     /// Length of a ray in the unit of length of the network's densities; `None`: as published for SRN, 1 over the focal
     /// length in halves of the image's height.
@@ -67,12 +68,21 @@ pub struct GenvsOptions {
     pub plan: Plan,
     /// Omissions.
     pub omissions: Omissions,
+    /// Rows and columns of pictures are divided by this, and the pictures enlarged; 1 for whole pictures.
+    pub divisor: u32,
 }
 
 impl Default for GenvsOptions {
     /// The fast run with seed 0.
     fn default() -> GenvsOptions {
-        GenvsOptions { rays: Rays::default(), plan: Plan::fast(0), omissions: Omissions::default() }
+        GenvsOptions { rays: Rays::default(), plan: Plan::fast(0), omissions: Omissions::default(), divisor: 1 }
+    }
+}
+
+impl Options for GenvsOptions {
+    /// Where both keep volumes in the same precision.
+    fn encodes_alike(&self, other: &GenvsOptions) -> bool {
+        self.omissions.half_volumes == other.omissions.half_volumes
     }
 }
 
@@ -97,8 +107,9 @@ impl GenvsOptions {
         }
     }
 
-    /// These settings with at least two samples on a ray.
+    /// These options with at least two samples on a ray, and pictures that are divided by at least 1.
     pub(super) fn checked(self) -> GenvsOptions {
-        GenvsOptions { rays: Rays { sample_count: self.rays.sample_count.max(2), ..self.rays }, ..self }
+        let rays = Rays { sample_count: self.rays.sample_count.max(2), ..self.rays };
+        GenvsOptions { rays, divisor: self.divisor.max(1), ..self }
     }
 }

@@ -1,16 +1,18 @@
 //! Source views on a device, with their volumes.
 
-use super::efforts;
 use super::encoder::SIDE_STEP;
 use super::feature_image;
+use super::memory;
 use super::open::{CALLS, ROWS};
 use super::parts::Parts;
 use super::ray_sampling::RaySampling;
-use super::sampling::{Plan, Start};
+use super::sampling::Start;
 use super::volume::Volume;
-use super::{COLOUR_CHANNELS, Genvs, GenvsOptions, Omissions, Rays};
-use crate::learned::over_white;
-use crate::{Check, Effort, Efforts, Encoding, Encodings, FieldError, LeftOut, Prepared, Record, Rendered, Request};
+use super::{COLOUR_CHANNELS, Genvs, GenvsOptions, Omissions, Rays, variants};
+use crate::enlarged::enlarged;
+use crate::learned::{NoDepths, over_white};
+use crate::variant::erased;
+use crate::{AnyOptions, Check, Encoding, FieldError, LeftOut, Prepared, Record, Rendered, Request, Variant};
 use std::ops::Range;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_device::{Device, DeviceError};
@@ -27,16 +29,16 @@ pub(super) struct Views<'a, D: Device> {
     pub(super) images: Vec<SourceView>,
     /// `[view]`: none before it is encoded.
     pub(super) volumes: Vec<Option<Volume<D>>>,
-    pub(super) near_far: [f32; 2],
-    pub(super) memory_estimate: u64,
+    /// The bounds where the options state none.
+    pub(super) usual_near_far: [f32; 2],
+    /// Widths and heights of the sources.
+    pub(super) source_sizes: Vec<[u32; 2]>,
     /// The last frame's picture, and its size.
     pub(super) earlier: Option<(Size, D::Buffer<f32>)>,
-    /// The denoiser's run: the field's own, or that of an effort.
-    pub(super) plan: Plan,
-    /// The effort that was set, and the estimated error of the last picture with it.
-    pub(super) effort: Option<usize>,
+    pub(super) options: GenvsOptions,
+    /// The estimated error of the last picture.
     pub(super) error: f32,
-    /// The last frame's feature image: another effort for the same frame uses it again.
+    /// The last frame's feature image: another run of the denoiser for the same frame uses it again.
     pub(super) features: Option<(FeatureKey, Image<D>)>,
     pub(super) counts: Counts,
 }
@@ -47,6 +49,7 @@ pub(super) struct FeatureKey {
     camera: CameraBlock,
     views: Vec<usize>,
     weights: Vec<f32>,
+    ray_sampling: RaySampling,
 }
 
 /// A source as the encoder's input: over white, padded to multiples of the encoder's output stride.
@@ -72,16 +75,17 @@ pub(super) struct Counts {
 impl<D: Device> Views<'_, D> {
     /// Encodes a view.
     pub(super) fn encode_view(&mut self, view: usize) -> Result<(), FieldError> {
-        let Views { field, device, parts, .. } = self;
+        let Views { device, parts, .. } = self;
         let SourceView { size, values, .. } = &self.images[view];
         let mut encoded = parts.encode(*device, values, *size, view)?;
         let (row_count, whole_bytes) = (encoded.row_count(), encoded.byte_count());
         let mut filled_rows = 0;
-        if field.options.omissions.half_volumes {
+        if self.options.omissions.half_volumes {
             // One view after the other: at most one is in memory at full precision.
             filled_rows = parts.fill(*device, &mut encoded, 0..row_count, view)?;
             encoded.pack(*device)?;
         }
+        self.features = None;
         self.counts.volume_rows += u64::from(row_count);
         self.counts.filled_rows += u64::from(filled_rows);
         self.counts.volume_bytes += whole_bytes;
@@ -105,7 +109,7 @@ impl<D: Device> Views<'_, D> {
         target: &CameraBlock,
         ray_sampling: &RaySampling,
     ) -> Result<(), FieldError> {
-        let unseen_rows = self.field.options.omissions.unseen_rows;
+        let unseen_rows = self.options.omissions.unseen_rows;
         for &view in views {
             let camera = self.images[view].camera;
             self.fill(view, |volume| match unseen_rows {
@@ -126,25 +130,24 @@ impl<D: Device> Views<'_, D> {
         })
     }
 
-    /// The efforts, with the denoiser's run of each.
-    fn runs(&self) -> Vec<(Effort, Plan)> {
-        let denoiser = self.field.architecture.denoiser.as_ref();
-        denoiser.map_or_else(Vec::new, |denoiser| efforts::of(&self.field.options.plan, denoiser.estimate))
+    /// Near and far bounds.
+    fn near_far(&self) -> [f32; 2] {
+        self.options.rays.near_far.unwrap_or(self.usual_near_far)
     }
 
     /// The sampling of rays for a target.
     fn ray_sampling(&self, target: &Camera) -> RaySampling {
-        let Rays { sample_count, jitter, length, inclusive, .. } = self.field.options.rays;
+        let Rays { sample_count, jitter, length, inclusive, .. } = self.options.rays;
         let focal = 2.0 * target.pinhole.focal()[1] / target.pinhole.height() as f32;
         let ray_length = length.unwrap_or(1.0 / focal);
-        let (near_far, seed) = (self.near_far, self.field.options.plan.seed);
+        let (near_far, seed) = (self.near_far(), self.options.plan.seed);
         RaySampling { near_far, sample_count, jitter, seed, ray_length, inclusive }
     }
 }
 
 impl<D: Device> Prepared for Views<'_, D> {
     fn encoding(&self) -> Encoding {
-        if self.field.options.omissions.unused_views { Encoding::Used } else { Encoding::All }
+        if self.options.omissions.unused_views { Encoding::Used } else { Encoding::All }
     }
 
     fn encode(&mut self, view: usize, _progress: &dyn Progress) -> Result<(), FieldError> {
@@ -152,9 +155,13 @@ impl<D: Device> Prepared for Views<'_, D> {
     }
 
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
-        let (field, device, target) = (self.field, self.device, request.camera);
+        let (device, GenvsOptions { plan, omissions, divisor, .. }) = (self.device, self.options);
+        let [width, height] = [request.camera.pinhole.width(), request.camera.pinhole.height()];
+        // A camera that cannot be made so small is not changed.
+        let small = request.camera.pinhole.resized(width.div_ceil(divisor), height.div_ceil(divisor));
+        let target = &Camera { pinhole: small.unwrap_or(request.camera.pinhole), ..*request.camera };
         let ray_sampling = self.ray_sampling(target);
-        let step = field.picture_step();
+        let step = self.field.picture_step();
         let size = Size {
             height: target.pinhole.height().next_multiple_of(step),
             width: target.pinhole.width().next_multiple_of(step),
@@ -162,7 +169,7 @@ impl<D: Device> Prepared for Views<'_, D> {
         };
         let camera = CameraBlock { height: size.height, width: size.width, ..target.block(0) };
         let mut scratch = Scratch::new(device);
-        let key = FeatureKey { camera, views: request.views.to_vec(), weights: request.view_weights() };
+        let key = FeatureKey { camera, views: request.views.to_vec(), weights: request.view_weights(), ray_sampling };
         let features = match self.features.take() {
             Some((of, features)) if of == key => features,
             _ => {
@@ -171,32 +178,51 @@ impl<D: Device> Prepared for Views<'_, D> {
                 self.parts.features(device, &mut scratch, &views, &camera, &ray_sampling, progress)?
             }
         };
-        let start = match (&self.earlier, field.options.omissions.reuse) {
+        let start = match (&self.earlier, omissions.reuse) {
             (Some((of_size, picture)), Some(level)) if *of_size == size => Start::Picture { picture, level },
             _ => Start::Noise,
         };
-        let sampled = self.parts.picture(device, &mut scratch, &features, &self.plan, start, progress)?;
+        let sampled = self.parts.picture(device, &mut scratch, &features, &plan, start, progress)?;
         self.features = Some((key, features));
-        self.error = self.effort.map_or(f32::INFINITY, |effort| efforts::error_of(effort, sampled.accuracy));
+        self.error = variants::error_of(&plan, sampled.accuracy);
         self.counts.calls += u64::from(sampled.call_count());
         self.counts.planned_calls += u64::from(sampled.call_count() + sampled.left_out);
         let values = device.download(&sampled.picture)?;
-        if field.options.omissions.reuse.is_some() {
+        if omissions.reuse.is_some() {
             self.earlier = Some((size, sampled.picture));
         }
-        Ok(cropped(&values, size, target))
+        Ok(enlarged(cropped(&values, size, target), [width, height]))
     }
 
-    fn efforts(&mut self) -> Option<&mut dyn Efforts> {
-        // Efforts differ in the calls of the denoiser.
-        if self.field.architecture.denoiser.is_some() { Some(self) } else { None }
+    fn set(&mut self, options: &AnyOptions) -> Result<(), FieldError> {
+        if let Some(options) = options.of::<GenvsOptions>().copied().map(GenvsOptions::checked) {
+            self.options = options;
+            NoDepths::check(self.near_far()).map_err(FieldError::unsuitable)?;
+        }
+        Ok(())
+    }
+
+    fn efforts(&self, options: &AnyOptions) -> Vec<Variant<AnyOptions>> {
+        // They differ in the calls of the denoiser.
+        let Some((options, denoiser)) = options.of().zip(self.field.architecture.denoiser.as_ref()) else {
+            return Vec::new();
+        };
+        erased(variants::efforts(options, denoiser.estimate))
+    }
+
+    fn check(&self) -> Check {
+        if self.field.architecture.denoiser.is_some() { Check::Steps } else { Check::Comparison }
+    }
+
+    fn error(&self) -> f32 {
+        self.error
     }
 
     fn record(&self) -> Record {
         let Counts { volume_rows, filled_rows, volume_bytes, kept_bytes, planned_calls, calls } = self.counts;
-        let Genvs { architecture, options, .. } = self.field;
-        let Omissions { unseen_rows, reuse, half_volumes, .. } = options.omissions;
-        let ends = options.plan.early_termination.is_some();
+        let Genvs { architecture, .. } = self.field;
+        let Omissions { unseen_rows, reuse, half_volumes, .. } = self.options.omissions;
+        let ends = self.options.plan.early_termination.is_some();
         let halves = LeftOut {
             what: "volume bytes",
             switch: half_volumes,
@@ -210,27 +236,10 @@ impl<D: Device> Prepared for Views<'_, D> {
             CALLS.left_out(ends || reuse.is_some(), planned_calls - calls, planned_calls),
         ];
         let has_denoiser = architecture.denoiser.is_some();
-        let run = GenvsOptions { plan: self.plan, ..*options };
-        let denoising = has_denoiser.then(|| run.denoising(calls, planned_calls.saturating_sub(calls)));
-        let (memory_estimate, near_far) = (Some(self.memory_estimate), Some(self.near_far));
+        let denoising = has_denoiser.then(|| self.options.denoising(calls, planned_calls.saturating_sub(calls)));
+        let estimate = memory::estimate(self.device, architecture, &self.options, &self.source_sizes);
+        let (memory_estimate, near_far) = (Some(estimate), Some(self.near_far()));
         Record { left_out, denoising, memory_estimate, near_far }
-    }
-}
-
-impl<D: Device> Efforts for Views<'_, D> {
-    fn list(&self) -> Vec<Effort> {
-        self.runs().into_iter().map(|(effort, _)| effort).collect()
-    }
-
-    fn set(&mut self, effort: usize) -> Result<Encodings, FieldError> {
-        if let Some((_, plan)) = self.runs().into_iter().nth(effort) {
-            (self.plan, self.effort) = (plan, Some(effort));
-        }
-        Ok(Encodings::Kept)
-    }
-
-    fn check(&mut self) -> Check<'_> {
-        Check::Steps(self.error)
     }
 }
 

@@ -1,9 +1,9 @@
 //! The row of PixelNeRF, and how its network is opened with a person's options.
 
-use super::{Omissions, PixelNerf, PixelNerfOptions, Sampling, presets, test_networks};
+use super::{PixelNerf, PixelNerfOptions, test_networks, variants};
 use crate::AnyField;
 use crate::learned::{NEAR_FAR, parse_near_far};
-use crate::options::{BOUNDS_OR_EXACT, FieldOptions, Flag, FlagAbout, OpenError, count, flags, list, number, switch};
+use crate::options::{BOUNDS_OR_EXACT, Given, OpenError, count, flags, list, number, switch};
 use crate::record::{Omission, VIEWS};
 use crate::row::{Origin, Row, Small, TestNetwork};
 use viewfuse_nn::checkpoint::Checkpoint;
@@ -21,9 +21,9 @@ pub(crate) const ROW: Row = Row {
         ],
         open,
     },
-    flags: Given::FLAGS,
+    flags: FLAGS,
     omissions: &[LAYERS, BEHIND, SPACE, RAYS, PARTS, HIDDEN],
-    presets: presets::of,
+    drawn: variants::drawn,
 };
 
 pub(super) const LAYERS: Omission = Omission {
@@ -54,17 +54,29 @@ const PARTS: Omission = Omission { name: "parts", part: "in empty parts of rays"
 const HIDDEN: Omission = Omission { name: "hidden", part: "behind surfaces", ..RAYS };
 
 flags! {
-    samples: [u32; 3] = "samples", "N,N,N|N", parse_samples, Picture, &[], "Samples on a ray of a PixelNeRF: in the first \
-        pass, in the second pass by weight, and in the second pass around the depth [default: 64,16,16]";
-    near_far: [f32; 2] = "near-far", "NEAR,FAR", parse_near_far, Picture, &[], NEAR_FAR;
-    published_depth: () = "published-depth", "", switch, Picture, &[], "Place second-pass samples around the depth of the \
-        published code (the sum of weights times depths, too near on rays that are not opaque) instead of the mean depth";
-    probe_step: u32 = "probe-step", "PIXELS", parse_step, Effort, BOUNDS_OR_EXACT, "Probe one ray in every square of this \
-        many pixels on a side for empty space [default: 4]";
-    probe_error: f32 = "probe-error", "ERROR", parse_error, Effort, BOUNDS_OR_EXACT, "Raise the threshold of empty space \
-        while the probes' colours change by at most this, root mean square; 1 is from black to white [default: 1/128]";
-    half_latents: () = "half-latents", "", switch, Effort, BOUNDS_OR_EXACT, "Keep the latents that points look up in half \
-        precision (f16): half of their memory";
+    PixelNerfOptions;
+    "samples", "N,N,N|N", parse_samples, Picture, &[],
+        "Samples on a ray of a PixelNeRF: in the first pass, in the second pass by weight, and in the second pass \
+         around the depth [default: 64,16,16]",
+        |own, counts: [u32; 3]| {
+            let sampling = &mut own.sampling;
+            [sampling.coarse_count, sampling.importance_count, sampling.depth_count] = counts;
+        };
+    "near-far", "NEAR,FAR", parse_near_far, Picture, &[], NEAR_FAR, |own, bounds| own.sampling.near_far = Some(bounds);
+    "published-depth", "", switch, Picture, &[],
+        "Place second-pass samples around the depth of the published code (the sum of weights times depths, too \
+         near on rays that are not opaque) instead of the mean depth",
+        |own, ()| own.sampling.published_depth = true;
+    "probe-step", "PIXELS", parse_step, Effort, BOUNDS_OR_EXACT,
+        "Probe one ray in every square of this many pixels on a side for empty space [default: 4]",
+        |own, step| own.omissions.empty_space = step;
+    "probe-error", "ERROR", parse_error, Effort, BOUNDS_OR_EXACT,
+        "Raise the threshold of empty space while the probes' colours change by at most this, root mean square; 1 \
+         is from black to white [default: 1/128]",
+        |own, error| own.omissions.probe_error = error;
+    "half-latents", "", switch, Effort, BOUNDS_OR_EXACT,
+        "Keep the latents that points look up in half precision (f16): half of their memory",
+        |own, ()| own.omissions.half_latents = true;
 }
 
 /// In the first pass, in the second by weight, and in the second around the depth.
@@ -82,33 +94,22 @@ fn parse_error(text: &str) -> Result<f32, String> {
     number(text, |error| (0.0..1.0).contains(&error), "a number, at least 0 and less than 1")
 }
 
-/// Opens the network with these options.
-fn open(checkpoint: Checkpoint, options: &FieldOptions) -> Result<AnyField, OpenError> {
-    let (given, usual, computes) = (Given::of(options), PixelNerfOptions::default(), |what| options.computes(what));
-    let Sampling { coarse_count, importance_count, depth_count, .. } = usual.sampling;
-    let counts = given.samples.unwrap_or([coarse_count, importance_count, depth_count]);
-    let [coarse_count, importance_count, depth_count] = counts;
-    let sampling = Sampling {
-        coarse_count,
-        importance_count,
-        depth_count,
-        seed: options.seed,
-        near_far: given.near_far,
-        published_depth: given.published_depth.is_some(),
-        ..usual.sampling
-    };
-    let Omissions { empty_space, probe_error, .. } = usual.omissions;
-    let omissions = Omissions {
-        unused_views: !computes(VIEWS.name),
-        latent_layers: !computes(LAYERS.name),
-        half_latents: given.half_latents.is_some(),
-        unseen_points: !computes(BEHIND.name),
-        empty_space: if computes(SPACE.name) { 0 } else { given.probe_step.unwrap_or(empty_space) },
-        probe_error: if options.exact { 0.0 } else { given.probe_error.unwrap_or(probe_error) },
-        empty_rays: !computes(RAYS.name),
-        empty_parts: !computes(PARTS.name),
-        hidden_samples: !computes(HIDDEN.name),
-        ..usual.omissions
-    };
-    Ok(AnyField::new(PixelNerf::new(&checkpoint, PixelNerfOptions { sampling, omissions })?))
+/// Opens the network with what is given.
+fn open(checkpoint: Checkpoint, given: &Given) -> Result<AnyField, OpenError> {
+    let mut options = taken(given, PixelNerfOptions::default());
+    options.sampling.seed = given.seed;
+    let own = &mut options.omissions;
+    own.unused_views = !given.computes(&VIEWS);
+    own.latent_layers = !given.computes(&LAYERS);
+    own.unseen_points = !given.computes(&BEHIND);
+    own.empty_rays = !given.computes(&RAYS);
+    own.empty_parts = !given.computes(&PARTS);
+    own.hidden_samples = !given.computes(&HIDDEN);
+    if given.computes(&SPACE) {
+        own.empty_space = 0;
+    }
+    if given.exact {
+        own.probe_error = 0.0;
+    }
+    Ok(AnyField::new(PixelNerf::new(&checkpoint, options)?))
 }

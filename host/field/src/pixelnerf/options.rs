@@ -1,4 +1,6 @@
-//! Settings of a PixelNeRF render, and its omissions.
+//! The options of a PixelNeRF: its samples, and its omissions.
+
+use crate::variant::Options;
 
 /// Samples on a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,22 +59,22 @@ pub struct Omissions {
     /// Latent layers at points: they are applied once at every node of a view's grid, before looking up. Exact up to
     /// rounding, because looking up is linear.
     pub latent_layers: bool,
-    /// Half of the bits of the grids that points look up (f16): latents, or the outputs of latent layers, have a relative error
-    /// of at most 2^-11, and are limited to 65504.
+    /// Half of the bits of the grids that points look up (f16): latents, or the outputs of latent layers, have a
+    /// relative error of at most 2^-11, and are limited to 65504.
     pub half_latents: bool,
     /// Views at points behind their cameras, where their weight is 0. Exact.
     pub unseen_points: bool,
-    /// First-pass samples in empty space: one ray in every square of this side in pixels (a probe) is computed first, the
-    /// others only where the four probes around them are not empty. 0 or 1: no probes.
+    /// First-pass samples in empty space: one ray in every square of this side in pixels (a probe) is computed first,
+    /// the others only where the four probes around them are not empty. 0 or 1: no probes.
     pub empty_space: u32,
     /// The largest change of the probes' colours, root mean square, `1` from black to white: the largest threshold of a
     /// part's opacity that stays within it replaces [`MIN_SHARE`]. 0: always [`MIN_SHARE`].
     pub probe_error: f32,
-    /// Rays between alike neighbours: a pixel is interpolated where the colours and opacities around it differ by no more
-    /// than this in any channel. 0: every pixel has its ray.
+    /// Rays between alike neighbours: a pixel is interpolated where the colours and opacities around it differ by no
+    /// more than this in any channel. 0: every pixel has its ray.
     pub interpolation: f32,
-    /// Samples of both passes are interpolated along rays between this many evenly spaced nodes, at most 128, at which alone the
-    /// second pass's network is evaluated, and not in space that neighbouring rays find empty. 0: no nodes.
+    /// Samples of both passes are interpolated along rays between this many evenly spaced nodes, at most 128, at which
+    /// alone the second pass's network is evaluated, and not in space that neighbouring rays find empty. 0: no nodes.
     pub nodes: u32,
     /// Second-pass samples on rays whose first pass has an opacity below [`MIN_OPACITY`].
     pub empty_rays: bool,
@@ -119,6 +121,14 @@ impl Omissions {
     };
 }
 
+impl Omissions {
+    /// Other omissions, but those that views are encoded with, or that cost nothing, as here.
+    pub(super) fn kept_in(self, others: Omissions) -> Omissions {
+        let Omissions { unused_views, latent_layers, half_latents, unseen_points, .. } = self;
+        Omissions { unused_views, latent_layers, half_latents, unseen_points, ..others }
+    }
+}
+
 impl Default for Omissions {
     /// [`Omissions::ALL`].
     fn default() -> Omissions {
@@ -133,6 +143,14 @@ pub struct PixelNerfOptions {
     pub sampling: Sampling,
     /// Omissions.
     pub omissions: Omissions,
+}
+
+impl Options for PixelNerfOptions {
+    /// Where both keep the same grids.
+    fn encodes_alike(&self, other: &PixelNerfOptions) -> bool {
+        let grids = |own: &PixelNerfOptions| (own.omissions.latent_layers, own.omissions.half_latents);
+        grids(self) == grids(other)
+    }
 }
 
 impl PixelNerfOptions {

@@ -60,8 +60,8 @@ impl<'a, D: Device> Reference<'a, D> {
         Ok(all)
     }
 
-    /// Red, green, blue and density at points (their `length` must be 1, their `sample` their index), with these weights
-    /// of all views.
+    /// Red, green, blue and density at points (their `length` must be 1, their `sample` their index), with these
+    /// weights of all views.
     ///
     /// # Errors
     /// If the device fails.
@@ -74,7 +74,7 @@ impl<'a, D: Device> Reference<'a, D> {
         }
         let Views { field, device, .. } = &self.views;
         let views = self.views.used(&all, weights, None)?;
-        let maps = field.options.omissions.latent_layers;
+        let maps = self.views.options.omissions.latent_layers;
         let mut workspace = Workspace::new(*device, &field.architecture, all.len(), points.len(), maps)?;
         let network = self.views.network(pass);
         let mut samples = device.zeros(points.len())?;
@@ -129,8 +129,8 @@ impl<'a, D: Device> Reference<'a, D> {
     }
 
     /// Depths of fine samples `[ray][sample]` and all depths in order `[ray][sample]`, from the first pass's
-    /// `coarse_depths[ray][sample]`, `coarse_weights[ray][sample]` and `depths[ray]` (not divided by the weights' sum) and
-    /// the random numbers `draws[ray][fine sample]`.
+    /// `coarse_depths[ray][sample]`, `coarse_weights[ray][sample]` and `depths[ray]` (not divided by the weights' sum)
+    /// and the random numbers `draws[ray][fine sample]`.
     ///
     /// # Errors
     /// If the device fails.

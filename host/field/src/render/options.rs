@@ -2,7 +2,7 @@
 
 use super::RenderError;
 use crate::budget::Bound;
-use crate::{Mixture, Renderer, Setting};
+use crate::{AnyOptions, Mixture, Renderer};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::{Album, BackgroundChoice, longest_side};
 use viewfuse_scene::{Scene, View};
@@ -19,9 +19,9 @@ pub struct RenderOptions {
     pub leave_out: f32,
     /// Transmittance of early termination.
     pub early_termination: f32,
-    /// Values of the field's scalars ([`Tunable`](crate::Tunable)); those that are not named take their defaults.
-    pub settings: Vec<Setting>,
-    /// Pictures under several settings that are mixed in place of one under [`RenderOptions::settings`].
+    /// The field's options in place of its own.
+    pub field: Option<AnyOptions>,
+    /// Pictures under several options of the field that are mixed in place of one.
     pub mixture: Option<Mixture>,
     /// A bound on each picture's error or time, which chooses the effort.
     pub bound: Option<Bound>,
@@ -29,8 +29,8 @@ pub struct RenderOptions {
 
 /// Default of the largest share of the weight that is left out: it bounds the change of a fusion of all
 /// views at 1 % of the range of its inputs. Where only some views see a point, the bound is this over their weight: for
-/// schemes that give one view nearly everything (cross attention), leaving out 5 % already costs 1 dB where that one view
-/// sees nothing.
+/// schemes that give one view nearly everything (cross attention), leaving out 5 % already costs 1 dB where that one
+/// view sees nothing.
 pub const DEFAULT_LEAVE_OUT: f32 = 0.01;
 /// Default transmittance of early termination: 1/256 of the range of a channel.
 pub const DEFAULT_EARLY_TERMINATION: f32 = 1.0 / 256.0;
@@ -42,7 +42,7 @@ impl Default for RenderOptions {
             background: BackgroundChoice::Auto,
             leave_out: DEFAULT_LEAVE_OUT,
             early_termination: DEFAULT_EARLY_TERMINATION,
-            settings: Vec::new(),
+            field: None,
             mixture: None,
             bound: None,
         }

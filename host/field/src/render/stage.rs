@@ -6,7 +6,8 @@ use super::{Frame, RenderError, RenderOptions, Truth, working_side};
 use crate::budget::{Controller, View};
 use crate::session::Session;
 use crate::{
-    DepthMap, Effort, Encoding, FieldError, Geometry, Mixture, Record, Rendered, Renderer, Setting, Surfaces, Tunable,
+    AnyOptions, DepthMap, Encoding, FieldError, Geometry, Mixture, Purpose, Record, Rendered, Renderer, Surfaces,
+    Variant,
 };
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -140,7 +141,7 @@ impl<'a> Stage<'a> {
         let largest = images.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
         let side = options.size.map_or(largest, |[width, height]| width.max(height));
         let mut stage = Stage { scene: None, options, side, first, unit, sources, images, session, controller, costs };
-        stage.tune(&options.settings, options.mixture.as_ref());
+        stage.session.vary(options.field.as_ref(), options.mixture.as_ref(), progress)?;
         Ok(stage)
     }
 
@@ -177,9 +178,9 @@ impl<'a> Stage<'a> {
         timed(&mut self.costs.encode, || session.encode_all(progress)).map_err(|error| self.error(error))
     }
 
-    /// Renders a target with these weights of the sources, all of which are used, whatever the options say. Sources with a
-    /// weight that are not encoded yet are encoded; if their encoding depends on a weighting and none has begun, all
-    /// weights are equal.
+    /// Renders a target with these weights of the sources, all of which are used, whatever the options say. Sources
+    /// with a weight that are not encoded yet are encoded; if their encoding depends on a weighting and none has begun,
+    /// all weights are equal.
     ///
     /// # Errors
     /// [`FieldError`].
@@ -194,11 +195,12 @@ impl<'a> Stage<'a> {
     }
 
     /// The efforts of the field, the cheapest first, the exact one last; none for a field with one way to render.
-    pub fn efforts(&self) -> &[Effort] {
+    pub fn efforts(&self) -> &[Variant<AnyOptions>] {
         &self.session.efforts
     }
 
-    /// Renders what follows with one of [`Stage::efforts`]; without effect where the options have a bound, which chooses.
+    /// Renders what follows with one of [`Stage::efforts`]; without effect where the options have a bound, which
+    /// chooses.
     ///
     /// # Errors
     /// [`RenderError`].
@@ -206,27 +208,26 @@ impl<'a> Stage<'a> {
         self.session.set_effort(effort, progress).map_err(|error| self.error(error))
     }
 
-    /// Renders what follows with the effort of trials; see [`Efforts::set_trial`](crate::Efforts::set_trial).
-    pub(crate) fn set_trial(&mut self) {
-        if let Some(efforts) = self.session.prepared.efforts() {
-            efforts.set_trial();
-        }
+    /// Renders what follows under other options of the field than its own, if there are some, and mixes pictures under
+    /// several ones. Views are encoded again where these options need it.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub fn vary(
+        &mut self,
+        options: Option<&AnyOptions>,
+        mixture: Option<&Mixture>,
+        progress: &dyn Progress,
+    ) -> Result<(), RenderError> {
+        self.session.vary(options, mixture, progress).map_err(|error| self.error(error))
     }
 
-    /// The field's scalars that can be chosen for a scene.
-    pub fn tunables(&self) -> &'static [Tunable] {
-        self.session.tunables
-    }
-
-    /// Sets the field's scalars for what follows, and the mixture of pictures under other settings, if there is one; views that
-    /// are encoded stay as they are.
-    pub fn tune(&mut self, settings: &[Setting], mixture: Option<&Mixture>) {
-        self.session.tune(settings, mixture);
-    }
-
-    /// The settings whose pictures are worth mixing where these were chosen.
-    pub(crate) fn parts(&mut self, chosen: &[Setting]) -> Vec<Vec<Setting>> {
-        self.session.parts(chosen)
+    /// Renders what follows with less resolution, for a purpose; before views are encoded.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub fn reduce(&mut self, purpose: Purpose) -> Result<(), RenderError> {
+        self.session.reduce(purpose).map_err(|error| self.error(error))
     }
 
     /// What the field knows of where the surfaces are.
@@ -258,7 +259,8 @@ impl<'a> Stage<'a> {
         self.scene.as_ref()
     }
 
-    /// What a photograph of the scene must have behind its object to be compared with a frame; `None` if it is shown whole.
+    /// What a photograph of the scene must have behind its object to be compared with a frame; `None` if it is shown
+    /// whole.
     pub fn background(&self) -> Option<[f32; 3]> {
         self.images.has_silhouettes.then_some(self.images.background)
     }
@@ -359,8 +361,8 @@ impl<'a> Stage<'a> {
         })
     }
 
-    /// The total weight of the sources that may be left out of a picture: that of the options, or of all that are beyond the number
-    /// that the field uses. Where nothing may be left out, it uses all.
+    /// The total weight of the sources that may be left out of a picture: that of the options, or of all that are
+    /// beyond the number that the field uses. Where nothing may be left out, it uses all.
     fn left_out_total(&self, weights: &SourceWeights) -> f32 {
         let asked = self.options.leave_out;
         match self.session.prepared.encoding() {

@@ -4,14 +4,15 @@
 //! first iterations of the same optimisation, which a dearer effort goes on from.
 
 use super::hull::Hull;
-use super::splats::{SourceDepths, Splats, TRIAL_DIVISOR};
+use super::splats::{SourceDepths, Splats};
 use super::sweep::Sweep;
 use crate::gaussians::{MAX_COUNT, MAX_ITERATIONS, Optimisation, Recipe};
-use crate::options::{FieldOptions, Flag, FlagAbout, OpenError, count, flags};
+use crate::options::{Given, OpenError, count, flags};
 use crate::row::{Origin, Row};
+use crate::variant::erased;
 use crate::{
-    About, AnyField, Effort, Efforts, Encoding, Encodings, Field, FieldError, Geometry, Prepared, Record, Rendered,
-    Request, Weighted,
+    About, AnyField, AnyOptions, Encoding, Field, FieldError, Geometry, Options, Prepared, Purpose, Record, Rendered,
+    Request, Variant, Weighted,
 };
 use std::collections::BTreeMap;
 use viewfuse_device::Device;
@@ -21,11 +22,11 @@ use viewfuse_weighting::sources::SourceWeights;
 
 /// The error and the share of the optimisation's time that are typical of its first iterations: those at a quarter of
 /// the finest level's size, those at a half too, and half of those at the finest level too
-/// (`host/results/gaussians.md`).
+/// (`host/research/results/gaussians.md`).
 const EFFORTS: [(f32, f32); 3] = [(0.09, 0.31), (0.045, 0.56), (0.012, 0.75)];
 
 /// Pictures of Gaussians that are optimised for the sources. Nothing is learned but the scene itself.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gaussians {
     /// The depths of sources with silhouettes, which the Gaussians begin with.
     pub hull: Hull,
@@ -33,6 +34,46 @@ pub struct Gaussians {
     pub sweep: Sweep,
     /// The optimisation.
     pub recipe: Recipe,
+    /// The optimisation ends after so many iterations, if the recipe has more.
+    pub end: u32,
+}
+
+impl Default for Gaussians {
+    /// All iterations of the default recipe.
+    fn default() -> Gaussians {
+        Gaussians { hull: Hull::default(), sweep: Sweep::default(), recipe: Recipe::default(), end: u32::MAX }
+    }
+}
+
+impl Options for Gaussians {
+    /// Where the surfaces that the Gaussians begin with are the same.
+    fn encodes_alike(&self, other: &Gaussians) -> bool {
+        self.hull.encodes_alike(&other.hull) && self.sweep.encodes_alike(&other.sweep)
+    }
+}
+
+impl Gaussians {
+    /// The efforts for sources of this longest side, the exact one last: each goes on from where the one before ended.
+    /// Those that would end with another one, as where there are few iterations, are not in the list.
+    fn efforts(&self, source_side: u32) -> Vec<Variant<Gaussians>> {
+        let Recipe { iterations: [eighth, quarter, half, whole], side, .. } = self.recipe;
+        let side = side.min(source_side);
+        let ends = [
+            (eighth + quarter, side / 4),
+            (eighth + quarter + half, side / 2),
+            (eighth + quarter + half + whole / 2, side),
+        ];
+        let mut efforts: Vec<Variant<Gaussians>> = Vec::new();
+        for ((end, side), (error, share)) in ends.into_iter().zip(EFFORTS) {
+            let before = efforts.last().map_or(0, |effort| effort.options.end);
+            if end > before && end < self.recipe.all_iterations() {
+                let label = format!("{end} iterations, sources at {side} pixels at last");
+                efforts.push(Variant::new(label, Gaussians { end, ..*self }, error, share));
+            }
+        }
+        efforts.push(Variant::exact(*self));
+        efforts
+    }
 }
 
 /// The row of the Gaussians.
@@ -41,14 +82,17 @@ pub(crate) const ROW: Row = Row {
     title: "field of Gaussians",
     heading: "Options of the field of Gaussians",
     origin: Origin::TrainingFree { open },
-    flags: Given::FLAGS,
+    flags: FLAGS,
     omissions: &[],
-    presets: |_, _, _| Vec::new(),
+    drawn: |_, _, _| Vec::new(),
 };
 
 flags! {
-    iterations: u32 = "gaussian-iterations", "N", parse_iterations, Picture, &[], "Iterations at each size of the sources";
-    count: u32 = "gaussian-count", "N", parse_count, Picture, &[], "Most Gaussians";
+    Recipe;
+    "gaussian-iterations", "N", parse_iterations, Picture, &[],
+        "Iterations at each size of the sources",
+        |own, iterations| *own = own.with(Some(iterations), None);
+    "gaussian-count", "N", parse_count, Picture, &[], "Most Gaussians", |own, count| *own = own.with(None, Some(count));
 }
 
 fn parse_iterations(text: &str) -> Result<u32, String> {
@@ -59,9 +103,8 @@ fn parse_count(text: &str) -> Result<u32, String> {
     count(text, 1..=MAX_COUNT)
 }
 
-fn open(options: &FieldOptions) -> Result<AnyField, OpenError> {
-    let given = Given::of(options);
-    let recipe = Recipe { seed: options.seed, ..Recipe::default() }.with(given.iterations, given.count);
+fn open(given: &Given) -> Result<AnyField, OpenError> {
+    let recipe = taken(given, Recipe { seed: given.seed, ..Recipe::default() });
     Ok(AnyField::new(Gaussians { recipe, ..Gaussians::default() }))
 }
 
@@ -71,6 +114,10 @@ impl Field for Gaussians {
         About { least_sources: 2, ..About::new(ROW.name) }
     }
 
+    fn options(&self) -> AnyOptions {
+        AnyOptions::new(*self)
+    }
+
     fn prepare<'a, D: Device>(
         &'a self,
         device: &'a D,
@@ -78,78 +125,36 @@ impl Field for Gaussians {
         progress: &dyn Progress,
     ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
         let depths = SourceDepths::prepare(device, (&self.hull, &self.sweep), None, sources, progress)?;
-        let source_side = sources.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
-        let stops = stops(&self.recipe, source_side);
-        Ok(Box::new(Alone {
-            depths,
-            recipe: self.recipe,
-            effort: stops.len() - 1,
-            stops,
-            splats: BTreeMap::new(),
-            optimisation: None,
-        }))
+        Ok(Box::new(Alone { depths, options: *self, splats: BTreeMap::new(), optimisation: None }))
     }
-}
-
-/// An effort, and how many iterations it ends after.
-struct Stop {
-    effort: Effort,
-    iteration: u32,
-}
-
-/// The efforts of this recipe for sources of this longest side, the exact one last: each goes on from where the one
-/// before ended. Those that would end with another one, as where there are few iterations, are not in the list.
-fn stops(recipe: &Recipe, source_side: u32) -> Vec<Stop> {
-    let [eighth, quarter, half, whole] = recipe.iterations;
-    let side = recipe.side.min(source_side);
-    let ends = [
-        (eighth + quarter, side / 4),
-        (eighth + quarter + half, side / 2),
-        (eighth + quarter + half + whole / 2, side),
-    ];
-    let all = recipe.iterations.iter().sum();
-    let mut stops: Vec<Stop> = Vec::new();
-    for ((iteration, side), (error, share)) in ends.into_iter().zip(EFFORTS) {
-        let before = stops.last().map_or(0, |stop| stop.iteration);
-        if iteration > before && iteration < all {
-            let name = format!("{iteration} iterations, sources at {side} pixels at last");
-            stops.push(Stop { effort: Effort::new(name, error, share), iteration });
-        }
-    }
-    stops.push(Stop { effort: Effort::exact(), iteration: all });
-    stops
 }
 
 /// The Gaussians of the sources.
 struct Alone<'a, D: Device> {
     depths: SourceDepths<'a, D>,
-    recipe: Recipe,
-    /// The efforts, the exact one last...
-    stops: Vec<Stop>,
-    /// ... and the current one.
-    effort: usize,
-    /// The Gaussians of the current weighting by their effort, once they are needed; none where the sources have too
-    /// few surfaces.
-    splats: BTreeMap<usize, Option<Splats<D>>>,
+    options: Gaussians,
+    /// The Gaussians of the current weighting and recipe by their last iteration, once they are needed; none where the
+    /// sources have too few surfaces.
+    splats: BTreeMap<u32, Option<Splats<D>>>,
     /// The optimisation for the current weighting, as far as it went, where a dearer effort may go on from there.
     optimisation: Option<Box<dyn Optimisation + 'a>>,
 }
 
 impl<D: Device> Alone<'_, D> {
-    /// The Gaussians of the current effort, optimised if they are not there yet; `None` where the sources have too few
+    /// The Gaussians of the current options, optimised if they are not there yet; `None` where the sources have too few
     /// surfaces.
     fn splats(&mut self, progress: &dyn Progress) -> Result<Option<&mut Splats<D>>, FieldError> {
-        if !self.splats.contains_key(&self.effort) {
-            let end = self.stops[self.effort].iteration;
+        let Gaussians { recipe, end, .. } = self.options;
+        if !self.splats.contains_key(&end) {
             let begun = match self.optimisation.take().filter(|optimisation| optimisation.done() <= end) {
                 Some(optimisation) => Some(optimisation),
-                None => self.depths.optimisation(self.recipe, progress)?,
+                None => self.depths.optimisation(recipe, progress)?,
             };
             let splats = match begun {
                 Some(mut optimisation) => {
                     let ran = optimisation.run_to(end, &Quiet(progress));
                     let optimised = optimisation.optimised();
-                    if self.effort + 1 < self.stops.len() {
+                    if end < recipe.all_iterations() {
                         self.optimisation = Some(optimisation);
                     }
                     ran?;
@@ -157,9 +162,9 @@ impl<D: Device> Alone<'_, D> {
                 }
                 None => None,
             };
-            self.splats.insert(self.effort, splats);
+            self.splats.insert(end, splats);
         }
-        Ok(self.splats.get_mut(&self.effort).and_then(Option::as_mut))
+        Ok(self.splats.get_mut(&end).and_then(Option::as_mut))
     }
 
     /// Drops the Gaussians, finished and unfinished.
@@ -195,8 +200,24 @@ impl<D: Device> Prepared for Alone<'_, D> {
         Some(self)
     }
 
-    fn efforts(&mut self) -> Option<&mut dyn Efforts> {
-        Some(self)
+    fn set(&mut self, options: &AnyOptions) -> Result<(), FieldError> {
+        let Some(options) = options.of::<Gaussians>() else { return Ok(()) };
+        if options.recipe != self.options.recipe {
+            self.drop_splats();
+        }
+        self.options = *options;
+        self.depths.set(&options.hull, &options.sweep)
+    }
+
+    fn efforts(&self, options: &AnyOptions) -> Vec<Variant<AnyOptions>> {
+        let side = self.depths.images.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
+        erased(options.of::<Gaussians>().map_or_else(Vec::new, |options| options.efforts(side)))
+    }
+
+    fn reduced(&self, options: &AnyOptions, purpose: Purpose) -> AnyOptions {
+        let Some(whole) = options.of::<Gaussians>() else { return options.clone() };
+        let (sweep, recipe) = (whole.sweep.reduced(purpose), whole.recipe.reduced(purpose));
+        AnyOptions::new(Gaussians { sweep, recipe, ..*whole })
     }
 
     fn geometry(&self) -> Option<&dyn Geometry> {
@@ -208,30 +229,5 @@ impl<D: Device> Weighted for Alone<'_, D> {
     fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
         self.drop_splats();
         self.depths.weigh(relevance)
-    }
-}
-
-impl<D: Device> Efforts for Alone<'_, D> {
-    fn list(&self) -> Vec<Effort> {
-        self.stops.iter().map(|stop| stop.effort.clone()).collect()
-    }
-
-    /// The surfaces that the Gaussians begin with are the same.
-    fn set(&mut self, effort: usize) -> Result<Encodings, FieldError> {
-        self.effort = effort;
-        Ok(Encodings::Kept)
-    }
-
-    fn goes_on(&self) -> bool {
-        true
-    }
-
-    fn set_trial(&mut self) {
-        self.recipe.iterations = self.recipe.iterations.map(|count| count / TRIAL_DIVISOR);
-        self.stops.iter_mut().for_each(|stop| stop.iteration /= TRIAL_DIVISOR);
-        self.drop_splats();
-        if let Some(efforts) = self.depths.views.efforts() {
-            efforts.set_trial();
-        }
     }
 }

@@ -2,7 +2,7 @@
 //! fusion; the mathematics is in [`viewfuse_kernels::visual_hull`].
 
 use crate::{
-    DepthMap, Effort, Efforts, Encoding, Encodings, FieldError, Geometry, Prepared, Rendered, Request, Weighted,
+    AnyOptions, DepthMap, Encoding, FieldError, Geometry, Options, Prepared, Rendered, Request, Variant, Weighted,
 };
 use std::ops::Range;
 use viewfuse_core::camera::{Camera, CameraBlock};
@@ -25,17 +25,26 @@ const EFFORTS: [(f32, f32, f32); 2] = [(0.25, 0.065, 0.2), (0.5, 0.04, 0.4)];
 const MIN_REDUCED: u32 = 256;
 
 /// Density from silhouettes and photo-consistency, colour by weighted fusion with visibility.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hull {
     /// Most values in each of the three buffers of a sweep. Larger pictures are swept in bands of rows, which changes
     /// memory and run time but not the result.
     pub most_band_values: usize,
+    /// Side of the sources that depths are found in, as a share of their own.
+    pub source_share: f32,
 }
 
 impl Default for Hull {
-    /// 16 Mi values: 256 MiB in all.
+    /// 16 Mi values: 256 MiB in all. Whole sources.
     fn default() -> Hull {
-        Hull { most_band_values: 16 << 20 }
+        Hull { most_band_values: 16 << 20, source_share: 1.0 }
+    }
+}
+
+impl Options for Hull {
+    /// Where both find depths in sources of the same size.
+    fn encodes_alike(&self, other: &Hull) -> bool {
+        self.source_share == other.source_share
     }
 }
 
@@ -48,7 +57,7 @@ struct NotWeighed;
 
 /// Photographs on the device, with the object's box and where each pixel's ray enters the hull.
 pub(super) struct Views<'a, D: Device> {
-    field: &'a Hull,
+    options: Hull,
     device: &'a D,
     /// The sources' cameras.
     cameras: Vec<Camera>,
@@ -115,7 +124,21 @@ impl Hull {
         let whole = Silhouettes::upload(device, &sources.images, progress)?;
         let cameras = sources.images.iter().map(|image| image.camera).collect();
         let background = sources.background;
-        Ok(Views { field: self, device, cameras, whole, reduced: None, background, depths: None })
+        let mut views = Views { options: *self, device, cameras, whole, reduced: None, background, depths: None };
+        views.reduce()?;
+        Ok(views)
+    }
+
+    /// The efforts for sources of this longest side, the exact one last; none for small ones.
+    pub(super) fn efforts(&self, side: u32) -> Vec<Variant<Hull>> {
+        if side < MIN_REDUCED {
+            return Vec::new();
+        }
+        let reduced = EFFORTS.map(|(share, error, work)| {
+            let label = format!("sources at {} pixels", (share * side as f32).round());
+            Variant::new(label, Hull { source_share: share, ..*self }, error, work)
+        });
+        reduced.into_iter().chain([Variant::exact(*self)]).collect()
     }
 }
 
@@ -154,9 +177,22 @@ impl<D: Device> Views<'_, D> {
         self.reduced.as_ref().unwrap_or(&self.whole)
     }
 
-    /// Longest side of the sources.
-    fn side(&self) -> u32 {
-        self.cameras.iter().map(longest_side).max().unwrap_or(1)
+    /// Makes the smaller sources that the options ask for.
+    fn reduce(&mut self) -> Result<(), FieldError> {
+        let (device, share) = (self.device, self.options.source_share);
+        self.reduced = None;
+        if share < 1.0 {
+            let HullScene { texels, cameras, .. } = &self.whole.scene;
+            let texels = device.download(texels)?;
+            let reduced = |(camera, block): (&Camera, &CameraBlock)| {
+                let whole = texels[block.first_texel as usize..].iter().take((block.width * block.height) as usize);
+                let side = (share * longest_side(camera) as f32).round().max(1.0) as u32;
+                SourceImage { camera: *camera, texels: whole.copied().collect() }.reduced(side)
+            };
+            let images: Result<Vec<SourceImage>, _> = self.cameras.iter().zip(cameras).map(reduced).collect();
+            self.reduced = Some(Silhouettes::upload(device, &images.map_err(FieldError::unsuitable)?, &Silent)?);
+        }
+        Ok(())
     }
 }
 
@@ -166,14 +202,14 @@ impl<D: Device> Prepared for Views<'_, D> {
     }
 
     fn encode(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
-        let Views { field, device, whole, reduced, depths, .. } = self;
+        let Views { options, device, whole, reduced, depths, .. } = self;
         let Silhouettes { scene, entries, .. } = reduced.as_ref().unwrap_or(whole);
         let Some(Depths { maps, sweep: Some(Sweep { pair_weights, nothing, first_guess }) }) = depths else {
             return Err(FieldError::unsuitable(NotWeighed));
         };
         let HullScene { object_buffer: object, views, texels, .. } = scene;
         // The widest of a sweep's three buffers is bound as a whole.
-        let most_values = field.most_band_values.min(device.most_elements::<[f32; 2]>());
+        let most_values = options.most_band_values.min(device.most_elements::<[f32; 2]>());
         let camera = &scene.cameras[view];
         let whole = SweepBlock::new(&scene.object, camera, view as u32);
         for (sweep, kept_rows) in bands(whole, most_values) {
@@ -234,8 +270,15 @@ impl<D: Device> Prepared for Views<'_, D> {
         Some(self)
     }
 
-    fn efforts(&mut self) -> Option<&mut dyn Efforts> {
-        if self.side() >= MIN_REDUCED { Some(self) } else { None }
+    fn set(&mut self, options: &AnyOptions) -> Result<(), FieldError> {
+        let Some(options) = options.of::<Hull>() else { return Ok(()) };
+        let is_alike = options.encodes_alike(&self.options);
+        self.options = *options;
+        if is_alike {
+            return Ok(());
+        }
+        self.depths = None;
+        self.reduce()
     }
 
     fn geometry(&self) -> Option<&dyn Geometry> {
@@ -258,36 +301,6 @@ impl<D: Device> Weighted for Views<'_, D> {
         };
         self.depths = Some(Depths { maps: device.zeros(texel_count)?, sweep: Some(sweep) });
         Ok(())
-    }
-}
-
-impl<D: Device> Efforts for Views<'_, D> {
-    fn list(&self) -> Vec<Effort> {
-        let side = self.side() as f32;
-        let named = |(share, error, work): (f32, f32, f32)| {
-            Effort::new(format!("sources at {} pixels", (share * side).round()), error, work)
-        };
-        EFFORTS.into_iter().map(named).chain([Effort::exact()]).collect()
-    }
-
-    fn set(&mut self, effort: usize) -> Result<Encodings, FieldError> {
-        let device = self.device;
-        self.depths = None;
-        self.reduced = match EFFORTS.get(effort) {
-            None => None,
-            Some((share, ..)) => {
-                let HullScene { texels, cameras, .. } = &self.whole.scene;
-                let texels = device.download(texels)?;
-                let reduced = |(camera, block): (&Camera, &CameraBlock)| {
-                    let own = texels[block.first_texel as usize..].iter().take((block.width * block.height) as usize);
-                    let side = (share * longest_side(camera) as f32).round().max(1.0) as u32;
-                    SourceImage { camera: *camera, texels: own.copied().collect() }.reduced(side)
-                };
-                let images: Result<Vec<SourceImage>, _> = self.cameras.iter().zip(cameras).map(reduced).collect();
-                Some(Silhouettes::upload(device, &images.map_err(FieldError::unsuitable)?, &Silent)?)
-            }
-        };
-        Ok(Encodings::Dropped)
     }
 }
 

@@ -4,39 +4,40 @@
 //! They are one of the pictures that are mixed by region. With a bound on the time or on the error these pictures have
 //! no Gaussians: what is omitted is measured against a picture without.
 
-use super::splats::{SourceDepths, Splats, TRIAL_DIVISOR};
+use super::TrainingFree;
+use super::splats::{SourceDepths, Splats};
 use crate::gaussians::Recipe;
+use crate::variant::erased;
 use crate::{
-    Effort, Efforts, Encoding, Encodings, FieldError, Geometry, Prepared, Record, Rendered, Request, Setting, Tunable,
-    Tuned, Weighted,
+    AnyOptions, Encoding, FieldError, Geometry, Prepared, Purpose, Record, Rendered, Request, Setting, Variant,
+    Weighted,
 };
 use viewfuse_device::Device;
 use viewfuse_job::progress::{Progress, Quiet};
+use viewfuse_scene::photographs::longest_side;
 use viewfuse_weighting::sources::SourceWeights;
 
-/// The setting that says what a picture shows: 0 for the sweep or the hull, [`FILLED`], 1 for the Gaussians.
-const GAUSSIANS: &str = "gaussians";
-/// The hull, filled by the Gaussians where they are more opaque.
-const FILLED: f32 = 0.5;
-
 /// What a picture shows.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Shown {
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Shown {
     /// The sweep or the hull.
+    #[default]
     Depths,
     /// The hull, filled by the Gaussians where they are more opaque.
     Filled,
+    /// The Gaussians.
     Gaussians,
 }
 
 impl Shown {
-    /// By the value of [`GAUSSIANS`].
-    fn of(value: f32) -> Shown {
-        match value {
-            FILLED => Shown::Filled,
-            value if value > 0.0 => Shown::Gaussians,
-            _ => Shown::Depths,
-        }
+    /// In a record; none for the depths.
+    pub(super) fn setting(self) -> Option<Setting> {
+        let value = match self {
+            Shown::Depths => return None,
+            Shown::Filled => 0.5,
+            Shown::Gaussians => 1.0,
+        };
+        Some(Setting { name: "gaussians", value })
     }
 }
 
@@ -45,35 +46,14 @@ pub(super) struct Mixed<'a, D: Device> {
     depths: SourceDepths<'a, D>,
     recipe: Recipe,
     shown: Shown,
-    /// The efforts of the sweep or of the hull...
-    efforts: Vec<Effort>,
-    /// ... and the current one.
-    effort: usize,
-    /// The scalars of the sweep or of the hull.
-    tunables: &'static [Tunable],
-    /// The Gaussians of the current weighting and effort, once they are needed; none where the sources have too few
+    /// The Gaussians of the current weighting and recipe, once they are needed; none where the sources have too few
     /// surfaces.
     splats: Option<Option<Splats<D>>>,
 }
 
 impl<'a, D: Device> Mixed<'a, D> {
-    pub(super) fn new(mut depths: SourceDepths<'a, D>, recipe: Recipe) -> Mixed<'a, D> {
-        let efforts = depths.views.efforts().map_or_else(Vec::new, |efforts| efforts.list());
-        let tunables = depths.views.tuned().map_or(&[][..], |tuned| tuned.tunables());
-        Mixed {
-            recipe: recipe.mixed_with(&depths.images),
-            depths,
-            shown: Shown::Depths,
-            effort: efforts.len().saturating_sub(1),
-            efforts,
-            tunables,
-            splats: None,
-        }
-    }
-
-    /// Whether nothing is omitted.
-    fn is_exact(&self) -> bool {
-        self.effort + 1 >= self.efforts.len()
+    pub(super) fn new(depths: SourceDepths<'a, D>, options: &TrainingFree) -> Mixed<'a, D> {
+        Mixed { recipe: options.recipe.mixed_with(&depths.images), depths, shown: options.shown, splats: None }
     }
 
     /// The Gaussians, optimised if they are not there yet; `None` where the sources have too few surfaces.
@@ -122,8 +102,7 @@ impl<D: Device> Prepared for Mixed<'_, D> {
     }
 
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
-        let has_gaussians = self.shown != Shown::Depths && self.is_exact();
-        let splatted = if has_gaussians { self.splatted(request, progress)? } else { None };
+        let splatted = if self.shown == Shown::Depths { None } else { self.splatted(request, progress)? };
         match splatted {
             Some(splatted) if self.shown == Shown::Filled => {
                 let mut filled = self.depths.views.render(request, progress)?;
@@ -143,12 +122,61 @@ impl<D: Device> Prepared for Mixed<'_, D> {
         Some(self)
     }
 
-    fn efforts(&mut self) -> Option<&mut dyn Efforts> {
-        if self.efforts.is_empty() { None } else { Some(self) }
+    fn set(&mut self, options: &AnyOptions) -> Result<(), FieldError> {
+        let Some(TrainingFree { hull, sweep, recipe, shown, .. }) = options.of() else { return Ok(()) };
+        let recipe = recipe.mixed_with(&self.depths.images);
+        if recipe != self.recipe {
+            self.splats = None;
+        }
+        (self.recipe, self.shown) = (recipe, *shown);
+        self.depths.set(hull, sweep)
     }
 
-    fn tuned(&mut self) -> Option<&mut dyn Tuned> {
-        Some(self)
+    /// Those of the sweep or of the hull: less than the exact one is measured against pictures without Gaussians.
+    fn efforts(&self, options: &AnyOptions) -> Vec<Variant<AnyOptions>> {
+        let Some(options) = options.of::<TrainingFree>() else { return Vec::new() };
+        let images = &self.depths.images;
+        let side = images.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
+        let reduced = TrainingFree { shown: Shown::Depths, ..options.clone() };
+        let mut efforts: Vec<Variant<TrainingFree>> = match images.has_silhouettes {
+            true => options.hull.efforts(side).into_iter().map(|own| own.map(|hull| reduced.with_hull(hull))).collect(),
+            false => options.sweep.efforts(side).into_iter().map(|own| own.map(|sweep| reduced.with(sweep))).collect(),
+        };
+        if let Some(exact) = efforts.last_mut() {
+            exact.options = options.clone();
+        }
+        erased(efforts)
+    }
+
+    fn reduced(&self, options: &AnyOptions, purpose: Purpose) -> AnyOptions {
+        let Some(whole) = options.of::<TrainingFree>() else { return options.clone() };
+        let recipe = whole.recipe.reduced(purpose);
+        AnyOptions::new(TrainingFree { recipe, ..whole.with(whole.sweep.reduced(purpose)) })
+    }
+
+    fn candidates(&self, chosen: &AnyOptions, step: usize) -> Vec<AnyOptions> {
+        match chosen.of::<TrainingFree>() {
+            Some(chosen) if !self.depths.images.has_silhouettes => {
+                let candidates = chosen.sweep.candidates(step).into_iter();
+                candidates.map(|sweep| AnyOptions::new(chosen.with(sweep))).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// The sweep's, or the hull's one picture, filled, and that of the Gaussians alone: their errors are the least like
+    /// the others'.
+    fn parts(&self, chosen: &AnyOptions) -> Vec<AnyOptions> {
+        let Some(chosen) = chosen.of::<TrainingFree>() else { return Vec::new() };
+        let showing = |shown: Shown| AnyOptions::new(TrainingFree { shown, ..chosen.clone() });
+        let mut parts = match self.depths.images.has_silhouettes {
+            true => vec![showing(Shown::Filled)],
+            false => {
+                chosen.sweep.parts().map(|(sweep, stated)| AnyOptions::stated(chosen.with(sweep), stated)).to_vec()
+            }
+        };
+        parts.push(showing(Shown::Gaussians));
+        parts
     }
 
     fn geometry(&self) -> Option<&dyn Geometry> {
@@ -160,54 +188,6 @@ impl<D: Device> Weighted for Mixed<'_, D> {
     fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
         self.splats = None;
         self.depths.weigh(relevance)
-    }
-}
-
-impl<D: Device> Efforts for Mixed<'_, D> {
-    fn list(&self) -> Vec<Effort> {
-        self.efforts.clone()
-    }
-
-    fn set(&mut self, effort: usize) -> Result<Encodings, FieldError> {
-        self.effort = effort;
-        let Some(efforts) = self.depths.views.efforts() else { return Ok(Encodings::Kept) };
-        let encodings = efforts.set(effort)?;
-        if encodings == Encodings::Dropped {
-            self.depths.drop_encodings();
-            self.splats = None;
-        }
-        Ok(encodings)
-    }
-
-    fn set_trial(&mut self) {
-        self.recipe.iterations = self.recipe.iterations.map(|count| count / TRIAL_DIVISOR);
-        self.splats = None;
-        if let Some(efforts) = self.depths.views.efforts() {
-            efforts.set_trial();
-        }
-    }
-}
-
-impl<D: Device> Tuned for Mixed<'_, D> {
-    fn tunables(&self) -> &'static [Tunable] {
-        self.tunables
-    }
-
-    fn tune(&mut self, settings: &[Setting]) {
-        let shown = settings.iter().find(|setting| setting.name == GAUSSIANS);
-        self.shown = shown.map_or(Shown::Depths, |setting| Shown::of(setting.value));
-        if let Some(tuned) = self.depths.views.tuned() {
-            tuned.tune(settings);
-        }
-    }
-
-    /// The sweep's, or the hull's one picture, filled, and that of the Gaussians alone: their errors are the least like
-    /// the others'.
-    fn parts(&mut self, chosen: &[Setting]) -> Vec<Vec<Setting>> {
-        let with = |value: f32| chosen.iter().copied().chain([Setting { name: GAUSSIANS, value }]).collect();
-        let mut parts = self.depths.views.tuned().map_or_else(|| vec![with(FILLED)], |tuned| tuned.parts(chosen));
-        parts.push(with(1.0));
-        parts
     }
 }
 

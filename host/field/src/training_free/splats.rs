@@ -4,7 +4,7 @@ use super::hull::Hull;
 use super::sweep::{Cache, Sweep};
 use crate::gaussians::{Optimisation, Optimised, Recipe, Residuals, Splatter, optimisation};
 use crate::point_cloud::cloud_of;
-use crate::{DepthMap, FieldError, Geometry, Prepared, Rendered, Request, Surfaces};
+use crate::{AnyOptions, DepthMap, FieldError, Geometry, Prepared, Rendered, Request, Surfaces};
 use std::sync::Arc;
 use viewfuse_device::Device;
 use viewfuse_job::progress::{Progress, Quiet};
@@ -14,9 +14,6 @@ use viewfuse_weighting::sources::SourceWeights;
 
 /// Opacity below which a pixel has no depth.
 const MIN_OPACITY: f32 = 0.5;
-
-/// Part of the iterations that are made for pictures of held-out sources: those are small and only compared.
-pub(super) const TRIAL_DIVISOR: u32 = 2;
 
 /// The sources as the hull or the sweep prepared them: Gaussians begin with their depths.
 pub(super) struct SourceDepths<'a, D: Device> {
@@ -57,14 +54,15 @@ impl<'a, D: Device> SourceDepths<'a, D> {
 
     /// Begins a weighting.
     pub(super) fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
-        self.drop_encodings();
+        self.encoded.fill(false);
         self.relevance = relevance.to_vec();
         self.views.weighted().map_or(Ok(()), |weighted| weighted.weigh(relevance))
     }
 
-    /// Views are encoded again when they are needed.
-    pub(super) fn drop_encodings(&mut self) {
-        self.encoded.fill(false);
+    /// Sets the options of what prepared the sources.
+    pub(super) fn set(&mut self, hull: &Hull, sweep: &Sweep) -> Result<(), FieldError> {
+        let options = if self.images.has_silhouettes { AnyOptions::new(*hull) } else { AnyOptions::new(*sweep) };
+        self.views.set(&options)
     }
 
     /// The optimisation at its beginning, from the sources' surfaces; `None` where there are too few.

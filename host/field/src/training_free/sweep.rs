@@ -30,7 +30,7 @@ mod unseen;
 mod views;
 
 use crate::row::{Origin, Row};
-use crate::{About, AnyField, Field, FieldError, Prepared};
+use crate::{About, AnyField, AnyOptions, Field, FieldError, Prepared};
 pub use kept::Cache;
 use matching::Matching;
 use viewfuse_core::camera::Camera;
@@ -100,13 +100,17 @@ pub(crate) const ROW: Row = Row {
     origin: Origin::TrainingFree { open: |_| Ok(AnyField::new(Sweep::default())) },
     flags: &[],
     omissions: &[],
-    presets: |_, _, _| Vec::new(),
+    drawn: |_, _, _| Vec::new(),
 };
 
 impl Field for Sweep {
     /// Sources at the size of the pictures.
     fn about(&self) -> About {
-        About { least_sources: 2, ..About::new(ROW.name) }
+        About { least_sources: 2, has_previews: true, ..About::new(ROW.name) }
+    }
+
+    fn options(&self) -> AnyOptions {
+        AnyOptions::new(*self)
     }
 
     fn prepare<'a, D: Device>(
@@ -116,10 +120,6 @@ impl Field for Sweep {
         progress: &dyn Progress,
     ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
         self.prepare_kept(device, sources, None, progress)
-    }
-
-    fn preview(&self) -> Option<Sweep> {
-        Some(self.cheaper())
     }
 }
 

@@ -2,7 +2,7 @@
 //! known.
 
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
-use viewfuse_field::options::{FieldOptions, Flag, FlagAbout};
+use viewfuse_field::options::{Flag, FlagAbout, Given};
 use viewfuse_field::row::Row;
 use viewfuse_field::rows::ROWS;
 
@@ -60,9 +60,9 @@ pub(crate) const SEQUENCE: u8 = FlagAbout::Sequence as u8;
 pub(crate) struct Flags<const ABOUT: u8>(Vec<(&'static str, String)>);
 
 impl<const ABOUT: u8> Flags<ABOUT> {
-    /// `options` with these flags.
-    pub(crate) fn given_to(&self, options: FieldOptions) -> FieldOptions {
-        self.0.iter().fold(options, |options, (name, value)| options.with(*name, value))
+    /// What is given, with these flags.
+    pub(crate) fn add_to(&self, given: Given) -> Given {
+        self.0.iter().fold(given, |given, (name, value)| given.with(*name, value))
     }
 
     /// Whether none is given.

@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 use viewfuse_field::AnyField;
-use viewfuse_field::options::{FieldOptions, OpenError};
+use viewfuse_field::options::{Given, OpenError};
 use viewfuse_field::row::{Origin, Row, Small, TestNetwork};
 use viewfuse_field::rows::{self, ROWS};
 use viewfuse_nn::checkpoint::Checkpoint;
@@ -90,11 +90,11 @@ impl Model {
     }
 
     /// Opens the field.
-    pub(crate) fn open(&self, options: &FieldOptions) -> Result<AnyField, OpenError> {
+    pub(crate) fn open(&self, given: &Given) -> Result<AnyField, OpenError> {
         match self {
-            Model::File(path) => rows::open(Checkpoint::open(path)?, options),
-            Model::Test(network, size) => rows::open((network.checkpoint)(*size), options),
-            Model::TrainingFree(row) => row.open(options),
+            Model::File(path) => rows::open(Checkpoint::open(path)?, given),
+            Model::Test(network, size) => rows::open((network.checkpoint)(*size), given),
+            Model::TrainingFree(row) => row.open(given),
         }
     }
 }

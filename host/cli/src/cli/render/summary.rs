@@ -47,7 +47,7 @@ fn choice(chosen: &ChosenRecord, weighting: &str) -> String {
     if left_out.is_empty() {
         return format!("chosen: {weighting}, the default: too few sources to leave one out");
     }
-    let of = |candidate: &Candidate| candidate.weighting == weighting && candidate.settings == *settings;
+    let of = |candidate: &Candidate| candidate.weighting == weighting && candidate.options.settings() == settings;
     // A mixture is tried last.
     let own = match mixture {
         Some(_) => candidates.last(),

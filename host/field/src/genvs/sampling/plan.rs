@@ -17,10 +17,11 @@ pub struct Plan {
     /// The run stops when no value of the picture will change by more than this; `None` to run to the last level.
     pub early_termination: Option<f32>,
     /// Whether a denoiser that knows the colours of the feature image starts from them with noise of the largest level,
-    /// instead of from noise alone. Above some level its estimate hardly depends on the noisy picture, and calls there are
-    /// left out.
+    /// instead of from noise alone. Above some level its estimate hardly depends on the noisy picture, and calls there
+    /// are left out.
     pub from_colours: bool,
-    /// Whether [`Accuracy`](super::Accuracy) has the differences of steps, for which each step brings a picture back from the device.
+    /// Whether [`Accuracy`](super::Accuracy) has the differences of steps, for which each step brings a picture back
+    /// from the device.
     pub compares_orders: bool,
     /// Seed of the noise.
     pub seed: u64,
@@ -45,6 +46,13 @@ pub enum Steps {
     },
 }
 
+impl Steps {
+    /// Adaptive levels for this error of a step, with as many calls as the published run at most.
+    pub fn within(tolerance: f32) -> Steps {
+        Steps::Chosen { tolerance, most_calls: 49 }
+    }
+}
+
 impl Plan {
     /// The published run: Heun's method over 25 levels from 80 to 0.002, 49 calls.
     pub fn published(seed: u64) -> Plan {
@@ -65,7 +73,6 @@ impl Plan {
     /// Adaptive levels, for an error of about a level of 255 (root mean square, 0.01 of values between -1
     /// and 1): 15 or 16 calls on the same data, and on data 0.001 wide as well.
     pub fn careful(seed: u64) -> Plan {
-        let steps = Steps::Chosen { tolerance: 0.01, most_calls: 49 };
-        Plan { steps, early_termination: Some(HALF_A_LEVEL), ..Plan::published(seed) }
+        Plan { steps: Steps::within(0.01), early_termination: Some(HALF_A_LEVEL), ..Plan::published(seed) }
     }
 }

@@ -3,73 +3,76 @@
 use super::Sweep;
 use super::sources::SourceMaps;
 use super::views::{Matched, Views};
-use crate::{Effort, Efforts, Encodings, FieldError};
+use crate::{FieldError, Options, Purpose, Setting, Variant};
 use viewfuse_device::Device;
-use viewfuse_scene::photographs::{SourceImage, longest_side};
-
-/// Most planes of a frustum in pictures that are only compared with one another.
-const TRIAL_PLANES: u32 = 32;
+use viewfuse_scene::photographs::SourceImage;
 
 /// Shares of the side at which views are compared and of the planes, and the neighbours of each source, with the error
 /// and the work that are typical of them (`host/results/front_to_back.md`, "Efforts").
 const EFFORTS: [(f32, f32, usize, f32, f32); 4] =
     [(0.25, 0.5, 2, 0.055, 0.1), (0.5, 1.0, 1, 0.035, 0.22), (0.75, 1.0, 1, 0.027, 0.4), (1.0, 1.0, 1, 0.024, 0.8)];
 
-/// Most planes, and the longest side at which views are compared, in pictures for a moving camera.
+/// Most planes, and the longest side at which views are compared, in pictures for a moving camera...
 const PREVIEW: (u32, u32) = (32, 80);
+/// ... and in pictures that are only compared with one another.
+const TRIAL: (u32, u32) = (32, u32::MAX);
 
 impl Sweep {
-    /// Cheaper settings, for a moving camera.
-    pub(in crate::training_free) fn cheaper(self) -> Sweep {
-        let (planes, side) = PREVIEW;
+    /// The efforts for sources of this longest side, the exact one last.
+    pub(in crate::training_free) fn efforts(&self, source_side: u32) -> Vec<Variant<Sweep>> {
+        let side = source_side.min(self.match_side) as f32;
+        let reduced = EFFORTS.map(|(share, planes, neighbours, error, work)| {
+            // The whole side is the settings' own: targets may be larger than the sources.
+            let match_side = if share < 1.0 { (share * side).round().max(1.0) as u32 } else { self.match_side };
+            let plane_count = (self.plane_count as f32 * planes).round() as u32;
+            let neighbours = neighbours.min(self.neighbours);
+            let label =
+                format!("matching at {match_side} pixels, {plane_count} planes, {neighbours} neighbours a source");
+            Variant::new(label, Sweep { plane_count, match_side, neighbours, ..*self }, error, work)
+        });
+        reduced.into_iter().chain([Variant::exact(*self)]).collect()
+    }
+
+    /// With less resolution.
+    pub(in crate::training_free) fn reduced(self, purpose: Purpose) -> Sweep {
+        let (planes, side) = if purpose == Purpose::Preview { PREVIEW } else { TRIAL };
         Sweep { plane_count: self.plane_count.min(planes), match_side: self.match_side.min(side), ..self }
     }
 }
 
-impl<D: Device> Views<'_, D> {
-    /// The settings with shares of the side at which the sources are compared and of the planes, and with at most so
-    /// many neighbours.
-    fn at(&self, share: f32, planes: f32, neighbours: usize) -> Sweep {
-        let side = self.scene.small.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
-        let reduced = (share * side as f32).round().max(1.0) as u32;
-        // The whole side is the settings' own: targets may be larger than the sources.
-        let match_side = if share < 1.0 { reduced } else { self.scene.defaults.match_side };
-        let plane_count = (self.scene.defaults.plane_count as f32 * planes).round() as u32;
-        Sweep { plane_count, match_side, neighbours: neighbours.min(self.scene.defaults.neighbours), ..self.settings }
+impl Options for Sweep {
+    /// Where both find the same disparities of the sources, each from the costs of its own planes.
+    fn encodes_alike(&self, other: &Sweep) -> bool {
+        self.finds_of() == other.finds_of() && self.near_cost == other.near_cost
+    }
+
+    fn settings(&self) -> Vec<Setting> {
+        self.stated(&[])
     }
 }
 
-impl<D: Device> Efforts for Views<'_, D> {
-    fn list(&self) -> Vec<Effort> {
-        let named = |(share, planes, neighbours, error, work): (f32, f32, usize, f32, f32)| {
-            let Sweep { plane_count, match_side, neighbours, .. } = self.at(share, planes, neighbours);
-            let name =
-                format!("matching at {match_side} pixels, {plane_count} planes, {neighbours} neighbours a source");
-            Effort::new(name, error, work)
-        };
-        EFFORTS.into_iter().map(named).chain([Effort::exact()]).collect()
+impl Sweep {
+    /// What the size of what is found of the sources depends on.
+    fn finds_of(&self) -> (u32, u32, usize) {
+        (self.plane_count, self.match_side, self.neighbours)
     }
+}
 
-    fn set(&mut self, effort: usize) -> Result<Encodings, FieldError> {
-        let settings = match EFFORTS.get(effort) {
-            Some((share, planes, neighbours, ..)) => self.at(*share, *planes, *neighbours),
-            None => self.at(1.0, 1.0, self.scene.defaults.neighbours),
-        };
-        if settings == self.settings {
-            return Ok(Encodings::Kept);
+impl<D: Device> Views<'_, D> {
+    /// Goes on with other settings. What is found of the sources is dropped where it has another size.
+    pub(super) fn go_on_with(&mut self, settings: Sweep) -> Result<(), FieldError> {
+        let before = std::mem::replace(&mut self.settings, settings);
+        if before.finds_of() == settings.finds_of() {
+            return Ok(());
         }
-        self.settings = settings;
-        let images = self.scene.small.iter().map(|image| image.reduced(settings.match_side));
-        let images: Vec<SourceImage> = images.collect::<Result<_, _>>().map_err(FieldError::unsuitable)?;
-        let device = self.scene.device;
-        let relevance = std::mem::take(&mut self.maps.relevance);
+        let (device, relevance) = (self.scene.device, std::mem::take(&mut self.maps.relevance));
         self.target = None;
-        self.matched = Matched::upload(device, &images)?;
+        if before.match_side != settings.match_side {
+            let images = self.scene.small.iter().map(|image| image.reduced(settings.match_side));
+            let images: Vec<SourceImage> = images.collect::<Result<_, _>>().map_err(FieldError::unsuitable)?;
+            self.matched = Matched::upload(device, &images)?;
+        }
         self.maps = SourceMaps::new(device, &self.matched, relevance)?;
-        Ok(Encodings::Dropped)
-    }
-
-    fn set_trial(&mut self) {
-        self.settings.plane_count = self.settings.plane_count.min(TRIAL_PLANES);
+        Ok(())
     }
 }

@@ -1,71 +1,58 @@
 //! The scalars that are chosen for a scene, and the pictures that are worth mixing.
 
-use super::views::Views;
 use super::{DEFAULT, Sweep};
-use crate::{Setting, Tunable, Tuned};
-use viewfuse_device::Device;
+use crate::Setting;
 
-const NEAR_COST: &str = "near cost";
 const FRONT_SHARE: &str = "front share";
-const DISSENT_SHARE: &str = "dissent share";
-const TEMPERATURE_NAME: &str = "temperature";
 const SECOND_SHARE: &str = "second share";
-
-/// The scalars that differ most from scene to scene, the most effective ones first.
-const TUNABLES: &[Tunable] = &[
-    Tunable { name: FRONT_SHARE, default: DEFAULT.front_share, others: &[0.0, 0.2] },
-    Tunable { name: NEAR_COST, default: DEFAULT.near_cost, others: &[0.002, 0.02] },
-    Tunable { name: DISSENT_SHARE, default: DEFAULT.dissent_share, others: &[0.0, 0.125] },
-    Tunable { name: SECOND_SHARE, default: DEFAULT.second_share, others: &[0.03] },
-    Tunable { name: TEMPERATURE_NAME, default: DEFAULT.temperature, others: &[0.005, 0.013] },
-];
-
-/// The front share, and the second share, of pictures that are mixed.
-const PART_FRONT_SHARE: f32 = 0.2;
-const PART_SECOND_SHARE: f32 = 0.03;
+const DISSENT_SHARE: &str = "dissent share";
 
 impl Sweep {
-    /// The scalars that can be chosen for a scene, by the names in [`TUNABLES`].
-    fn scalars(&mut self) -> [(&'static str, &mut f32); 5] {
+    /// The scalars that differ most from scene to scene, by their names in a record, in the order in which they are
+    /// chosen.
+    fn scalars(&self) -> [Setting; 5] {
         [
-            (FRONT_SHARE, &mut self.front_share),
-            (SECOND_SHARE, &mut self.second_share),
-            (NEAR_COST, &mut self.near_cost),
-            (DISSENT_SHARE, &mut self.dissent_share),
-            (TEMPERATURE_NAME, &mut self.temperature),
+            (FRONT_SHARE, self.front_share),
+            ("near cost", self.near_cost),
+            (DISSENT_SHARE, self.dissent_share),
+            (SECOND_SHARE, self.second_share),
+            ("temperature", self.temperature),
         ]
-    }
-}
-
-impl<D: Device> Tuned for Views<'_, D> {
-    fn tunables(&self) -> &'static [Tunable] {
-        TUNABLES
+        .map(|(name, value)| Setting { name, value })
     }
 
-    fn tune(&mut self, settings: &[Setting]) {
-        let Sweep { plane_count, match_side, neighbours, .. } = self.settings;
-        self.settings = Sweep { plane_count, match_side, neighbours, ..self.scene.defaults };
-        for Setting { name, value } in settings {
-            if let Some((_, scalar)) = self.settings.scalars().into_iter().find(|(known, _)| known == name) {
-                *scalar = *value;
-            }
+    /// What a record says of them: those that are not at their defaults, and at last these, whatever they are.
+    pub(super) fn stated(&self, last: &[&'static str]) -> Vec<Setting> {
+        let scalars = self.scalars();
+        let is_varied = |(scalar, default): &(&Setting, Setting)| *scalar != default && !last.contains(&scalar.name);
+        let varied = scalars.iter().zip(DEFAULT.scalars()).filter(is_varied).map(|(scalar, _)| *scalar);
+        varied
+            .chain(last.iter().flat_map(|name| scalars.into_iter().filter(move |scalar| scalar.name == *name)))
+            .collect()
+    }
+
+    /// What a step of the search tries in place of these settings, the most effective scalars first; nothing after the
+    /// last step.
+    pub(in crate::training_free) fn candidates(&self, step: usize) -> Vec<Sweep> {
+        match step {
+            0 => [0.0, 0.2].map(|front_share| Sweep { front_share, ..*self }).to_vec(),
+            1 => [0.002, 0.02].map(|near_cost| Sweep { near_cost, ..*self }).to_vec(),
+            2 => [0.0, 0.125].map(|dissent_share| Sweep { dissent_share, ..*self }).to_vec(),
+            3 => vec![Sweep { second_share: 0.03, ..*self }],
+            4 => [0.005, 0.013].map(|temperature| Sweep { temperature, ..*self }).to_vec(),
+            _ => Vec::new(),
         }
     }
 
     /// Where the scene is as most sources see it, as the sources' own disparities say, and as the disparities say that
-    /// are found the second time: each is right where the others are not.
-    fn parts(&mut self, chosen: &[Setting]) -> Vec<Vec<Setting>> {
-        if self.scene.has_silhouettes {
-            return Vec::new();
-        }
-        let with = |others: &[(&'static str, f32)]| {
-            let kept = chosen.iter().filter(|setting| others.iter().all(|(name, _)| *name != setting.name)).copied();
-            kept.chain(others.iter().map(|&(name, value)| Setting { name, value })).collect()
-        };
-        vec![
-            with(&[(FRONT_SHARE, 0.0), (SECOND_SHARE, 0.0)]),
-            chosen.to_vec(),
-            with(&[(FRONT_SHARE, PART_FRONT_SHARE), (SECOND_SHARE, PART_SECOND_SHARE), (DISSENT_SHARE, 0.0)]),
+    /// are found the second time: each is right where the others are not. With what a record says of each.
+    pub(in crate::training_free) fn parts(&self) -> [(Sweep, Vec<Setting>); 3] {
+        let seen = Sweep { front_share: 0.0, second_share: 0.0, ..*self };
+        let second = Sweep { front_share: 0.2, second_share: 0.03, dissent_share: 0.0, ..*self };
+        [
+            (seen, seen.stated(&[FRONT_SHARE, SECOND_SHARE])),
+            (*self, self.stated(&[])),
+            (second, second.stated(&[FRONT_SHARE, SECOND_SHARE, DISSENT_SHARE])),
         ]
     }
 }

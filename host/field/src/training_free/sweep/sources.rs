@@ -1,10 +1,10 @@
 //! The disparities of the sources: found in each one's own frustum, found a second time by what they say of one
 //! another, and kept between runs.
 
-use super::Sweep;
 use super::kept::Key;
 use super::matching::swept;
 use super::views::{Matched, Views};
+use super::{DEFAULT, Sweep};
 use crate::FieldError;
 use std::ops::Range;
 use viewfuse_core::camera::CameraBlock;
@@ -96,7 +96,7 @@ impl<D: Device> Views<'_, D> {
         }
         // A source's own planes contradict no maps, and the temperature is the picture's: with them the same maps are
         // found.
-        let Sweep { dissent_share, temperature, .. } = self.scene.defaults;
+        let Sweep { dissent_share, temperature, .. } = DEFAULT;
         let settings = Sweep { front_share: self.settings.second_share, dissent_share, temperature, ..self.settings };
         let known = self.maps.settled.take().filter(|known| known.settings == settings);
         let Settled { mut voters, mut maps, .. } = match known {
@@ -210,7 +210,7 @@ impl<D: Device> Views<'_, D> {
     pub(super) fn find(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
         self.maps.settled = None;
         self.target = None;
-        let settings = Sweep { dissent_share: self.scene.defaults.dissent_share, ..self.settings };
+        let settings = Sweep { dissent_share: DEFAULT.dissent_share, ..self.settings };
         let (frustum, swept) = self.source_frustum(view, settings);
         self.maps.steps[view] = frustum.disparity_step;
         let kept = self.scene.kept.as_ref();

@@ -8,14 +8,16 @@ use super::sources::SourceMaps;
 use super::target::{TargetViews, Volume};
 use super::{Sweep, holes, search, unseen};
 use crate::training_free::space::Space;
+use crate::variant::erased;
 use crate::{
-    DepthMap, Efforts, Encoding, FieldError, Geometry, Prepared, Rendered, Request, Surfaces, Tuned, Weighted,
+    AnyOptions, DepthMap, Encoding, FieldError, Geometry, Prepared, Purpose, Rendered, Request, Surfaces, Variant,
+    Weighted,
 };
 use std::borrow::Cow;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
-use viewfuse_scene::photographs::{SourceImage, SourceImages};
+use viewfuse_scene::photographs::{SourceImage, SourceImages, longest_side};
 use viewfuse_weighting::sources::SourceWeights;
 
 /// Most views that contribute to a picture: more of less weight lose (`host/results/training_free.md`, "Many sources").
@@ -24,7 +26,6 @@ const MAX_VIEWS: usize = 9;
 /// Photographs on the device at two sizes, and their disparity maps.
 pub(super) struct Views<'a, D: Device> {
     pub(super) scene: SceneViews<'a, D>,
-    /// The settings of the effort, with the scalars that are chosen.
     pub(super) settings: Sweep,
     /// For an effort.
     pub(super) matched: Matched<D>,
@@ -38,8 +39,6 @@ pub(super) struct Views<'a, D: Device> {
 /// What stays as long as the sources do.
 pub(super) struct SceneViews<'a, D: Device> {
     pub(super) device: &'a D,
-    /// The settings before any effort or scalar was chosen.
-    pub(super) defaults: Sweep,
     pub(super) has_silhouettes: bool,
     background: [f32; 3],
     /// At the size of the pictures.
@@ -97,8 +96,7 @@ impl<'a, D: Device> Views<'a, D> {
         let matched = Matched::upload(device, &small)?;
         let maps = SourceMaps::new(device, &matched, Vec::new())?;
         let (background, pictures) = (sources.background, Images::upload(device, &pictures)?);
-        let defaults = settings;
-        let scene = SceneViews { device, defaults, has_silhouettes, background, pictures, small, space, kept };
+        let scene = SceneViews { device, has_silhouettes, background, pictures, small, space, kept };
         Ok(Views { scene, settings, matched, maps, target: None, scratch: Scratch::default() })
     }
 
@@ -171,12 +169,31 @@ impl<D: Device> Prepared for Views<'_, D> {
         Some(self)
     }
 
-    fn efforts(&mut self) -> Option<&mut dyn Efforts> {
-        Some(self)
+    fn set(&mut self, options: &AnyOptions) -> Result<(), FieldError> {
+        options.of().map_or(Ok(()), |settings| self.go_on_with(*settings))
     }
 
-    fn tuned(&mut self) -> Option<&mut dyn Tuned> {
-        Some(self)
+    fn efforts(&self, options: &AnyOptions) -> Vec<Variant<AnyOptions>> {
+        let side = self.scene.small.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
+        erased(options.of::<Sweep>().map_or_else(Vec::new, |settings| settings.efforts(side)))
+    }
+
+    fn reduced(&self, options: &AnyOptions, purpose: Purpose) -> AnyOptions {
+        options.of::<Sweep>().map_or_else(|| options.clone(), |settings| AnyOptions::new(settings.reduced(purpose)))
+    }
+
+    fn candidates(&self, chosen: &AnyOptions, step: usize) -> Vec<AnyOptions> {
+        let candidates = chosen.of::<Sweep>().map_or_else(Vec::new, |settings| settings.candidates(step));
+        candidates.into_iter().map(AnyOptions::new).collect()
+    }
+
+    fn parts(&self, chosen: &AnyOptions) -> Vec<AnyOptions> {
+        match chosen.of::<Sweep>() {
+            Some(settings) if !self.scene.has_silhouettes => {
+                settings.parts().map(|(part, stated)| AnyOptions::stated(part, stated)).to_vec()
+            }
+            _ => Vec::new(),
+        }
     }
 
     fn geometry(&self) -> Option<&dyn Geometry> {
