@@ -2,7 +2,6 @@
 //! faster form of. Arrays that may lie in pages lie in four. What a GPU's workgroup computes together runs so as well, with a
 //! thread for each invocation.
 
-use bytemuck::{Pod, cast_slice_mut};
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Barrier, Mutex};
@@ -127,21 +126,13 @@ fn paged_mut<T>(all: &mut [T]) -> PagesMut<'_, T> {
     PagesMut { a, b, c, d, shift }
 }
 
-/// Numbers as elements of several of them, as far as they are whole.
-fn elements_of<H: Pod, E: Pod>(values: &mut [H]) -> &mut [E] {
-    let count = size_of_val(values) / size_of::<E>();
-    cast_slice_mut(&mut values[..count * size_of::<E>() / size_of::<H>()])
-}
-
 /// How a body gets an array.
 macro_rules! lend {
     ($kind:ident $array:ident $Host:ty, vectors) => { lend!($kind $array $Host) };
     (write $array:ident $Host:ty) => { &mut $array[..] };
-    (write $array:ident $Host:ty, $Entry:ty) => { elements_of::<$Host, $Entry>($array) };
     (write_paged $array:ident $Host:ty) => { &mut paged_mut(&mut $array[..]) };
     (paged $array:ident $Host:ty) => { &paged(&$array[..]) };
     (one $array:ident $Host:ty) => { &$array[0] };
-    (one $array:ident $Host:ty, FourierEmbedding) => { &FourierEmbedding::from_flat($array) };
     ($kind:ident $array:ident $Host:ty) => { &$array[..] };
 }
 
