@@ -1,10 +1,10 @@
 //! Compositing: samples along a ray become a pixel, by emission and absorption, one sample at a time.
 //!
 //! Source: NeRF, equation 3, in transmittance form. With the optical depth `o_i = density_i * length_i` of sample `i`,
-//! the transmittance in front of it is `T_i = exp(-(o_0 + ... + o_(i-1)))` and its weight is `T_i - T_(i+1)`. The optical
-//! depth is summed before the exponential, so thin samples are not lost one by one (`1 - exp(-o)` in `f32` is wrong by
-//! 1.3 % at 1e-6), and the weights telescope to `1 - T_end`. Exclusive: a sample does not shade itself (in published
-//! GeNVS it does).
+//! the transmittance in front of it is `T_i = exp(-(o_0 + ... + o_(i-1)))` and its weight is `T_i - T_(i+1)`. The
+//! optical depth is summed before the exponential, so thin samples are not lost one by one (`1 - exp(-o)` in `f32` is
+//! wrong by 1.3 % at 1e-6), and the weights telescope to `1 - T_end`. Exclusive: a sample does not shade itself (in
+//! published GeNVS it does).
 
 use crate::fetch::Fetch;
 use crate::math::{exp, max};
@@ -85,8 +85,8 @@ impl<const C: usize> Compositor<C> {
     /// sample's occupancy in `[0, 1]` (NaN counts as 0). Returns the sample's weight.
     ///
     /// This is the volume rendering of nested solids, one for each level of occupancy: the transmittance is 1 minus
-    /// the largest occupancy so far, for any step, while a density would depend on the step. For one ray use either this
-    /// or [`Compositor::add`].
+    /// the largest occupancy so far, for any step, while a density would depend on the step. For one ray use either
+    /// this or [`Compositor::add`].
     #[inline]
     pub fn add_solid(&mut self, channels: &[f32; C], occupancy: f32, depth: f32) -> f32 {
         if !(1.0 - occupancy < self.transmittance) {
@@ -95,9 +95,9 @@ impl<const C: usize> Compositor<C> {
         self.pass(channels, max(1.0 - occupancy, 0.0), depth)
     }
 
-    /// Adds the next surface, front to back, that covers the share `alpha` in `[0, 1]` of what lies behind it (NaN counts as
-    /// 0): the transmittance is multiplied by `1 - alpha`. Returns the surface's weight. For one ray use either this, or
-    /// [`Compositor::add`], or [`Compositor::add_solid`].
+    /// Adds the next surface, front to back, that covers the share `alpha` in `[0, 1]` of what lies behind it (NaN
+    /// counts as 0): the transmittance is multiplied by `1 - alpha`. Returns the surface's weight. For one ray use
+    /// either this, or [`Compositor::add`], or [`Compositor::add_solid`].
     #[inline]
     pub fn add_alpha(&mut self, channels: &[f32; C], alpha: f32, depth: f32) -> f32 {
         if !(alpha > 0.0) {

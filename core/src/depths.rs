@@ -33,7 +33,8 @@ pub fn inverse_cdf<const N: usize>(near: f32, far: f32, weights: &[f32; N], u: f
     stratified_depth(near, far, part as u32, N as u32, inside)
 }
 
-/// The part, of `count` parts of these weights, in which their distribution reaches `u`, and the share of the part below.
+/// The part, of `count` parts of these weights, in which their distribution reaches `u`, and the share of the part
+/// below.
 #[inline]
 fn part_at(weights: &(impl Fetch<f32> + ?Sized), count: usize, u: f32) -> (usize, f32) {
     let mut total = 0.0;
@@ -107,8 +108,8 @@ impl FineBlock {
 }
 
 /// The random numbers that place fine sample `index` of a pixel's ray: for importance samples where in the distribution
-/// (one in each of as many equal parts as there are samples, in `[0, 1]`: the sum may round up) and where in the part that
-/// it hits, in `[0, 1)`; for depth samples a normal number and 0.
+/// (one in each of as many equal parts as there are samples, in `[0, 1]`: the sum may round up) and where in the part
+/// that it hits, in `[0, 1)`; for depth samples a normal number and 0.
 #[inline]
 pub fn random_draw(pixel: u32, index: u32, block: &FineBlock) -> [f32; 2] {
     let counter = block.coarse_count + index;

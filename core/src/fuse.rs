@@ -38,8 +38,8 @@ macro_rules! readings {
 
 readings!(u8, i8, u16, i16);
 
-/// As [`fuse_views`] for readings that are whole numbers: `readings[view][channel]` to `[channel]`, with the same bits as
-/// for these numbers as `f32`, and without a copy of them.
+/// As [`fuse_views`] for readings that are whole numbers: `readings[view][channel]` to `[channel]`, with the same bits
+/// as for these numbers as `f32`, and without a copy of them.
 #[inline]
 pub fn fuse_readings<T: Reading, const S: usize, const C: usize>(
     weights: &Weights<S>,

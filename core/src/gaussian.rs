@@ -1,13 +1,13 @@
 //! Three-dimensional Gaussians: projection to the image, opacity at a pixel, colour from a direction.
 //!
 //! A Gaussian has a mean, a covariance `R S S R^T` (rotation `R` of a unit quaternion, `S` the diagonal of its standard
-//! deviations), an opacity and a colour. Its projection is the two-dimensional Gaussian of the first-order expansion of the
-//! pinhole at the mean (EWA splatting: Zwicker et al. 2001), dilated by [`DILATION`] as in the published code of
+//! deviations), an opacity and a colour. Its projection is the two-dimensional Gaussian of the first-order expansion of
+//! the pinhole at the mean (EWA splatting: Zwicker et al. 2001), dilated by [`DILATION`] as in the published code of
 //! "3D Gaussian Splatting" (Kerbl et al. 2023). Projected Gaussians, sorted by depth, are composited front to back with
 //! [`crate::composite::Compositor::add_alpha`].
 //!
-//! All functions are total: what cannot be drawn (behind the near bound, transparent, a covariance that is not finite) has
-//! the opacity 0 and covers no pixel.
+//! All functions are total: what cannot be drawn (behind the near bound, transparent, a covariance that is not finite)
+//! has the opacity 0 and covers no pixel.
 
 use crate::camera::CameraBlock;
 use crate::composite::Compositor;
@@ -20,7 +20,8 @@ use glam::Vec3;
 pub const DILATION: f32 = 0.3;
 /// Least opacity at a pixel: below it a Gaussian adds nothing there.
 pub const MIN_ALPHA: f32 = 1.0 / 255.0;
-/// Greatest opacity at a pixel: something of what lies behind is always seen, and the backward pass can divide by the rest.
+/// Greatest opacity at a pixel: something of what lies behind is always seen, and the backward pass can divide by the
+/// rest.
 pub const MAX_ALPHA: f32 = 0.99;
 /// Transmittance at which what lies behind is left out: together it has at most this weight.
 pub const MIN_TRANSMITTANCE: f32 = 1.0e-4;
@@ -78,8 +79,8 @@ pub struct ProjectedGaussian {
 
 const _: () = assert!(size_of::<ProjectedGaussian>() == 64);
 
-/// The rotation of a quaternion `w, x, y, z` of any length: the Gaussian's axes in world coordinates. The identity for a
-/// quaternion that is zero or not finite.
+/// The rotation of a quaternion `w, x, y, z` of any length: the Gaussian's axes in world coordinates. The identity for
+/// a quaternion that is zero or not finite.
 #[inline]
 pub fn axes(rotation: [f32; 4]) -> [Vec3; 3] {
     let [w, x, y, z] = rotation;
@@ -103,9 +104,9 @@ pub fn opacity(logit: f32) -> f32 {
     odds / (1.0 + odds)
 }
 
-/// The rows of the matrix that takes a Gaussian's own axes, each of its standard deviation's length, to the image: pixels
-/// along x and y. `place` is the mean in the camera's axes, its `z` positive. The covariance in the image is this matrix
-/// times its transpose.
+/// The rows of the matrix that takes a Gaussian's own axes, each of its standard deviation's length, to the image:
+/// pixels along x and y. `place` is the mean in the camera's axes, its `z` positive. The covariance in the image is
+/// this matrix times its transpose.
 #[inline]
 pub fn image_axes(gaussian: &GaussianBlock, camera: &CameraBlock, place: Vec3) -> [Vec3; 2] {
     let [focal_x, focal_y, principal_x, principal_y] = camera.intrinsics;
@@ -136,10 +137,11 @@ pub fn image_axes(gaussian: &GaussianBlock, camera: &CameraBlock, place: Vec3) -
     ]
 }
 
-/// A Gaussian in a camera's image. What is nearer than `near` (depth along the principal axis, world units) is not drawn.
+/// A Gaussian in a camera's image. What is nearer than `near` (depth along the principal axis, world units) is not
+/// drawn.
 ///
-/// The determinant of the covariance is a sum of squares (Lagrange's identity for the two rows of [`image_axes`]), which loses
-/// nothing for a long and thin Gaussian, where the difference of two products would.
+/// The determinant of the covariance is a sum of squares (Lagrange's identity for the two rows of [`image_axes`]),
+/// which loses nothing for a long and thin Gaussian, where the difference of two products would.
 #[inline]
 pub fn project(gaussian: &GaussianBlock, camera: &CameraBlock, near: f32) -> ProjectedGaussian {
     let hidden = ProjectedGaussian::default();
@@ -176,7 +178,8 @@ pub fn project(gaussian: &GaussianBlock, camera: &CameraBlock, near: f32) -> Pro
 }
 
 impl ProjectedGaussian {
-    /// The opacity at the image coordinate `(x, y)`: in `[MIN_ALPHA, MAX_ALPHA]`, or 0. A coordinate that is NaN gives 0.
+    /// The opacity at the image coordinate `(x, y)`: in `[MIN_ALPHA, MAX_ALPHA]`, or 0. A coordinate that is NaN gives
+    /// 0.
     #[inline]
     pub fn alpha(&self, x: f32, y: f32) -> f32 {
         let (right, down) = (x - self.mean[0], y - self.mean[1]);
@@ -187,8 +190,8 @@ impl ProjectedGaussian {
         if alpha >= MIN_ALPHA { alpha } else { 0.0 }
     }
 
-    /// The pixels of an image whose centres are in the box of [`ProjectedGaussian::extent`]: first column, column behind the
-    /// last, first row, row behind the last. Nothing is covered where a first one is not below its end.
+    /// The pixels of an image whose centres are in the box of [`ProjectedGaussian::extent`]: first column, column
+    /// behind the last, first row, row behind the last. Nothing is covered where a first one is not below its end.
     #[inline]
     pub fn pixels(&self, width: u32, height: u32) -> [u32; 4] {
         if !(self.opacity > 0.0) {
@@ -202,11 +205,12 @@ impl ProjectedGaussian {
     }
 }
 
-/// The indices of projected Gaussians, nearest first, those of equal depth in their own order. Those that are not drawn come
-/// first and cover nothing. `order` has the length of `projected`; what is beyond the shorter of both is left alone.
+/// The indices of projected Gaussians, nearest first, those of equal depth in their own order. Those that are not drawn
+/// come first and cover nothing. `order` has the length of `projected`; what is beyond the shorter of both is left
+/// alone.
 ///
-/// Rust's own sort of slices: at most a multiple of `N log N` comparisons, and it recurses at most `2 log N` deep. On a GPU
-/// the host sorts.
+/// Rust's own sort of slices: at most a multiple of `N log N` comparisons, and it recurses at most `2 log N` deep. On a
+/// GPU the host sorts.
 pub fn nearest_first(projected: &[ProjectedGaussian], order: &mut [u32]) {
     let count = if order.len() < projected.len() { order.len() } else { projected.len() };
     let order = &mut order[..count];
@@ -217,9 +221,9 @@ pub fn nearest_first(projected: &[ProjectedGaussian], order: &mut [u32]) {
     order.sort_unstable_by_key(|index| (projected[*index as usize].depth.to_bits(), *index));
 }
 
-/// A row of an image of `W` columns: pixel by pixel what is in front of what. `order` are `count` indices, nearest first
-/// ([`nearest_first`]). A pixel whose transmittance is at most [`MIN_TRANSMITTANCE`] takes nothing more. Channels are summed
-/// in the order of the depths.
+/// A row of an image of `W` columns: pixel by pixel what is in front of what. `order` are `count` indices, nearest
+/// first ([`nearest_first`]). A pixel whose transmittance is at most [`MIN_TRANSMITTANCE`] takes nothing more. Channels
+/// are summed in the order of the depths.
 #[inline]
 pub fn composite_row<const W: usize>(
     projected: &(impl Fetch<ProjectedGaussian> + ?Sized),
@@ -249,8 +253,9 @@ pub fn composite_row<const W: usize>(
 /// Numbers of a channel's coefficients beyond degree 0, for degrees 0 to 3.
 pub const REST_COUNTS: [u32; 4] = [0, 3, 8, 15];
 
-/// The colour of a Gaussian seen along `direction` (from the camera to the mean; any length, zero leaves degree 0 alone), red,
-/// green, blue, at least 0: `0.5` plus the spherical harmonics up to `degree` (at most 3) of the published code.
+/// The colour of a Gaussian seen along `direction` (from the camera to the mean; any length, zero leaves degree 0
+/// alone), red, green, blue, at least 0: `0.5` plus the spherical harmonics up to `degree` (at most 3) of the published
+/// code.
 ///
 /// `f_dc` are the coefficients of degree 0; `f_rest` those of the higher degrees, `[channel][coefficient]` with
 /// [`REST_COUNTS`]`[degree]` coefficients a channel. Terms are added in the order of the coefficients.

@@ -1,9 +1,10 @@
 //! Lenses: where a point of the ideal (pinhole) image appears in a photograph taken through a real lens, and back.
 //!
-//! Points are in normalised coordinates: `x / z`, `y / z` of a point in camera coordinates (x right, y down, z forward), so
-//! that the pixel is `focal * point + principal`. [`Lens::distort`] maps the ideal point to the photograph's,
-//! [`Lens::undistort`] is its inverse. Two families cover the models of COLMAP, OpenCV and nerfstudio (OpenCV's documentation,
-//! "Camera Calibration and 3D Reconstruction" and "Fisheye camera model"); a model with fewer coefficients leaves the others 0:
+//! Points are in normalised coordinates: `x / z`, `y / z` of a point in camera coordinates (x right, y down, z
+//! forward), so that the pixel is `focal * point + principal`. [`Lens::distort`] maps the ideal point to the
+//! photograph's, [`Lens::undistort`] is its inverse. Two families cover the models of COLMAP, OpenCV and nerfstudio
+//! (OpenCV's documentation, "Camera Calibration and 3D Reconstruction" and "Fisheye camera model"); a model with fewer
+//! coefficients leaves the others 0:
 //!
 //! ```text
 //! perspective   r2 = x^2 + y^2,  g = (1 + k1 r2 + k2 r2^2 + k3 r2^3) / (1 + k4 r2 + k5 r2^2 + k6 r2^3)
@@ -310,8 +311,8 @@ fn radial_slope(is_fisheye: bool, coefficients: &[f64; 8], radius: f64) -> f64 {
 /// until it reduces the residual. It ends if no step does, after 24 steps at most. Total: if no ideal point maps to the
 /// given one, or it is not finite, the residual is large or not finite.
 ///
-/// Inside [`Lens::reach`] the residual is a few units in the last place of the point (in `f64` below 1e-14 for points up
-/// to 10; in `f32` below 2e-6).
+/// Inside [`Lens::reach`] the residual is a few units in the last place of the point (in `f64` below 1e-14 for points
+/// up to 10; in `f32` below 2e-6).
 #[inline]
 pub fn undistort<T: Real>(is_fisheye: bool, coefficients: &[T; 8], point: [T; 2]) -> Undistorted<T> {
     let guess = if is_fisheye { unbent(coefficients, point) } else { straightened(coefficients, point) };

@@ -1,8 +1,8 @@
 //! The mathematics of viewfuse, at fixed sizes.
 //!
 //! Everything here is `no_std`, free of allocation and of `unsafe`, and computes in `f32` and 32-bit integers (only the
-//! metrics, which never run on a device, in `f64`; lenses in either), so that one body serves as the definition on a workstation, as a
-//! part of a GPU kernel and as firmware. The modules are listed in the order of the data:
+//! metrics, which never run on a device, in `f64`; lenses in either), so that one body serves as the definition on a
+//! workstation, as a part of a GPU kernel and as firmware. The modules are listed in the order of the data:
 //!
 //! ```text
 //! math              one result on every target                     sqrt, exp, sin_cos, angles, norms

@@ -1,8 +1,8 @@
 //! Interpolation in grids of `C` channels.
 //!
-//! Grids are `[row][column]` or `[slice][row][column]`, flat, row-major, one `[f32; C]` a node. Coordinates are continuous
-//! with node centres at halves (the image convention of [`crate::camera`]). Outside the outermost centres the border
-//! node's value is used; a NaN coordinate counts as 0. Grids shorter than the stated size are not allowed.
+//! Grids are `[row][column]` or `[slice][row][column]`, flat, row-major, one `[f32; C]` a node. Coordinates are
+//! continuous with node centres at halves (the image convention of [`crate::camera`]). Outside the outermost centres
+//! the border node's value is used; a NaN coordinate counts as 0. Grids shorter than the stated size are not allowed.
 
 use crate::fetch::Fetch;
 use crate::math::clamp;
@@ -83,8 +83,8 @@ pub fn bilinear_channel_from<const C: usize>(
     upper + (lower - upper) * share_y
 }
 
-/// Trilinear look-up in `grid[slice][row][column]`, `size` = `[columns, rows, slices]`, all at least 1. Columns are mixed
-/// first, then rows, then slices.
+/// Trilinear look-up in `grid[slice][row][column]`, `size` = `[columns, rows, slices]`, all at least 1. Columns are
+/// mixed first, then rows, then slices.
 #[inline]
 pub fn trilinear<const C: usize>(
     grid: &(impl Fetch<[f32; C]> + ?Sized),

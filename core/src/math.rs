@@ -127,7 +127,8 @@ pub fn exp(x: f32) -> f32 {
 }
 
 /// Natural logarithm: error at most 0.9 ULP for normal numbers. Zero, negative numbers, subnormals (devices may flush
-/// them) and NaN give the logarithm of the smallest normal number, -87.3; infinity that of the largest finite one, 88.7.
+/// them) and NaN give the logarithm of the smallest normal number, -87.3; infinity that of the largest finite one,
+/// 88.7.
 #[inline]
 pub fn ln(x: f32) -> f32 {
     // ln 2 in two parts, as in `exp`.
@@ -156,8 +157,8 @@ pub fn ln(x: f32) -> f32 {
     (r + rest) + LN_2_HIGH * k
 }
 
-/// `ln(a / b)` for positive normal numbers whose quotient is one: relative error at most 4e-7, also where they are almost
-/// equal and the quotient alone has lost their difference. Otherwise as [`ln`].
+/// `ln(a / b)` for positive normal numbers whose quotient is one: relative error at most 4e-7, also where they are
+/// almost equal and the quotient alone has lost their difference. Otherwise as [`ln`].
 #[inline]
 pub fn ln_ratio(a: f32, b: f32) -> f32 {
     // Twice the inverse hyperbolic tangent of z; the difference of numbers within a factor of 2 is exact.

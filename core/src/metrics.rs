@@ -53,7 +53,8 @@ pub fn ssim(prediction: &[u8], truth: &[u8], width: usize, height: usize, channe
     Some(total / window_count as f64)
 }
 
-/// SSIM of the window whose top left corner is `[row, column]`, in one channel. The sums are whole numbers, hence exact.
+/// SSIM of the window whose top left corner is `[row, column]`, in one channel. The sums are whole numbers, hence
+/// exact.
 fn window_similarity(prediction: &[u8], truth: &[u8], width: usize, channel_count: usize, at: [usize; 3]) -> f64 {
     const COUNT: f64 = (SSIM_WINDOW * SSIM_WINDOW) as f64;
     const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);

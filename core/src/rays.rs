@@ -5,8 +5,8 @@ use crate::fetch::Fetch;
 use crate::math::{max, norm3};
 use bytemuck::{Pod, Zeroable};
 
-/// A ray of a target with its near and far bounds, as plain data. World coordinates; `near` and `far` are distances from
-/// the origin in lengths of `direction`, `far` at least `near`.
+/// A ray of a target with its near and far bounds, as plain data. World coordinates; `near` and `far` are distances
+/// from the origin in lengths of `direction`, `far` at least `near`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
@@ -31,8 +31,8 @@ pub struct CastBlock {
     pub near: f32,
     /// See [`TargetRay::far`].
     pub far: f32,
-    /// Where in a pixel its centre is: 0.5 in this crate's convention, 0 in published PixelNeRF's, whose rays go through
-    /// the pixels' upper left corners.
+    /// Where in a pixel its centre is: 0.5 in this crate's convention, 0 in published PixelNeRF's, whose rays go
+    /// through the pixels' upper left corners.
     pub pixel_centre: f32,
     /// 1 if depths are measured along the target's principal axis, 0 if along the rays.
     pub along_axis: u32,

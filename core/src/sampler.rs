@@ -13,8 +13,8 @@
 //!                       coefficients for even steps, although the steps are not (on even ones it has order 4)
 //! ```
 //!
-//! `heun` is the published run. Of the samplers that were tried, `ipndm` has the least error up to 25 calls and `unipc` with
-//! more (`host/results/speed.md` has the table).
+//! `heun` is the published run. Of the samplers that were tried, `ipndm` has the least error up to 25 calls and `unipc`
+//! with more (`host/results/speed.md` has the table).
 //!
 //! Multistep samplers begin with lower orders until they have enough results. What they put a polynomial through is the
 //! denoised picture over the logarithm of the level, for `ipndm` the direction `(x - D) / s` over the level
@@ -54,8 +54,8 @@ pub enum Corrected {
     Never,
     /// By a call at the level reached, made for that: twice the calls. The state that the step reached is corrected.
     ByAnotherCall,
-    /// By the call at the level reached that the next step needs anyway. What is corrected is the step: from the state in
-    /// which it began.
+    /// By the call at the level reached that the next step needs anyway. What is corrected is the step: from the state
+    /// in which it began.
     ByTheNextCall,
 }
 
@@ -66,8 +66,8 @@ pub enum Corrected {
 /// - `results`: how many results a step combines, once there are so many,
 /// - `keeps`: what is kept of a call at a level; [`denoised`] or a function from the level to a mix,
 /// - `step`: the step from the newest of the levels, by so many results, to a level,
-/// - `corrected`, `correction`: when a step is corrected, and the mix of that from the levels, their count and the level
-///   reached; [`none`] where it never is.
+/// - `corrected`, `correction`: when a step is corrected, and the mix of that from the levels, their count and the
+///   level reached; [`none`] where it never is.
 macro_rules! samplers {
     ($($(#[$attribute:meta])+ $sampler:ident {
         name: $name:literal,
@@ -222,8 +222,8 @@ impl Sampler {
         self.step_by(&history.levels, known, next)
     }
 
-    /// What the step to `next` adds to the step by one result less: the size of the error of such a step, without another
-    /// call (embedded solutions of two orders). `None` where a step has one result only.
+    /// What the step to `next` adds to the step by one result less: the size of the error of such a step, without
+    /// another call (embedded solutions of two orders). `None` where a step has one result only.
     pub fn embedded_difference(self, history: &History, next: f32) -> Option<Mix> {
         let known = if self.result_count() < history.count { self.result_count() } else { history.count };
         if known < 2 || !(next < history.levels[0]) {
@@ -233,9 +233,9 @@ impl Sampler {
         Some(self.step_by(&history.levels, known, next).beyond(&less))
     }
 
-    /// The correction of a step that reached level `reached`, from what was kept of the calls at the levels of the history
-    /// and, as the newest result, of the one at the level reached; of which state, [`Corrected`] says. Where nothing is
-    /// corrected, the state.
+    /// The correction of a step that reached level `reached`, from what was kept of the calls at the levels of the
+    /// history and, as the newest result, of the one at the level reached; of which state, [`Corrected`] says. Where
+    /// nothing is corrected, the state.
     pub fn correction(self, history: &History, reached: f32) -> Mix {
         if history.count == 0 || !(reached < history.levels[0] && reached > 0.0) {
             return Mix::STAY;

@@ -14,7 +14,8 @@
 //! ```
 //!
 //! so no difference of large numbers is divided by a small level, `x` may be overwritten by `e`, and the state may
-//! be `f32` (the published one is `f64`). Everything but [`HeunStep`]'s two formulas runs once a step, not once a pixel.
+//! be `f32` (the published one is `f64`). Everything but [`HeunStep`]'s two formulas runs once a step, not once a
+//! pixel.
 
 use crate::math::{clamp, ln, min, norm3, seventh_root, two_product, two_sum};
 use bytemuck::{Pod, Zeroable};
@@ -87,8 +88,8 @@ impl NoiseSchedule {
     }
 
     /// Level `index` of `count`: `(max^(1/7) + index / (count - 1) (min^(1/7) - max^(1/7)))^7`. Level 0 is exactly the
-    /// largest, level `count - 1` exactly the smallest (a single level is the largest), and level `count` and everything
-    /// behind it 0. Error at most 0.6 ULP for counts up to 2^24 (3 ULP below 1e-28).
+    /// largest, level `count - 1` exactly the smallest (a single level is the largest), and level `count` and
+    /// everything behind it 0. Error at most 0.6 ULP for counts up to 2^24 (3 ULP below 1e-28).
     pub fn level(&self, index: u32, count: u32) -> f32 {
         if index >= count {
             return 0.0;
@@ -198,8 +199,8 @@ pub struct HeunStep {
 }
 
 impl HeunStep {
-    /// From level `sigma` to level `next`, both at least 0. From level 0 the step gives the denoised value. Factors that
-    /// would overflow are the largest finite number.
+    /// From level `sigma` to level `next`, both at least 0. From level 0 the step gives the denoised value. Factors
+    /// that would overflow are the largest finite number.
     pub fn between(sigma: f32, next: f32) -> HeunStep {
         let remaining = if sigma > 0.0 { min(next / sigma, f32::MAX) } else { 0.0 };
         let correction = if next > 0.0 { clamp(0.5 * ((sigma - next) / next), -0.5, f32::MAX) } else { 0.0 };

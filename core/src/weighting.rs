@@ -25,7 +25,8 @@
 //! weight; where squares approach overflow it is not. Weights below 4e-38 may be 0.
 //! `viewfuse::check::oracle` derives these bounds, and tests assert them for each weight.
 //!
-//! [`Formula`], [`ROWS`] and [`weigh`] come from one list below: a scheme is one row of it, and a function in `formulas`.
+//! [`Formula`], [`ROWS`] and [`weigh`] come from one list below: a scheme is one row of it, and a function in
+//! `formulas`.
 
 mod formulas;
 mod scheme;
@@ -40,8 +41,8 @@ use scheme::Limits;
 /// Added to every error before the reciprocal, as in the published code.
 pub const ERROR_OFFSET: f32 = 1.0e-6;
 
-/// Makes [`Formula`], [`ROWS`] and [`weigh`] from one row a scheme. Of a row the documentation, the number and the columns
-/// are those of [`Row`]; `weigh` is the formula's function.
+/// Makes [`Formula`], [`ROWS`] and [`weigh`] from one row a scheme. Of a row the documentation, the number and the
+/// columns are those of [`Row`]; `weigh` is the formula's function.
 macro_rules! schemes {
     ($($(#[doc = $doc:literal])+ $formula:ident = $number:literal {
         name: $name:literal,

@@ -1,8 +1,9 @@
 //! Times of GeNVS's parts on the CPU at full size: `cargo bench -p viewfuse-tests --bench genvs [-- ROUNDS]`.
 //!
-//! Encoder passes of three photographs of 128 x 128, and single calls of the denoiser: a run of eight levels less one of two,
-//! by six, so that parameters are where they are needed and buffers are there. In turns, because what else a machine does
-//! changes from second to second; medians of all rounds, as one line of JSON for programs (`tests/compare_pytorch_genvs`).
+//! Encoder passes of three photographs of 128 x 128, and single calls of the denoiser: a run of eight levels less one
+//! of two, by six, so that parameters are where they are needed and buffers are there. In turns, because what else a
+//! machine does changes from second to second; medians of all rounds, as one line of JSON for programs
+//! (`tests/compare_pytorch_genvs`).
 
 use std::time::Instant;
 use viewfuse::device::cpu::Cpu;

@@ -1,15 +1,15 @@
 //! How fast, and against what limit: `cargo bench -p viewfuse-tests`.
 //!
 //! - `weights`: error weighting of 32 sources for 251 targets on one core (SRN's test trajectory).
-//! - `sample`: the field at a point, on one core; the unit in which a render's time is counted. A sample asks `S` views;
-//!   each view costs a projection (21 operations and a reciprocal), a bilinear look-up of 4 channels (4 texels of 16
-//!   bytes, 30 operations) and, for a view with a weight, one of the depths (4 of 4 bytes, 25 operations) and its fusion
-//!   (25 operations): about 100 operations and 80 bytes a view. The maps of 15 views at 160x120 are 5.8 MB, so the
-//!   look-ups hit the second-level cache: it is the chain of dependent operations that bounds a sample, not memory.
+//! - `sample`: the field at a point, on one core; the unit in which a render's time is counted. A sample asks `S`
+//!   views; each view costs a projection (21 operations and a reciprocal), a bilinear look-up of 4 channels (4 texels
+//!   of 16 bytes, 30 operations) and, for a view with a weight, one of the depths (4 of 4 bytes, 25 operations) and its
+//!   fusion (25 operations): about 100 operations and 80 bytes a view. The maps of 15 views at 160x120 are 5.8 MB, so
+//!   the look-ups hit the second-level cache: it is the chain of dependent operations that bounds a sample, not memory.
 //! - `prepare`, `encode`, `render`: the stages of the sample scene at its own size, on all cores.
 //! - `40 thousand Gaussians`: opening a file of them, from the system's cache.
-//! - with `VIEWFUSE_BENCH_SCENE=FOLDER` (a full path): the first view of that scene from all others at 160 pixels across, from the
-//!   photographs in memory to the picture, on the CPU and on each Vulkan device.
+//! - with `VIEWFUSE_BENCH_SCENE=FOLDER` (a full path): the first view of that scene from all others at 160 pixels
+//!   across, from the photographs in memory to the picture, on the CPU and on each Vulkan device.
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;

@@ -1,8 +1,9 @@
 //! How soon the viewer shows something: `cargo bench -p viewfuse-cli --bench view [-- SECONDS]`.
 //!
-//! Starts `viewfuse view` on the CPU for both sample scenes, and for Gaussians of one of them, and asks as the page does while a hand drags: the time from the
-//! start of the program to the first coarse picture, then coarse pictures a second, each asked for once the one before has come,
-//! and their sizes; `late means coarser` shows there. The viewer aims at a first picture within 1 s and ten a second on two cores, of Gaussians at thirty.
+//! Starts `viewfuse view` on the CPU for both sample scenes, and for Gaussians of one of them, and asks as the page
+//! does while a hand drags: the time from the start of the program to the first coarse picture, then coarse pictures a
+//! second, each asked for once the one before has come, and their sizes; `late means coarser` shows there. The viewer
+//! aims at a first picture within 1 s and ten a second on two cores, of Gaussians at thirty.
 
 use serde_json::{Value, json};
 use std::collections::BTreeMap;

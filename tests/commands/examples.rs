@@ -7,7 +7,8 @@ use viewfuse_tests::command::{self, command, killed_when, toy};
 use viewfuse_tests::places::repository;
 use viewfuse_tests::viewer::Program;
 
-/// Runs a command of a README as far as that goes, if it is one of those that do not end by themselves or need what is not here.
+/// Runs a command of a README as far as that goes, if it is one of those that do not end by themselves or need what is
+/// not here.
 pub(super) fn run(line: &str) -> bool {
     if let Some(arguments) = line.strip_prefix("cargo run --release -- view ") {
         view(arguments);
@@ -48,7 +49,8 @@ fn starts_to_write(arguments: &str) {
     killed_when(lab(), folder.path(), &format!("scenes make {arguments}"), is_there);
 }
 
-/// Hours of training: everything that is written on the command line is right, and the first file that it reads is missing.
+/// Hours of training: everything that is written on the command line is right, and the first file that it reads is
+/// missing.
 fn lacks_only_its_data(arguments: &str) {
     let folder = tempfile::tempdir().expect("a folder");
     let outcome = command::run(lab(), folder.path(), &format!("train {arguments}"));

@@ -1,4 +1,5 @@
-//! Input from somebody else, and a machine that is full or closed: no panic, no abort, nothing on the terminal but text.
+//! Input from somebody else, and a machine that is full or closed: no panic, no abort, nothing on the terminal but
+//! text.
 
 use super::{BINARY, binary};
 use serde_json::json;

@@ -76,8 +76,8 @@ fn inputs(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     files.filter(|(path, _)| path.is_file()).map(|(path, _)| (path.clone(), fs::read(&path).expect("a file"))).collect()
 }
 
-/// Every file is whole: it is read by whatever reads its kind, or is `like` the one that an undisturbed run wrote. Hidden
-/// ones are those that a kill leaves.
+/// Every file is whole: it is read by whatever reads its kind, or is `like` the one that an undisturbed run wrote.
+/// Hidden ones are those that a kill leaves.
 #[track_caller]
 pub(super) fn assert_whole(folder: &Path, like: &Files) -> Files {
     let mut whole = Files::new();
@@ -123,8 +123,8 @@ fn is_hidden(path: &Path) -> bool {
     path.components().any(|part| part.as_os_str().to_string_lossy().starts_with('.'))
 }
 
-/// The first of the finished files that are no longer there. A journal goes when its run is done, record and video of a render
-/// when another one begins to write over its pictures.
+/// The first of the finished files that are no longer there. A journal goes when its run is done, record and video of a
+/// render when another one begins to write over its pictures.
 fn lost<'a>(finished: &'a Files, now: &Files) -> Option<&'a PathBuf> {
     let may_go =
         |name: &Path| name.ends_with(JOURNAL) || name.ends_with(RECORD) || name.file_stem() == Some("video".as_ref());

@@ -54,8 +54,8 @@ const BINARY: &str = env!("CARGO_BIN_EXE_viewfuse");
 /// Commands of the laboratory.
 const IN_THE_LABORATORY: [&str; 3] = ["train", "scenes", "report"];
 
-/// The laboratory's command. Cargo tells only tests of its own package where its binary is: this program is it under its
-/// name.
+/// The laboratory's command. Cargo tells only tests of its own package where its binary is: this program is it under
+/// its name.
 fn lab() -> &'static str {
     static LINK: LazyLock<String> = LazyLock::new(|| {
         let link = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("viewfuse-lab{}", std::env::consts::EXE_SUFFIX));

@@ -1,4 +1,5 @@
-//! `viewfuse optimise`: the scene of Gaussians, its score on the way, what interruptions leave, and who reads its files.
+//! `viewfuse optimise`: the scene of Gaussians, its score on the way, what interruptions leave, and who reads its
+//! files.
 #![cfg(unix)]
 
 use super::{BINARY, done};
@@ -114,7 +115,8 @@ fn after_a_kill_it_goes_on_from_the_file() {
         let text = done(folder.path(), &format!("{OPTIMISE} --left-out 20 --resume toy.ply -o {output}"));
         (scores(&text), fs::read(folder.path().join(output)).expect("a file"))
     };
-    // What goes on from a file is the same each time; it has the finest size's 60 iterations, and is better than the file.
+    // What goes on from a file is the same each time; it has the finest size's 60 iterations, and is better than the
+    // file.
     let (first, second) = (resumed("a.ply"), resumed("b.ply"));
     assert!(first == second, "two scenes from one file");
     assert_eq!(first.0.iter().map(|own| own.0).collect::<Vec<_>>(), [200, 240]);

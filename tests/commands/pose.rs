@@ -1,6 +1,7 @@
 //! `viewfuse pose`: photographs without poses, to a scene; and what keeps photographs, or all of them, out of it.
 //!
-//! Most tests need the program `viewfuse-openmvg` beside the command or named by `VIEWFUSE_OPENMVG`; `tests/run` builds it.
+//! Most tests need the program `viewfuse-openmvg` beside the command or named by `VIEWFUSE_OPENMVG`; `tests/run` builds
+//! it.
 
 mod colmap;
 mod on_the_way;
@@ -121,7 +122,8 @@ fn posed(command: Command) -> String {
     outcome.stdout
 }
 
-/// The greatest angle in degrees between relative rotations of the scene and of the room, over the views that have these names.
+/// The greatest angle in degrees between relative rotations of the scene and of the room, over the views that have
+/// these names.
 fn worst_rotation(scene: &Scene) -> f32 {
     let known = Scene::open(data("room")).expect("the room");
     let pose = |scene: &Scene, name: &str| scene.views[scene.view_named(name).expect("a view")].camera.pose;

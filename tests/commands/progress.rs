@@ -1,5 +1,5 @@
-//! Progress where standard error is no terminal: each long command names its stages, its share never falls, and lines come
-//! while it works, with the time that is left.
+//! Progress where standard error is no terminal: each long command names its stages, its share never falls, and lines
+//! come while it works, with the time that is left.
 
 use super::{BINARY, binary};
 use std::fs;

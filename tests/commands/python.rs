@@ -1,5 +1,5 @@
-//! The Python package. Its wheel is built and tested by `host/python/test`, which takes minutes and the network: only with
-//! `VIEWFUSE_REQUIRE_PYTHON=1`. That it is built from the same crates as the command is tested always.
+//! The Python package. Its wheel is built and tested by `host/python/test`, which takes minutes and the network: only
+//! with `VIEWFUSE_REQUIRE_PYTHON=1`. That it is built from the same crates as the command is tested always.
 
 use super::BINARY;
 use libtest_mimic::Trial;

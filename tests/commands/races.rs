@@ -1,5 +1,5 @@
-//! Kills without a warning while two runs want one folder: one of them has it, nothing of both is mixed, and nothing is lost
-//! that was finished. `VIEWFUSE_KILLS=N` kills N times; the tests do it a few times.
+//! Kills without a warning while two runs want one folder: one of them has it, nothing of both is mixed, and nothing is
+//! lost that was finished. `VIEWFUSE_KILLS=N` kills N times; the tests do it a few times.
 
 use super::BINARY;
 use super::kill::{Files, assert_whole, is_unfinished, undisturbed};

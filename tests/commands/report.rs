@@ -1,7 +1,7 @@
 //! `viewfuse-lab report`: the page as text, and as a browser shows it.
 //!
-//! The browser is Chromium or Chrome: `VIEWFUSE_BROWSER`, or the first that is found. Without one its tests are ignored and
-//! say why; with `VIEWFUSE_REQUIRE_BROWSER=1` they fail instead. Pictures of the page, to be looked at, are left in
+//! The browser is Chromium or Chrome: `VIEWFUSE_BROWSER`, or the first that is found. Without one its tests are ignored
+//! and say why; with `VIEWFUSE_REQUIRE_BROWSER=1` they fail instead. Pictures of the page, to be looked at, are left in
 //! `tmp/report` of the target folder.
 
 use super::browser::{self, Browser, InBrowser};
@@ -148,7 +148,8 @@ fn number(text: &str) -> f64 {
     first.parse().unwrap_or_else(|_| panic!("{text:?} is no number"))
 }
 
-/// Where something is bold in a column, as the browser shows it, the best values are, and not all; nothing else is marked.
+/// Where something is bold in a column, as the browser shows it, the best values are, and not all; nothing else is
+/// marked.
 #[track_caller]
 fn assert_marks(table: &Value) {
     let header: Vec<&str> = table["header"].as_array().expect("a header").iter().filter_map(Value::as_str).collect();

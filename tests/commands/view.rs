@@ -9,8 +9,8 @@
 //! one_file   a scene of Gaussians as one page
 //! ```
 //!
-//! The browser is that of `report.rs`: without one its tests are ignored and say why; with `VIEWFUSE_REQUIRE_BROWSER=1` they
-//! fail instead. Pictures of the page, to be looked at, are left in `tmp/view` of the target folder.
+//! The browser is that of `report.rs`: without one its tests are ignored and say why; with `VIEWFUSE_REQUIRE_BROWSER=1`
+//! they fail instead. Pictures of the page, to be looked at, are left in `tmp/view` of the target folder.
 #![cfg(unix)]
 
 mod attacks;

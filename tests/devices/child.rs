@@ -65,8 +65,8 @@ fn do_work(work: &str, instance: &std::sync::Arc<Instance>, adapter: &Adapter) -
                 outcome => return Err(format!("it was in time: {outcome:?}").into()),
             }
             drop(gpu);
-            // What the driver does at the end of a process is not tested: with its threads at work llvmpipe freed a wrong pointer there
-            // once.
+            // What the driver does at the end of a process is not tested: with its threads at work llvmpipe freed a
+            // wrong pointer there once.
             std::thread::sleep(Duration::from_secs(2));
         }
         _ => return Err(format!("{work} is no work").into()),

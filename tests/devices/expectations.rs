@@ -1,5 +1,5 @@
-//! What is expected of the drivers that the tests know, and that it is neither less nor more: a driver that begins to do what
-//! it did not do fails as well, so that the table stays true and what was left out for it comes back.
+//! What is expected of the drivers that the tests know, and that it is neither less nor more: a driver that begins to
+//! do what it did not do fails as well, so that the table stays true and what was left out for it comes back.
 //!
 //! With it: dispatches that are small before a kernel's time is known, which holds on every device.
 

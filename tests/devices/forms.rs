@@ -1,5 +1,6 @@
-//! Forms of tiled kernels: what they write while they are measured is compared, and leaves nothing behind; a form that a driver
-//! compiles wrongly, or for subgroups of another size, is not used. Faults are made on every device ([`Faults`]).
+//! Forms of tiled kernels: what they write while they are measured is compared, and leaves nothing behind; a form that
+//! a driver compiles wrongly, or for subgroups of another size, is not used. Faults are made on every device
+//! ([`Faults`]).
 
 use crate::candidate::{Candidate, Test};
 use bytemuck::bytes_of;
@@ -44,7 +45,8 @@ const WIDE: u32 = 100;
 const FIRST: u32 = 20;
 const OWN: u32 = 70;
 
-/// A convolution that is large enough to be measured, into some channels of a wider image that holds numbers before, as bits.
+/// A convolution that is large enough to be measured, into some channels of a wider image that holds numbers before, as
+/// bits.
 fn convolve_into_a_wider_image(gpu: &Gpu) -> Result<Vec<u32>, VulkanError> {
     let [side, in_channels, size] = [20_u32, 32, 3];
     let block = ConvolveBlock {

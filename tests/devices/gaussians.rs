@@ -28,8 +28,8 @@ pub(crate) const TESTS: &[Test] = &[
 
 /// Most splats of a tile: fewer than those whose loops Mesa's llvmpipe ends (`viewfuse_field::gaussians::optimised`).
 const MAX_LISTED: u32 = 100;
-/// Largest difference of derivatives, as a share of the norm of all: sums of at most 64 pixels and some 50 splats, in another order and
-/// with other last digits of the exponential, differ by some 1e-5.
+/// Largest difference of derivatives, as a share of the norm of all: sums of at most 64 pixels and some 50 splats, in
+/// another order and with other last digits of the exponential, differ by some 1e-5.
 const MAX_DIFFERENCE: f64 = 1.0e-3;
 /// Largest difference of scores, decibels: on another device the last digits differ, and the steps make them grow.
 const MAX_LOSS: f64 = 0.5;

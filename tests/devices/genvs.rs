@@ -24,8 +24,8 @@ pub(crate) const TESTS: &[Test] = &[
     Test::new("genvss_feature_image_stays_on_the_device", genvss_feature_image_stays_on_the_device),
 ];
 
-/// Largest difference of a channel, whose range is 1. Sums of products run in another order than the CPU's, through three
-/// calls of the denoiser.
+/// Largest difference of a channel, whose range is 1. Sums of products run in another order than the CPU's, through
+/// three calls of the denoiser.
 const MAX_DIFFERENCE: f32 = 1.0e-3;
 
 /// What only the denoiser needs.
@@ -90,11 +90,11 @@ fn genvs_without_denoiser_runs_no_kernel_of_it(candidate: &Candidate) -> Result<
     Ok(())
 }
 
-/// What comes back from the device: the picture, with a denoiser once more for every call, and indices of numbers that are
-/// not finite, one for some thousand numbers. The feature image alone would be more.
+/// What comes back from the device: the picture, with a denoiser once more for every call, and indices of numbers that
+/// are not finite, one for some thousand numbers. The feature image alone would be more.
 fn genvss_feature_image_stays_on_the_device(candidate: &Candidate) -> Result<(), Failed> {
-    // Pictures of 22 pixels on a side are rendered with as many rows and columns as can be halved often enough. What comes
-    // back of a buffer that was used before may be twice as long.
+    // Pictures of 22 pixels on a side are rendered with as many rows and columns as can be halved often enough. What
+    // comes back of a buffer that was used before may be twice as long.
     for (has_denoiser, side, pictures, most) in [(false, 22, 1, 2), (true, 24, 4, 4)] {
         let device = candidate.vulkan(&GpuOptions::default())?;
         picture(&device, Omissions::default(), has_denoiser).map_err(said)?;

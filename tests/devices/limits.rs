@@ -1,5 +1,5 @@
-//! A device with lowered limits: work is cut into pieces, and the picture is the same; where nothing can be cut any finer,
-//! the error names the limit.
+//! A device with lowered limits: work is cut into pieces, and the picture is the same; where nothing can be cut any
+//! finer, the error names the limit.
 
 use crate::candidate::{Candidate, Test, assert_works};
 use crate::picture::{KERNELS, Rendering, SIDE, SOURCE_COUNT};
@@ -21,7 +21,8 @@ pub(crate) const TESTS: &[Test] = &[
     Test::new("a_picture_that_cannot_be_cut_names_the_limit", a_picture_that_cannot_be_cut_names_the_limit),
 ];
 
-/// Ten rows or more of a sweep's widest array: a band with its halo of eight. No power of two, so that pages are shorter.
+/// Ten rows or more of a sweep's widest array: a band with its halo of eight. No power of two, so that pages are
+/// shorter.
 const BYTES: u64 = 96 << 10;
 /// A page of the scene then.
 const PAGE_BYTES: u64 = 64 << 10;

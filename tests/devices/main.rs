@@ -1,5 +1,5 @@
-//! Vulkan devices under bad conditions: nothing there, lowered limits, no memory, no time, wrong arguments; and good ones
-//! under validation. Each ends in its typed error or in the right picture, never in a crash or in a wrong one.
+//! Vulkan devices under bad conditions: nothing there, lowered limits, no memory, no time, wrong arguments; and good
+//! ones under validation. Each ends in its typed error or in the right picture, never in a crash or in a wrong one.
 //!
 //! One trial for each test and device. Without a device they are ignored and say why; with `VIEWFUSE_REQUIRE_VULKAN=1`
 //! nothing is ignored, and with `VIEWFUSE_REQUIRE_DRIVERS=N` devices of so many drivers must be there.

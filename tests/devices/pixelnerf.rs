@@ -1,4 +1,5 @@
-//! A small PixelNeRF on each device: the reference values, and whole pictures with everything and with nothing left out.
+//! A small PixelNeRF on each device: the reference values, and whole pictures with everything and with nothing left
+//! out.
 
 use crate::candidate::{Candidate, Test};
 use libtest_mimic::Failed;
@@ -24,8 +25,8 @@ pub(crate) const TESTS: &[Test] = &[
 
 const SIDE: u32 = 20;
 const COARSE_COUNT: u32 = 32;
-/// Largest difference of a channel, whose range is 1. Sums of products run in another order than the CPU's; a fine sample
-/// that falls into the next part of a ray for it moves by a 64th of the ray, which changes a pixel by little.
+/// Largest difference of a channel, whose range is 1. Sums of products run in another order than the CPU's; a fine
+/// sample that falls into the next part of a ray for it moves by a 64th of the ray, which changes a pixel by little.
 const MAX_DIFFERENCE: f32 = 4.0e-3;
 
 fn pixelnerf_has_the_reference_values(candidate: &Candidate) -> Result<(), Failed> {
@@ -83,8 +84,8 @@ fn pixelnerfs_pictures_are_the_cpus(candidate: &Candidate) -> Result<(), Failed>
     Ok(())
 }
 
-/// What a further picture takes over the border of the device's memory: its pixels, its views and their weights; the picture,
-/// the probes' samples, and how many samples each list has.
+/// What a further picture takes over the border of the device's memory: its pixels, its views and their weights; the
+/// picture, the probes' samples, and how many samples each list has.
 fn pixelnerfs_sample_lists_stay_on_the_device(candidate: &Candidate) -> Result<(), Failed> {
     let transfers = |targets: &str| -> Result<Transfers, Failed> {
         let device = candidate.vulkan(&GpuOptions::default())?;

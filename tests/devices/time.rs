@@ -20,7 +20,8 @@ const LIMIT: Duration = Duration::from_millis(5);
 /// Elements of the long kernel.
 const COUNT: u32 = 1 << 12;
 
-/// Sends a kernel on its way that takes as long as one likes: it adds the same number again and again. Returns when that was.
+/// Sends a kernel on its way that takes as long as one likes: it adds the same number again and again. Returns when
+/// that was.
 pub(crate) fn add_again(gpu: &Gpu, times: u32) -> Result<Instant, VulkanError> {
     let [weights, latents, fused] =
         [gpu.zeros::<f32>(times as usize)?, gpu.zeros(COUNT as usize)?, gpu.zeros(COUNT as usize)?];
@@ -53,8 +54,8 @@ pub(crate) fn times_that_take(gpu: &Gpu, time: Duration) -> Result<u32, VulkanEr
     }
 }
 
-/// On a busy machine anything may take longer than a limit; then it is not the kernel that is told, and a longer limit is
-/// tried, with a kernel that takes longer.
+/// On a busy machine anything may take longer than a limit; then it is not the kernel that is told, and a longer limit
+/// is tried, with a kernel that takes longer.
 fn a_time_limit_expires(candidate: &Candidate) -> Result<(), Failed> {
     let mut limit = LIMIT;
     while limit < PATIENCE {

@@ -1,8 +1,8 @@
 //! Under validation and synchronization validation: no message, and proof that there would be one.
 //!
-//! `VIEWFUSE_TEST_LAYERS` names a folder with validation layers that see a missing barrier between two kernels, as those of
-//! distributions often do not, and with the C library that they want; programs are then started under that. Without it
-//! the layers are the system's.
+//! `VIEWFUSE_TEST_LAYERS` names a folder with validation layers that see a missing barrier between two kernels, as
+//! those of distributions often do not, and with the C library that they want; programs are then started under that.
+//! Without it the layers are the system's.
 
 use crate::BINARY;
 use crate::candidate::{Candidate, Test};

@@ -1,5 +1,5 @@
-//! The C face: its header is the one that its sources make, and C programs that are compiled with all warnings as errors
-//! get the same bits as a call of core and a status for every mistake.
+//! The C face: its header is the one that its sources make, and C programs that are compiled with all warnings as
+//! errors get the same bits as a call of core and a status for every mistake.
 //!
 //! Set `VIEWFUSE_WRITE_HEADER=1` to write the header instead of comparing it, `CC` for another compiler than `cc`.
 

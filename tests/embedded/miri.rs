@@ -1,5 +1,5 @@
-//! Undefined behaviour: the program of `tests/miri` calls what firmware calls and the whole C interface, as it is and, where
-//! a toolchain has it, under Miri.
+//! Undefined behaviour: the program of `tests/miri` calls what firmware calls and the whole C interface, as it is and,
+//! where a toolchain has it, under Miri.
 
 use libtest_mimic::{Failed, Trial};
 use std::path::Path;

@@ -17,7 +17,8 @@ use viewfuse_tests::places;
 
 /// The most pictures whose error exceeds its bound, as a share.
 const MAX_MISSED: f64 = 0.05;
-/// The most that one of them exceeds it, as a factor: 1.08 was measured, and 1.6 where a corner of a small picture was lost.
+/// The most that one of them exceeds it, as a factor: 1.08 was measured, and 1.6 where a corner of a small picture was
+/// lost.
 const MAX_EXCESS: f64 = 1.25;
 
 fn scene(name: &str) -> Scene {

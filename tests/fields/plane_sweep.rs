@@ -367,7 +367,8 @@ fn what_is_kept_of_the_sources_is_used_and_gives_the_same_picture() {
         assert_eq!(picture_of(&field, &sources, &target), expected);
         assert_eq!(kept_files(&kept), files);
     }
-    // Another photograph has files of its own: its own disparities, those of the two that it is compared with, and the points.
+    // Another photograph has files of its own: its own disparities, those of the two that it is compared with, and the
+    // points.
     let mut others = sources.clone();
     others.images[2].texels[0][0] *= 0.5;
     assert_eq!(picture_of(&field, &others, &target), picture(&others, &target));

@@ -1,5 +1,5 @@
-//! The verdict on poses that a solver gives for bare photographs: true ones pass, and wrong ones do not, also where every
-//! attempt agrees on them.
+//! The verdict on poses that a solver gives for bare photographs: true ones pass, and wrong ones do not, also where
+//! every attempt agrees on them.
 
 use glam::{DMat3, DVec3};
 use std::f64::consts::PI;

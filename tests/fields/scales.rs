@@ -1,4 +1,5 @@
-//! A scene at ten scales from 1e-9 to 1e9: every scheme gives the same weights and every field the same pictures as at scale 1.
+//! A scene at ten scales from 1e-9 to 1e9: every scheme gives the same weights and every field the same pictures as at
+//! scale 1.
 //!
 //! Prints a table. `VIEWFUSE_ALL_SCALES=1` renders with every scheme at every scale; the tests do it with one, at two:
 //! weights are compared with all.
@@ -27,7 +28,8 @@ use viewfuse_tests::places::{data, repository};
 const SCALES: [f64; 10] = [1.0e-9, 1.0e-7, 1.0e-5, 1.0e-3, 1.0e-1, 1.0e1, 1.0e3, 1.0e5, 1.0e7, 1.0e9];
 /// Those and the schemes of the pictures in the ordinary tests.
 const FEW: ([f64; 2], [&str; 1]) = ([1.0e-9, 1.0e5], ["gaussian:beta=1"]);
-/// Differences of weights: rounding of poses, times the exponents of attention, whose features have frequencies up to 48.
+/// Differences of weights: rounding of poses, times the exponents of attention, whose features have frequencies up to
+/// 48.
 const MAX_DIFFERENCE: f32 = 2.0e-5;
 
 /// The scene with another unit in its files.
@@ -198,8 +200,8 @@ fn cameras_in_one_place_have_no_unit() {
     assert!(!RigUnit::of(&cameras[..2]).is_world());
 }
 
-/// Two sources at the same distance from the target, 2400 units from the object: rounding of squared distances once gave one of
-/// them 0.94 of the weight.
+/// Two sources at the same distance from the target, 2400 units from the object: rounding of squared distances once
+/// gave one of them 0.94 of the weight.
 #[test]
 fn mirrored_neighbours_have_equal_weights() {
     let radius = 2400.0_f32;

@@ -4,10 +4,11 @@
 //! VIEWFUSE_FUZZ_SECONDS=60 cargo test --profile fuzz -p viewfuse-tests --test fuzz [TARGET ...]
 //! ```
 //!
-//! runs every target (or those named) for so many seconds, with overflow checks, and prints executions, executions a second,
-//! the most memory of one execution, different outcomes, and what fell. Each target runs in processes of its own: an input
-//! that ends a process, or takes too long, is found and kept like one that panics. The generator draws from a seed, so that
-//! a run can be repeated; an input that leads to a new kind of message is kept and changed further.
+//! runs every target (or those named) for so many seconds, with overflow checks, and prints executions, executions a
+//! second, the most memory of one execution, different outcomes, and what fell. Each target runs in processes of its
+//! own: an input that ends a process, or takes too long, is found and kept like one that panics. The generator draws
+//! from a seed, so that a run can be repeated; an input that leads to a new kind of message is kept and changed
+//! further.
 //!
 //! ```text
 //! memory    the allocator that counts

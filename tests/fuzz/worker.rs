@@ -57,7 +57,8 @@ pub(crate) struct Found {
     pub(crate) fell: Vec<(PathBuf, String)>,
 }
 
-/// The input that is being tried, for the watchdog, and when it began, in milliseconds from the start; 0 between inputs.
+/// The input that is being tried, for the watchdog, and when it began, in milliseconds from the start; 0 between
+/// inputs.
 static CURRENT: Mutex<Vec<u8>> = Mutex::new(Vec::new());
 static BEGAN: AtomicU64 = AtomicU64::new(0);
 /// What the last panic said.

@@ -62,8 +62,8 @@ fn chosen(block: &FrontBlock, opacities: &[Planes]) -> usize {
     (0..costs.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b])).expect("planes")
 }
 
-/// Five views see a floor, two a body before it: the floor has the greater support, and the body is chosen. Where no view sees a
-/// body, the floor is.
+/// Five views see a floor, two a body before it: the floor has the greater support, and the body is chosen. Where no
+/// view sees a body, the floor is.
 #[test]
 fn the_nearer_surface_wins() {
     let both = opacity(&[3.0, 3.0, 3.0, 3.0, 3.0, 11.0, 11.0]);

@@ -49,7 +49,8 @@ fn covariance(gaussian: &GaussianBlock, camera: &CameraBlock) -> [f64; 3] {
     sum
 }
 
-/// A needle across the diagonal of the image: the difference of products of variances would be off by a tenth or negative.
+/// A needle across the diagonal of the image: the difference of products of variances would be off by a tenth or
+/// negative.
 #[test]
 fn a_needle_keeps_its_width() {
     let camera = camera(Pose::IDENTITY);

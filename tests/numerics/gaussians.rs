@@ -1,5 +1,5 @@
-//! Gaussians: the fast exponential, derivatives against differences of the `f64` evaluation, lists of tiles, and the same
-//! bytes for any number of threads.
+//! Gaussians: the fast exponential, derivatives against differences of the `f64` evaluation, lists of tiles, and the
+//! same bytes for any number of threads.
 
 use viewfuse::check::gaussian_oracle::{blend, project};
 use viewfuse::device::Memory;
@@ -46,8 +46,8 @@ fn by_pixel(column: u32, row: u32) -> [f32; 4] {
     [wave(0.9), wave(0.5), wave(0.3), 0.5 * wave(0.2)]
 }
 
-/// The loss, a sum over pixels and channels, in `f64`. The opacity at which splats begin to count is a step of the loss: pixels where a
-/// splat's is near it are left out, the same for all evaluations.
+/// The loss, a sum over pixels and channels, in `f64`. The opacity at which splats begin to count is a step of the
+/// loss: pixels where a splat's is near it are left out, the same for all evaluations.
 fn loss(gaussians: &[GaussianBlock], counted: &[bool]) -> f64 {
     let [width, height] = SIZE;
     let splats: Vec<ProjectedGaussian> = gaussians.iter().map(rounded).collect();

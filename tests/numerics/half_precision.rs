@@ -138,8 +138,8 @@ fn a_volume_is_the_nearest_of_16_bits() {
     assert!(halves == nearest && halves != whole);
 }
 
-/// What is looked up are sums with weights that sum to 1: off by no more than a feature of a volume is. What the network makes
-/// of them may grow that; measured are 5e-5 of the largest feature, and 3e-5 of a picture's range.
+/// What is looked up are sums with weights that sum to 1: off by no more than a feature of a volume is. What the
+/// network makes of them may grow that; measured are 5e-5 of the largest feature, and 3e-5 of a picture's range.
 #[test]
 fn features_and_pictures_hardly_change() {
     let sources = sources();

@@ -1,5 +1,5 @@
-//! Winograd's way on the CPU, for inputs and weights of very different sizes, against `f64` loops that go another way: from the
-//! inputs to the outputs.
+//! Winograd's way on the CPU, for inputs and weights of very different sizes, against `f64` loops that go another way:
+//! from the inputs to the outputs.
 
 use viewfuse::check::poses::Random;
 use viewfuse::device::cpu::Cpu;
@@ -16,8 +16,8 @@ fn output_of(at: usize, place: usize, [stride, dilation, padding, out_count]: [u
     (first % stride == 0 && first / stride < out_count).then_some(first / stride)
 }
 
-/// A layer of 3x3 windows run by the CPU, as it comes and for large images, with its errors against `f64` in units of 2^-24
-/// of the largest sum of magnitudes: the largest, and the root of the mean of their squares.
+/// A layer of 3x3 windows run by the CPU, as it comes and for large images, with its errors against `f64` in units of
+/// 2^-24 of the largest sum of magnitudes: the largest, and the root of the mean of their squares.
 fn convolution_errors(
     random: &mut Random,
     [height, width, channels, columns, padding]: [usize; 5],

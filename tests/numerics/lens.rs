@@ -1,5 +1,5 @@
-//! Lenses: the formulas by another hand (figures of OpenCV 5.0.0's `projectPoints` and `fisheye::projectPoints`), and that
-//! what is distorted is undistorted, over whole pictures.
+//! Lenses: the formulas by another hand (figures of OpenCV 5.0.0's `projectPoints` and `fisheye::projectPoints`), and
+//! that what is distorted is undistorted, over whole pictures.
 
 use viewfuse_core::lens::{Lens, LensBlock, LensError, MAX_COEFFICIENT, Projection};
 
@@ -7,7 +7,8 @@ use viewfuse_core::lens::{Lens, LensBlock, LensError, MAX_COEFFICIENT, Projectio
 const POINTS: [[f64; 2]; 5] = [[0.0, 0.0], [0.3, -0.2], [-0.55, 0.4], [0.1, 0.7], [-0.8, -0.6]];
 
 /// A camera model with coefficients `k1 .. k6 p1 p2`, and where OpenCV projects [`POINTS`] with a focal length of 1:
-/// `cv2.projectPoints(points, 0, 0, I, [k1, k2, p1, p2, k3, k4, k5, k6])`, `cv2.fisheye.projectPoints(..., [k1, k2, k3, k4])`.
+/// `cv2.projectPoints(points, 0, 0, I, [k1, k2, p1, p2, k3, k4, k5, k6])`, `cv2.fisheye.projectPoints(..., [k1, k2, k3,
+/// k4])`.
 struct Case {
     model: &'static str,
     projection: Projection,

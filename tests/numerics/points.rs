@@ -1,5 +1,5 @@
-//! PixelNeRF's arithmetic around its network at the ends: weights of views that count for nothing, latents at and beyond the
-//! borders of an image, radiance.
+//! PixelNeRF's arithmetic around its network at the ends: weights of views that count for nothing, latents at and
+//! beyond the borders of an image, radiance.
 
 use viewfuse::check::poses::looking_at_origin;
 use viewfuse_core::Vec3;

@@ -1,4 +1,5 @@
-//! Learned attention with 8 bits a weight: within its bound of the exact weights, whatever the poses and the parameters.
+//! Learned attention with 8 bits a weight: within its bound of the exact weights, whatever the poses and the
+//! parameters.
 
 use viewfuse::weighting::attention::AttentionModel;
 use viewfuse::weighting::attention::quantised::{Change, change_bound, quantised, rust_source};

@@ -1,4 +1,5 @@
-//! Rays and where to look along them, at extremes: random numbers, depths of both passes, what is seen and what is wanted.
+//! Rays and where to look along them, at extremes: random numbers, depths of both passes, what is seen and what is
+//! wanted.
 
 use viewfuse::check::poses::Random;
 use viewfuse::check::ray_inputs;

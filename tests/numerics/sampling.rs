@@ -34,7 +34,8 @@ fn uniform_is_uniform() {
         let (mean, expected) = (sum / count, count / 256.0);
         let variance = squares / count - mean * mean;
         let chi_square: f64 = cells.iter().map(|c| (f64::from(*c) - expected).powi(2) / expected).sum();
-        // Four to five standard deviations each: 0.289 / sqrt N, 0.0745 / sqrt N, 255 +- sqrt(2 * 255), 0.0833 / sqrt N.
+        // Four to five standard deviations each: 0.289 / sqrt N, 0.0745 / sqrt N, 255 +- sqrt(2 * 255), 0.0833 / sqrt
+        // N.
         assert!((mean - 0.5).abs() < 5.0 * 0.289 / count.sqrt(), "mean {mean}");
         assert!((variance - 1.0 / 12.0).abs() < 5.0 * 0.0745 / count.sqrt(), "variance {variance}");
         assert!((155.0..360.0).contains(&chi_square), "chi-square {chi_square}");

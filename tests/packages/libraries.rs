@@ -16,8 +16,7 @@ const ALLOWED: [(&str, &str, &str); 1] = [(
 )];
 
 /// Where programs begin: only the command and the laboratory's print, among what is installed.
-const PROGRAMS: [&str; 4] =
-    ["host/cli/", "host/lab/src/command", "host/pose/openmvg/", "vulkan/compiler/"];
+const PROGRAMS: [&str; 4] = ["host/cli/", "host/lab/src/command", "host/pose/openmvg/", "vulkan/compiler/"];
 
 /// What a file has that a library must not have, with its line.
 fn faults(path: &str, source: &Source) -> Vec<String> {

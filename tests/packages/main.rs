@@ -14,7 +14,8 @@ use serde_json::Value;
 use std::process::Command;
 use viewfuse_tests::places::repository;
 
-/// What cargo prints about the repository. Crates of other platforms, which no build has fetched, are fetched where they are missing.
+/// What cargo prints about the repository. Crates of other platforms, which no build has fetched, are fetched where
+/// they are missing.
 fn cargo(arguments: &[&str]) -> String {
     let run = |more: &[&str]| {
         let mut command = Command::new(env!("CARGO"));

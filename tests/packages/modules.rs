@@ -1,10 +1,11 @@
-//! The order of modules: each crate's `lib.rs` lists its modules along the data, and a module uses only those before it.
+//! The order of modules: each crate's `lib.rs` lists its modules along the data, and a module uses only those before
+//! it.
 //!
 //! The list is the first `text` block of the crate's documentation that names a module: a line begins with the names of
 //! modules between commas, and two spaces end them; a line that is further in goes on with the text of the one before.
 //! A line of `*` stands for all modules that are not named: several of one kind, none of which uses another.
-//! What stands in the crate's root itself (types that several modules share) may be used by all. The command's modules are all
-//! in one, `cli`, which is their root.
+//! What stands in the crate's root itself (types that several modules share) may be used by all. The command's modules
+//! are all in one, `cli`, which is their root.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

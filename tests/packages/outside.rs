@@ -1,5 +1,5 @@
-//! A field, a layout and a weighting of one's own, by the public interface alone: what they give is checked as everything
-//! else is, and the render loop takes them.
+//! A field, a layout and a weighting of one's own, by the public interface alone: what they give is checked as
+//! everything else is, and the render loop takes them.
 
 use std::fmt::Write;
 use std::fs;

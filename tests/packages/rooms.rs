@@ -55,8 +55,8 @@ fn every_test_is_run() {
     assert!(!is_declared(&a_room.with_file_name("forgotten.rs"), &a_room));
 }
 
-/// The repository tests itself: what it is built and tested with comes from the system or through environment variables,
-/// which one line of the CI script may set to what lies beside the repository.
+/// The repository tests itself: what it is built and tested with comes from the system or through environment
+/// variables, which one line of the CI script may set to what lies beside the repository.
 #[test]
 fn no_path_leads_out_of_the_repository() {
     let beside = concat!("../", "shared");

@@ -1,5 +1,5 @@
-//! Every piece of unsafe code says why it is sound: a comment `SAFETY:` above the statement, `# Safety` in the documentation of
-//! an unsafe function.
+//! Every piece of unsafe code says why it is sound: a comment `SAFETY:` above the statement, `# Safety` in the
+//! documentation of an unsafe function.
 
 use viewfuse_tests::places::repository;
 use viewfuse_tests::source::{Source, files};

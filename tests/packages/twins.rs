@@ -1,4 +1,5 @@
-//! The marks of kernels' rows that no compiler checks: `measured` says that no production code calls a kernel, `twin` that the CPU does not call its body.
+//! The marks of kernels' rows that no compiler checks: `measured` says that no production code calls a kernel, `twin`
+//! that the CPU does not call its body.
 
 use viewfuse_kernels::rows::Kernel;
 use viewfuse_kernels::{for_each_kernel, has_mark};

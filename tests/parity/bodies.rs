@@ -1,6 +1,6 @@
-//! A device that runs the body of every kernel as it stands, one element after the other: the definition of what the CPU has a
-//! faster form of. Arrays that may lie in pages lie in four. What a GPU's workgroup computes together runs so as well, with a
-//! thread for each invocation.
+//! A device that runs the body of every kernel as it stands, one element after the other: the definition of what the
+//! CPU has a faster form of. Arrays that may lie in pages lie in four. What a GPU's workgroup computes together runs so
+//! as well, with a thread for each invocation.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};

@@ -1,5 +1,5 @@
-//! Every form of every tiled kernel that a device can run: against `f64` as the first form is, with the same bits as that
-//! one and as itself in pieces, and chosen by measuring where none is asked for.
+//! Every form of every tiled kernel that a device can run: against `f64` as the first form is, with the same bits as
+//! that one and as itself in pieces, and chosen by measuring where none is asked for.
 
 use super::Parity;
 use libtest_mimic::{Failed, Trial};
@@ -58,7 +58,8 @@ pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> 
     trials
 }
 
-/// Lavapipe's usual subgroups have eight invocations. In another process it has some of sixteen, which take another way.
+/// Lavapipe's usual subgroups have eight invocations. In another process it has some of sixteen, which take another
+/// way.
 fn of_wider_subgroups() -> Result<(), Failed> {
     let mut again = Command::new(std::env::current_exe()?);
     let output = again.args(["--nocapture", "::subgroup"]).env("LP_NATIVE_VECTOR_WIDTH", "512").output()?;

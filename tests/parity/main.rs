@@ -1,5 +1,5 @@
-//! Every kernel on every device against `f64`, and the negative controls: an input that is off by 1 % must show. The bodies
-//! themselves are a device, too: the CPU has faster forms of some.
+//! Every kernel on every device against `f64`, and the negative controls: an input that is off by 1 % must show. The
+//! bodies themselves are a device, too: the CPU has faster forms of some.
 //!
 //! One trial for each kernel and device. A device that is not there gives ignored trials, or, where
 //! `VIEWFUSE_REQUIRE_VULKAN=1` asks for it, failing ones.

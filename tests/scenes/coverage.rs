@@ -30,7 +30,8 @@ fn around(camera: &Camera) -> f32 {
 fn assert_around(cameras: &[Camera], count: usize, expected: &[f32]) {
     let orbit = orbit(cameras, &Arc::covered(cameras), cameras[0].pinhole, count).expect("an orbit");
     let found: Vec<f32> = orbit.iter().map(around).collect();
-    // The mean of the cameras' up directions leans to where they are: not the angles, but their order and their gaps are as given.
+    // The mean of the cameras' up directions leans to where they are: not the angles, but their order and their gaps
+    // are as given.
     let is_near = |(a, b): (&f32, &f32)| ((a - b + 540.0).rem_euclid(360.0) - 180.0).abs() < 6.0;
     assert!(found.len() == expected.len() && found.iter().zip(expected).all(is_near), "{found:?} {expected:?}");
     for camera in orbit {

@@ -159,7 +159,8 @@ fn a_mask_is_turned_like_its_photograph() {
             mask
         };
         assert_eq!((upright.width(), upright.height()), (24, 32));
-        // Cameras of the upright and of the stored picture; masks of each, of another size, and with a tag of their own.
+        // Cameras of the upright and of the stored picture; masks of each, of another size, and with a tag of their
+        // own.
         for size in [[24, 32], [32, 24]] {
             for mask in [
                 png(&left_half(32, 24)),

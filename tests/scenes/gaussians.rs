@@ -1,4 +1,5 @@
-//! Files of Gaussians: what is written is read again, by our reader and another one; other orders and types; what is refused.
+//! Files of Gaussians: what is written is read again, by our reader and another one; other orders and types; what is
+//! refused.
 
 use glam::DVec3;
 use ply_rs_bw::parser::Parser;

@@ -1,5 +1,5 @@
-//! Photographs taken through lenses, undistorted when they are read: a smooth picture in the world must come out where the
-//! pinhole sees it, and what the lens did not see is marked.
+//! Photographs taken through lenses, undistorted when they are read: a smooth picture in the world must come out where
+//! the pinhole sees it, and what the lens did not see is marked.
 
 use super::made::open;
 use image::{Rgb, RgbImage};

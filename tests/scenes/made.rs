@@ -1,5 +1,5 @@
-//! Small scenes in layouts of photogrammetry, made byte by byte. All cameras are that of [`scenes::WORLD_FROM_CAMERA`] unless a
-//! test moves them; photographs are 16 x 12.
+//! Small scenes in layouts of photogrammetry, made byte by byte. All cameras are that of [`scenes::WORLD_FROM_CAMERA`]
+//! unless a test moves them; photographs are 16 x 12.
 
 use viewfuse::scene::Scene;
 use viewfuse_core::Vec3;

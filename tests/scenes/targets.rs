@@ -1,5 +1,5 @@
-//! What is said of targets and photographs before anything is rendered: names that are one file on some systems, targets that
-//! face away from everything, exposures far apart; and that equal runs say the same.
+//! What is said of targets and photographs before anything is rendered: names that are one file on some systems,
+//! targets that face away from everything, exposures far apart; and that equal runs say the same.
 
 use super::made::open;
 use image::{Rgba, RgbaImage};
@@ -95,7 +95,8 @@ fn exposures_far_apart_are_told() {
     }
 }
 
-/// Several photographs show nothing: the first in the order of the scene is named, whichever thread finds another one sooner.
+/// Several photographs show nothing: the first in the order of the scene is named, whichever thread finds another one
+/// sooner.
 #[test]
 fn equal_runs_name_the_same_photograph() {
     let folder = called(&["0", "1", "2", "3", "4", "5", "6", "7"]);

@@ -94,7 +94,8 @@ fn extreme_units_become_usual_ones() {
     for factor in [1e-9, 1e12] {
         let scene = open(&at([[factor, 0.0, 0.0], [0.0, factor, 0.0], [0.0, 0.0, factor]]));
         let spread = centres(&scene)[0].distance(centres(&scene)[1]);
-        // Parallel axes: the unit is of the spread, the root of two thirds of the factor; the gap is the root of 2 of it.
+        // Parallel axes: the unit is of the spread, the root of two thirds of the factor; the gap is the root of 2 of
+        // it.
         assert!((spread - 1.3 * 3.0_f32.sqrt()).abs() < 1e-4, "{spread}");
         assert!((scene.frame.scale / (factor * (2.0_f64 / 3.0).sqrt() / 1.3) - 1.0).abs() < 1e-6);
         assert_eq!(scene.frame.origin, DVec3::ZERO);

@@ -1,5 +1,5 @@
-//! NaN and infinity are found by their bits in what becomes SPIR-V: without the execution modes that preserve them, which few
-//! drivers have, a compiler may assume that there are none, and then `is_nan` is always false.
+//! NaN and infinity are found by their bits in what becomes SPIR-V: without the execution modes that preserve them,
+//! which few drivers have, a compiler may assume that there are none, and then `is_nan` is always false.
 
 use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::Op;

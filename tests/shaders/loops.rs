@@ -13,8 +13,8 @@ use viewfuse_shader_compiler::split::Modules;
 use viewfuse_tests::module::{Declarations, id_of, instructions};
 use viewfuse_tests::places::repository;
 
-/// Kernels with loops that keep rust-gpu's shape, and how many: a `break` or an early `return` in the body ends them, so
-/// that what decides at their end is known in the body alone.
+/// Kernels with loops that keep rust-gpu's shape, and how many: a `break` or an early `return` in the body ends them,
+/// so that what decides at their end is known in the body alone.
 const LEFT_BY_THEIR_BODY: [(&str, usize); 9] = [
     ("blend_gradient", 2),
     ("find_non_finite", 1),
@@ -27,8 +27,8 @@ const LEFT_BY_THEIR_BODY: [(&str, usize); 9] = [
     ("sample_mask", 3),
 ];
 
-/// Kernels with arrays of an invocation's own that a loop's counter indexes. rust-gpu unrolls nothing: until a driver does,
-/// these arrays are memory and not registers.
+/// Kernels with arrays of an invocation's own that a loop's counter indexes. rust-gpu unrolls nothing: until a driver
+/// does, these arrays are memory and not registers.
 const INDEXED_BY_A_COUNTER: [&str; 23] = [
     "add_noise",
     "blend_gradient",
@@ -115,8 +115,8 @@ struct Shape {
 const LIMIT: Word = 1;
 const RESULT: Word = 2;
 
-/// `sum = 0; i = 0; while i < limit { sum += i; i += 1 } result = sum + i`, where sum and i are 0 in the join if they come
-/// from the exit, as rust-gpu leaves them.
+/// `sum = 0; i = 0; while i < limit { sum += i; i += 1 } result = sum + i`, where sum and i are 0 in the join if they
+/// come from the exit, as rust-gpu leaves them.
 #[expect(clippy::too_many_lines, reason = "a module, block by block")]
 fn module(shape: Shape) -> Module {
     let mut b = Builder::new();

@@ -123,7 +123,8 @@ pub fn assert_command_refused(command: Command, folder: &Path, parts: &[&str]) {
     assert_eq!(files_below(folder), before, "viewfuse {arguments} left something behind");
 }
 
-/// The arguments must be refused: exit code 2, every part in the first line of standard error, and the folder as it was.
+/// The arguments must be refused: exit code 2, every part in the first line of standard error, and the folder as it
+/// was.
 #[track_caller]
 pub fn assert_wrong_arguments(binary: &str, folder: &Path, arguments: &str, parts: &[&str]) {
     let before = files_below(folder);

@@ -250,7 +250,8 @@ impl Breaches<'_> {
         });
     }
 
-    /// Tiles, and elements that a workgroup computes together, are computed in memory that the workgroup really shares; other kernels have none, and wait for nobody.
+    /// Tiles, and elements that a workgroup computes together, are computed in memory that the workgroup really shares;
+    /// other kernels have none, and wait for nobody.
     fn look_at_sharing(&mut self, is_sharing: bool, name: &str, shared: &[Word], functions: &[&Function]) {
         let bytes: usize = shared.iter().map(|variable| self.declarations.variable_bytes(*variable)).sum();
         self.unless((bytes > 0) == is_sharing && bytes <= SHARED_BYTES, || {

@@ -51,8 +51,8 @@ impl Emulator {
         Ok(Emulator { board, library, folder: folder.join("firmware") })
     }
 
-    /// Whether Rust's library is compiled along with the programs, and for size where they are. One that came compiled is
-    /// for speed.
+    /// Whether Rust's library is compiled along with the programs, and for size where they are. One that came compiled
+    /// is for speed.
     pub fn compiles_the_library(&self) -> bool {
         !matches!(self.library, Library::Installed)
     }

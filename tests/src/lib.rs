@@ -19,8 +19,8 @@ pub mod source;
 pub mod trials;
 pub mod viewer;
 
-/// The examples of the main README, and of core's and the kernels', compiled and run. These two crates are `no_std` and become
-/// shaders: they have no tests of their own.
+/// The examples of the main README, and of core's and the kernels', compiled and run. These two crates are `no_std` and
+/// become shaders: they have no tests of their own.
 #[cfg(doctest)]
 mod readmes {
     #[doc = include_str!("../../README.md")]

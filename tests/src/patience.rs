@@ -8,8 +8,8 @@ use std::process::{Child, Command, ExitStatus};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// The deadline of every wait. The longest one, of an emulated processor, takes under two minutes on two idle cores: a machine
-/// that is four times slower and runs four other busy processes does not reach the deadline.
+/// The deadline of every wait. The longest one, of an emulated processor, takes under two minutes on two idle cores: a
+/// machine that is four times slower and runs four other busy processes does not reach the deadline.
 pub const PATIENCE: Duration = Duration::from_secs(1800);
 
 /// Time between two looks.

@@ -12,7 +12,8 @@ pub fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("data").join(name)
 }
 
-/// The README of the repository, then those of all folders in the order of their paths; not what lies in target folders.
+/// The README of the repository, then those of all folders in the order of their paths; not what lies in target
+/// folders.
 pub fn readmes() -> Vec<PathBuf> {
     fn below(folder: &Path, found: &mut Vec<PathBuf>) {
         let mut entries: Vec<PathBuf> =

@@ -78,7 +78,8 @@ impl Source {
     }
 }
 
-/// All files of a folder and its folders whose names end so, in the order of their paths; not what lies in target folders.
+/// All files of a folder and its folders whose names end so, in the order of their paths; not what lies in target
+/// folders.
 pub fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let entries = fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));

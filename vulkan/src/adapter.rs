@@ -84,8 +84,8 @@ pub struct Adapter {
     pub memory: u64,
     /// The limits by which work is split.
     pub limits: Limits,
-    /// Invocations of a subgroup in [`Form::Subgroup`](crate::kernel::Form::Subgroup); `None` if the device cannot run that
-    /// form.
+    /// Invocations of a subgroup in [`Form::Subgroup`](crate::kernel::Form::Subgroup); `None` if the device cannot run
+    /// that form.
     pub subgroup_size: Option<u32>,
     /// Missing requirements; if there are any, it cannot be opened.
     pub missing: Vec<Missing>,
@@ -209,8 +209,8 @@ impl Adapter {
         format!("{vendor:x}-{device:x}-{cache}")
     }
 
-    /// Chooses among [`Instance::adapters`]: by number, by a part of the name (in any case), or, for an empty text, any. Of
-    /// several, the first usable one. A number that no device has may still be part of a name ("4090").
+    /// Chooses among [`Instance::adapters`]: by number, by a part of the name (in any case), or, for an empty text,
+    /// any. Of several, the first usable one. A number that no device has may still be part of a name ("4090").
     ///
     /// # Errors
     /// [`VulkanError::NoDevice`] if none matches, [`VulkanError::Missing`] if the matching one cannot be used.

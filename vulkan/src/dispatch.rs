@@ -34,12 +34,12 @@ impl<'a> Job<'a> {
 
 impl Gpu {
     /// Dispatches a kernel for some of its elements. `parameters` are the kernel's own push constants, `arrays` its
-    /// bindings, both as in its row. Elements of a tiled kernel are counted in [`Form::Single`], and are all of them: the
-    /// device takes the form that was the fastest when it was measured, at the first use of such a size.
+    /// bindings, both as in its row. Elements of a tiled kernel are counted in [`Form::Single`], and are all of them:
+    /// the device takes the form that was the fastest when it was measured, at the first use of such a size.
     ///
     /// # Errors
-    /// [`VulkanError::Arguments`] if they are not, [`VulkanError::OtherDevice`], [`VulkanError::Limit`] if an array cannot
-    /// be bound, and others if the device fails, or failed before.
+    /// [`VulkanError::Arguments`] if they are not, [`VulkanError::OtherDevice`], [`VulkanError::Limit`] if an array
+    /// cannot be bound, and others if the device fails, or failed before.
     pub fn dispatch(
         &self,
         kernel: Kernel,

@@ -1,9 +1,9 @@
 //! The part of a module that one kernel needs.
 //!
-//! A driver works through all of a module for each pipeline that it creates: given the module of all kernels, a software
-//! driver takes 14 s of processor time for each of them. An excerpt has one entry point, the functions that it calls and the
-//! variables that these use: some drivers count the workgroup memory of all that are declared. Types and constants are those of the
-//! whole module.
+//! A driver works through all of a module for each pipeline that it creates: given the module of all kernels, a
+//! software driver takes 14 s of processor time for each of them. An excerpt has one entry point, the functions that it
+//! calls and the variables that these use: some drivers count the workgroup memory of all that are declared. Types and
+//! constants are those of the whole module.
 
 use std::collections::{HashMap, HashSet};
 

@@ -1,7 +1,7 @@
 //! Forms of tiled kernels: which come into question for a product, and which was the fastest.
 //!
-//! A form is measured at the first use of a kernel for products of a class, sizes to within a factor of two. All forms give the
-//! same bits, which is compared then, so a choice changes nothing but the time.
+//! A form is measured at the first use of a kernel for products of a class, sizes to within a factor of two. All forms
+//! give the same bits, which is compared then, so a choice changes nothing but the time.
 
 use crate::kernel::{Form, Kernel, TILE, WORKGROUP, tile_elements};
 use std::collections::BTreeMap;
@@ -35,7 +35,8 @@ impl Class {
         Class { shape, key: (kernel.name().to_owned(), sizes) }
     }
 
-    /// The forms that come into question, [`Form::Single`] first: one for little work, and none that the device cannot run.
+    /// The forms that come into question, [`Form::Single`] first: one for little work, and none that the device cannot
+    /// run.
     pub(crate) fn candidates(&self, has_subgroups: bool) -> &'static [Form] {
         let Shape { row_count, inner_count, column_count } = self.shape;
         let work = u64::from(row_count) * u64::from(inner_count) * u64::from(column_count);

@@ -76,8 +76,8 @@ impl Default for GpuOptions {
 impl GpuOptions {
     /// Time limit of a submission on a device of this kind; `None` without a limit.
     ///
-    /// The default of a GPU is two minutes. A software driver has no limit: its kernels share the processor with all other
-    /// processes of the machine, and a busy machine is not a failure.
+    /// The default of a GPU is two minutes. A software driver has no limit: its kernels share the processor with all
+    /// other processes of the machine, and a busy machine is not a failure.
     pub fn time_limit_on(&self, kind: AdapterKind) -> Option<Duration> {
         let of_kind = match kind {
             AdapterKind::Software => None,
@@ -88,10 +88,11 @@ impl GpuOptions {
 }
 
 impl GpuOptions {
-    /// The longest time that a piece of a dispatch may be expected to take on a device of this kind; `None` where work is cut by
-    /// the device's limits alone.
+    /// The longest time that a piece of a dispatch may be expected to take on a device of this kind; `None` where work
+    /// is cut by the device's limits alone.
     ///
-    /// The default of a GPU is 0.2 s: systems end what takes seconds (two on Windows). Nobody watches a software driver.
+    /// The default of a GPU is 0.2 s: systems end what takes seconds (two on Windows). Nobody watches a software
+    /// driver.
     pub fn longest_piece_on(&self, kind: AdapterKind) -> Option<Duration> {
         let of_kind = match kind {
             AdapterKind::Software => None,

@@ -138,8 +138,8 @@ fn create(entry: &ash::Entry, options: &InstanceOptions, messages: &Messages) ->
     })
 }
 
-/// The reason why there is no driver. The loader does not report which files it rejected; these variables set its search
-/// path.
+/// The reason why there is no driver. The loader does not report which files it rejected; these variables set its
+/// search path.
 fn no_driver() -> String {
     let told = ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"].into_iter().find_map(|name| Some((name, env::var_os(name)?)));
     match told {

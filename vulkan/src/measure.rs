@@ -1,8 +1,10 @@
-//! The form of a tiled kernel for a class of products: as was asked for, as is known, or the fastest of those that are measured.
+//! The form of a tiled kernel for a class of products: as was asked for, as is known, or the fastest of those that are
+//! measured.
 //!
-//! What a form writes before it is timed is compared with what [`Form::Single`] writes, bit by bit: a driver may compile one of
-//! them wrongly. Outputs are overwritten before, or what an earlier form wrote would stand for a form that writes nothing. A
-//! dispatch need not write all of an array (some channels of a wider image), so the array is restored at the end.
+//! What a form writes before it is timed is compared with what [`Form::Single`] writes, bit by bit: a driver may
+//! compile one of them wrongly. Outputs are overwritten before, or what an earlier form wrote would stand for a form
+//! that writes nothing. A dispatch need not write all of an array (some channels of a wider image), so the array is
+//! restored at the end.
 
 use crate::buffer::Array;
 use crate::dispatch::Job;
@@ -52,14 +54,14 @@ impl Gpu {
         Ok(form)
     }
 
-    /// Forms that gave other results than [`Form::Single`], or were compiled for subgroups of another size than was asked for:
-    /// they are not used for the products of their class. On a driver without faults there are none.
+    /// Forms that gave other results than [`Form::Single`], or were compiled for subgroups of another size than was
+    /// asked for: they are not used for the products of their class. On a driver without faults there are none.
     pub fn refused_forms(&self) -> Vec<(Kernel, Form)> {
         self.lock().refused.clone()
     }
 
-    /// Invocations of a subgroup that the driver reports of the kernel's pipelines that need them; `None` where it reports
-    /// nothing, or there are none yet.
+    /// Invocations of a subgroup that the driver reports of the kernel's pipelines that need them; `None` where it
+    /// reports nothing, or there are none yet.
     pub fn reported_subgroup_size(&self, kernel: Kernel) -> Option<u32> {
         self.lock().pipelines.reported(kernel)
     }

@@ -1,7 +1,7 @@
 //! Dispatches in pieces that a watchdog stands: systems end a GPU's work that takes seconds.
 //!
-//! Of a kernel that this device has not run yet nobody knows how long it takes, so its first dispatch is small, and is waited
-//! for. From its time follows how many elements a piece may have.
+//! Of a kernel that this device has not run yet nobody knows how long it takes, so its first dispatch is small, and is
+//! waited for. From its time follows how many elements a piece may have.
 
 use crate::dispatch::Job;
 use crate::error::VulkanError;
@@ -14,8 +14,8 @@ use std::time::{Duration, Instant};
 const FIRST: u32 = 256 * WORKGROUP;
 
 impl Gpu {
-    /// Records a dispatch in pieces, each expected to take no longer than the device's longest piece, and returns how many
-    /// there are. `count` elements are counted.
+    /// Records a dispatch in pieces, each expected to take no longer than the device's longest piece, and returns how
+    /// many there are. `count` elements are counted.
     pub(crate) fn record_in_pieces(
         &self,
         state: &mut State,
@@ -47,8 +47,8 @@ impl Gpu {
     }
 }
 
-/// How many of `rest` elements, which together take `time`, take at most `longest`: whole workgroups, at least those of a
-/// first dispatch.
+/// How many of `rest` elements, which together take `time`, take at most `longest`: whole workgroups, at least those of
+/// a first dispatch.
 fn within(longest: Duration, time: Duration, rest: u32) -> u32 {
     if time <= longest {
         return rest;

@@ -54,8 +54,8 @@ impl Pipelines {
         Ok(pipelines)
     }
 
-    /// Begins with the data of another process's cache, which is of this device and driver. A driver that does not take it
-    /// goes on without.
+    /// Begins with the data of another process's cache, which is of this device and driver. A driver that does not take
+    /// it goes on without.
     pub(crate) fn recall(&mut self, data: &[u8]) {
         let info = vk::PipelineCacheCreateInfo::default().initial_data(data);
         let Handle { device, .. } = &*self.handle;
@@ -86,8 +86,8 @@ impl Pipelines {
         Ok(Pipeline { raw, layout, set_layout })
     }
 
-    /// Whether a form has the subgroups that it demands, as far as the driver reports it of the pipeline, which is made if it is
-    /// not there.
+    /// Whether a form has the subgroups that it demands, as far as the driver reports it of the pipeline, which is made
+    /// if it is not there.
     pub(crate) fn fits(&mut self, kernel: Kernel, form: Form, page_shift: u32) -> Result<bool, VulkanError> {
         if !form.needs_subgroups() {
             return Ok(true);
@@ -195,8 +195,8 @@ impl Pipelines {
         let code: Vec<u32> = bytes.chunks_exact(4).map(bytemuck::pod_read_unaligned).collect();
         let code = excerpt(&code, entry_point);
         let info = vk::ShaderModuleCreateInfo::default().code(&code);
-        // SAFETY: the whole module was validated when it was made, and a part that nothing else refers to stays valid; the device
-        // has the features that it needs.
+        // SAFETY: the whole module was validated when it was made, and a part that nothing else refers to stays valid;
+        // the device has the features that it needs.
         unsafe { self.handle.device.create_shader_module(&info, None) }
             .map_err(|result| self.handle.failure("vkCreateShaderModule", result))
     }

@@ -8,8 +8,8 @@
 //! checksum   CRC-32 of all before it: against damage, not against malice
 //! ```
 //!
-//! Numbers are little-endian. Data of another device, driver or module, and damaged data, is ignored: everything is made
-//! anew. The pipelines' own header is looked at, too, because not every driver does.
+//! Numbers are little-endian. Data of another device, driver or module, and damaged data, is ignored: everything is
+//! made anew. The pipelines' own header is looked at, too, because not every driver does.
 
 use crate::adapter::Identity;
 use crate::forms::Choices;

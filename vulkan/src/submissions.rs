@@ -1,9 +1,9 @@
 //! Submissions to the queue.
 //!
-//! Commands are recorded one behind the other into the open submission, which is submitted when somebody waits for it, or
-//! when it is full: of dispatches, of time that they are expected to take, or of memory that they hold. Up to
-//! [`MAX_IN_FLIGHT`] submissions are in flight at once, so that the device works while the host prepares the next ones. A
-//! submission keeps its resources alive until its fence is signalled.
+//! Commands are recorded one behind the other into the open submission, which is submitted when somebody waits for it,
+//! or when it is full: of dispatches, of time that they are expected to take, or of memory that they hold. Up to
+//! [`MAX_IN_FLIGHT`] submissions are in flight at once, so that the device works while the host prepares the next ones.
+//! A submission keeps its resources alive until its fence is signalled.
 
 use crate::buffer::Array;
 use crate::error::VulkanError;

@@ -239,8 +239,8 @@ impl Gpu {
     }
 }
 
-/// Calls with each range of at most `most` bytes of an array within one chunk: the chunk, the byte in it, and the bytes of
-/// the whole array.
+/// Calls with each range of at most `most` bytes of an array within one chunk: the chunk, the byte in it, and the bytes
+/// of the whole array.
 fn for_each_stretch(
     array: &Array,
     most: usize,

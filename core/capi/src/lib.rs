@@ -1,7 +1,7 @@
 //! The C face of viewfuse-core: fixed-size entry points for firmware, as a static library with a generated header.
 //!
-//! Each function checks its pointers and the values behind them, calls core and stores the result. Inputs are read through
-//! raw pointers, so overlapping arrays break no aliasing rule; each function says what overlap does.
+//! Each function checks its pointers and the values behind them, calls core and stores the result. Inputs are read
+//! through raw pointers, so overlapping arrays break no aliasing rule; each function says what overlap does.
 //!
 //! No panic unwinds into C: core has no reachable panic, and `extern "C"` would turn one into an abort.
 #![cfg_attr(target_os = "none", no_std)]

@@ -15,8 +15,8 @@ pub struct Ray {
     pub weighted_depth: f32,
     /// Sum of the optical depths.
     pub optical_depth: f32,
-    /// Transmittance of the samples so far, from 0 to 1. Early termination: stop where it is below a threshold. The samples
-    /// behind change a colour by at most this fraction of its range.
+    /// Transmittance of the samples so far, from 0 to 1. Early termination: stop where it is below a threshold. The
+    /// samples behind change a colour by at most this fraction of its range.
     pub transmittance: f32,
 }
 
@@ -57,8 +57,8 @@ pub unsafe extern "C" fn viewfuse_ray_start(ray: *mut Ray) -> Status {
     Status::of(unsafe { write(ray, Ray::from(Compositor::<3>::START.block())) })
 }
 
-/// Adds the next sample, front to back: its colour `[3]`, its optical depth (density times length; negative or NaN counts
-/// as 0, infinity as opaque) and its distance along the ray.
+/// Adds the next sample, front to back: its colour `[3]`, its optical depth (density times length; negative or NaN
+/// counts as 0, infinity as opaque) and its distance along the ray.
 ///
 /// # Safety
 /// Pointers are null or valid.
@@ -90,8 +90,8 @@ pub unsafe extern "C" fn viewfuse_ray_add_solid(ray: *mut Ray, rgb: *const f32, 
     })
 }
 
-/// The pixel, with the background `[3]` behind everything; `empty_depth` is the depth of a ray that hit nothing. The ray
-/// is not changed.
+/// The pixel, with the background `[3]` behind everything; `empty_depth` is the depth of a ray that hit nothing. The
+/// ray is not changed.
 ///
 /// # Safety
 /// Pointers are null or valid.

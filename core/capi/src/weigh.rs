@@ -186,8 +186,8 @@ unsafe fn attend<const S: usize>(
     // SAFETY: the caller's promise.
     let views = unsafe { Views::<S>::new(source_poses, source_count, target_pose, weights) }?;
     views.weigh(|sources, target| {
-        // SAFETY: aligned, and of that many floats, which is all that the struct is made of (C's layout, no padding); it
-        // is not used any more when the weights are written.
+        // SAFETY: aligned, and of that many floats, which is all that the struct is made of (C's layout, no padding);
+        // it is not used any more when the weights are written.
         let embedding = unsafe { &*parameters.cast::<FourierEmbedding>() };
         cross_attention(embedding, sources, target)
     })

@@ -1,5 +1,6 @@
-//! Stream compaction: from a mask over elements to the list of those that it marks, in order, so that the list never leaves
-//! the device. Three kernels without atomics: count what each run of elements marks, sum the counts, write the list.
+//! Stream compaction: from a mask over elements to the list of those that it marks, in order, so that the list never
+//! leaves the device. Three kernels without atomics: count what each run of elements marks, sum the counts, write the
+//! list.
 
 use viewfuse_core::fetch::Fetch;
 
@@ -24,8 +25,8 @@ pub fn marked_in_run(mask: &(impl Fetch<u32> + ?Sized), element_count: u32, run:
     count
 }
 
-/// Where each run's part of the list begins, `write(run, offset)` in order, and at last, as one run more, its length: sums
-/// of `counts[run]`.
+/// Where each run's part of the list begins, `write(run, offset)` in order, and at last, as one run more, its length:
+/// sums of `counts[run]`.
 #[inline]
 pub fn run_offsets(counts: &(impl Fetch<u32> + ?Sized), run_count: u32, mut write: impl FnMut(usize, u32)) {
     let (mut run, mut offset) = (0, 0);

@@ -1,7 +1,8 @@
 //! Gaussians of a scene: projected to a camera, composited front to back, and the derivatives by their parameters.
 //!
-//! A picture is made of tiles of [`SPLAT_TILE`] by [`SPLAT_TILE`] pixels. Each tile has a list of the splats that cover pixels of it, the
-//! nearest first; the host sorts and lists them between the two dispatches. Stages, each a data-parallel kernel:
+//! A picture is made of tiles of [`SPLAT_TILE`] by [`SPLAT_TILE`] pixels. Each tile has a list of the splats that cover
+//! pixels of it, the nearest first; the host sorts and lists them between the two dispatches. Stages, each a
+//! data-parallel kernel:
 //!
 //! ```text
 //! lanes               pixels of a row, and a splat's opacity there        Lanes, SplatLanes
@@ -12,8 +13,8 @@
 //! adam                a step against the derivative                       adam_step
 //! ```
 //!
-//! Forward: [`viewfuse_core::gaussian`]. Backward: the chain rule by hand, as in "3D Gaussian Splatting" (Kerbl et al. 2023). All sums
-//! run in one order, so that results do not depend on the number of threads.
+//! Forward: [`viewfuse_core::gaussian`]. Backward: the chain rule by hand, as in "3D Gaussian Splatting" (Kerbl et al.
+//! 2023). All sums run in one order, so that results do not depend on the number of threads.
 
 pub mod adam;
 pub mod blend;
@@ -90,8 +91,8 @@ impl TileBlock {
         [tile % self.tile_columns * SPLAT_TILE as u32, tile / self.tile_columns * SPLAT_TILE as u32]
     }
 
-    /// Column and row of a pixel that is counted tile by tile, row by row in each, whole tiles at the borders, too; `None` outside of the
-    /// picture.
+    /// Column and row of a pixel that is counted tile by tile, row by row in each, whole tiles at the borders, too;
+    /// `None` outside of the picture.
     #[inline]
     pub fn pixel_of_tiles(&self, pixel: u32) -> Option<[u32; 2]> {
         const SIDE: u32 = SPLAT_TILE as u32;

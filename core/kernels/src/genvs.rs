@@ -1,8 +1,8 @@
 //! GeNVS with weighted views: volumes of features, looked up at points, become a feature image; the denoiser's inputs.
 //!
 //! Source: Chan et al., "Generative novel view synthesis with 3D-aware diffusion models" (2023), and the code of "Pay
-//! Attention to Where You Looked" (`pixel_nerf_net.py`). A view's volume spans its photograph and the depths from `near`
-//! to `far` along its principal axis; depth node 0 is the *farthest* (published convention).
+//! Attention to Where You Looked" (`pixel_nerf_net.py`). A view's volume spans its photograph and the depths from
+//! `near` to `far` along its principal axis; depth node 0 is the *farthest* (published convention).
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -81,8 +81,8 @@ impl VolumePlace {
         self.lower[0] < -1
     }
 
-    /// One feature there from `volume[row][column][depth][feature]`, flat, trilinear, zeros around the volume: the sum over
-    /// the eight nodes, columns innermost, then rows, then depths.
+    /// One feature there from `volume[row][column][depth][feature]`, flat, trilinear, zeros around the volume: the sum
+    /// over the eight nodes, columns innermost, then rows, then depths.
     #[inline(always)]
     pub fn value(&self, volume: impl Fn(usize) -> f32, block: &VolumeBlock, feature: u32) -> f32 {
         let mut sum = 0.0;
@@ -100,8 +100,8 @@ impl VolumePlace {
         sum
     }
 
-    /// Number of a node around the place (`[row][column][depth]`; `u32::MAX` outside the volume) and its weight. Bit 0 of
-    /// `corner` says which column, bit 1 which row, bit 2 which depth.
+    /// Number of a node around the place (`[row][column][depth]`; `u32::MAX` outside the volume) and its weight. Bit 0
+    /// of `corner` says which column, bit 1 which row, bit 2 which depth.
     #[inline(always)]
     pub fn corner(&self, block: &VolumeBlock, corner: u32) -> (u32, f32) {
         let (x, share_x) = step(self.lower[0], self.share[0], corner % 2);
@@ -167,12 +167,12 @@ pub struct FeatureBlock {
     pub first_ray: u32,
 }
 
-/// Weights of a ray's samples, one at a time and front to back: `weigh(sample, weight)`. `raw[sample][0]` is the network's
-/// density (rectified; a density or optical depth of NaN makes all weights from there on NaN), `points[sample]` has its
-/// length.
+/// Weights of a ray's samples, one at a time and front to back: `weigh(sample, weight)`. `raw[sample][0]` is the
+/// network's density (rectified; a density or optical depth of NaN makes all weights from there on NaN),
+/// `points[sample]` has its length.
 ///
-/// With the optical depth `o_i` and the transmittance `T_i` in front of a sample, exclusive weights are `T_i - T_(i+1)` as
-/// in [`viewfuse_core::composite`]; inclusive ones, `(1 - e^-o_i) T_(i+1)`, are those times `e^-o_i`.
+/// With the optical depth `o_i` and the transmittance `T_i` in front of a sample, exclusive weights are `T_i - T_(i+1)`
+/// as in [`viewfuse_core::composite`]; inclusive ones, `(1 - e^-o_i) T_(i+1)`, are those times `e^-o_i`.
 #[inline]
 pub fn weigh_features(
     raw: &(impl Fetch<f32> + ?Sized),
@@ -202,8 +202,8 @@ pub fn weigh_features(
     }
 }
 
-/// Number `element` of `[ray][feature]`: the sum over the ray's samples of `weights[sample]` times the feature, which is
-/// the fused feature plus the network's output: `fused[sample][feature] + raw[sample][1 + feature]`.
+/// Number `element` of `[ray][feature]`: the sum over the ray's samples of `weights[sample]` times the feature, which
+/// is the fused feature plus the network's output: `fused[sample][feature] + raw[sample][1 + feature]`.
 #[inline]
 pub fn summed_feature(
     weights: &(impl Fetch<f32> + ?Sized),

@@ -1,8 +1,8 @@
 //! The kernels of viewfuse: functions of one output element each, and the rows that declare them.
 //!
-//! A kernel's body ([`bodies`]) is made of the mathematics of `viewfuse-core`; the CPU calls it in a loop, and an entry point
-//! on a Vulkan device calls it for its invocation. Everything here is `no_std`, free of allocation and of `unsafe`, and computes in `f32`
-//! and 32-bit integers. The modules are listed in the order of the data:
+//! A kernel's body ([`bodies`]) is made of the mathematics of `viewfuse-core`; the CPU calls it in a loop, and an entry
+//! point on a Vulkan device calls it for its invocation. Everything here is `no_std`, free of allocation and of
+//! `unsafe`, and computes in `f32` and 32-bit integers. The modules are listed in the order of the data:
 //!
 //! ```text
 //! store             writing elements by index                       Store

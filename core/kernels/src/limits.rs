@@ -1,9 +1,9 @@
-//! What a device can do at most: kernels that only copy, that only multiply and add, and that only look texels up. Rates of other
-//! kernels are compared with theirs.
+//! What a device can do at most: kernels that only copy, that only multiply and add, and that only look texels up.
+//! Rates of other kernels are compared with theirs.
 //!
-//! A chain is a number that is multiplied and added to again and again, `x = x * factor + summand`: each step needs the one
-//! before, and nothing is read or written in between. An element has [`CHAINS`] of them, so that a device always has one
-//! to go on with.
+//! A chain is a number that is multiplied and added to again and again, `x = x * factor + summand`: each step needs the
+//! one before, and nothing is read or written in between. An element has [`CHAINS`] of them, so that a device always
+//! has one to go on with.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
@@ -17,7 +17,8 @@ pub const ROUND_STEPS: u32 = 8;
 
 /// Look-ups of an element.
 pub const LOOK_UPS: u32 = 16;
-/// From one look-up of an element to the next, in pixels to the right: as planes of a sweep follow each other in a view.
+/// From one look-up of an element to the next, in pixels to the right: as planes of a sweep follow each other in a
+/// view.
 pub const LOOK_UP_STEP: f32 = 0.3;
 
 /// A dispatch of [`looked_up`], as plain data.
@@ -66,9 +67,9 @@ pub fn chained(block: &ChainBlock, start: f32) -> f32 {
     all.x + all.y + all.z + all.w
 }
 
-/// The sum of all channels of [`LOOK_UPS`] bilinear look-ups in `texels[row][column]`, [`LOOK_UP_STEP`] apart, the first one a little
-/// below and right of the corner of the pixel of the element's number, counted row by row and again from the first one behind
-/// the last. Channels are summed first, in pairs.
+/// The sum of all channels of [`LOOK_UPS`] bilinear look-ups in `texels[row][column]`, [`LOOK_UP_STEP`] apart, the
+/// first one a little below and right of the corner of the pixel of the element's number, counted row by row and again
+/// from the first one behind the last. Channels are summed first, in pairs.
 #[inline(always)]
 pub fn looked_up(block: &LookUpBlock, texels: &(impl Fetch<[f32; 4]> + ?Sized), element: u32) -> f32 {
     let (column, row) = (element % block.width, element / block.width % block.height);

@@ -1,5 +1,5 @@
-//! Reading and writing elements by index in several pages: a buffer that is longer than a device can bind at once lies in up
-//! to four [`Pages`] of equal length, a power of two.
+//! Reading and writing elements by index in several pages: a buffer that is longer than a device can bind at once lies
+//! in up to four [`Pages`] of equal length, a power of two.
 
 use crate::store::Store;
 use viewfuse_core::fetch::Fetch;

@@ -205,8 +205,8 @@ pub fn gathered_value(
     if block.has_residual != 0 { residual.fetch(element) + value } else { value }
 }
 
-/// As [`gathered_value`], from a grid of numbers in half precision, two in a word: they are read exactly, and sums are in
-/// `f32`.
+/// As [`gathered_value`], from a grid of numbers in half precision, two in a word: they are read exactly, and sums are
+/// in `f32`.
 #[inline]
 pub fn gathered_value_f16(
     views: &(impl Fetch<CameraBlock> + ?Sized),
@@ -219,8 +219,9 @@ pub fn gathered_value_f16(
     gathered_value(views, points, &Halves(grid), residual, block, element)
 }
 
-/// Radiance from the network's four outputs `raw[channel]` at a point: red, green, blue in `[0, 1]` (logistic function, 1
-/// for NaN), and optical depth: density (rectified; NaN counts as 0) times the length of ray that the point represents.
+/// Radiance from the network's four outputs `raw[channel]` at a point: red, green, blue in `[0, 1]` (logistic function,
+/// 1 for NaN), and optical depth: density (rectified; NaN counts as 0) times the length of ray that the point
+/// represents.
 #[inline]
 pub fn radiance(raw: &(impl Fetch<f32> + ?Sized), point: &RayPoint) -> [f32; 4] {
     let colour = |channel: usize| 1.0 / (1.0 + exp(-raw.fetch(channel)));

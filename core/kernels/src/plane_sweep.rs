@@ -1,5 +1,5 @@
-//! The training-free field for any scene: planes of equal disparity are swept through a camera's frustum, the source views
-//! are compared on them, and a picture is blended from the planes on which they agree.
+//! The training-free field for any scene: planes of equal disparity are swept through a camera's frustum, the source
+//! views are compared on them, and a picture is blended from the planes on which they agree.
 //!
 //! The frustum is the target's, for a picture, or a source's, for its disparities. Stages, each a data-parallel kernel:
 //!
@@ -14,12 +14,13 @@
 //! blend       a target's pixel: softmax over planes                blend
 //! ```
 //!
-//! Disparity is the inverse of the depth along the principal axis, in inverse world units; 0 is infinitely far. Planes go from far
-//! to near. Volumes hold [`PLANES`] neighbouring planes in an element and are laid out `[row][column][group of planes]`.
+//! Disparity is the inverse of the depth along the principal axis, in inverse world units; 0 is infinitely far. Planes
+//! go from far to near. Volumes hold [`PLANES`] neighbouring planes in an element and are laid out `[row][column][group
+//! of planes]`.
 //!
 //! Published ideas: plane sweeping (Collins 1996), census (Zabih and Woodfill 1994), semi-global matching (Hirschmüller
-//! 2008), soft visibility and consensus (Penner and Zhang, "Soft 3D reconstruction", 2017), blending by relevance (Buehler et
-//! al. 2001). The cameras' weights enter twice: in the pairs that are compared, and in the blend.
+//! 2008), soft visibility and consensus (Penner and Zhang, "Soft 3D reconstruction", 2017), blending by relevance
+//! (Buehler et al. 2001). The cameras' weights enter twice: in the pairs that are compared, and in the blend.
 
 pub mod blend;
 pub mod census;

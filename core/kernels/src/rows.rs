@@ -1,8 +1,9 @@
 //! One row a kernel: its name, what it takes, what it binds, what it costs, and its body.
 //!
-//! A kernel is a function of one output element, its *body*, the function of its name in [`bodies`](crate::bodies). Everything else that is known about a kernel
-//! follows from its row: the variant of [`Kernel`] with its name, arrays and parameter bytes, the method of a device with
-//! its forwarding on the CPU and on Vulkan, the faulty device of the tests, and the way to the kernel's case. A row is
+//! A kernel is a function of one output element, its *body*, the function of its name in [`bodies`](crate::bodies).
+//! Everything else that is known about a kernel follows from its row: the variant of [`Kernel`] with its name, arrays
+//! and parameter bytes, the method of a device with its forwarding on the CPU and on Vulkan, the faulty device of the
+//! tests, and the way to the kernel's case. A row is
 //!
 //! ```text
 //! /// What it computes, and what an element is.
@@ -13,9 +14,9 @@
 //!
 //! - `block: Parameters` are the push constants, `count` further numbers that only the host needs; `first..end` are the
 //!   elements of a dispatch. `N` elements take about 20 µs: a core gets no fewer.
-//! - `tiles [rows, inner, columns]` in the place of `for`: the kernel is a matrix product of this shape, and a workgroup
-//!   computes a tile together, in memory that it shares. There is an entry point for each [`Form`] of a tile, with the same
-//!   bits in its outputs; a device takes the fastest. The body is the definition.
+//! - `tiles [rows, inner, columns]` in the place of `for`: the kernel is a matrix product of this shape, and a
+//!   workgroup computes a tile together, in memory that it shares. There is an entry point for each [`Form`] of a tile,
+//!   with the same bits in its outputs; a device takes the fastest. The body is the definition.
 //! - Arrays stand in the order of their bindings. `Element` is what a buffer on the host holds. `as vectors`: the
 //!   entry point loads and stores each as vectors of four numbers. `place`
 //!   is the index of the first value that an element writes, where it is not the element's own number.
@@ -44,13 +45,13 @@
 //! | `write` | writes its elements, and reads nothing of it | a buffer |
 //! | `write_paged` | the same; it may be longer than a device can bind at once | a buffer |
 //!
-//! Buffers may be longer than the parameters say. [`for_each_kernel`](crate::for_each_kernel) hands all rows to a macro, in
-//! the form of [`normal_rows`](crate::normal_rows), which alone knows the grammar above.
+//! Buffers may be longer than the parameters say. [`for_each_kernel`](crate::for_each_kernel) hands all rows to a
+//! macro, in the form of [`normal_rows`](crate::normal_rows), which alone knows the grammar above.
 //!
 //! A new kernel is its row, its body in [`bodies`](crate::bodies), a case with its `f64` evaluation in
-//! `host/check/src/cases/`, and a faster form in `host/device/src/cpu/` where it has the mark `twin` or `looped`: three files
-//! or four. Its entry points on a GPU and its loop on the CPU are made from the row. What is missing of body, form and case
-//! does not compile; a module that was not compiled again (`cargo shaders`) fails a test.
+//! `host/check/src/cases/`, and a faster form in `host/device/src/cpu/` where it has the mark `twin` or `looped`: three
+//! files or four. Its entry points on a GPU and its loop on the CPU are made from the row. What is missing of body,
+//! form and case does not compile; a module that was not compiled again (`cargo shaders`) fails a test.
 
 mod kernel;
 mod normal;

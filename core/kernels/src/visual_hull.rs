@@ -1,5 +1,5 @@
-//! The training-free field inside silhouettes: a solid carved by silhouettes and by photo-consistency, coloured by weighted
-//! fusion of the views' colours.
+//! The training-free field inside silhouettes: a solid carved by silhouettes and by photo-consistency, coloured by
+//! weighted fusion of the views' colours.
 //!
 //! Four stages, each a few data-parallel kernels; a kernel is a function of one output element.
 //!

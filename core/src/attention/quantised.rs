@@ -1,19 +1,20 @@
 //! The paper's cross attention with parameters of 8 bits, for firmware: 12.6 kB instead of 60 kB, and whole numbers in
 //! its sums.
 //!
-//! The last layer of the embedding, `E = W h + b`, has no ReLU behind it, so the product of two embeddings is a product of
-//! the hidden numbers `h`. With `A` the length of an embedding, `G = W^T W / sqrt(A)` and `g = W^T b / sqrt(A)`:
+//! The last layer of the embedding, `E = W h + b`, has no ReLU behind it, so the product of two embeddings is a product
+//! of the hidden numbers `h`. With `A` the length of an embedding, `G = W^T W / sqrt(A)` and `g = W^T b / sqrt(A)`:
 //!
 //! ```text
 //! E_t . E_s / sqrt(A)  =  h_t . G h_s  +  g . h_s  +  (g . h_t + b . b / sqrt(A))
 //! ```
 //!
-//! The softmax over the sources does not see what is the same for all of them, the bracket. `G h_s` is a source's key and
-//! `g . h_s` its offset: both are computed once, and a further target costs two layers and a product with each key.
+//! The softmax over the sources does not see what is the same for all of them, the bracket. `G h_s` is a source's key
+//! and `g . h_s` its offset: both are computed once, and a further target costs two layers and a product with each key.
 //!
-//! Weights of a layer are whole numbers of 8 bits times a scale a row (symmetric), layers' inputs are whole numbers of 16
-//! bits times one scale, sums are exact in 32 bits (keys' products in 64). All targets give the same bits, those without an
-//! FPU as well. `viewfuse-weighting` makes the parameters from an attention file and bounds how much the weights change.
+//! Weights of a layer are whole numbers of 8 bits times a scale a row (symmetric), layers' inputs are whole numbers of
+//! 16 bits times one scale, sums are exact in 32 bits (keys' products in 64). All targets give the same bits, those
+//! without an FPU as well. `viewfuse-weighting` makes the parameters from an attention file and bounds how much the
+//! weights change.
 
 use super::{FREQUENCY_COUNT, FREQUENCY_FACTOR, HIDDEN, POSE_FEATURES, pose_features};
 use crate::math::{abs, sin_cos};
@@ -68,8 +69,8 @@ fn features(pose: &Pose) -> [f32; POSE_FEATURES] {
     features
 }
 
-/// How far a feature may be from that of [`super::pose_features`]: with an error `e` of sine and cosine each, those of the
-/// double angle are known to `2 sqrt(2) e` and the roundings.
+/// How far a feature may be from that of [`super::pose_features`]: with an error `e` of sine and cosine each, those of
+/// the double angle are known to `2 sqrt(2) e` and the roundings.
 pub fn feature_error(feature: usize) -> f32 {
     let is_angle = (3..3 + 6 * FREQUENCY_COUNT).contains(&feature);
     // Both ways of computing are known to 9e-8 at the first frequency.
@@ -82,9 +83,9 @@ pub fn feature_error(feature: usize) -> f32 {
     if is_angle && feature >= 9 { error } else { 0.0 }
 }
 
-/// An affine map with weights of 8 bits from `2 P N` inputs, which are taken in `N` steps of `P` pairs, to `4 B` outputs:
-/// `y[o] = bias[o] + scale[o] * sum over i of weight[o][i] x[i]`. The weights of four outputs stand together, so that the
-/// four read an input once.
+/// An affine map with weights of 8 bits from `2 P N` inputs, which are taken in `N` steps of `P` pairs, to `4 B`
+/// outputs: `y[o] = bias[o] + scale[o] * sum over i of weight[o][i] x[i]`. The weights of four outputs stand together,
+/// so that the four read an input once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct QuantisedLinear<const P: usize, const N: usize, const B: usize> {
@@ -197,7 +198,8 @@ impl<const P: usize, const N: usize, const B: usize> QuantisedLinear<P, N, B> {
     }
 }
 
-/// Parameters of the paper's cross attention on Fourier features, the last layer folded into products of hidden numbers.
+/// Parameters of the paper's cross attention on Fourier features, the last layer folded into products of hidden
+/// numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct QuantisedAttention {
@@ -300,8 +302,8 @@ impl<const S: usize> SourceKeys<S> {
     }
 }
 
-/// The paper's cross-attention weighting with parameters of 8 bits. For more than one target of the same sources, keep the
-/// [`SourceKeys`].
+/// The paper's cross-attention weighting with parameters of 8 bits. For more than one target of the same sources, keep
+/// the [`SourceKeys`].
 pub fn quantised_attention<const S: usize>(
     parameters: &QuantisedAttention,
     sources: &Sources<S>,

@@ -1,8 +1,8 @@
 //! iPNDM: results are directions `d = (x - D) / s`, which `dx/ds = d` integrates by Adams and Bashforth's method.
 //!
-//! Sources: Zhang and Chen, "Fast sampling of diffusion models with exponential integrator" (2022), for the method and its
-//! start with lower orders; Zhou et al., "Fast ODE-based sampling for diffusion models in around 5 steps" (2024), and their
-//! code, for its form on EDM's levels.
+//! Sources: Zhang and Chen, "Fast sampling of diffusion models with exponential integrator" (2022), for the method and
+//! its start with lower orders; Zhou et al., "Fast ODE-based sampling for diffusion models in around 5 steps" (2024),
+//! and their code, for its form on EDM's levels.
 
 use super::Mix;
 use super::interpolation::Row;

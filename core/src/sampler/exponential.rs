@@ -3,8 +3,8 @@
 //! With `l = -ln s` and the step's length `h = ln(s / n)` the flow is `x_n = n / s x_s + integral of exp(l - l_n) D dl`
 //! exactly; a polynomial in `l` through the known results replaces `D`.
 //!
-//! Source: Zhao et al., "UniPC" (2023), and their code, with data prediction. Where it solves for its coefficients exactly,
-//! as for three results and more, they are the integrals of that polynomial, for any function `B(h)`.
+//! Source: Zhao et al., "UniPC" (2023), and their code, with data prediction. Where it solves for its coefficients
+//! exactly, as for three results and more, they are the integrals of that polynomial, for any function `B(h)`.
 
 use super::Mix;
 use super::interpolation::{Row, exponential_moments, places, weights};

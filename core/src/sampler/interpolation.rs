@@ -35,8 +35,8 @@ pub(super) fn exponential_moments(h: f32, first: f32) -> Row {
 }
 
 /// The weight of each of `count` results at different `places` in the integral of the polynomial through them, with the
-/// integrals of `t^k` given as `moments`. The sum is exactly the first moment to a rounding: a result that does not change
-/// is taken as it is.
+/// integrals of `t^k` given as `moments`. The sum is exactly the first moment to a rounding: a result that does not
+/// change is taken as it is.
 pub(super) fn weights(places: &Row, count: u32, moments: &Row) -> Row {
     let count = count as usize;
     let mut weights = [0.0; MAX_RESULTS];
@@ -64,8 +64,8 @@ pub(super) fn weights(places: &Row, count: u32, moments: &Row) -> Row {
     weights
 }
 
-/// Where the results at `levels` lie along a step of length `h` in the logarithm of the level that begins at `start`: 0 at
-/// its beginning, negative before.
+/// Where the results at `levels` lie along a step of length `h` in the logarithm of the level that begins at `start`: 0
+/// at its beginning, negative before.
 pub(super) fn places(levels: &Row, count: u32, start: f32, h: f32) -> Row {
     let mut places = [0.0; MAX_RESULTS];
     let mut index = 0;

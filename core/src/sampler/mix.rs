@@ -89,8 +89,8 @@ pub struct NoiseBlock {
     pub scale: f32,
 }
 
-/// Kernel `add_noise`: a picture's value with noise, `value + scale * normal(seed, element, stream)`. The same number for
-/// the same seed on every device, up to the rounding of [`normal`].
+/// Kernel `add_noise`: a picture's value with noise, `value + scale * normal(seed, element, stream)`. The same number
+/// for the same seed on every device, up to the rounding of [`normal`].
 #[inline]
 pub fn noisy_element(block: &NoiseBlock, value: f32, element: u32) -> f32 {
     value + block.scale * normal(block.seed, element, block.stream)

@@ -108,8 +108,8 @@ pub fn is_decided(expected: &Option<Bounded>, tolerance: f64) -> Option<Bounded>
     expected.filter(|expected| expected.error <= tolerance)
 }
 
-/// Compares results with their expectations, each within its own bound. Elements without an expectation, or with a bound
-/// above the tolerance, are undecided and must be few; NaN is a mismatch also there.
+/// Compares results with their expectations, each within its own bound. Elements without an expectation, or with a
+/// bound above the tolerance, are undecided and must be few; NaN is a mismatch also there.
 pub fn measure(actual: &[f32], expected: &[Option<Bounded>], limits: Limits) -> Agreement {
     let mut agreement = Agreement::default();
     if actual.len() != expected.len() || actual.is_empty() {

@@ -10,8 +10,8 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 /// Twice the unit roundoff of `f32`, relative.
 pub const ROUNDING: f64 = 2.0 / 16_777_216.0;
 
-/// The error of a division, relative: Vulkan allows 2.5 ULP, and a device may multiply with the rounded reciprocal, which
-/// is one rounding more.
+/// The error of a division, relative: Vulkan allows 2.5 ULP, and a device may multiply with the rounded reciprocal,
+/// which is one rounding more.
 pub const DIVISION: f64 = 3.0 * ROUNDING;
 
 /// Absolute error of our sine and cosine for arguments up to 8192.
@@ -47,7 +47,8 @@ impl Bounded {
     /// A sum of products in any order.
     ///
     /// Of `n` summands each is rounded at most `n` times: once as a product, and in at most `n - 1` additions, in
-    /// whichever order they run (Higham, section 4.2). Underflow of products, which a device may flush to 0, is included.
+    /// whichever order they run (Higham, section 4.2). Underflow of products, which a device may flush to 0, is
+    /// included.
     pub fn sum(summands: impl Iterator<Item = f64>) -> Bounded {
         let (mut value, mut magnitudes, mut count) = (0.0, 0.0, 0);
         for summand in summands {

@@ -69,8 +69,8 @@ pub fn project(camera: &CameraBlock, point_world: Vector) -> BoundedProjection {
     BoundedProjection { x, y, depth, in_front, in_image: inside(camera, in_front, x, y) }
 }
 
-/// Whether a point that is projected to these image coordinates is in front of the camera and inside its image; the border
-/// counts. `None` if an error of a number may change the answer.
+/// Whether a point that is projected to these image coordinates is in front of the camera and inside its image; the
+/// border counts. `None` if an error of a number may change the answer.
 pub fn inside(camera: &CameraBlock, in_front: Option<bool>, x: Bounded, y: Bounded) -> Option<bool> {
     let answers = [
         in_front,

@@ -9,8 +9,8 @@ use viewfuse_device::{Device, DeviceError};
 /// workgroup, several workgroups. Kernels on pictures take pictures of about as many pixels.
 pub const SIZES: [u32; 5] = [1, 7, 65, 500, 2000];
 
-/// An input by its name in [`Kernel::arrays`](viewfuse_vulkan::kernel::Kernel::arrays), or `parameters`; and a function that
-/// changes it by 1 %.
+/// An input by its name in [`Kernel::arrays`](viewfuse_vulkan::kernel::Kernel::arrays), or `parameters`; and a function
+/// that changes it by 1 %.
 pub type NegativeControl<C> = (&'static str, fn(&mut C));
 
 /// A kernel's check. Its inputs are dispatches as the kernel's row makes them.
@@ -44,7 +44,8 @@ pub trait Case: Dispatch {
         self.dispatch(device, loaded, index)
     }
 
-    /// The outputs that begin with one of several dispatches. A case whose outputs are no plain numbers has its own way.
+    /// The outputs that begin with one of several dispatches. A case whose outputs are no plain numbers has its own
+    /// way.
     ///
     /// # Errors
     /// If the device is lost.

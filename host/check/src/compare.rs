@@ -54,7 +54,8 @@ impl fmt::Display for Mismatch {
 }
 
 impl Comparator {
-    /// Compares element by element; on success returns the element with the largest difference in units of its tolerance.
+    /// Compares element by element; on success returns the element with the largest difference in units of its
+    /// tolerance.
     ///
     /// # Errors
     /// The [`Mismatch`]; of several elements out of tolerance, the worst.

@@ -1,5 +1,5 @@
-//! A dispatch of every kernel on the host, made from the kernels' rows: a struct of its parameters, counts and arrays, which
-//! goes to a device, runs there and comes back. What a case adds is in [`crate::case`].
+//! A dispatch of every kernel on the host, made from the kernels' rows: a struct of its parameters, counts and arrays,
+//! which goes to a device, runs there and comes back. What a case adds is in [`crate::case`].
 
 use viewfuse_device::{Device, DeviceError, Element, LayerShape, Memory};
 use viewfuse_kernels::rows::*;

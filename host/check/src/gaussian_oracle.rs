@@ -222,8 +222,8 @@ fn pixel_parts(
     Some(parts)
 }
 
-/// What a tile's pixels say of each splat of its list, 12 numbers each in the order of [`SplatGradient`]'s fields; `None` where it depends
-/// on rounding.
+/// What a tile's pixels say of each splat of its list, 12 numbers each in the order of [`SplatGradient`]'s fields;
+/// `None` where it depends on rounding.
 pub fn blend_gradient(
     block: &TileBlock,
     list: &[u32],

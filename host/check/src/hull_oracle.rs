@@ -1,5 +1,5 @@
-//! The kernels of [`viewfuse_kernels::visual_hull`] evaluated in `f64` from their documentation, with bounds on the error
-//! of `f32`.
+//! The kernels of [`viewfuse_kernels::visual_hull`] evaluated in `f64` from their documentation, with bounds on the
+//! error of `f32`.
 //!
 //! `None` means undecided: a value lies so near to a threshold that `f32` may fall on either side of it.
 

@@ -3,7 +3,8 @@
 //! Bounds count roundings to first order in units of `u = 2^-24`. An error `e` with a relative error of `k` units
 //! (`k + 1` once the offset is added) gives weights with at most `2 (k + 1) + S + 2` units: the numerator and the sum
 //! inherit `k + 1` each, the quotient of the smallest
-//! and each error is rounded (1 in the numerator, 1 in the sum), the sum has `S - 1` additions, and the last division 1.
+//! and each error is rounded (1 in the numerator, 1 in the sum), the sum has `S - 1` additions, and the last division
+//! 1.
 //!
 //! This holds for correctly rounded divisions and square roots. [`Arithmetic`] has their errors on other devices; their
 //! number in a weight is counted for each formula.
@@ -234,12 +235,12 @@ fn relative_frobenius(source: &WidePose, target: &WidePose) -> (f64, f64) {
 }
 
 /// The logit of a source is `-beta (d^2 - n^2)` with the nearest distance `n`. Up to distances and a beta of 1e6 it is
-/// kept with its rounding error: `exp` has 4 units, the correction 3, and 1 is left for what is of second order. Beyond,
-/// each square inherits 7 units of its distance (11 if scaled), the difference, sum and products are rounded 4 times,
-/// and `exp` adds its own 4 units.
+/// kept with its rounding error: `exp` has 4 units, the correction 3, and 1 is left for what is of second order.
+/// Beyond, each square inherits 7 units of its distance (11 if scaled), the difference, sum and products are rounded 4
+/// times, and `exp` adds its own 4 units.
 fn gaussian(distances: &[f64], beta: f64, arithmetic: Arithmetic) -> (Vec<f64>, Vec<f64>) {
-    // Within 1e6 there is no root on the way and only the quotients behind the exponential; beyond, squares inherit twice
-    // a distance's root and scaling.
+    // Within 1e6 there is no root on the way and only the quotients behind the exponential; beyond, squares inherit
+    // twice a distance's root and scaling.
     let Arithmetic { division, square_root } = arithmetic;
     let square_units = 11.0 + 2.0 * (square_root + division);
     let nearest = distances.iter().copied().fold(f64::INFINITY, f64::min);

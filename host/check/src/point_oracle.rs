@@ -1,4 +1,5 @@
-//! PixelNeRF's points in `f64`: the inputs of its network and radiance from its outputs, with bounds on the error of `f32`.
+//! PixelNeRF's points in `f64`: the inputs of its network and radiance from its outputs, with bounds on the error of
+//! `f32`.
 
 use super::bounded::Bounded;
 use super::camera_oracle::{Vector, axes, bilinear, centre, dot, point, project, tents};
@@ -56,7 +57,8 @@ pub fn visible_weights(views: &[CameraBlock], weights: &[f32], at: &RayPoint) ->
     of_seen.into_iter().map(|weight| Some(weight / all)).collect()
 }
 
-/// All channels of a view's grid at a point's projection; `None` if it depends on rounding whether the point is in front.
+/// All channels of a view's grid at a point's projection; `None` if it depends on rounding whether the point is in
+/// front.
 pub fn gather(view: &CameraBlock, grid: &[f32], at: &RayPoint, block: &GatherBlock) -> Option<Vec<Bounded>> {
     let position = point(at.position);
     let (x, y) = if is_in_front(view, position)? {

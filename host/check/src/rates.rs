@@ -1,13 +1,15 @@
 //! Rates of the kernels that take the time, beside what the device can do at most, both measured in the same run.
 //!
-//! Three limits are measured: how fast a kernel copies, how fast one multiplies and adds in registers, and how fast one looks
-//! texels up, bilinear, of four channels. A kernel that must move so many bytes and needs so many operations or look-ups takes at
-//! least the longest of the times that these limits allow; its *share* is that time over the time that it took. Limits and kernels are measured in turns, because what else a machine
-//! does, and how fast its clock may run, changes from second to second: a share is the median of the shares of all rounds.
+//! Three limits are measured: how fast a kernel copies, how fast one multiplies and adds in registers, and how fast one
+//! looks texels up, bilinear, of four channels. A kernel that must move so many bytes and needs so many operations or
+//! look-ups takes at least the longest of the times that these limits allow; its *share* is that time over the time
+//! that it took. Limits and kernels are measured in turns, because what else a machine does, and how fast its clock may
+//! run, changes from second to second: a share is the median of the shares of all rounds.
 //!
 //! Bytes count each number once that is read or written; a cache may serve several reads. Of products, convolutions,
-//! compositing and the census the operations are counted by hand; an operation that no device may fuse with another takes the
-//! place of two. Where views are compared on planes it is look-ups. Other kernels are compared with the copy only.
+//! compositing and the census the operations are counted by hand; an operation that no device may fuse with another
+//! takes the place of two. Where views are compared on planes it is look-ups. Other kernels are compared with the copy
+//! only.
 
 mod limits;
 mod networks;

@@ -1,5 +1,5 @@
-//! Cameras, rays and points for kernels on rays: in front of cameras and behind them, at the borders of their images, far
-//! outside, far away.
+//! Cameras, rays and points for kernels on rays: in front of cameras and behind them, at the borders of their images,
+//! far outside, far away.
 
 use super::poses::{Random, looking_at_origin};
 use viewfuse_core::Vec3;

@@ -24,8 +24,8 @@ pub struct Swept {
 }
 
 impl Swept {
-    /// The frustum of a seed, with about `size` groups of planes in all. Every other seed has photographs in the place of
-    /// silhouettes and a view without a map; every fourth has its farthest plane infinitely far away.
+    /// The frustum of a seed, with about `size` groups of planes in all. Every other seed has photographs in the place
+    /// of silhouettes and a view without a map; every fourth has its farthest plane infinitely far away.
     pub fn new(seed: u64, size: u32) -> Swept {
         let numbers = &mut Numbers::new(seed ^ 0x5eed);
         let group_count = 1 + (seed % 3) as u32;
@@ -157,8 +157,8 @@ pub fn costs(numbers: &mut Numbers, volume: &CostBlock) -> Vec<Planes> {
     costs
 }
 
-/// `[view][row][column][group]` greys and `[row][column][group][4]` evidence of a band: little contrast, a tenth unseen,
-/// some places where nothing is compared, some outside the silhouettes.
+/// `[view][row][column][group]` greys and `[row][column][group][4]` evidence of a band: little contrast, a tenth
+/// unseen, some places where nothing is compared, some outside the silhouettes.
 pub fn band(numbers: &mut Numbers, swept: &Swept) -> (Vec<Planes>, Vec<Planes>) {
     let count = swept.band_len();
     let mut grey = Vec::new();

@@ -28,7 +28,8 @@ fn nodes(coordinate: Bounded, count: u32) -> Nodes {
     Nodes { nodes: (low.floor() as i64..=high.ceil() as i64).map(node).collect(), error: high - low }
 }
 
-/// All features of a view's volume where a point lies; `None` if it depends on rounding whether it is in front of the view.
+/// All features of a view's volume where a point lies; `None` if it depends on rounding whether it is in front of the
+/// view.
 pub fn gather(view: &CameraBlock, volume: &[f32], at: &RayPoint, block: &VolumeBlock) -> Option<Vec<Bounded>> {
     let features = block.feature_count as usize;
     let position = point(at.position);

@@ -1,7 +1,7 @@
 //! The CPU: every kernel a loop over its elements, spread over all cores.
 //!
-//! The loops are made from the rows. Where a row says `twin`, a function of the kernel's name in one of the modules has its
-//! own, faster loops, and the body in `viewfuse-kernels` is the definition that it is tested against; where it says
+//! The loops are made from the rows. Where a row says `twin`, a function of the kernel's name in one of the modules has
+//! its own, faster loops, and the body in `viewfuse-kernels` is the definition that it is tested against; where it says
 //! `looped`, such a function has the loop over the body or its parts.
 
 mod blend;

@@ -3,8 +3,8 @@
 use std::error::Error;
 use viewfuse_vulkan::VulkanError;
 
-/// A device failed. This is the one error of every device, so that crates above have errors without type parameters. The
-/// device's own message is shown unchanged.
+/// A device failed. This is the one error of every device, so that crates above have errors without type parameters.
+/// The device's own message is shown unchanged.
 #[derive(Debug, thiserror::Error)]
 pub enum DeviceError {
     /// A Vulkan device failed.

@@ -12,8 +12,8 @@ pub struct LayerShape {
     pub inner_count: usize,
     /// Output channels; for a transposed convolution times places of the square.
     pub column_count: usize,
-    /// Whether it is used only by convolutions with windows of 3x3, without dilation, at every pixel of large images (32x32
-    /// or more). A device may have another algorithm for these.
+    /// Whether it is used only by convolutions with windows of 3x3, without dilation, at every pixel of large images
+    /// (32x32 or more). A device may have another algorithm for these.
     pub has_wide_images: bool,
 }
 
@@ -39,7 +39,8 @@ macro_rules! device {
     })+) => {
         /// Something that runs every kernel: a method for each row of [`viewfuse_kernels::rows`], so that a kernel that
         /// exists on one device only does not compile. A method takes the kernel's parameters, the numbers that say how
-        /// many elements there are, and the arrays in the order of the row. Buffers may be longer than the parameters say.
+        /// many elements there are, and the arrays in the order of the row. Buffers may be longer than the parameters
+        /// say.
         pub trait Device: Memory {
             /// A layer's weights in the device's own form.
             type Weights: Send + Sync;

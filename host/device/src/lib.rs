@@ -1,8 +1,8 @@
 //! Devices: where kernels run.
 //!
-//! A device holds buffers ([`Memory`]) and runs kernels on them, one method per kernel ([`Device`]), made from the rows of
-//! [`viewfuse_kernels::rows`], so that a kernel that exists on one device only does not compile. The body of every kernel
-//! is a function in `viewfuse-kernels`; a device decides how its elements are spread over cores or invocations.
+//! A device holds buffers ([`Memory`]) and runs kernels on them, one method per kernel ([`Device`]), made from the rows
+//! of [`viewfuse_kernels::rows`], so that a kernel that exists on one device only does not compile. The body of every
+//! kernel is a function in `viewfuse-kernels`; a device decides how its elements are spread over cores or invocations.
 //!
 //! The modules are listed in the order of the data; a module uses only modules listed above it:
 //!

@@ -1,9 +1,9 @@
 //! The one driver under all parallel loops: compiled once, for work behind a `dyn Fn`.
 //!
 //! Loops hand out parts of a slice, or indices, under a lock; the threads of the current pool take one after the other
-//! until none is left. The result of a part does not depend on the thread that computes it, so results are the same bits
-//! for any number of threads. A part should be 20 µs of work or more: handing it out takes well below 1 µs, waking a thread
-//! a few. Work of a single part runs on the calling thread.
+//! until none is left. The result of a part does not depend on the thread that computes it, so results are the same
+//! bits for any number of threads. A part should be 20 µs of work or more: handing it out takes well below 1 µs, waking
+//! a thread a few. Work of a single part runs on the calling thread.
 
 use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -45,8 +45,8 @@ pub fn for_each_part<T: Send>(values: &mut [T], part_len: usize, work: &(dyn Fn(
     });
 }
 
-/// `work(first row, rows)` for some rows of `values` at a time, each of `row_len` values; `least` values are enough work
-/// for a part.
+/// `work(first row, rows)` for some rows of `values` at a time, each of `row_len` values; `least` values are enough
+/// work for a part.
 pub fn for_each_rows<T: Send>(values: &mut [T], row_len: usize, least: usize, work: &(dyn Fn(usize, &mut [T]) + Sync)) {
     let row_len = row_len.max(1);
     let rows = rows_at_once(values.len().div_ceil(row_len), row_len, least);
@@ -72,8 +72,8 @@ pub fn for_each<T: Send>(values: &mut [T], least: usize, work: impl Fn(usize, &m
     });
 }
 
-/// `work(elements, part)` for some of `elements` at a time; `take(elements)` gives each of these their part of what they
-/// write, in order. `least` elements are enough work for a part.
+/// `work(elements, part)` for some of `elements` at a time; `take(elements)` gives each of these their part of what
+/// they write, in order. `least` elements are enough work for a part.
 pub fn for_each_piece<P: Send>(
     elements: Range<u32>,
     least: usize,

@@ -12,8 +12,8 @@ use viewfuse_kernels::rows::*;
 use viewfuse_kernels::{elements, for_each_kernel};
 use viewfuse_vulkan::{Adapter, AdapterKind, Buffer, Gpu, GpuOptions, Instance, Tally, VulkanError};
 
-/// A Vulkan device. Calls return when their work is recorded; it is submitted when a download waits for it, or when there is
-/// enough of it.
+/// A Vulkan device. Calls return when their work is recorded; it is submitted when a download waits for it, or when
+/// there is enough of it.
 pub struct Vulkan {
     gpu: Gpu,
     transfers: Mutex<Transfers>,
@@ -37,9 +37,10 @@ impl Vulkan {
         Ok(Vulkan { gpu, transfers: Mutex::default(), is_software, memory: None })
     }
 
-    /// As [`Vulkan::open`], with a folder where the device remembers compiled pipelines and which forms of its kernels were
-    /// the fastest: they are read now, and written when the device is closed, if there are new ones. A file of another
-    /// driver or of other kernels, and a damaged one, is replaced. A folder that cannot be written costs only time.
+    /// As [`Vulkan::open`], with a folder where the device remembers compiled pipelines and which forms of its kernels
+    /// were the fastest: they are read now, and written when the device is closed, if there are new ones. A file of
+    /// another driver or of other kernels, and a damaged one, is replaced. A folder that cannot be written costs only
+    /// time.
     ///
     /// # Errors
     /// [`VulkanError`].

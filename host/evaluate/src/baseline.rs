@@ -74,12 +74,12 @@ impl Baseline {
         }
     }
 
-    /// The picture at a target, of the target's size. `nearest` are sources, the nearest to the target first; `depth` is
-    /// that of the plane along the target's principal axis in world units, infinite for the homography of a pure
+    /// The picture at a target, of the target's size. `nearest` are sources, the nearest to the target first; `depth`
+    /// is that of the plane along the target's principal axis in world units, infinite for the homography of a pure
     /// rotation. Without sources the picture is black.
     ///
-    /// Where the plane's point lies outside a source, the copy takes the source's nearest pixel. The blend is the mean of
-    /// those sources that show the point, and where none does, the nearest source's nearest pixel.
+    /// Where the plane's point lies outside a source, the copy takes the source's nearest pixel. The blend is the mean
+    /// of those sources that show the point, and where none does, the nearest source's nearest pixel.
     pub fn picture(self, nearest: &[&Shot], target: &Camera, depth: f64) -> RgbImage {
         let (width, height) = (target.pinhole.width(), target.pinhole.height());
         let Some((first, _)) = nearest.split_first() else { return RgbImage::new(width, height) };

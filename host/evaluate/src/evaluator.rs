@@ -53,8 +53,8 @@ impl Hinted for EvaluateError {
     }
 }
 
-/// Name of the peak signal to noise ratio in decibels, of 8-bit values; infinite for equal pictures. Names of metrics are
-/// those of [`Scored`](crate::metrics::Scored).
+/// Name of the peak signal to noise ratio in decibels, of 8-bit values; infinite for equal pictures. Names of metrics
+/// are those of [`Scored`](crate::metrics::Scored).
 pub const PSNR: &str = "psnr";
 /// Name of the structural similarity; pictures that are too small have none.
 pub const SSIM: &str = "ssim";
@@ -103,8 +103,8 @@ pub fn without_masks(scene: &Scene) -> Scene {
 
 /// What renders and scores.
 pub struct Evaluator<'a> {
-    /// The schemes. [`OpenedChoice::Auto`] chooses a scheme and the field's scalars for each set of sources, from these sources
-    /// alone.
+    /// The schemes. [`OpenedChoice::Auto`] chooses a scheme and the field's scalars for each set of sources, from these
+    /// sources alone.
     pub weightings: &'a [OpenedChoice],
     /// What makes the pictures.
     pub renderer: &'a dyn Renderer,
@@ -123,8 +123,8 @@ const READINGS_A_GROUP: usize = 20;
 type Masks = HashMap<usize, Option<MaskedTruth>>;
 
 impl Evaluator<'_> {
-    /// Scores the baselines and then every scheme on targets that share their sources. `seen` gets each rendered frame with
-    /// its scheme's name, its values and the sources at working size.
+    /// Scores the baselines and then every scheme on targets that share their sources. `seen` gets each rendered frame
+    /// with its scheme's name, its values and the sources at working size.
     ///
     /// # Errors
     /// [`EvaluateError`].
@@ -256,8 +256,8 @@ impl Evaluator<'_> {
         Ok(MaskedTruth::of(over(1.0)?, &over(0.0)?))
     }
 
-    /// Scores every scheme on a scene. Without `--sources`, each target is rendered from all other views (leave one out)
-    /// and the targets are all views; with them, the targets are all other views.
+    /// Scores every scheme on a scene. Without `--sources`, each target is rendered from all other views (leave one
+    /// out) and the targets are all views; with them, the targets are all other views.
     ///
     /// # Errors
     /// [`EvaluateError`].

@@ -83,8 +83,8 @@ pub struct Subject<'a> {
 }
 
 impl Subject<'_> {
-    /// Renders all targets under every setting, `round_count` times after a first round that is not timed. In each round a
-    /// setting starts with nothing encoded; uploading photographs and parameters to the device is not counted.
+    /// Renders all targets under every setting, `round_count` times after a first round that is not timed. In each
+    /// round a setting starts with nothing encoded; uploading photographs and parameters to the device is not counted.
     ///
     /// `progress` gets a step for every picture.
     ///

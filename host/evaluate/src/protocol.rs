@@ -40,8 +40,8 @@ pub const CLOSE_DEGREES: f32 = 10.0;
 pub const COUNTS: [usize; 4] = [2, 8, 16, 32];
 
 /// How sources and targets are chosen. As text: `NAME` or `NAME:KEY=VALUE[,KEY=VALUE]`, of `fixed` `fixed:LIST` or
-/// `fixed:SOURCES:TARGETS`, of `nearest` `nearest:K` or `nearest:K:TARGETS`, of a benchmark `NAME:K`, of one with masks also
-/// `NAME:K,masks=given`.
+/// `fixed:SOURCES:TARGETS`, of `nearest` `nearest:K` or `nearest:K:TARGETS`, of a benchmark `NAME:K`, of one with masks
+/// also `NAME:K,masks=given`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Protocol {
     /// This many sources; sources and targets are drawn from all photographs.
@@ -62,7 +62,8 @@ pub enum Protocol {
         /// The numbers, ascending.
         sources: Vec<usize>,
     },
-    /// The same views of every scene, as lists that [`view_list`](viewfuse_scene::few_shot::view_list) reads. A source is never a target.
+    /// The same views of every scene, as lists that [`view_list`](viewfuse_scene::few_shot::view_list) reads. A source
+    /// is never a target.
     Fixed {
         /// Which views are sources.
         sources: String,
@@ -129,8 +130,8 @@ impl Protocol {
     /// from it; other views replace it.
     ///
     /// # Errors
-    /// [`ProtocolError`] if no job is left or the field needs more sources; [`viewfuse_scene::few_shot::SelectionError`] for a list that does not
-    /// fit a scene.
+    /// [`ProtocolError`] if no job is left or the field needs more sources;
+    /// [`viewfuse_scene::few_shot::SelectionError`] for a list that does not fit a scene.
     pub fn plan(&self, scenes: &[Scene], draws: Draws, least_sources: usize) -> Result<Plan, ProtocolError> {
         let fewest = match self {
             Protocol::Random { sources }

@@ -1,5 +1,5 @@
-//! The tables of an evaluation: means with intervals, and how each scheme compares with averaging the views and with the
-//! baselines.
+//! The tables of an evaluation: means with intervals, and how each scheme compares with averaging the views and with
+//! the baselines.
 //!
 //! Every scene has the same weight: the targets and trials of a scene are averaged first, then the scenes. The
 //! difference of two rows is computed scene by scene before it is averaged, so that the difficulty of a scene cancels.

@@ -10,9 +10,9 @@
 //! expectation   from these scores to a target's
 //! ```
 //!
-//! The choice is a coordinate search: the scheme first, then each step of the field's candidates. All candidates are rendered
-//! from one encoding, under the first scheme. A candidate replaces the current choice only if its gain exceeds the
-//! noise; of an object with silhouettes, a scheme also where a held-out source is nearest to the others. At last,
+//! The choice is a coordinate search: the scheme first, then each step of the field's candidates. All candidates are
+//! rendered from one encoding, under the first scheme. A candidate replaces the current choice only if its gain exceeds
+//! the noise; of an object with silhouettes, a scheme also where a held-out source is nearest to the others. At last,
 //! pictures under several settings are mixed by region, where that is not worse. With too few sources to hold one out,
 //! everything stays at its default.
 
@@ -363,8 +363,8 @@ impl Search<'_, '_> {
     }
 }
 
-/// As [`crate::render::render`]; without a weighting, under what is chosen for the scene, which `deliver` gets with each frame:
-/// it knows the frame's expected score.
+/// As [`crate::render::render`]; without a weighting, under what is chosen for the scene, which `deliver` gets with
+/// each frame: it knows the frame's expected score.
 ///
 /// # Errors
 /// [`RenderError`]; those of `deliver` pass through.

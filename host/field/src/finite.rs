@@ -18,8 +18,8 @@ pub fn check_finite(values: &[f32], stage: &str, tensor: &str) -> Result<(), Not
     }
 }
 
-/// Checks the first `count` values of a stage's result on the device. Only if one is not finite, the tensor is downloaded
-/// to report that value.
+/// Checks the first `count` values of a stage's result on the device. Only if one is not finite, the tensor is
+/// downloaded to report that value.
 ///
 /// # Errors
 /// [`FieldError::NotFinite`] with the first value that is not finite; [`FieldError::Device`] if the device is lost.

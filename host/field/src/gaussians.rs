@@ -1,4 +1,5 @@
-//! Gaussians optimised for a scene: some ten seconds of gradient descent on the source views, then every picture at once.
+//! Gaussians optimised for a scene: some ten seconds of gradient descent on the source views, then every picture at
+//! once.
 //!
 //! ```text
 //! tiles      a picture's tiles, and which splats each shows
@@ -13,12 +14,13 @@
 //! given      a scene of Gaussians that is there already, as a field
 //! ```
 //!
-//! No network and no data but the scene's own photographs. The start is the cloud of the sources' depths ([`crate::point_cloud`]):
-//! gradient descent does not repair wrong surfaces. The kernels run on the device; sorting, lists of tiles, the loss and the steps
-//! on the host, in one order, so that the same seed gives the same scene for any number of threads.
+//! No network and no data but the scene's own photographs. The start is the cloud of the sources' depths
+//! ([`crate::point_cloud`]): gradient descent does not repair wrong surfaces. The kernels run on the device; sorting,
+//! lists of tiles, the loss and the steps on the host, in one order, so that the same seed gives the same scene for any
+//! number of threads.
 //!
-//! Source: "3D Gaussian Splatting for Real-Time Radiance Field Rendering" (Kerbl et al. 2023); the pyramid, the faint Gaussians at
-//! random and the penalty on opacity are for few views.
+//! Source: "3D Gaussian Splatting for Real-Time Radiance Field Rendering" (Kerbl et al. 2023); the pyramid, the faint
+//! Gaussians at random and the penalty on opacity are for few views.
 
 mod given;
 mod level;

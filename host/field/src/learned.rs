@@ -20,12 +20,12 @@ pub(super) fn parse_near_far(text: &str) -> Result<[f32; 2], String> {
         .ok_or_else(|| "two distances, for example 0.8,1.8, the first at least 0 and less than the second".to_owned())
 }
 
-/// Near and far bounds as published for SRN's cars (0.8 and 1.8 for cameras at distance 1.3), as multiples of the cameras'
-/// distance from the point that they look at.
+/// Near and far bounds as published for SRN's cars (0.8 and 1.8 for cameras at distance 1.3), as multiples of the
+/// cameras' distance from the point that they look at.
 const NEAR_FAR_SHARES: [f32; 2] = [8.0 / 13.0, 18.0 / 13.0];
 
-/// Default near and far bounds, from the mean distance of the cameras to the point that they look at. A single camera does
-/// not define that point: then it is the world's origin, where SRN's objects are.
+/// Default near and far bounds, from the mean distance of the cameras to the point that they look at. A single camera
+/// does not define that point: then it is the world's origin, where SRN's objects are.
 pub fn default_near_far(cameras: &[Camera]) -> [f32; 2] {
     let distance = match cameras {
         [camera] => camera.pose.centre_world().length(),

@@ -1,8 +1,8 @@
 //! The sources' depth maps as one cloud of points, with normals and colours.
 //!
 //! A pixel's point is kept if enough other views agree: it lies on their surface too, and their point comes back to the
-//! pixel. What agrees becomes one point, the mean by the scheme's weights; its pixels make no further points. A point is
-//! dropped if more views see through it (their surface is clearly behind it, or it is outside of their silhouette)
+//! pixel. What agrees becomes one point, the mean by the scheme's weights; its pixels make no further points. A point
+//! is dropped if more views see through it (their surface is clearly behind it, or it is outside of their silhouette)
 //! than agree.
 
 use crate::DepthMap;
@@ -200,8 +200,8 @@ impl Fusion<'_> {
         self.maps[view].confidences.get(pixel).copied().unwrap_or(1.0)
     }
 
-    /// The unit normal of a view's surface at a pixel, towards the camera; that direction itself where no neighbour is on
-    /// the surface.
+    /// The unit normal of a view's surface at a pixel, towards the camera; that direction itself where no neighbour is
+    /// on the surface.
     fn normal(&self, view: usize, pixel: usize) -> Vec3 {
         let DepthMap { camera, depths, .. } = &self.maps[view];
         let (width, depth) = (camera.width as usize, depths[pixel]);

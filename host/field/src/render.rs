@@ -68,7 +68,8 @@ pub fn render<X: From<RenderError>>(
     Ok(render_chosen(run, given, deliver)?.0)
 }
 
-/// The render loop. `choose` sees the prepared sources and returns the weighting with what `deliver` gets beside each frame.
+/// The render loop. `choose` sees the prepared sources and returns the weighting with what `deliver` gets beside each
+/// frame.
 pub(crate) fn render_chosen<C, X: From<RenderError>>(
     run: &RenderRun<'_>,
     choose: impl FnOnce(&mut Stage<'_>) -> Result<(Weighting, C), RenderError>,

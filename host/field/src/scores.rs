@@ -1,16 +1,16 @@
 //! PSNR and SSIM of what a photograph shows.
 //!
 //! A photograph that was taken through a lens does not show the whole picture of its pinhole
-//! ([`GroundTruth::seen`](viewfuse_scene::photographs::GroundTruth::seen)). What it does not show has no truth and is left
-//! out: of the mean squared error the pixels, of SSIM every window that holds one of them.
+//! ([`GroundTruth::seen`](viewfuse_scene::photographs::GroundTruth::seen)). What it does not show has no truth and is
+//! left out: of the mean squared error the pixels, of SSIM every window that holds one of them.
 
 use image::imageops::crop_imm;
 use image::{GrayImage, Rgb, RgbImage};
 use std::borrow::Cow;
 use viewfuse_core::metrics::{SSIM_WINDOW, psnr, ssim};
 
-/// [`psnr`] over the seen pixels, in decibels; infinite where these are equal or none is seen. All pictures must have one
-/// size.
+/// [`psnr`] over the seen pixels, in decibels; infinite where these are equal or none is seen. All pictures must have
+/// one size.
 pub fn psnr_of_seen(prediction: &RgbImage, truth: &RgbImage, seen: Option<&GrayImage>) -> f64 {
     let Some(seen) = seen else { return psnr(prediction, truth) };
     let levels = |picture: &RgbImage| -> Vec<u8> {

@@ -61,7 +61,8 @@ pub struct WholeFile {
 }
 
 impl WholeFile {
-    /// Begins a file. Until it is finished, its content is in a temporary file beside `path`. Missing folders are created.
+    /// Begins a file. Until it is finished, its content is in a temporary file beside `path`. Missing folders are
+    /// created.
     ///
     /// # Errors
     /// [`WriteError::Io`].
@@ -93,8 +94,8 @@ impl WholeFile {
         self.writer.write_all(bytes).map_err(|cause| WriteError::Io { path: self.path.clone(), cause })
     }
 
-    /// Renames it into place; an existing file is replaced. What is written is on disk before that: a machine that loses
-    /// power keeps one of the two.
+    /// Renames it into place; an existing file is replaced. What is written is on disk before that: a machine that
+    /// loses power keeps one of the two.
     ///
     /// # Errors
     /// [`WriteError::Io`]; then no temporary file remains.
@@ -118,8 +119,8 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     file.finish()
 }
 
-/// Checks, before long work, that `path` can be written: it is not a folder, no part of it is a link to nothing, and files
-/// can be created in the nearest existing folder above it. No file remains.
+/// Checks, before long work, that `path` can be written: it is not a folder, no part of it is a link to nothing, and
+/// files can be created in the nearest existing folder above it. No file remains.
 ///
 /// # Errors
 /// [`WriteError::Io`].

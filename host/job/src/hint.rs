@@ -1,5 +1,5 @@
-//! What helps a person on from an error, as a code: a library does not know the words and options of the program that shows
-//! the error, and that program does not take errors apart.
+//! What helps a person on from an error, as a code: a library does not know the words and options of the program that
+//! shows the error, and that program does not take errors apart.
 
 use std::error::Error;
 

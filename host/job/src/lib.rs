@@ -1,5 +1,5 @@
-//! Common parts of long jobs: progress and cancellation through one trait, output files that are written completely or not
-//! at all, panics of other libraries as errors, digests of inputs.
+//! Common parts of long jobs: progress and cancellation through one trait, output files that are written completely or
+//! not at all, panics of other libraries as errors, digests of inputs.
 //!
 //! The modules are listed in the order of the data; a module uses only modules listed above it:
 //!

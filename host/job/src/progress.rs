@@ -1,5 +1,5 @@
-//! Progress and cancellation of long work, through one trait: the library reports its progress and checks for cancellation;
-//! the caller decides what is shown and when to stop.
+//! Progress and cancellation of long work, through one trait: the library reports its progress and checks for
+//! cancellation; the caller decides what is shown and when to stop.
 
 use std::ops::Range;
 
@@ -11,8 +11,8 @@ pub struct Interrupted;
 /// The caller's side of long work: it receives progress reports and can cancel. Every method has a default that shows
 /// nothing and never cancels, so that `impl Progress for MyType {}` is enough to begin with.
 pub trait Progress: Sync {
-    /// A stage begins: its name, and its place: the whole work is `of` parts of about the same time, and these are its own.
-    /// The pieces that follow are of this stage. Work that contains other work gives it a [`Part`].
+    /// A stage begins: its name, and its place: the whole work is `of` parts of about the same time, and these are its
+    /// own. The pieces that follow are of this stage. Work that contains other work gives it a [`Part`].
     fn stage(&self, _name: &str, _place: Range<usize>, _of: usize) {}
 
     /// The work, or its stage, has this many more pieces.
@@ -47,7 +47,8 @@ pub struct Silent;
 
 impl Progress for Silent {}
 
-/// A part of longer work: the stages of the work in it become stages of the whole, so that what is shown never goes back.
+/// A part of longer work: the stages of the work in it become stages of the whole, so that what is shown never goes
+/// back.
 #[derive(Clone)]
 pub struct Part<'a> {
     whole: &'a dyn Progress,
@@ -57,8 +58,8 @@ pub struct Part<'a> {
 }
 
 impl<'a> Part<'a> {
-    /// A stage of the whole work at `place` of `of`, as of [`Progress::stage`]. It begins under this name, which the names
-    /// of the stages within follow. With an empty name those stand alone, and nothing begins before them.
+    /// A stage of the whole work at `place` of `of`, as of [`Progress::stage`]. It begins under this name, which the
+    /// names of the stages within follow. With an empty name those stand alone, and nothing begins before them.
     pub fn begin(whole: &'a dyn Progress, name: impl Into<String>, place: Range<usize>, of: usize) -> Part<'a> {
         let part = Part { whole, name: name.into(), place, of };
         if !part.name.is_empty() {

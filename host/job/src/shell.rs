@@ -8,9 +8,9 @@ fn turns(character: char) -> bool {
     matches!(character, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// A word as bash, zsh and other shells of POSIX take it: as it is where it has letters, digits and `_@%+=:,./-` only, otherwise
-/// between quotes. A word with control characters, which a terminal would obey while the line is pasted, with characters
-/// that turn the text, or with bytes that are no UTF-8 has these as numbers: `$'a\033b'` (POSIX since 2024).
+/// A word as bash, zsh and other shells of POSIX take it: as it is where it has letters, digits and `_@%+=:,./-` only,
+/// otherwise between quotes. A word with control characters, which a terminal would obey while the line is pasted, with
+/// characters that turn the text, or with bytes that are no UTF-8 has these as numbers: `$'a\033b'` (POSIX since 2024).
 pub fn quoted(word: impl AsRef<OsStr>) -> String {
     let bytes = word.as_ref().as_encoded_bytes();
     let is_plain = |byte: &u8| byte.is_ascii_alphanumeric() || b"_@%+=:,./-".contains(byte);

@@ -16,8 +16,8 @@ pub fn in_line(text: impl Display) -> String {
     line
 }
 
-/// Of the names that are known, those that a text most likely meant, the nearest first, at most `most`: at most half of its
-/// characters have to be changed, inserted, removed or swapped.
+/// Of the names that are known, those that a text most likely meant, the nearest first, at most `most`: at most half of
+/// its characters have to be changed, inserted, removed or swapped.
 pub fn nearest<'a>(text: &str, known: impl IntoIterator<Item = &'a str>, most: usize) -> Vec<&'a str> {
     let length = |text: &str| text.chars().count();
     let near = |name: &'a str| {

@@ -5,8 +5,8 @@ use super::scratch::Scratch;
 use viewfuse_device::{Device, DeviceError};
 use viewfuse_kernels::network::attend::MatrixBlock;
 
-/// Scaled dot-product attention with one head: of `qkv[pixel][query, key, value][channel]`, an image that fills its buffer,
-/// each pixel's mean of all values, weighted by the softmax of `query . key / sqrt(channels)`.
+/// Scaled dot-product attention with one head: of `qkv[pixel][query, key, value][channel]`, an image that fills its
+/// buffer, each pixel's mean of all values, weighted by the softmax of `query . key / sqrt(channels)`.
 ///
 /// # Errors
 /// If the device is lost or has no memory left.

@@ -1,12 +1,12 @@
 //! Files of network parameters: named tensors.
 //!
 //! Opening a file reads the names and shapes of its tensors, not the values, so that they are checked against an
-//! architecture before large memory is allocated. The formats are safetensors, PyTorch's `torch.save` (zip archives and the
-//! older format), and networks that Python's `pickle` wrote, such as the snapshots of EDM's training. The format is
+//! architecture before large memory is allocated. The formats are safetensors, PyTorch's `torch.save` (zip archives and
+//! the older format), and networks that Python's `pickle` wrote, such as the snapshots of EDM's training. The format is
 //! recognised by the content. No code in a file is ever executed: see [`pickle`].
 //!
-//! A `state_dict`, or a network itself, is searched at the top of the file and under [`PLACES`]; a `module.` in front of
-//! every name, from training on several GPUs, is removed.
+//! A `state_dict`, or a network itself, is searched at the top of the file and under [`PLACES`]; a `module.` in front
+//! of every name, from training on several GPUs, is removed.
 //!
 //! Memory: opening takes at most [`OPENING_BYTES`], and at most a fixed multiple of the file's description of its
 //! tensors. Reading takes [`Checkpoint::byte_estimate`], which is known before and limited by
@@ -187,8 +187,8 @@ impl Checkpoint {
         &self.metadata
     }
 
-    /// Memory for reading and keeping these tensors, in bytes: 4 for every element, and the buffers for reading the largest
-    /// of them. Missing names count 0.
+    /// Memory for reading and keeping these tensors, in bytes: 4 for every element, and the buffers for reading the
+    /// largest of them. Missing names count 0.
     pub fn byte_estimate<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> u64 {
         let (mut kept, mut working) = (0u64, 0);
         for name in names {

@@ -228,8 +228,8 @@ impl<D: Device> DepthwiseConvolution<D> {
     }
 }
 
-/// The first `channels` channels of an image as an image of their own: a depthwise convolution with a window of one pixel
-/// and weight 1.
+/// The first `channels` channels of an image as an image of their own: a depthwise convolution with a window of one
+/// pixel and weight 1.
 ///
 /// # Errors
 /// If the device is lost or has no memory left.

@@ -1,4 +1,5 @@
-//! Neural networks on any device: their parameters from checkpoints, and the layers that all networks of viewfuse share.
+//! Neural networks on any device: their parameters from checkpoints, and the layers that all networks of viewfuse
+//! share.
 //!
 //! ```text
 //! checkpoint             files of named tensors, and which of them an architecture must have
@@ -12,8 +13,8 @@
 //! resnet                 the trunk of both published networks
 //! ```
 //!
-//! Images are `[row][column][channel]`, matrices `[row][column]`. A layer is loaded once and run with options on images of
-//! any size. Sums run in an order of the device's choice.
+//! Images are `[row][column][channel]`, matrices `[row][column]`. A layer is loaded once and run with options on images
+//! of any size. Sums run in an order of the device's choice.
 #![forbid(unsafe_code)]
 
 pub mod attention;

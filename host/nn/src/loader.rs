@@ -146,8 +146,8 @@ impl<'a, D: Device> Loader<'a, D> {
         Ok(DepthwiseConvolution { weights: self.upload(&weights)?, size: size as u32, is_shared: false })
     }
 
-    /// A transposed convolution whose stride is its window's size, from `weight[in][out][row][column]` and, where there is
-    /// one, `bias[out]`.
+    /// A transposed convolution whose stride is its window's size, from `weight[in][out][row][column]` and, where there
+    /// is one, `bias[out]`.
     ///
     /// # Errors
     /// [`LoadError`].

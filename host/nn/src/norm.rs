@@ -18,8 +18,8 @@ pub struct GroupNorm<D: Device> {
 }
 
 impl<D: Device> GroupNorm<D> {
-    /// Normalises an image into a new one: mean 0 and variance 1 in each group of channels, then `weights[channel]` times
-    /// that plus `bias[channel]`; with `silu`, outputs `x` become `x / (1 + e^-x)`.
+    /// Normalises an image into a new one: mean 0 and variance 1 in each group of channels, then `weights[channel]`
+    /// times that plus `bias[channel]`; with `silu`, outputs `x` become `x / (1 + e^-x)`.
     ///
     /// # Errors
     /// If the device is lost or has no memory left.

@@ -85,8 +85,8 @@ pub fn average_pool(image: &HostImage, count_include_pad: bool) -> HostImage {
 /// Added by DISTS before the square root.
 const L2_POOL_EPSILON: f64 = 1.0e-12;
 
-/// DISTS' L2 pool: the root of the squares, blurred with `[1, 2, 1] / 4` in both directions, at every second pixel; outside
-/// of the image there are zeros.
+/// DISTS' L2 pool: the root of the squares, blurred with `[1, 2, 1] / 4` in both directions, at every second pixel;
+/// outside of the image there are zeros.
 pub fn l2_pool(image: &HostImage) -> HostImage {
     let size = [image.height.div_ceil(2), image.width.div_ceil(2)];
     pooled(image, size, 2, |window, channel| {

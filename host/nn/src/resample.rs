@@ -5,8 +5,8 @@ use super::scratch::Scratch;
 use viewfuse_device::{Device, DeviceError};
 use viewfuse_kernels::network::resample::UpsampleBlock;
 
-/// Upsamples an image that fills its buffer to the size of another, bilinear with aligned corners, into the channels of that
-/// one's buffer from `first_channel` on. To an image of its own size, the values are copied.
+/// Upsamples an image that fills its buffer to the size of another, bilinear with aligned corners, into the channels of
+/// that one's buffer from `first_channel` on. To an image of its own size, the values are copied.
 ///
 /// # Errors
 /// If the device is lost.
@@ -28,8 +28,8 @@ pub fn upsample<D: Device>(
     device.upsample(&block, &image.values, &mut output.values)
 }
 
-/// Concatenates images that fill their buffers by channels, in their order, in a new one of the first one's rows and columns.
-/// Smaller images are upsampled as by [`upsample`].
+/// Concatenates images that fill their buffers by channels, in their order, in a new one of the first one's rows and
+/// columns. Smaller images are upsampled as by [`upsample`].
 ///
 /// # Errors
 /// If the device is lost or has no memory left.

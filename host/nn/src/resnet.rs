@@ -61,8 +61,8 @@ pub struct ResNet<L> {
     pub levels: Vec<Vec<BasicBlock<L>>>,
 }
 
-/// Whether the first block of level `level` (counted from 1) has a shortcut convolution: where the level halves the image
-/// (or would halve it, in a trunk that stops halving), and where it changes the channels.
+/// Whether the first block of level `level` (counted from 1) has a shortcut convolution: where the level halves the
+/// image (or would halve it, in a trunk that stops halving), and where it changes the channels.
 pub fn has_shortcut(level: usize, in_channels: usize, out_channels: usize) -> bool {
     level > 1 || in_channels != out_channels
 }

@@ -13,13 +13,13 @@ const MAP_MARGIN: i32 = 60;
 /// The brightest level of a point: white ones would be lost on the page.
 const MAX_LEVEL: u8 = 210;
 
-/// The share of the points that is on the map, as far as the map then reaches at most [`MAX_REACH`] times as far as the cameras:
-/// single points are far away, and so are backgrounds.
+/// The share of the points that is on the map, as far as the map then reaches at most [`MAX_REACH`] times as far as the
+/// cameras: single points are far away, and so are backgrounds.
 const SHOWN_POINTS: f32 = 0.9;
 const MAX_REACH: f32 = 2.0;
 
-/// The cameras seen from above (along the up direction): sources blue, target poses red, the object's box grey; reconstructed
-/// points in their colours.
+/// The cameras seen from above (along the up direction): sources blue, target poses red, the object's box grey;
+/// reconstructed points in their colours.
 pub fn camera_map(scene: &Scene, inspection: &Inspection) -> RgbImage {
     let focus = Vec3::from_array(inspection.focus);
     let up = Vec3::from_array(inspection.up);

@@ -4,8 +4,8 @@ use image::{Rgb, RgbImage, imageops};
 
 /// Width of a character of [`Canvas::text`], in pixels.
 pub const CHARACTER_WIDTH: u32 = 6;
-/// The printable characters of ASCII in rows of 16, one bit a pixel: the public-domain font "6x10" of the X Window System.
-/// A crate of fonts brings five others for this one.
+/// The printable characters of ASCII in rows of 16, one bit a pixel: the public-domain font "6x10" of the X Window
+/// System. A crate of fonts brings five others for this one.
 const FONT: &[u8; 720] = include_bytes!("canvas/font_6x10.raw");
 /// Rows of pixels of a character.
 const CHARACTER_HEIGHT: u32 = 10;

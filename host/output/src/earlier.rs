@@ -40,8 +40,8 @@ pub(crate) fn files_of(target: &str) -> Vec<String> {
     pictures.chain(depths).collect()
 }
 
-/// Names of the targets of the record in a folder; `None` if the file is no record of a render. An empty one is: of a machine
-/// that lost its power.
+/// Names of the targets of the record in a folder; `None` if the file is no record of a render. An empty one is: of a
+/// machine that lost its power.
 pub(crate) fn recorded_targets(folder: &Path) -> Option<Vec<String>> {
     let bytes = bytes_of_record(folder)?;
     if bytes.is_empty() {
@@ -51,7 +51,8 @@ pub(crate) fn recorded_targets(folder: &Path) -> Option<Vec<String>> {
     Some(record.frames.into_iter().map(|frame| frame.target).collect())
 }
 
-/// The background of the record in a folder, red green blue in `[0, 1]`; `Some(None)` if there was none, `None` without a record.
+/// The background of the record in a folder, red green blue in `[0, 1]`; `Some(None)` if there was none, `None` without
+/// a record.
 pub(crate) fn recorded_background(folder: &Path) -> Option<Option<[f32; 3]>> {
     let record: WrittenRecord = serde_json::from_slice(&bytes_of_record(folder)?).ok()?;
     let WrittenBackground { asked, used } = record.background?;
@@ -65,8 +66,8 @@ fn bytes_of_record(folder: &Path) -> Option<Vec<u8>> {
     if path.is_file() { read_at_most(&path, MAX_RECORD).ok() } else { None }
 }
 
-/// The files that earlier runs wrote to a folder and that are there; the record and the journal themselves are not among them.
-/// Nothing outside the folder, and no link.
+/// The files that earlier runs wrote to a folder and that are there; the record and the journal themselves are not
+/// among them. Nothing outside the folder, and no link.
 pub(crate) fn earlier_files(folder: &Path) -> BTreeSet<String> {
     let recorded = recorded_targets(folder);
     let videos = recorded.iter().flat_map(|_| VideoFormat::ALL).map(|format| format!("video.{format}"));

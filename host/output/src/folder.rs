@@ -1,4 +1,5 @@
-//! Checks of an output folder before work begins: what a run would destroy there, and targets whose files have one name.
+//! Checks of an output folder before work begins: what a run would destroy there, and targets whose files have one
+//! name.
 
 use crate::earlier::{earlier_files, files_of, recorded_targets};
 use crate::record::{RECORD, SUFFIXES};
@@ -49,15 +50,15 @@ impl Hinted for OutputError {
     }
 }
 
-/// The background that the run of a folder used, red green blue in `[0, 1]`; `Some(None)` if it had none, `None` if the folder
-/// has no record.
+/// The background that the run of a folder used, red green blue in `[0, 1]`; `Some(None)` if it had none, `None` if the
+/// folder has no record.
 pub fn recorded_background(folder: &Path) -> Option<Option<[f32; 3]>> {
     crate::earlier::recorded_background(folder)
 }
 
 /// Checks that the pictures of these targets can be written to a folder: no two files have one name, there is no record
-/// of anything but an earlier render, and, unless `replaces` is set, no picture of an earlier render would stay beside the new
-/// ones. (With it, such pictures are removed when the first new one is written.)
+/// of anything but an earlier render, and, unless `replaces` is set, no picture of an earlier render would stay beside
+/// the new ones. (With it, such pictures are removed when the first new one is written.)
 ///
 /// # Errors
 /// [`OutputError`].

@@ -1,10 +1,10 @@
-//! A scene of Gaussians as one page: a file that any browser with WebGL 2 shows, on a phone too, without a server and without
-//! the network.
+//! A scene of Gaussians as one page: a file that any browser with WebGL 2 shows, on a phone too, without a server and
+//! without the network.
 //!
 //! It has the Gaussians (means as `f32`, scales and rotations in 16 bits, colours and opacities in 8; of the spherical
-//! harmonics degree 0), the source cameras, gsplat.js (`vendor/gsplat.md`), which draws, and the scripts of `page/`. The weights
-//! that it shows are those of `distance:power=2`, which a script computes for the view on the screen: pages have no server
-//! to ask for another scheme.
+//! harmonics degree 0), the source cameras, gsplat.js (`vendor/gsplat.md`), which draws, and the scripts of `page/`.
+//! The weights that it shows are those of `distance:power=2`, which a script computes for the view on the screen: pages
+//! have no server to ask for another scheme.
 
 use std::collections::HashMap;
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! Finished frames of a run that is not: what an interrupted run continues from. It survives a kill at any time.
 //!
-//! `frames.jsonl` begins with a line that says which run it is of, followed by a line for each frame whose files are all
-//! there. A last line without a line break is not whole and does not count.
+//! `frames.jsonl` begins with a line that says which run it is of, followed by a line for each frame whose files are
+//! all there. A last line without a line break is not whole and does not count.
 
 use crate::record::FrameRecord;
 use serde::{Deserialize, Serialize};
@@ -84,12 +84,13 @@ impl Reading {
 }
 
 impl FrameJournal {
-    /// The journal of a folder for a run, and the frames that an earlier start of the same run has finished: those whose
-    /// files are all there. `run` is any text that differs for runs that would write different frames. Nothing is
+    /// The journal of a folder for a run, and the frames that an earlier start of the same run has finished: those
+    /// whose files are all there. `run` is any text that differs for runs that would write different frames. Nothing is
     /// written yet.
     ///
     /// # Errors
-    /// [`WriteError::Io`] if there is a journal that cannot be read, [`WriteError::NotOwn`] if what has its name is none.
+    /// [`WriteError::Io`] if there is a journal that cannot be read, [`WriteError::NotOwn`] if what has its name is
+    /// none.
     pub fn open(folder: &Path, run: &str) -> Result<(FrameJournal, Vec<FinishedFrame>), WriteError> {
         let mut journal = FrameJournal { path: folder.join(JOURNAL), run: run.to_owned(), whole: 0, lines: None };
         let mut frames: Vec<FinishedFrame> = Vec::new();

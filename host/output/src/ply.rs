@@ -6,8 +6,8 @@ use viewfuse_job::files::{WriteError, write_whole};
 use viewfuse_scene::SceneFrame;
 use viewfuse_scene::ply::header;
 
-/// Writes a cloud, completely or not at all. Coordinates are `float`, or `double` where the scene was moved or scaled when
-/// it was opened: `float` would not hold them.
+/// Writes a cloud, completely or not at all. Coordinates are `float`, or `double` where the scene was moved or scaled
+/// when it was opened: `float` would not hold them.
 ///
 /// # Errors
 /// [`WriteError`].

@@ -15,9 +15,9 @@ pub fn write_png(path: &Path, picture: &DynamicImage) -> Result<(), WriteError> 
     write_whole(path, &bytes)
 }
 
-/// A picture with its opacity as straight alpha: what is in front of a background of one colour (in `[0, 1]`), which was
-/// mixed into `colours` (red, green, blue in `[0, 1]` and opacity, row-major, of this width and height). Black where the
-/// opacity is 0.
+/// A picture with its opacity as straight alpha: what is in front of a background of one colour (in `[0, 1]`), which
+/// was mixed into `colours` (red, green, blue in `[0, 1]` and opacity, row-major, of this width and height). Black
+/// where the opacity is 0.
 pub fn without_background(colours: &[[f32; 4]], [width, height]: [u32; 2], background: [f32; 3]) -> RgbaImage {
     RgbaImage::from_fn(width, height, |x, y| {
         let colour = colours[(y * width + x) as usize];

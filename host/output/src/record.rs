@@ -99,15 +99,16 @@ impl DepthUnits {
 pub struct ChosenRecord {
     /// The field's scalars that are not at their defaults.
     pub settings: Vec<Setting>,
-    /// Pictures under other settings that are mixed in place of one under these, with the constants of their shares (the module
-    /// `mixture` of `viewfuse-field`); null where one picture is not worse.
+    /// Pictures under other settings that are mixed in place of one under these, with the constants of their shares
+    /// (the module `mixture` of `viewfuse-field`); null where one picture is not worse.
     pub mixture: Option<Mixture>,
     /// All schemes and settings that were tried, with the mean score of the sources that were left out.
     pub candidates: Vec<Candidate>,
     /// The sources that were left out, each rendered coarsely from the others with what was chosen.
     pub left_out: Vec<HeldOutSource>,
-    /// What confidences mean: the root mean square error, as a share of a colour's range, that pixels of a confidence have in
-    /// those pictures; null for fields without confidences. In a frame it is this times `expected.pixels.scale`.
+    /// What confidences mean: the root mean square error, as a share of a colour's range, that pixels of a confidence
+    /// have in those pictures; null for fields without confidences. In a frame it is this times
+    /// `expected.pixels.scale`.
     pub calibration: Option<Calibration>,
 }
 
@@ -204,28 +205,30 @@ pub struct FrameRecord {
     pub weights_before: Vec<f32>,
     /// Names of the sources that were left out.
     pub left_out: Vec<String>,
-    /// Share of its surfaces that a photograph of a source shows from within 30 degrees, whatever stands before them; of
-    /// a field without depths, of points as far away as what the sources look at.
+    /// Share of its surfaces that a photograph of a source shows from within 30 degrees, whatever stands before them;
+    /// of a field without depths, of points as far away as what the sources look at.
     #[serde(default)]
     pub seen: f32,
-    /// What share of its surfaces few photographs show, by the depths that the field found; null for fields without depths.
+    /// What share of its surfaces few photographs show, by the depths that the field found; null for fields without
+    /// depths.
     #[serde(default)]
     pub seen_by: Option<Seen>,
-    /// Mean share of each part of the mixture in the picture, the rest that of the picture under the chosen settings; empty without a
-    /// mixture.
+    /// Mean share of each part of the mixture in the picture, the rest that of the picture under the chosen settings;
+    /// empty without a mixture.
     #[serde(default)]
     pub shares: Vec<f32>,
-    /// Sum of their weights: a bound on the change of a fusion of all views by leaving them out, as a share of the range
-    /// of its inputs.
+    /// Sum of their weights: a bound on the change of a fusion of all views by leaving them out, as a share of the
+    /// range of its inputs.
     pub left_out_weight: f32,
-    /// Peak signal to noise ratio against the ground truth, decibels; null for equal pictures or without a ground truth.
+    /// Peak signal to noise ratio against the ground truth, decibels; null for equal pictures or without a ground
+    /// truth.
     pub psnr: Option<f64>,
     /// The score to expect without a ground truth; null where the scheme was given, and with too few sources.
     pub expected: Option<Expected>,
     /// Structural similarity with the ground truth.
     pub ssim: Option<f64>,
-    /// Depth in one step of the 16-bit depth map, in units of the scene's files; 0 in the map means no surface. Null for
-    /// fields without depths.
+    /// Depth in one step of the 16-bit depth map, in units of the scene's files; 0 in the map means no surface. Null
+    /// for fields without depths.
     pub depth_step: Option<f32>,
     /// Time for this frame alone.
     pub seconds: f64,

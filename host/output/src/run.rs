@@ -1,5 +1,5 @@
-//! The output folder of a run: `NAME.png`, `NAME_depth.png` (16 bit; also `.exr` and `.npy`), `NAME_confidence.png` (8 bit)
-//! and `NAME_sheet.png` for each target, and `run.json` when all are there.
+//! The output folder of a run: `NAME.png`, `NAME_depth.png` (16 bit; also `.exr` and `.npy`), `NAME_confidence.png` (8
+//! bit) and `NAME_sheet.png` for each target, and `run.json` when all are there.
 //!
 //! A run that was interrupted continues: [`RunWriter::resume`] tells which targets are finished.
 
@@ -145,8 +145,8 @@ impl RunWriter {
     }
 
     /// Keeps a journal of finished frames, and continues an earlier start of the same run in this folder: returns the
-    /// names of the targets that need not be rendered again. One target always remains. `run` is any text that differs for
-    /// runs that would write different frames. Nothing is written yet.
+    /// names of the targets that need not be rendered again. One target always remains. `run` is any text that differs
+    /// for runs that would write different frames. Nothing is written yet.
     ///
     /// # Errors
     /// [`WriteError::Io`] if there is a journal that cannot be read.
@@ -164,8 +164,8 @@ impl RunWriter {
         Ok(self.frames.iter().map(|frame| frame.target.clone()).collect())
     }
 
-    /// The frames that follow are of a scheme and settings that were chosen for the scene: they replace the weighting, and each
-    /// frame gets the score to expect.
+    /// The frames that follow are of a scheme and settings that were chosen for the scene: they replace the weighting,
+    /// and each frame gets the score to expect.
     pub fn set_chosen(&mut self, chosen: &Chosen) {
         if self.chosen.is_none() {
             self.weighting = chosen.weighting.to_string();

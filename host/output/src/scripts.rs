@@ -1,5 +1,5 @@
-//! Scripts and the style that pages share: modules of JavaScript, each of one responsibility, which import one another by name. The viewer
-//! serves them as files; a page that is one file has them joined.
+//! Scripts and the style that pages share: modules of JavaScript, each of one responsibility, which import one another
+//! by name. The viewer serves them as files; a page that is one file has them joined.
 
 /// A module: its file's name, and its text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

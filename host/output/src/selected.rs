@@ -33,8 +33,8 @@ pub struct SourceSet {
     pub indices: Vec<usize>,
     /// Their names.
     pub sources: Vec<String>,
-    /// The weight of these sources among all, mean and least over the targets: what is missing to 1 bounds the change of a
-    /// fusion by leaving the others out, as a share of the range of its inputs.
+    /// The weight of these sources among all, mean and least over the targets: what is missing to 1 bounds the change
+    /// of a fusion by leaving the others out, as a share of the range of its inputs.
     pub share: [f32; 2],
 }
 

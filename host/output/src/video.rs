@@ -107,8 +107,8 @@ pub enum VideoError {
     Interrupted(#[from] Interrupted),
 }
 
-/// Writes pictures that are there as files, all of one size, as a moving picture, completely or not at all. Transparency
-/// is kept in WebP, and laid over `background` in the others.
+/// Writes pictures that are there as files, all of one size, as a moving picture, completely or not at all.
+/// Transparency is kept in WebP, and laid over `background` in the others.
 ///
 /// # Errors
 /// [`VideoError`]; [`VideoError::NoProgram`] if the format is MP4 and there is no `ffmpeg`.

@@ -1,5 +1,5 @@
-//! Animated WebP: frames that `image` encodes without loss, in the container of the format's specification. The result is
-//! the same to the bit for the same frames.
+//! Animated WebP: frames that `image` encodes without loss, in the container of the format's specification. The result
+//! is the same to the bit for the same frames.
 //!
 //! ```text
 //! RIFF size WEBP

@@ -1,5 +1,5 @@
-//! The weights of many targets under several schemes, for other programs: as JSON, one object a target, and as an array for
-//! NumPy.
+//! The weights of many targets under several schemes, for other programs: as JSON, one object a target, and as an array
+//! for NumPy.
 
 use serde::Serialize;
 use std::collections::BTreeMap;

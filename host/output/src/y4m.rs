@@ -1,8 +1,8 @@
 //! YUV4MPEG2 (`.y4m`): video without compression, which nearly every video program reads.
 //!
 //! A header line, then each frame as `FRAME` and its planes Y, Cb, Cr at full resolution (`C444`), 8 bits, BT.601 with
-//! the limited range 16 to 235, which readers assume where nothing is said. Whole-number arithmetic: the same bytes on every
-//! machine.
+//! the limited range 16 to 235, which readers assume where nothing is said. Whole-number arithmetic: the same bytes on
+//! every machine.
 
 use crate::rate::FrameRate;
 use image::RgbImage;

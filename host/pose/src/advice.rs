@@ -14,8 +14,8 @@ pub struct Neighbours {
     pub median: f32,
     /// The greatest of these angles.
     pub greatest: f32,
-    /// Pairs of photographs with a gap of more than 15 degrees between them, and no way around it over smaller ones: their
-    /// names and the gap, the greatest first.
+    /// Pairs of photographs with a gap of more than 15 degrees between them, and no way around it over smaller ones:
+    /// their names and the gap, the greatest first.
     pub gaps: Vec<(String, String, f32)>,
 }
 

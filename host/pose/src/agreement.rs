@@ -1,10 +1,11 @@
-//! Rotations of two solutions between the same photographs: what does not depend on the world's orientation, place and scale.
+//! Rotations of two solutions between the same photographs: what does not depend on the world's orientation, place and
+//! scale.
 
 use crate::solution::Solution;
 use glam::DMat3;
 
-/// For each of these photographs, which both solutions must have registered, the median over the others of the angle in degrees
-/// between the two solutions' relative rotations; 0 for a photograph without others.
+/// For each of these photographs, which both solutions must have registered, the median over the others of the angle in
+/// degrees between the two solutions' relative rotations; 0 for a photograph without others.
 pub(crate) fn differences(a: &Solution, b: &Solution, photos: &[usize]) -> Vec<f64> {
     let of = |solution: &Solution| -> Vec<DMat3> {
         photos.iter().map(|photo| solution.photographs[*photo].rotation().unwrap_or(DMat3::IDENTITY)).collect()

@@ -1,7 +1,8 @@
-//! The person's own COLMAP, as the program `colmap`: features, exhaustive matching and incremental mapping on the processor.
+//! The person's own COLMAP, as the program `colmap`: features, exhaustive matching and incremental mapping on the
+//! processor.
 //!
-//! Every step works on one thread, because matches and models depend on the order in which threads finish. Version 3.8 does not
-//! seed all of its random draws: its answers differ a little from run to run, also on one thread.
+//! Every step works on one thread, because matches and models depend on the order in which threads finish. Version 3.8
+//! does not seed all of its random draws: its answers differ a little from run to run, also on one thread.
 //!
 //! Names of options differ between versions (3.8 to 4.2); each step's help says which it has.
 

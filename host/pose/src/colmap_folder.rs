@@ -70,10 +70,12 @@ impl ColmapFolder {
         self.scratch.path()
     }
 
-    /// The model with the most images as a solution, by a solver of this name and version; `program` is named in errors.
+    /// The model with the most images as a solution, by a solver of this name and version; `program` is named in
+    /// errors.
     ///
     /// # Errors
-    /// [`SolverError::Nothing`] without a model, [`SolverError::Broken`] if none can be read or it does not fit the job.
+    /// [`SolverError::Nothing`] without a model, [`SolverError::Broken`] if none can be read or it does not fit the
+    /// job.
     pub(crate) fn solution(&self, job: &Job, solver: String, program: &Path) -> Result<Solution, SolverError> {
         let broken = |problem: String| SolverError::Broken { program: program.to_path_buf(), problem };
         let reader = READERS.iter().find(|reader| reader.name() == "colmap");

@@ -18,8 +18,8 @@ const FULL_FRAME_DIAGONAL: f64 = 43.266_615_305_567_87;
 /// Plausible focal lengths, in diagonals of the picture.
 const PLAUSIBLE: std::ops::RangeInclusive<f64> = 0.15..=20.0;
 
-/// Most that the focal plane's value may differ from the 35 mm equivalent, as a share of it: past rounding, its resolution is
-/// that of another size of the picture.
+/// Most that the focal plane's value may differ from the 35 mm equivalent, as a share of it: past rounding, its
+/// resolution is that of another size of the picture.
 const MAX_DIFFERENCE: f64 = 0.1;
 
 /// What a photograph states of its camera.

@@ -1,4 +1,5 @@
-//! The cameras of photographs before the work: which photographs share one, and its focal length with where it comes from.
+//! The cameras of photographs before the work: which photographs share one, and its focal length with where it comes
+//! from.
 
 use crate::intake::Photo;
 use crate::solution::CameraGuess;
@@ -38,8 +39,8 @@ pub struct Cameras {
 }
 
 impl Cameras {
-    /// Photographs of one size are of one camera; with focal lengths by EXIF, of one size, camera and zoom. `given` is a focal
-    /// length in pixels of photographs as large as the first: of others it is scaled with the longest side.
+    /// Photographs of one size are of one camera; with focal lengths by EXIF, of one size, camera and zoom. `given` is
+    /// a focal length in pixels of photographs as large as the first: of others it is scaled with the longest side.
     pub fn of(photos: &[Photo], given: Option<f64>) -> Cameras {
         let longest = |size: [u32; 2]| f64::from(size[0].max(size[1]));
         let mut groups: Vec<(String, CameraGroup)> = Vec::new();

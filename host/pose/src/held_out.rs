@@ -91,11 +91,7 @@ impl<'a> Photographs<'a> {
     ///
     /// # Errors
     /// [`RenderError`].
-    fn of(
-        scene: &Scene,
-        album: &'a Album<'a>,
-        progress: &dyn Progress,
-    ) -> Result<Photographs<'a>, RenderError> {
+    fn of(scene: &Scene, album: &'a Album<'a>, progress: &dyn Progress) -> Result<Photographs<'a>, RenderError> {
         let views: Vec<usize> = (0..scene.views.len()).collect();
         let all = album.sources(&views, HOLD_OUT.side, BackgroundChoice::None, progress)?;
         Ok(Photographs { scene: scene.clone(), album, all })

@@ -1,5 +1,5 @@
-//! The photographs of a folder: read, turned upright as their EXIF orientation says, reduced to working size; and those that
-//! cannot be used, by name with the reason.
+//! The photographs of a folder: read, turned upright as their EXIF orientation says, reduced to working size; and those
+//! that cannot be used, by name with the reason.
 
 mod checks;
 

@@ -1,8 +1,8 @@
-//! Answers of a solver, kept until the scene is written: work that was stopped, or killed, goes on behind the attempts that it had
-//! finished.
+//! Answers of a solver, kept until the scene is written: work that was stopped, or killed, goes on behind the attempts
+//! that it had finished.
 //!
-//! An answer is kept under a digest of all that it depends on: the photographs' pixels, the cameras, the features, the seed, the
-//! program that is asked, and this crate's version.
+//! An answer is kept under a digest of all that it depends on: the photographs' pixels, the cameras, the features, the
+//! seed, the program that is asked, and this crate's version.
 
 use crate::solution::{Features, Job, Solution, Solver, SolverError};
 use serde::{Deserialize, Serialize};

@@ -1,9 +1,10 @@
-//! Camera poses of bare photographs: structure from motion by libraries that others keep, and a verdict on what they found.
+//! Camera poses of bare photographs: structure from motion by libraries that others keep, and a verdict on what they
+//! found.
 //!
-//! Solvers of structure from motion can be wrong by tens of degrees without a sign of it in their own figures: the number of
-//! points, the reprojection error, what they accept. Two things tell. Attempts with other features, seeds and focal lengths
-//! disagree where poses are wrong. And photographs, held out one at a time and rendered from the others, are met only at their
-//! true poses.
+//! Solvers of structure from motion can be wrong by tens of degrees without a sign of it in their own figures: the
+//! number of points, the reprojection error, what they accept. Two things tell. Attempts with other features, seeds and
+//! focal lengths disagree where poses are wrong. And photographs, held out one at a time and rendered from the others,
+//! are met only at their true poses.
 //!
 //! The modules are listed in the order of the data; a module uses only modules listed above it:
 //!

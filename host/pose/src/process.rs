@@ -37,8 +37,8 @@ impl Ended {
 /// Runs a command to its end, or until the person stops the work. `log` is a file for what it says.
 ///
 /// # Errors
-/// [`SolverError::Missing`] with the name of the `solver` if it cannot be started, [`SolverError::Broken`] if the log cannot be
-/// written or read, [`SolverError::Interrupted`].
+/// [`SolverError::Missing`] with the name of the `solver` if it cannot be started, [`SolverError::Broken`] if the log
+/// cannot be written or read, [`SolverError::Interrupted`].
 pub(crate) fn run(
     command: &mut Command,
     solver: &'static str,

@@ -229,13 +229,14 @@ pub trait Solver: Sync {
     /// The kinds of features that it has.
     fn features(&self) -> &'static [Features];
 
-    /// What tells the program that is asked from others, whose answers could differ: a version or a digest. `None` if that cannot be
-    /// had: then answers are not kept for a run that goes on.
+    /// What tells the program that is asked from others, whose answers could differ: a version or a digest. `None` if
+    /// that cannot be had: then answers are not kept for a run that goes on.
     fn identity(&self, _progress: &dyn Progress) -> Option<String> {
         None
     }
 
-    /// Works on a job. The same job has the same answer, byte for byte, on one machine, as far as the program that it runs allows.
+    /// Works on a job. The same job has the same answer, byte for byte, on one machine, as far as the program that it
+    /// runs allows.
     ///
     /// # Errors
     /// [`SolverError`].

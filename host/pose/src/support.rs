@@ -37,8 +37,8 @@ impl Support {
     }
 }
 
-/// Square root of the least over that of the middle eigenvalue of the covariance of the points nearer to their median than
-/// three median distances: single points far away do not count.
+/// Square root of the least over that of the middle eigenvalue of the covariance of the points nearer to their median
+/// than three median distances: single points far away do not count.
 fn thickness(solution: &Solution) -> f64 {
     let points: Vec<DVec3> = solution.points.iter().map(|point| DVec3::from_array(point.position)).collect();
     let of = |axis: usize| median(points.iter().map(|point| point[axis]).collect());

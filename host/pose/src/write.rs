@@ -104,8 +104,8 @@ impl Found {
     }
 }
 
-/// Writes the accepted scene in a layout to a folder that does not exist or is empty, with the record `pose.json` and more
-/// files. The same photographs and options give the same bytes, but for the seconds in the record.
+/// Writes the accepted scene in a layout to a folder that does not exist or is empty, with the record `pose.json` and
+/// more files. The same photographs and options give the same bytes, but for the seconds in the record.
 ///
 /// # Errors
 /// [`WriteSceneError`]; no files remain then.
@@ -131,7 +131,8 @@ struct Earlier {
     files: Vec<(String, u64)>,
 }
 
-/// Whether [`write()`] wrote the scene in `posed` for the photographs that a folder has now, by their names and lengths.
+/// Whether [`write()`] wrote the scene in `posed` for the photographs that a folder has now, by their names and
+/// lengths.
 ///
 /// # Errors
 /// [`IntakeError`] if the folder's photographs cannot be listed.

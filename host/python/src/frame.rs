@@ -44,7 +44,8 @@ pub(crate) struct PyFrame {
     psnr: Option<f64>,
     /// Structural similarity with the photograph. None without one, or if the picture is smaller than 7x7.
     ssim: Option<f64>,
-    /// The PSNR to expect and the ends of the interval that holds four of five, decibels. None unless the scheme was chosen.
+    /// The PSNR to expect and the ends of the interval that holds four of five, decibels. None unless the scheme was
+    /// chosen.
     expected: Option<(f64, f64, f64)>,
     /// Time for this view alone, seconds.
     seconds: f64,

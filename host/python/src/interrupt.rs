@@ -1,7 +1,7 @@
 //! Long work, without Python's lock, which Ctrl-C ends.
 //!
-//! Only the thread that called may ask Python for signals, and the library asks for cancellation on any thread. So the work
-//! has a thread of its own, and the calling one looks after Python until it is done.
+//! Only the thread that called may ask Python for signals, and the library asks for cancellation on any thread. So the
+//! work has a thread of its own, and the calling one looks after Python until it is done.
 
 use crate::error::Failure;
 use crate::progress::{Course, Reporter};

@@ -51,8 +51,8 @@ pub(crate) enum Reporter {
 }
 
 impl Reporter {
-    /// What `progress=` says: a function, or whether there is a bar; without it there is one in a notebook where tqdm is
-    /// installed.
+    /// What `progress=` says: a function, or whether there is a bar; without it there is one in a notebook where tqdm
+    /// is installed.
     ///
     /// # Errors
     /// `TypeError` for anything else, `ImportError` if a bar was asked for and tqdm is not installed.

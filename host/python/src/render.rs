@@ -66,7 +66,8 @@ impl Order {
         Ok((job.sources, finished))
     }
 
-    /// `None` for the best of the scene, which is the default without a network: trying schemes takes a network too long.
+    /// `None` for the best of the scene, which is the default without a network: trying schemes takes a network too
+    /// long.
     fn weighting(&self) -> Result<Option<Weighting>, Failure> {
         let choice = self.weights.as_deref().map(str::parse::<WeightingChoice>).transpose()?;
         match choice {

@@ -17,7 +17,8 @@ use viewfuse::scene::few_shot::view_list;
 
 /// A scene: posed photographs, of which the poses and the headers of the photographs have been read and checked.
 ///
-/// Matrices are in the coordinates of the scene's files, with OpenCV axes: x to the right of the image, y down, z forward.
+/// Matrices are in the coordinates of the scene's files, with OpenCV axes: x to the right of the image, y down, z
+/// forward.
 #[pyclass(name = "Scene", module = "viewfuse", frozen)]
 pub(crate) struct PyScene {
     scene: Scene,
@@ -111,8 +112,8 @@ impl PyScene {
         weigh(py, &self.scene, schemes, &request)
     }
 
-    /// Renders targets; all frames stay in memory. Ctrl-C ends it. In a notebook a bar shows the progress, where tqdm is
-    /// installed.
+    /// Renders targets; all frames stay in memory. Ctrl-C ends it. In a notebook a bar shows the progress, where tqdm
+    /// is installed.
     #[pyo3(signature = (weights=None, *, size=None, model=None, device="auto", background="auto", leave_out=0.01, seed=0, progress=None, **selection))]
     #[allow(clippy::too_many_arguments)]
     fn render(

@@ -1,16 +1,16 @@
 //! What the photographs show of the space around them: where a camera may go, and how much of its picture was seen.
 //!
-//! A point was seen from a camera if a photograph shows it from nearly the same side: the point is inside that photograph,
-//! in front of it, and the directions from the point to the two cameras differ by at most [`REACH_DEGREES`].
-//! What stands between a point and a photograph is not asked for: it is a measure of cameras alone, known before anything is
-//! rendered.
+//! A point was seen from a camera if a photograph shows it from nearly the same side: the point is inside that
+//! photograph, in front of it, and the directions from the point to the two cameras differ by at most
+//! [`REACH_DEGREES`]. What stands between a point and a photograph is not asked for: it is a measure of cameras alone,
+//! known before anything is rendered.
 
 use crate::rig::{MAX_GAP_DEGREES, Rig};
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock};
 
-/// How far a camera may be from a photograph's, seen from a point, to show that point as the photograph does: twice the angle
-/// between neighbours at which depths are found reliably.
+/// How far a camera may be from a photograph's, seen from a point, to show that point as the photograph does: twice the
+/// angle between neighbours at which depths are found reliably.
 pub const REACH_DEGREES: f32 = 2.0 * MAX_GAP_DEGREES;
 /// A picture of which less was seen leaves what the photographs show.
 pub const MIN_SEEN: f32 = 0.5;
@@ -32,8 +32,8 @@ impl Coverage {
         Coverage { sources: cameras.iter().map(|camera| camera.block(0)).collect(), rig: Rig::of(cameras) }
     }
 
-    /// The share of a camera's picture that was seen, in `[0, 1]`. Its points are taken where its rays come nearest to what
-    /// the photographs look at; where they lead away from that, as far away as that is from the photographs.
+    /// The share of a camera's picture that was seen, in `[0, 1]`. Its points are taken where its rays come nearest to
+    /// what the photographs look at; where they lead away from that, as far away as that is from the photographs.
     pub fn seen(&self, camera: &Camera) -> f32 {
         let point = |x: f32, y: f32| {
             let ray = camera.ray(x, y);
@@ -43,8 +43,8 @@ impl Coverage {
         self.share(camera, point).unwrap_or(0.0)
     }
 
-    /// As [`Coverage::seen`], with the points of a depth map of this width and height (row-major, along the principal axis; 0:
-    /// no surface, which does not count). `None` if it has no surface, or another length.
+    /// As [`Coverage::seen`], with the points of a depth map of this width and height (row-major, along the principal
+    /// axis; 0: no surface, which does not count). `None` if it has no surface, or another length.
     pub fn seen_surfaces(&self, camera: &Camera, [width, height]: [u32; 2], depths: &[f32]) -> Option<f32> {
         let pinhole = camera.pinhole.resized(width, height).ok()?;
         let camera = Camera { pinhole, ..*camera };

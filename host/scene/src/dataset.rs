@@ -9,8 +9,8 @@
 //! data/cars/<object>/                          a folder of scenes, which is then used for every split
 //! ```
 //!
-//! An object is a folder in SRN's layout: one that holds `intrinsics.txt`. Nothing else is read here; a scene is checked
-//! when it is opened ([`crate::Scene::open`]).
+//! An object is a folder in SRN's layout: one that holds `intrinsics.txt`. Nothing else is read here; a scene is
+//! checked when it is opened ([`crate::Scene::open`]).
 
 use std::ffi::OsStr;
 use std::fs;

@@ -1,8 +1,8 @@
 //! The selection of source views and target cameras.
 //!
 //! Views are chosen by a list of items separated by commas: a view's name or number, its index as `#3` (from
-//! 0, in any scene), a range `A..B` of these (both ends included), `all`, a split of the scene (`train`, `val`, `test`, where its files define splits), and `/STEP` after
-//! either to take every `STEP`-th.
+//! 0, in any scene), a range `A..B` of these (both ends included), `all`, a split of the scene (`train`, `val`, `test`,
+//! where its files define splits), and `/STEP` after either to take every `STEP`-th.
 
 mod targets;
 

@@ -1,9 +1,9 @@
 //! Scenes of Gaussians, and their files in the layout of "3D Gaussian Splatting" (Kerbl et al. 2023).
 //!
-//! A file is a binary little-endian PLY file with an element `vertex` and the properties `x y z` (mean), `f_dc_0..2` and
-//! `f_rest_*` (spherical harmonics of the colour), `opacity` (logit), `scale_0..2` (natural logarithms of the standard
-//! deviations) and `rot_0..3` (quaternion `w, x, y, z`), in any order and with others between them, which are ignored. Its
-//! coordinates are those of the photographs' cameras, that is of the scene's files ([`SceneFrame`]).
+//! A file is a binary little-endian PLY file with an element `vertex` and the properties `x y z` (mean), `f_dc_0..2`
+//! and `f_rest_*` (spherical harmonics of the colour), `opacity` (logit), `scale_0..2` (natural logarithms of the
+//! standard deviations) and `rot_0..3` (quaternion `w, x, y, z`), in any order and with others between them, which are
+//! ignored. Its coordinates are those of the photographs' cameras, that is of the scene's files ([`SceneFrame`]).
 
 mod read;
 mod write;
@@ -18,7 +18,8 @@ use crate::{SceneError, SceneFrame};
 
 /// Greatest degree of spherical harmonics.
 pub const MAX_DEGREE: u32 = 3;
-/// Greatest magnitude of a logit and of a logarithm: files say "opaque" and "flat" with infinities, which are limited to it.
+/// Greatest magnitude of a logit and of a logarithm: files say "opaque" and "flat" with infinities, which are limited
+/// to it.
 pub const MAX_LOGARITHM: f32 = 80.0;
 
 /// A Gaussian of a scene.
@@ -52,15 +53,17 @@ impl GaussianScene {
     /// Reads a file in the coordinates of the scene's files: `frame` is the scene's.
     ///
     /// # Errors
-    /// [`SceneError`] with the path and the line of the header or the property: no such file, another format, a property that is
-    /// missing, twice or no `float` or `double`, rows that the file has no room for, NaN, coordinates beyond
-    /// [`viewfuse_core::pose::MAX_COORDINATE`]. Infinite opacities, and scales of zero, are limited to [`MAX_LOGARITHM`].
+    /// [`SceneError`] with the path and the line of the header or the property: no such file, another format, a
+    /// property that is missing, twice or no `float` or `double`, rows that the file has no room for, NaN, coordinates
+    /// beyond [`viewfuse_core::pose::MAX_COORDINATE`]. Infinite opacities, and scales of zero, are limited to
+    /// [`MAX_LOGARITHM`].
     pub fn read(path: &Path, frame: &SceneFrame) -> Result<GaussianScene, SceneError> {
         read::read(path, frame)
     }
 
-    /// Writes a file in the coordinates of the scene's files, completely or not at all. Coordinates are `float`, or `double` where the scene was moved
-    /// or scaled when it was opened: `float` would not hold them. Normals are 0, as in the published code.
+    /// Writes a file in the coordinates of the scene's files, completely or not at all. Coordinates are `float`, or
+    /// `double` where the scene was moved or scaled when it was opened: `float` would not hold them. Normals are 0, as
+    /// in the published code.
     ///
     /// # Errors
     /// [`WriteError`].

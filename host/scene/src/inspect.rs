@@ -56,8 +56,8 @@ pub struct Inspection {
     pub distances: [f32; 2],
     /// The up direction.
     pub up: [f32; 3],
-    /// The angle between a camera and the nearest other one, seen from the focus, in degrees: the median and the greatest of
-    /// the photographs; null for fewer than two.
+    /// The angle between a camera and the nearest other one, seen from the focus, in degrees: the median and the
+    /// greatest of the photographs; null for fewer than two.
     pub gaps: Option<[f32; 2]>,
     /// How much of the circle around the focus the photographs cover, in degrees: 360, or the arc of `--orbit`.
     pub arc: f32,

@@ -25,8 +25,8 @@ impl Element for f64 {
     }
 }
 
-/// The bytes of a `.npy` file with an array of this shape. The values' number should be the product of the shape: readers
-/// refuse a file with another.
+/// The bytes of a `.npy` file with an array of this shape. The values' number should be the product of the shape:
+/// readers refuse a file with another.
 pub fn npy<E: Element>(shape: &[usize], values: &[E]) -> Vec<u8> {
     // A tuple of one has a comma.
     let sides: String = shape.iter().map(|side| format!("{side}, ")).collect();

@@ -113,8 +113,8 @@ impl SourceImages {
     }
 }
 
-/// All results, or the first error in the order of the work: rayon's own collection returns any of several, so that equal runs
-/// would name different photographs.
+/// All results, or the first error in the order of the work: rayon's own collection returns any of several, so that
+/// equal runs would name different photographs.
 fn in_order<T: Send>(
     work: impl IndexedParallelIterator<Item = Result<T, PhotographsError>>,
 ) -> Result<Vec<T>, PhotographsError> {
@@ -160,9 +160,9 @@ impl<'a> Album<'a> {
         Album { scene, kept: vec![None; scene.views.len()], side: None }.filled(views, progress)
     }
 
-    /// As [`Album::open`], for sources and truths of at most `longest_side` pixels on a side: larger photographs are reduced as
-    /// soon as they are decoded, to no less than twice that side. Those below 1280 pixels, or four times that side,
-    /// keep their own size, with bit-identical results.
+    /// As [`Album::open`], for sources and truths of at most `longest_side` pixels on a side: larger photographs are
+    /// reduced as soon as they are decoded, to no less than twice that side. Those below 1280 pixels, or four times
+    /// that side, keep their own size, with bit-identical results.
     ///
     /// # Errors
     /// As [`Album::open`].
@@ -264,8 +264,8 @@ impl<'a> Album<'a> {
             BackgroundChoice::Colour(_) => false,
             BackgroundChoice::Auto => !backdrop.can_be_told(),
         };
-        // Whole photographs of a place are no fault. It is one where a person wants an object: by the background's colour, or
-        // by cutting it out of some of the photographs.
+        // Whole photographs of a place are no fault. It is one where a person wants an object: by the background's
+        // colour, or by cutting it out of some of the photographs.
         let is_asked = match choice {
             BackgroundChoice::None => false,
             BackgroundChoice::Colour(_) => true,

@@ -1,8 +1,9 @@
 //! The header of a PLY file: which elements follow, and where each property of an element is.
 //!
-//! Read are the headers of binary little-endian files whose rows have a fixed length: what scanners, reconstructions and
-//! programs for Gaussians write. A crate for the format would add two more to every build and name neither property nor
-//! element in its errors; of the format only the header's grammar is needed, because rows of fixed length are slices.
+//! Read are the headers of binary little-endian files whose rows have a fixed length: what scanners, reconstructions
+//! and programs for Gaussians write. A crate for the format would add two more to every build and name neither property
+//! nor element in its errors; of the format only the header's grammar is needed, because rows of fixed length are
+//! slices.
 
 use std::path::{Path, PathBuf};
 

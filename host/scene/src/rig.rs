@@ -50,8 +50,8 @@ impl Rig {
         }
     }
 
-    /// The angle between a camera and the nearest other one, seen from the focus, in degrees: of all cameras, ascending;
-    /// none of fewer than two.
+    /// The angle between a camera and the nearest other one, seen from the focus, in degrees: of all cameras,
+    /// ascending; none of fewer than two.
     pub fn gaps(&self, cameras: &[Camera]) -> Vec<f32> {
         let directions: Vec<Vec3> =
             cameras.iter().map(|c| (c.pose.centre_world() - self.focus).normalize_or_zero()).collect();
@@ -84,8 +84,8 @@ pub fn gap_warning(cameras: &[Camera]) -> Option<String> {
     ))
 }
 
-/// `count` of the points, each next one as far from those before as possible (farthest-point sampling, starting with the
-/// first point; of equally far ones the first), as ascending indices. All of them if there are fewer.
+/// `count` of the points, each next one as far from those before as possible (farthest-point sampling, starting with
+/// the first point; of equally far ones the first), as ascending indices. All of them if there are fewer.
 pub fn spread(points: &[Vec3], count: usize) -> Vec<usize> {
     let mut chosen: Vec<usize> = Vec::new();
     let mut gaps = vec![f32::INFINITY; points.len()];

@@ -1,8 +1,8 @@
 //! Scenes: posed photographs on disk.
 //!
-//! [`Scene::open`] calls each reader, which says whether it recognises a folder, reads every pose and every image *header* and
-//! checks them all: counts, finite and rigid poses, sizes. The pixels of a view are read when they are first needed
-//! ([`Scene::photograph`]), so that a command that needs only poses decodes no image.
+//! [`Scene::open`] calls each reader, which says whether it recognises a folder, reads every pose and every image
+//! *header* and checks them all: counts, finite and rigid poses, sizes. The pixels of a view are read when they are
+//! first needed ([`Scene::photograph`]), so that a command that needs only poses decodes no image.
 
 use std::collections::{HashMap, HashSet};
 use std::fs;
@@ -100,12 +100,12 @@ pub struct ScenePoint {
 /// The world's place in the coordinates of the scene's files: `point_file = origin + scale * point_world`.
 ///
 /// Rounding to `f32` would lose the distances between cameras far from the origin (surveyed coordinates). The origin is
-/// therefore moved before rounding, if the centroid of their centres is more than 16 times their spread (root mean square
-/// distance from it) away from the origin: to the point nearest to their principal axes, or to the centroid if these are
-/// parallel or meet further off. Cameras in one place are moved if it is further than 1e4 from the origin. The scale is
-/// other than 1 only where the spread is below 1e-3 or above 1e4: then it makes the cameras' mean distance from what they look at
-/// that of SRN's (1.3), for which networks were trained. An ordinary scene keeps its numbers bit for
-/// bit, because learned fields depend on the unit and on the origin.
+/// therefore moved before rounding, if the centroid of their centres is more than 16 times their spread (root mean
+/// square distance from it) away from the origin: to the point nearest to their principal axes, or to the centroid if
+/// these are parallel or meet further off. Cameras in one place are moved if it is further than 1e4 from the origin.
+/// The scale is other than 1 only where the spread is below 1e-3 or above 1e4: then it makes the cameras' mean distance
+/// from what they look at that of SRN's (1.3), for which networks were trained. An ordinary scene keeps its numbers bit
+/// for bit, because learned fields depend on the unit and on the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SceneFrame {
     /// The world's origin in the file's coordinates.
@@ -231,7 +231,8 @@ impl Scene {
         self.photograph_after(view, |stored| stored)
     }
 
-    /// As [`Scene::photograph`], with the stored photograph (upright, with its mask) made smaller before it is undistorted.
+    /// As [`Scene::photograph`], with the stored photograph (upright, with its mask) made smaller before it is
+    /// undistorted.
     pub(crate) fn photograph_after(
         &self,
         view: usize,
@@ -255,8 +256,8 @@ impl Scene {
         Ok(photograph)
     }
 
-    /// The mask of a view for the photograph of [`Scene::stored_photograph`], at the mask's own size; `None` without a mask,
-    /// or if the mask's file is that already.
+    /// The mask of a view for the photograph of [`Scene::stored_photograph`], at the mask's own size; `None` without a
+    /// mask, or if the mask's file is that already.
     pub(crate) fn stored_mask(&self, view: usize) -> Result<Option<GrayImage>, SceneError> {
         let Some(mask) = &self.view(view)?.mask else { return Ok(None) };
         let turn = Turn::of(&images::header(self.photograph_file(view)?)?, self.size(view)?);
@@ -294,10 +295,10 @@ impl Scene {
     /// The index of the view that `text` refers to: the view of exactly this name; otherwise, if `text` is a
     /// whole number, the one view whose name ends in that number, leading zeros aside.
     ///
-    /// `1` finds `dinoSR0001`, `3` finds `000003`, also where the count starts at 0. A number alone is never an index into
-    /// [`Scene::views`]: some data sets count from 1 and some from 0. Of a photograph and a target pose of the same
-    /// number the photograph is meant. `#3` is the index 3, in any scene without a view of just this name. `None` if no view
-    /// fits or, by number, several do.
+    /// `1` finds `dinoSR0001`, `3` finds `000003`, also where the count starts at 0. A number alone is never an index
+    /// into [`Scene::views`]: some data sets count from 1 and some from 0. Of a photograph and a target pose of the
+    /// same number the photograph is meant. `#3` is the index 3, in any scene without a view of just this name. `None`
+    /// if no view fits or, by number, several do.
     pub fn view_named(&self, text: &str) -> Option<usize> {
         if let Some(view) = self.views.iter().position(|view| view.name == text) {
             return Some(view);

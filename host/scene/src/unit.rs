@@ -1,8 +1,8 @@
 //! The unit of length that weightings and networks measure in, so that they give the same at every scale of a scene.
 //!
-//! Published formulas and networks have lengths in their parameters (`exp(-beta d^2)`, Fourier features of a centre, densities
-//! per length) and were made for the scenes of SRN, whose cameras are 1.3 units from their object. A scene of another size,
-//! or in other units, is therefore measured by its cameras' distance from what they look at.
+//! Published formulas and networks have lengths in their parameters (`exp(-beta d^2)`, Fourier features of a centre,
+//! densities per length) and were made for the scenes of SRN, whose cameras are 1.3 units from their object. A scene of
+//! another size, or in other units, is therefore measured by its cameras' distance from what they look at.
 
 use crate::Scene;
 use crate::rig::Rig;
@@ -13,8 +13,8 @@ use viewfuse_core::pose::Pose;
 /// Scenes whose cameras are so near to [`SRN_DISTANCE`], relatively, keep their numbers bit for bit.
 const MAX_DEVIATION: f32 = 1.0e-4;
 
-/// Networks are used in world units where the cameras' distance is within this factor of [`SRN_DISTANCE`]: they may have
-/// been trained there. The scenes of SRN, NMR (2.7), DTU as published (about 2) and Blender (4) are.
+/// Networks are used in world units where the cameras' distance is within this factor of [`SRN_DISTANCE`]: they may
+/// have been trained there. The scenes of SRN, NMR (2.7), DTU as published (about 2) and Blender (4) are.
 const MAX_TRAINED_FACTOR: f32 = 4.0;
 
 /// A unit of length, in world units.
@@ -27,8 +27,8 @@ impl RigUnit {
     /// The world's own unit.
     pub const WORLD: RigUnit = RigUnit { length: 1.0 };
 
-    /// The unit in which these cameras are [`SRN_DISTANCE`] from the point that they look at (the mean distance). The world's
-    /// own where they are not anywhere: none, a single one, or all in one place, looking one way.
+    /// The unit in which these cameras are [`SRN_DISTANCE`] from the point that they look at (the mean distance). The
+    /// world's own where they are not anywhere: none, a single one, or all in one place, looking one way.
     pub fn of(cameras: &[Camera]) -> RigUnit {
         let apart = |camera: &Camera| camera.pose.centre_world() != cameras[0].pose.centre_world();
         if !cameras.iter().any(apart) {

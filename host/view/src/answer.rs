@@ -117,8 +117,8 @@ pub(crate) fn jpeg(picture: &RgbImage) -> Result<Vec<u8>, ImageError> {
     Ok(bytes)
 }
 
-/// Depths between their percentiles as levels 1 to 255, and those percentiles; `None` for fields without depths, and where
-/// there is no surface at all.
+/// Depths between their percentiles as levels 1 to 255, and those percentiles; `None` for fields without depths, and
+/// where there is no surface at all.
 fn depth_levels(depths: &[f32]) -> Option<(Vec<u8>, [f32; 2])> {
     let mut sorted: Vec<f32> = depths.iter().copied().filter(|depth| *depth > 0.0).collect();
     if sorted.is_empty() {

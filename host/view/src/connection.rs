@@ -17,8 +17,8 @@ const MAX_REQUEST_TIME: Duration = Duration::from_secs(10);
 /// Time in which a client has to take an answer.
 const MAX_ANSWER_TIME: Duration = Duration::from_secs(60);
 
-/// So long, and so many bytes, are thrown away after a refusal: a connection that is closed with bytes unread is reset, and
-/// the client could not read why.
+/// So long, and so many bytes, are thrown away after a refusal: a connection that is closed with bytes unread is reset,
+/// and the client could not read why.
 const MAX_LINGER: Duration = Duration::from_secs(1);
 const MAX_LINGER_BYTES: usize = 64 * 1024;
 

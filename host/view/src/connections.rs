@@ -1,7 +1,8 @@
 //! The open connections: how many there may be, and which one is closed for a newer one.
 //!
-//! Each has a thread. A connection that was refused makes way first, then one that never asked with the token, the oldest before
-//! the others; one that waits for a picture stays. A new one has a moment to ask for something before it makes way.
+//! Each has a thread. A connection that was refused makes way first, then one that never asked with the token, the
+//! oldest before the others; one that waits for a picture stays. A new one has a moment to ask for something before it
+//! makes way.
 
 use std::net::{Shutdown, TcpStream};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -64,7 +65,8 @@ impl Connections {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes a new connection; another one may be closed for it. `None` if all of them wait for pictures, or if it is over.
+    /// Takes a new connection; another one may be closed for it. `None` if all of them wait for pictures, or if it is
+    /// over.
     pub(crate) fn admit(&self, stream: &Arc<TcpStream>) -> Option<Admission<'_>> {
         let mut state = self.state();
         loop {
@@ -97,8 +99,8 @@ impl Connections {
         self.state().close_least();
     }
 
-    /// Admits no other. Those that are open read nothing more; whatever is still on its way to a client after `patience` is
-    /// cut off.
+    /// Admits no other. Those that are open read nothing more; whatever is still on its way to a client after
+    /// `patience` is cut off.
     pub(crate) fn close(&self, patience: Duration) {
         let mut state = self.state();
         state.is_closed = true;

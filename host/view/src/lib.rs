@@ -1,5 +1,5 @@
-//! An interactive viewer: a page on this machine, in which a person drags the camera and sees the picture, the weights of
-//! the source views and the cameras change.
+//! An interactive viewer: a page on this machine, in which a person drags the camera and sees the picture, the weights
+//! of the source views and the cameras change.
 //!
 //! ```text
 //! page         the page's files, which are part of the program
@@ -90,8 +90,8 @@ pub struct Viewed<'a> {
     pub options: &'a RenderOptions,
     /// The weighting that the page begins with; the page can take any other that needs no file.
     pub weighting: &'a Weighting,
-    /// Whether the weighting and the field's scalars are chosen for the scene ([`viewfuse_field::auto`]) after the first full
-    /// picture, and shown from then on.
+    /// Whether the weighting and the field's scalars are chosen for the scene ([`viewfuse_field::auto`]) after the
+    /// first full picture, and shown from then on.
     pub chooses: bool,
 }
 
@@ -112,8 +112,8 @@ pub struct Viewer<'a> {
 }
 
 impl<'a> Viewer<'a> {
-    /// Listens on a port of the loopback interface, 0 for any. Nothing is rendered yet. The pictures have the intrinsics of
-    /// the first source.
+    /// Listens on a port of the loopback interface, 0 for any. Nothing is rendered yet. The pictures have the
+    /// intrinsics of the first source.
     ///
     /// # Errors
     /// [`ViewError`].
@@ -146,8 +146,8 @@ impl<'a> Viewer<'a> {
         &self.device_name
     }
 
-    /// Renders on this thread and answers on others, one of each connection, until the progress says that it is cancelled.
-    /// Pages may come and go.
+    /// Renders on this thread and answers on others, one of each connection, until the progress says that it is
+    /// cancelled. Pages may come and go.
     ///
     /// # Errors
     /// [`ViewError::Render`] if the sources cannot be prepared, or if the device fails.

@@ -1,5 +1,5 @@
-//! The record of a picture, for the page to save beside it: the keys are those of `run.json`, without those that only a whole
-//! run has.
+//! The record of a picture, for the page to save beside it: the keys are those of `run.json`, without those that only a
+//! whole run has.
 
 use crate::Viewed;
 use serde::Serialize;

@@ -1,7 +1,7 @@
 //! The server: who may ask, and for what.
 //!
-//! It listens on the loopback interface only. Every address begins with a random token, which other programs and sites do
-//! not know. A request must name this server in `Host`, so that a site whose name was pointed at this machine (DNS
+//! It listens on the loopback interface only. Every address begins with a random token, which other programs and sites
+//! do not know. A request must name this server in `Host`, so that a site whose name was pointed at this machine (DNS
 //! rebinding) gets nothing even if it knew the token; and one that a browser says comes from another site is refused.
 //! Nothing is written: a request changes no file and no state that another tab can see.
 

@@ -6,8 +6,8 @@ use crate::sources::SourceWeights;
 /// the sum over the targets of `sqrt(weight of the chosen sources)` most; of equal ones the first.
 ///
 /// For one target these are the sources of greatest weight. For several the root prefers a source for a target that has
-/// none to a further one for a target that has. The sum is within `1 - 1/e` of the greatest possible, as of every greedy
-/// choice for such a function (monotone and submodular). Empty without targets.
+/// none to a further one for a target that has. The sum is within `1 - 1/e` of the greatest possible, as of every
+/// greedy choice for such a function (monotone and submodular). Empty without targets.
 pub fn select_sources(weights: &[SourceWeights], count: usize) -> Vec<usize> {
     let source_count = weights.first().map_or(0, |own| own.count() as usize);
     let mut covered = vec![0.0_f64; weights.len()];

@@ -172,8 +172,8 @@ impl fmt::Display for WeightingSpec {
 impl FromStr for WeightingSpec {
     type Err = WeightingError;
 
-    /// `NAME`, `NAME:KEY=VALUE[,KEY=VALUE]` or `attention:FILE`; the file is not read. `LABEL=` in front of any of them is
-    /// what it is called in tables and records.
+    /// `NAME`, `NAME:KEY=VALUE[,KEY=VALUE]` or `attention:FILE`; the file is not read. `LABEL=` in front of any of them
+    /// is what it is called in tables and records.
     fn from_str(text: &str) -> Result<WeightingSpec, WeightingError> {
         // A parameter's `=` comes after the colon.
         let label = text.split(':').next().and_then(|head| head.split_once('=')).map(|(label, _)| label);

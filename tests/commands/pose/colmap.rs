@@ -15,7 +15,8 @@ use viewfuse_tests::places::data;
 use viewfuse_tests::scenes::Folder;
 use viewfuse_tests::trials::trial;
 
-/// Plays `colmap`: it keeps a list of its calls, and its mapper writes a model that lies beside it, by the features asked for.
+/// Plays `colmap`: it keeps a list of its calls, and its mapper writes a model that lies beside it, by the features
+/// asked for.
 const COLMAP: &str = r#"#!/bin/sh
 here=$(dirname "$0")
 step=$1
@@ -58,8 +59,8 @@ pub(super) fn trials() -> Vec<Trial> {
     all
 }
 
-/// Writes the room's first photographs and their true poses as COLMAP's text model, each turned about its down axis by as many
-/// degrees as `turn` says.
+/// Writes the room's first photographs and their true poses as COLMAP's text model, each turned about its down axis by
+/// as many degrees as `turn` says.
 fn model(folder: &Folder, name: &str, turn: impl Fn(usize) -> f64) {
     let scene = Scene::open(data("room")).expect("the room");
     let cameras: Vec<_> = scene.views.iter().map(|view| view.camera).collect();

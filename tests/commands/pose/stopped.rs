@@ -20,8 +20,8 @@ pub(super) fn trials() -> Vec<Trial> {
     }
 }
 
-/// Photographs of the room and a program that counts how often it is asked, in a file of the run's own: what a killed run has started
-/// may still count.
+/// Photographs of the room and a program that counts how often it is asked, in a file of the run's own: what a killed
+/// run has started may still count.
 fn counted() -> Folder {
     let folder = bare(0..4);
     let real = fs::canonicalize(program().expect("a program")).expect("a path");
@@ -50,8 +50,8 @@ fn kept(folder: &Folder) -> Vec<PathBuf> {
     entries.map(|entry| entry.path()).filter(|path| path.extension().is_some_and(|own| own == "json")).collect()
 }
 
-/// The first run has left nothing but finished attempts; the second one makes the others, and what it writes is what a run writes
-/// that nobody stopped.
+/// The first run has left nothing but finished attempts; the second one makes the others, and what it writes is what a
+/// run writes that nobody stopped.
 #[track_caller]
 fn goes_on(folder: &Folder) {
     assert!(!folder.path().join("posed").exists(), "no half of a scene");

@@ -1,7 +1,8 @@
 //! The recipes of host/evaluate/README.md for many machines, run as they stand there: GNU parallel, and Slurm on one
 //! node. A worker that is killed is noticed, and the same recipe goes on.
 //!
-//! Where GNU parallel or Slurm are missing, these tests are ignored and say so; with `VIEWFUSE_REQUIRE_CLUSTER=1` they fail.
+//! Where GNU parallel or Slurm are missing, these tests are ignored and say so; with `VIEWFUSE_REQUIRE_CLUSTER=1` they
+//! fail.
 
 use super::folders::finished;
 use crate::{BINARY, lab};

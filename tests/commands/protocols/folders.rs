@@ -214,7 +214,8 @@ fn one_writer_a_shard() {
     journal.lock().expect("a lock");
     assert_refused(BINARY, folder, &format!("{first} -o out"), &["scores-0-of-1.jsonl: another process", "--shard"]);
     done(BINARY, folder, &format!("{first} -o out --shard 1/2"));
-    // A process that another test starts at this moment has the file open too until it runs its program: closing is not enough.
+    // A process that another test starts at this moment has the file open too until it runs its program: closing is not
+    // enough.
     journal.unlock().expect("unlocked");
     done(BINARY, folder, &format!("{first} -o out"));
 }

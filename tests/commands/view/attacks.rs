@@ -1,5 +1,5 @@
-//! The server under attack by programs that do not know its address: it goes on, other tabs are answered, and Ctrl-C ends it.
-//! Requests of any bytes are a target of `fuzz`.
+//! The server under attack by programs that do not know its address: it goes on, other tabs are answered, and Ctrl-C
+//! ends it. Requests of any bytes are a target of `fuzz`.
 
 use super::super::BINARY;
 use super::start;
@@ -218,8 +218,8 @@ fn endless_lines() {
     attacked.ends();
 }
 
-/// Connections that are reset: by a client that does not linger, also before the server saw them, and by one that leaves an
-/// answer unread.
+/// Connections that are reset: by a client that does not linger, also before the server saw them, and by one that
+/// leaves an answer unread.
 fn resets() {
     let mut attacked = Attacked::start();
     let mut open = attacked.program.connect();

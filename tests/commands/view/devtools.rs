@@ -1,5 +1,5 @@
-//! A browser without a window that is driven as a hand does it: Chromium's DevTools protocol through a pipe, JSON messages
-//! that end in a zero byte.
+//! A browser without a window that is driven as a hand does it: Chromium's DevTools protocol through a pipe, JSON
+//! messages that end in a zero byte.
 
 use super::super::browser::Browser;
 use serde_json::{Value, json};

@@ -48,15 +48,16 @@ fn pictures_of_gaussians_follow_the_hand(browser: &Browser) {
     pictures_follow_the_hand(browser, &scene, [128.0, 128.0], "gaussians.png");
 }
 
-/// On the page, from now on: the sizes of the pictures and which requests they answer, and how often weights were drawn.
+/// On the page, from now on: the sizes of the pictures and which requests they answer, and how often weights were
+/// drawn.
 const WATCH: &str = "(() => { window.drawnSizes = []; window.drawnNumbers = []; window.weightsTold = 0; \
     new MutationObserver(() => { drawnSizes.push([...shows.shown.size]); drawnNumbers.push(shows.shown.number); }) \
         .observe(document.getElementById('picture'), {attributes: true, attributeFilter: ['data-pictures']}); \
     new MutationObserver(() => { weightsTold += 1; }).observe(document.getElementById('sum'), {childList: true}); })()";
 
-/// While a hand drags, coarse pictures come: each answers a newer request than the one before, with its weights, in one of
-/// the sizes that there are, of which `finest` is the largest; once it lets go, the picture is that of the last view. How many
-/// come in a second is a figure of `cargo bench -p viewfuse-cli --bench view`.
+/// While a hand drags, coarse pictures come: each answers a newer request than the one before, with its weights, in one
+/// of the sizes that there are, of which `finest` is the largest; once it lets go, the picture is that of the last
+/// view. How many come in a second is a figure of `cargo bench -p viewfuse-cli --bench view`.
 fn pictures_follow_the_hand(browser: &Browser, scene: &str, finest: [f64; 2], kept: &str) {
     let program = start(&repository(), &format!("{scene} --weights error:alpha=1"));
     let chromium = Chromium::start(browser);

@@ -1,4 +1,5 @@
-//! A scene of Gaussians as one page, in a browser: its picture beside core's, the weights of the view on the screen, a hand, a phone.
+//! A scene of Gaussians as one page, in a browser: its picture beside core's, the weights of the view on the screen, a
+//! hand, a phone.
 
 use super::super::browser::{self, Browser, InBrowser};
 use super::super::done;
@@ -35,8 +36,9 @@ const HEIGHT: usize = 180;
 /// The window in which the page's picture has this size: it has margins.
 const WINDOW: [u32; 2] = [WIDTH as u32 + 32, 700];
 const BACKGROUND: [f32; 3] = [0.7, 0.75, 0.8];
-/// What the page's picture has at least, in dB. The viewer ends a Gaussian at 1 / 55 of its opacity where core ends it at 1 / 255,
-/// keeps variances in half precision and mixes in 8 bits; measured: 33.7 to 36.3, and 34.8 of the page that the command writes.
+/// What the page's picture has at least, in dB. The viewer ends a Gaussian at 1 / 55 of its opacity where core ends it
+/// at 1 / 255, keeps variances in half precision and mixes in 8 bits; measured: 33.7 to 36.3, and 34.8 of the page that
+/// the command writes.
 const MIN_PSNR: f64 = 32.0;
 const STILL: &str = "document.body?.dataset.state === 'still'";
 

@@ -209,7 +209,8 @@ fn a_phone_shows_all_of_it(browser: &Browser) {
     assert_eq!(tab.console(), [""; 0]);
 }
 
-/// From behind the wall: words, a dimmed picture, and the same again when the view is back. For people who see it dark and small, too.
+/// From behind the wall: words, a dimmed picture, and the same again when the view is back. For people who see it dark
+/// and small, too.
 fn where_nothing_was_photographed_it_is_said(browser: &Browser) {
     let program = room(SMALL);
     let chromium = Chromium::start(browser);

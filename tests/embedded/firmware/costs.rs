@@ -20,8 +20,8 @@ const MAX_PARAMETERS: usize = 20_000;
 /// What the firmware without attention may have there of code and constants.
 const MAX_BYTES: u64 = 32 * 1024;
 
-/// Programs that are measured on the first board alone, and their calls with what they are in the tables: they take an FPU, and
-/// memory.
+/// Programs that are measured on the first board alone, and their calls with what they are in the tables: they take an
+/// FPU, and memory.
 const WITH_AN_FPU: [(&str, &[(&str, &str)]); 2] = [
     ("embeddings", &[("attend", "attention weights of 8 sources, 32 bits"), ("embed", "one pose embedded, 32 bits")]),
     (
@@ -163,10 +163,10 @@ fn results() -> PathBuf {
     repository().join("host/results/firmware.md")
 }
 
-/// The table of the results with this heading is this one, to a fifth: another compiler gives a few instructions more or
-/// less. The code (every third number) is as small as it says only where Rust's library is compiled for size as well, and
-/// that of one call to half or twice: which function holds what was inlined differs between builds of the same sources (836
-/// and 1404 bytes were seen for the stratified depths), the whole program by 2 %.
+/// The table of the results with this heading is this one, to a fifth: another compiler gives a few instructions more
+/// or less. The code (every third number) is as small as it says only where Rust's library is compiled for size as
+/// well, and that of one call to half or twice: which function holds what was inlined differs between builds of the
+/// same sources (836 and 1404 bytes were seen for the stratified depths), the whole program by 2 %.
 fn the_results_say_so(heading: &str, rows: &[Row], library_is_small: bool) -> Result<(), Failed> {
     let table = markdown(heading, rows);
     println!("\n{table}");

@@ -58,7 +58,8 @@ fn rays_of_any_length() {
     }
 }
 
-/// A volume reaches from near to far: with nothing between there is nothing to look up, and no picture would mean anything.
+/// A volume reaches from near to far: with nothing between there is nothing to look up, and no picture would mean
+/// anything.
 #[test]
 fn rays_of_no_length_are_an_error() {
     let infinite = f32::INFINITY;

@@ -13,8 +13,8 @@ fn both(latent_layers: bool) -> [Omissions; 2] {
     [false, true].map(|half_latents| Omissions { latent_layers, half_latents, ..Omissions::NONE })
 }
 
-/// What is looked up are means of four latents: off by no more than one is. The rest of the network may grow that; measured are
-/// 2.1e-3 for the mist with layers on the grid, 3.1e-3 at points, and 6e-5 for the body.
+/// What is looked up are means of four latents: off by no more than one is. The rest of the network may grow that;
+/// measured are 2.1e-3 for the mist with layers on the grid, 3.1e-3 at points, and 6e-5 for the body.
 #[test]
 fn pictures_hardly_change() {
     let (sources, target) = (sources(3), target(24));

@@ -50,8 +50,8 @@ fn a_ball_has_the_depth_and_the_silhouette_of_a_ball() {
     assert!(overlap > 0.97, "silhouettes overlap by {overlap}");
 }
 
-/// The camera in a world that is turned, moved by `shift` and scaled. A turn is `angle` about z and then a quarter about
-/// x.
+/// The camera in a world that is turned, moved by `shift` and scaled. A turn is `angle` about z and then a quarter
+/// about x.
 fn moved(camera: &Camera, angle: Option<f32>, shift: Vec3, scale: f32) -> Camera {
     let turn = |v: Vec3| {
         angle.map_or(v, |angle| {
@@ -100,8 +100,8 @@ fn moving_and_scaling_the_world_changes_next_to_nothing() {
     }
     assert!(failures.is_empty(), "{failures:?}");
 
-    // A turn that is no multiple of a quarter gives the object another box, hence other planes and steps: another picture
-    // of the same quality.
+    // A turn that is no multiple of a quarter gives the object another box, hence other planes and steps: another
+    // picture of the same quality.
     let truth = views(&lorry().expect("the lorry"), &[camera]);
     let psnr = |picture: &Rendered| {
         let over_white = truth.images[0].texels.iter().map(|t| [0, 1, 2].map(|c| t[c] + 1.0 - t[3]));

@@ -91,7 +91,8 @@ impl Face {
     }
 }
 
-/// A call of a function that takes a count and arrays of so many numbers behind a struct of `head` words; the last is written.
+/// A call of a function that takes a count and arrays of so many numbers behind a struct of `head` words; the last is
+/// written.
 fn each(
     numbers: &mut Numbers<'_>,
     head: usize,
@@ -131,7 +132,8 @@ fn weigh(numbers: &mut Numbers<'_>, most: usize) -> Call {
             16 => weigh::viewfuse_weigh_16,
             _ => weigh::viewfuse_weigh_32,
         };
-        // SAFETY: the arrays have the shapes that the function asks for; a pointer that is wrong is null or not aligned.
+        // SAFETY: the arrays have the shapes that the function asks for; a pointer that is wrong is null or not
+        // aligned.
         unsafe { function(at[0].cast::<Scheme>(), at[1].cast(), count, at[2].cast(), at[3].cast()) }
     })
 }

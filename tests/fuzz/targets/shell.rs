@@ -7,8 +7,8 @@ use viewfuse::job::shell::quoted;
 
 pub(crate) struct Shell;
 
-/// What a shell makes of a word, by the rules of POSIX 2024 for quotes and `$'...'`; an error where the word is not one, or
-/// anything in it would be expanded.
+/// What a shell makes of a word, by the rules of POSIX 2024 for quotes and `$'...'`; an error where the word is not
+/// one, or anything in it would be expanded.
 fn unquoted(word: &str) -> Result<Vec<u8>, String> {
     let (mut bytes, mut rest) = (Vec::new(), word.as_bytes());
     while let Some((first, after)) = rest.split_first() {

@@ -1,6 +1,7 @@
 //! Calls what firmware calls, and every function of the C interface, on memory of exactly the size that is asked for.
 //!
-//! `tests/embedded/miri.rs` runs it as it is and under Miri, where that is. The numbers that it prints are those of the host.
+//! `tests/embedded/miri.rs` runs it as it is and under Miri, where that is. The numbers that it prints are those of the
+//! host.
 
 use std::ffi::CStr;
 use viewfuse_capi_linked::fuse::viewfuse_fuse_views;

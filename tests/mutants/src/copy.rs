@@ -6,8 +6,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Sources of kernels: what `core` computes for them, and the kernels' own. Not what only describes kernels, and not what is
-/// generic in its numbers or never runs in a kernel.
+/// Sources of kernels: what `core` computes for them, and the kernels' own. Not what only describes kernels, and not
+/// what is generic in its numbers or never runs in a kernel.
 fn is_changed(path: &str) -> bool {
     const FOLDERS: [&str; 2] = ["core/src/", "core/kernels/src/"];
     const OTHERS: [&str; 4] =

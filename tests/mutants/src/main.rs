@@ -1,5 +1,5 @@
-//! Is every body of a kernel proven? Each value in a body (a constant, the result of an operator, an index) is changed by a
-//! hundredth (an index by one), one after the other, and the tests that reach it are asked whether they notice.
+//! Is every body of a kernel proven? Each value in a body (a constant, the result of an operator, an index) is changed
+//! by a hundredth (an index by one), one after the other, and the tests that reach it are asked whether they notice.
 //!
 //! ```text
 //! cargo run --manifest-path tests/mutants/Cargo.toml -- make                  compiles, lists what each test reaches
@@ -8,9 +8,9 @@
 //! cargo run --manifest-path tests/mutants/Cargo.toml -- table NAME NAME       the answers of two runs side by side
 //! ```
 //!
-//! The changes are compiled once: in a copy of the repository in `target/mutants` each value passes through a function that
-//! changes it where an environment variable has the value's number. Of a body at most [`MAX_CHANGES`] places of a kind are
-//! changed, spread evenly.
+//! The changes are compiled once: in a copy of the repository in `target/mutants` each value passes through a function
+//! that changes it where an environment variable has the value's number. Of a body at most [`MAX_CHANGES`] places of a
+//! kind are changed, spread evenly.
 
 mod copy;
 mod places;
@@ -30,7 +30,8 @@ use std::time::{Duration, Instant};
 
 /// Changes of a body and kind.
 const MAX_CHANGES: usize = 2;
-/// Groups of tests, which are asked one after the other: the cases on the CPU, those of the bodies themselves, and others.
+/// Groups of tests, which are asked one after the other: the cases on the CPU, those of the bodies themselves, and
+/// others.
 const GROUPS: [&str; 4] = ["case", "bodies", "numerics", "removed"];
 
 fn main() {

@@ -65,8 +65,8 @@ pub fn run(binary: &Path, name: &str, change: u32, list: Option<&Path>, limit: D
     }
 }
 
-/// Runs each test of these binaries that is asked once, and keeps a line for it: its group, its name, the binary, seconds, and
-/// the places that it reaches.
+/// Runs each test of these binaries that is asked once, and keeps a line for it: its group, its name, the binary,
+/// seconds, and the places that it reaches.
 pub fn list(binaries: &[Binary]) -> String {
     binaries.iter().map(listed).collect()
 }

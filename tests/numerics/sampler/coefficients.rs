@@ -218,7 +218,8 @@ fn verdicts() {
 
 #[test]
 fn embedded_differences_are_between_orders() {
-    // Even steps down to 1: Adams and Bashforth's coefficients of so many results less those of one result less, times -1.
+    // Even steps down to 1: Adams and Bashforth's coefficients of so many results less those of one result less, times
+    // -1.
     let history = |levels: &[f32]| {
         let mut history = History::NONE;
         levels.iter().for_each(|level| history.push(*level));

@@ -87,8 +87,8 @@ fn at_ten_calls_a_multistep_sampler_has_a_tenth_of_heuns_error() {
     }
 }
 
-/// The default's error, in ten calls, is at most eight times that of the published run with 49, and a tenth of what that makes
-/// in ten; the careful plan's is about that of the published run.
+/// The default's error, in ten calls, is at most eight times that of the published run with 49, and a tenth of what
+/// that makes in ten; the careful plan's is about that of the published run.
 #[test]
 fn what_the_plans_make() {
     let Steps::Fixed { sampler, level_count } = Plan::fast(0).steps else { panic!("another kind of default") };
@@ -129,7 +129,8 @@ fn what_a_state_in_f32_costs() {
                 picture.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
             });
             println!("{name:>17} {:>8}: {} with 10, 18, 49 calls", sampler.name(), row(&costs));
-            // Where a value must decide between two narrow components, rounding may decide: elsewhere far below a level.
+            // Where a value must decide between two narrow components, rounding may decide: elsewhere far below a
+            // level.
             assert!(name.starts_with("stiff") || costs.iter().all(|cost| *cost < 1.0e-3), "{name} {}", sampler.name());
         }
     }

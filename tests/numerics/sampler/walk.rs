@@ -1,4 +1,5 @@
-//! Samplers over given levels with the state in `f64` and core's coefficients: what rounding of a state hides shows here.
+//! Samplers over given levels with the state in `f64` and core's coefficients: what rounding of a state hides shows
+//! here.
 
 use viewfuse_core::random::normal;
 use viewfuse_core::sampler::{History, Mix, Sampler};

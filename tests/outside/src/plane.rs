@@ -64,7 +64,8 @@ impl<D: Device> Prepared for Photographs<'_, D> {
 }
 
 impl<D: Device> Photographs<'_, D> {
-    /// What a source shows of the plane, `[pixel][channel]`: the texel that a point falls into, nothing outside of the image.
+    /// What a source shows of the plane, `[pixel][channel]`: the texel that a point falls into, nothing outside of the
+    /// image.
     fn shown(&self, image: &SourceImage, target: &Camera) -> Vec<f32> {
         let source: CameraBlock = image.camera.block(0);
         let texel = |row: u32, column: u32| {

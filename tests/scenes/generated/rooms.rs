@@ -1,4 +1,5 @@
-//! Rooms: the checked-in sample against what the code makes, exact depth against other views, rays against single parts.
+//! Rooms: the checked-in sample against what the code makes, exact depth against other views, rays against single
+//! parts.
 
 use std::fs;
 use std::path::PathBuf;

@@ -1,5 +1,5 @@
-//! Makes `kernels.spv`, the kernels as one SPIR-V module, and `subgroups.spv`, those that need operations of subgroups, from
-//! the entry points in `vulkan/shaders`.
+//! Makes `kernels.spv`, the kernels as one SPIR-V module, and `subgroups.spv`, those that need operations of subgroups,
+//! from the entry points in `vulkan/shaders`.
 //!
 //! The modules are checked in: users of viewfuse need no shader compiler. `cargo shaders` compiles them again,
 //! `cargo shaders --check` compares them with a fresh compilation.

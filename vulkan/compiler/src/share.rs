@@ -1,8 +1,8 @@
 //! Makes an invocation's writes to workgroup memory visible to the others.
 //!
-//! In Vulkan's memory model, accesses are private to an invocation, despite barriers, unless each instruction is marked.
-//! rust-gpu sets no marks. Here every access to workgroup memory gets the mark `NonPrivatePointer`; the barriers in
-//! `viewfuse-shaders` do the rest.
+//! In Vulkan's memory model, accesses are private to an invocation, despite barriers, unless each instruction is
+//! marked. rust-gpu sets no marks. Here every access to workgroup memory gets the mark `NonPrivatePointer`; the
+//! barriers in `viewfuse-shaders` do the rest.
 
 use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{MemoryAccess, Op, StorageClass};

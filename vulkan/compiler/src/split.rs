@@ -1,6 +1,7 @@
 //! Takes the entry points that need operations of subgroups out of a module, into one of their own.
 //!
-//! A device must have every capability of a module, whichever entry points it runs. Not every device has these operations.
+//! A device must have every capability of a module, whichever entry points it runs. Not every device has these
+//! operations.
 
 use crate::refine::{RefineError, read};
 use rspirv::binary::Assemble;
@@ -24,7 +25,8 @@ pub struct Modules {
     pub subgroups: Vec<u8>,
 }
 
-/// Splits a module. Types and constants that a part does not need are left for [`refine`](crate::refine::refine) to remove.
+/// Splits a module. Types and constants that a part does not need are left for [`refine`](crate::refine::refine) to
+/// remove.
 ///
 /// # Errors
 /// If the bytes are not SPIR-V.

@@ -1,11 +1,11 @@
 //! The sources of the modules: `kernels.toml`.
 //!
-//! It holds the sha256 of the tokens of every source that determines the modules' bytes, the locked versions of the libraries
-//! that become part of them, the sha256 of the modules and the version of the compiler. So a test without a compiler finds a
-//! stale module.
+//! It holds the sha256 of the tokens of every source that determines the modules' bytes, the locked versions of the
+//! libraries that become part of them, the sha256 of the modules and the version of the compiler. So a test without a
+//! compiler finds a stale module.
 //!
-//! A comment, documentation or layout makes nothing stale. Neither does a module of `viewfuse-core` that no kernel reaches:
-//! its sources count from the modules that kernels and entry points name, along what these modules name.
+//! A comment, documentation or layout makes nothing stale. Neither does a module of `viewfuse-core` that no kernel
+//! reaches: its sources count from the modules that kernels and entry points name, along what these modules name.
 
 use crate::split::Modules;
 use crate::tokens::{names_in, tokens, without_modules};
@@ -193,7 +193,8 @@ impl Stamp {
         Stamp { compiler, module: sha256(&modules.kernels), subgroups: sha256(&modules.subgroups), inputs }
     }
 
-    /// Whether modules were made from these inputs: every difference as a sentence that names it, none if they are fresh.
+    /// Whether modules were made from these inputs: every difference as a sentence that names it, none if they are
+    /// fresh.
     pub fn stale(&self, inputs: &Inputs, modules: &Modules) -> Vec<String> {
         let mut stale = differences("library", &self.inputs.libraries, &inputs.libraries);
         stale.extend(differences("source", &self.inputs.sources, &inputs.sources));
@@ -243,8 +244,8 @@ fn read_all(root: &Path, relative: &str, sources: &mut Sources) -> Result<(), St
     Ok(())
 }
 
-/// Reads the modules of `viewfuse-core` that the sources name, those that these name, and so on; and what its root has besides
-/// modules.
+/// Reads the modules of `viewfuse-core` that the sources name, those that these name, and so on; and what its root has
+/// besides modules.
 fn read_core(root: &Path, sources: &mut Sources) -> Result<(), StampError> {
     let mut open: BTreeSet<String> = sources.values().flat_map(|tokens| names_in(tokens, "viewfuse_core")).collect();
     let mut core = Sources::new();

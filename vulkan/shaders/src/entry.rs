@@ -1,7 +1,7 @@
 //! Rows to entry points.
 //!
-//! rust-gpu reads its attributes as they stand in the source, so that bindings are numbered from a list of literals. An entry
-//! point without a name of its own has that of its function's path in the crate.
+//! rust-gpu reads its attributes as they stand in the source, so that bindings are numbered from a list of literals. An
+//! entry point without a name of its own has that of its function's path in the crate.
 
 /// The entry points of all rows.
 macro_rules! entries {
@@ -23,8 +23,8 @@ macro_rules! entries {
     };
 }
 
-/// The entry points of a row. What stands in brackets is the function's parameters, the pages that it puts together and the
-/// arguments of the body so far; then the arrays that are left, and the numbers of bindings that are left.
+/// The entry points of a row. What stands in brackets is the function's parameters, the pages that it puts together and
+/// the arguments of the body so far; then the arrays that are left, and the numbers of bindings that are left.
 macro_rules! entry {
     // Of tiled kernels all arrays are read and written without a panic.
     (

@@ -1,11 +1,12 @@
 //! Entry points of the kernels on Vulkan devices, made from the kernels' rows ([`viewfuse_kernels::rows`]).
 //!
-//! An entry point has the name of its kernel and takes its arrays in the order of the row, its parameters and the [`Piece`]
-//! as push constants. It checks whether its element exists and calls the kernel's body ([`viewfuse_kernels::bodies`]).
-//! Arrays that may be longer than a device can bind at once come as four pages; arrays `as vectors` are loaded and stored
-//! as vectors (`loads`). A tiled kernel has an entry point for each form of a tile: the first of the kernel's name, the
-//! other in a module of that name. What devices do otherwise than the CPU is here: matrix products are summed in workgroup
-//! memory or by subgroups (`tile`), and a workgroup computes an element `together`, both without a panic (`unchecked`).
+//! An entry point has the name of its kernel and takes its arrays in the order of the row, its parameters and the
+//! [`Piece`] as push constants. It checks whether its element exists and calls the kernel's body
+//! ([`viewfuse_kernels::bodies`]). Arrays that may be longer than a device can bind at once come as four pages; arrays
+//! `as vectors` are loaded and stored as vectors (`loads`). A tiled kernel has an entry point for each form of a tile:
+//! the first of the kernel's name, the other in a module of that name. What devices do otherwise than the CPU is here:
+//! matrix products are summed in workgroup memory or by subgroups (`tile`), and a workgroup computes an element
+//! `together`, both without a panic (`unchecked`).
 //!
 //! On the host the same entry points are plain functions, which are compiled and not called.
 #![cfg_attr(target_arch = "spirv", no_std)]

@@ -1,7 +1,7 @@
 //! Arrays whose elements are loaded as vectors: four numbers in a load, where a device would otherwise take four.
 //!
-//! An entry point takes an array of vectors instead of one of structs or of single numbers; it has the same bytes. Structs
-//! are loaded as integers, so that no word passes as a float that it is not.
+//! An entry point takes an array of vectors instead of one of structs or of single numbers; it has the same bytes.
+//! Structs are loaded as integers, so that no word passes as a float that it is not.
 
 use spirv_std::glam::{UVec4, Vec2, Vec4};
 use viewfuse_core::camera::CameraBlock;

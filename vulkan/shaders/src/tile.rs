@@ -3,8 +3,8 @@
 //! The workgroup proceeds along the inner index in steps: it fetches its rows of the left matrix and its columns of the
 //! right one into workgroup memory, each number once, and sums the products from there.
 //!
-//! This code must not panic, see [`crate::unchecked`]. Closures capture by value: a module with logical addressing cannot
-//! hold references to references.
+//! This code must not panic, see [`crate::unchecked`]. Closures capture by value: a module with logical addressing
+//! cannot hold references to references.
 
 mod subgroup;
 

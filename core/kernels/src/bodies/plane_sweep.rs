@@ -1,4 +1,5 @@
-//! The plane sweep: views compared on planes, costs averaged and joined along lines, disparities picked, pixels blended.
+//! The plane sweep: views compared on planes, costs averaged and joined along lines, disparities picked, pixels
+//! blended.
 
 use crate::plane_sweep::Planes;
 use crate::plane_sweep::blend::{self, BlendBlock};

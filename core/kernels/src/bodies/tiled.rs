@@ -1,7 +1,7 @@
 //! Layers that are products of matrices: a device computes them in tiles, in its own way.
 //!
-//! Arrays come by value: closures over references to them would hold references to references, which a module with logical
-//! addressing cannot.
+//! Arrays come by value: closures over references to them would hold references to references, which a module with
+//! logical addressing cannot.
 
 use crate::network::attend::MatrixBlock;
 use crate::network::convolve::{ConvolveBlock, convolved, patch_value};

@@ -1,6 +1,6 @@
-//! Kernels whose elements a workgroup computes together: for each the function of its name, which an invocation runs. Its results are
-//! those of the body of that name, which is the definition. It must not panic: others wait for it. Arrays hold at least one element and may be read beyond
-//! their end.
+//! Kernels whose elements a workgroup computes together: for each the function of its name, which an invocation runs.
+//! Its results are those of the body of that name, which is the definition. It must not panic: others wait for it.
+//! Arrays hold at least one element and may be read beyond their end.
 
 use crate::gaussians::blend_gradient::{GradientLanes, GradientSums, NUMBERS, SplatGradient};
 use crate::gaussians::lanes::sum;
@@ -32,8 +32,9 @@ pub const BLEND_GRADIENT_SHARED: usize = SPLATS + SPLAT_NUMBERS * FETCHED as usi
 const _: () = assert!(WORKGROUP as usize == SPLAT_TILE * SPLAT_TILE && SUMMED < WORKGROUP);
 const _: () = assert!(4 * BLEND_GRADIENT_SHARED <= SHARED_BYTES);
 
-/// A pixel of a tile, invocation `invocation % 64` of the tile `invocation / 64`. Splats go through the workgroup's memory, so that
-/// none is waited for alone; so do the pixels' numbers of some splats, where each sum over the pixels is one invocation's.
+/// A pixel of a tile, invocation `invocation % 64` of the tile `invocation / 64`. Splats go through the workgroup's
+/// memory, so that none is waited for alone; so do the pixels' numbers of some splats, where each sum over the pixels
+/// is one invocation's.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
 pub fn blend_gradient(

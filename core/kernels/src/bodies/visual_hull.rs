@@ -73,8 +73,8 @@ pub fn mean_column(
     means.store(plane as usize, sweep::mean_column(block, costs, row_sums, pixel, own));
 }
 
-/// The depth of least cost of a pixel of the band. `entries`, `guess` and `picked` are maps of all views, of which the band
-/// is a part.
+/// The depth of least cost of a pixel of the band. `entries`, `guess` and `picked` are maps of all views, of which the
+/// band is a part.
 #[inline]
 #[allow(clippy::too_many_arguments)]
 pub fn pick_depth(

@@ -21,8 +21,8 @@ pub struct BlendedLanes<const N: usize> {
 }
 
 impl<const N: usize> BlendedLanes<N> {
-    /// Composites the splats of a tile, `entries[starts[tile]..starts[tile + 1]]`, front to back, at pixels of it: the first one's column
-    /// and row. A pixel behind whose splats less than [`MIN_TRANSMITTANCE`] is seen takes no more.
+    /// Composites the splats of a tile, `entries[starts[tile]..starts[tile + 1]]`, front to back, at pixels of it: the
+    /// first one's column and row. A pixel behind whose splats less than [`MIN_TRANSMITTANCE`] is seen takes no more.
     #[inline(always)]
     pub fn of(
         block: &TileBlock,

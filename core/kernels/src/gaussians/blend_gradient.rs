@@ -1,8 +1,9 @@
 //! Derivatives of a tile's pixels by its splats.
 //!
-//! With the weight `w_i = T_i a_i` and `s_i`, the derivative of the loss by `w_i` alone, the derivative by the opacity is
-//! `T_i s_i - R_i / (1 - a_i)`, where `R_i` is what all that lies behind, the background included, adds to `sum w s`: it begins as the
-//! whole sum, which the pixel's own colour gives, and loses each splat's part as the tile is gone through again front to back.
+//! With the weight `w_i = T_i a_i` and `s_i`, the derivative of the loss by `w_i` alone, the derivative by the opacity
+//! is `T_i s_i - R_i / (1 - a_i)`, where `R_i` is what all that lies behind, the background included, adds to `sum w
+//! s`: it begins as the whole sum, which the pixel's own colour gives, and loses each splat's part as the tile is gone
+//! through again front to back.
 
 use super::lanes::{Lanes, SplatLanes, greatest, sum};
 use super::{MIN_TRANSMITTANCE, SPLAT_TILE, TileBlock};
@@ -11,8 +12,8 @@ use viewfuse_core::fetch::Fetch;
 use viewfuse_core::gaussian::ProjectedGaussian;
 use viewfuse_core::math::abs;
 
-/// What a tile's pixels say of one of its splats, as plain data. `p` is the derivative by the opacity times the opacity, `(dx, dy)` from
-/// the splat's centre to the pixel's.
+/// What a tile's pixels say of one of its splats, as plain data. `p` is the derivative by the opacity times the
+/// opacity, `(dx, dy)` from the splat's centre to the pixel's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct SplatGradient {

@@ -30,8 +30,8 @@ pub struct Footprint {
 }
 
 impl Footprint {
-    /// The ellipse of a Gaussian that is drawn: its mean lies before the camera. A quaternion that is zero or not finite has the axes of
-    /// the identity, and the length 1.
+    /// The ellipse of a Gaussian that is drawn: its mean lies before the camera. A quaternion that is zero or not
+    /// finite has the axes of the identity, and the length 1.
     #[inline(always)]
     pub fn of(gaussian: &GaussianBlock, camera: &CameraBlock) -> Footprint {
         let [focal_x, focal_y, principal_x, principal_y] = camera.intrinsics;

@@ -43,8 +43,8 @@ impl<const N: usize> SplatLanes<N> {
     }
 }
 
-/// `e^x` for `x` from -16 to 0, limited to that interval; relative error at most 4e-6. For loops that become vectors, where
-/// [`exp`](viewfuse_core::math::exp) takes half as long again for its last digits.
+/// `e^x` for `x` from -16 to 0, limited to that interval; relative error at most 4e-6. For loops that become vectors,
+/// where [`exp`](viewfuse_core::math::exp) takes half as long again for its last digits.
 #[inline(always)]
 pub fn falloff(x: f32) -> f32 {
     // 1.5 * 2^23: adding rounds to a whole number, whose bits are the last ones.

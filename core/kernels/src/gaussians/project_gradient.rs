@@ -6,8 +6,8 @@ use glam::Vec3;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::gaussian::{GaussianBlock, ProjectedGaussian};
 
-/// The derivative of a loss by a Gaussian's parameters, in their own places, from what all tiles say of its splat. Zero if nothing of
-/// it is seen.
+/// The derivative of a loss by a Gaussian's parameters, in their own places, from what all tiles say of its splat. Zero
+/// if nothing of it is seen.
 #[inline(always)]
 pub fn project_gradient(
     gaussian: &GaussianBlock,
@@ -62,7 +62,8 @@ fn component(vector: &Vec3, axis: usize) -> f32 {
     }
 }
 
-/// Derivatives by [`Footprint::image_axes`]: the conic is the inverse of the covariance, which is the product of the axes with themselves.
+/// Derivatives by [`Footprint::image_axes`]: the conic is the inverse of the covariance, which is the product of the
+/// axes with themselves.
 #[inline(always)]
 fn by_axes(footprint: &Footprint, splat: &ProjectedGaussian, sums: &SplatGradient) -> [Vec3; 2] {
     let [a, b, c] = splat.conic;

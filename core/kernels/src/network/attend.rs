@@ -1,7 +1,7 @@
 //! Self-attention of an image: matrix products of two computed matrices, and softmax over the rows of a matrix.
 //!
-//! With queries, keys and values `[pixel][channel]`: scores are `queries keys^T / sqrt(channels)`, their softmax over the
-//! keys are weights, and `weights values` is the result. A matrix may be some of the columns of a wider one.
+//! With queries, keys and values `[pixel][channel]`: scores are `queries keys^T / sqrt(channels)`, their softmax over
+//! the keys are weights, and `weights values` is the result. A matrix may be some of the columns of a wider one.
 
 use bytemuck::{Pod, Zeroable};
 use viewfuse_core::fetch::Fetch;
@@ -23,7 +23,8 @@ pub struct MatrixBlock {
     pub left_first: u32,
     /// Numbers from a row of the right matrix to the next.
     pub right_row_pitch: u32,
-    /// Numbers from a column of the right matrix to the next: its rows' pitch and 1 are exchanged where it is transposed.
+    /// Numbers from a column of the right matrix to the next: its rows' pitch and 1 are exchanged where it is
+    /// transposed.
     pub right_column_pitch: u32,
     /// Where the right matrix starts.
     pub right_first: u32,
@@ -45,7 +46,8 @@ impl MatrixBlock {
     }
 }
 
-/// Output number `element` of `[row][column]`: the products along the inner index, summed in its order, times the scale.
+/// Output number `element` of `[row][column]`: the products along the inner index, summed in its order, times the
+/// scale.
 #[inline]
 pub fn matrix_element(
     left: &(impl Fetch<f32> + ?Sized),
@@ -63,8 +65,8 @@ pub fn matrix_element(
     sum * block.scale
 }
 
-/// The largest number of a row `scores[column]`, and the reciprocal of the sum of `e^(score - largest)`, at most 1: what
-/// [`softmax_value`] needs. A row of minus infinity alone gives 0 for the second; a row with NaN or plus infinity
+/// The largest number of a row `scores[column]`, and the reciprocal of the sum of `e^(score - largest)`, at most 1:
+/// what [`softmax_value`] needs. A row of minus infinity alone gives 0 for the second; a row with NaN or plus infinity
 /// gives NaN, so that the fault is reported and not hidden.
 #[inline]
 pub fn softmax_scale(scores: &(impl Fetch<f32> + ?Sized), first: usize, column_count: u32) -> [f32; 2] {

@@ -24,7 +24,8 @@ pub struct ConvolveBlock {
     pub in_pitch: u32,
     /// Where the first pixel's first channel lies.
     pub in_first: u32,
-    /// How many times each input pixel is repeated in both directions: the image counts as enlarged by this, at least 1.
+    /// How many times each input pixel is repeated in both directions: the image counts as enlarged by this, at least
+    /// 1.
     pub enlarge: u32,
     /// Rows of the output image: `(in_height enlarge + 2 padding - (size - 1) dilation - 1) / stride + 1`.
     pub out_height: u32,
@@ -57,8 +58,8 @@ pub struct ConvolveBlock {
 }
 
 impl ConvolveBlock {
-    /// The same convolution of images that fill their buffers and are not enlarged, with windows without gaps and nothing
-    /// scaled.
+    /// The same convolution of images that fill their buffers and are not enlarged, with windows without gaps and
+    /// nothing scaled.
     #[inline]
     pub fn packed(self) -> ConvolveBlock {
         ConvolveBlock {

@@ -1,5 +1,5 @@
-//! Depthwise convolution: each channel has its own window. The first half of a separable convolution, and a filter before
-//! resampling.
+//! Depthwise convolution: each channel has its own window. The first half of a separable convolution, and a filter
+//! before resampling.
 
 use super::convolve::window_pixel;
 use bytemuck::{Pod, Zeroable};

@@ -1,8 +1,8 @@
 //! A part of a matrix product that stays in registers, for devices that compute products in tiles.
 //!
-//! A tile is [`TILE`] rows times [`TILE`] columns of the outputs. It has 8 rows of 8 invocations, and each invocation has
-//! 8 rows and 8 columns of sums. Both come in fours that lie next to one another ([`Sums::place`]): four numbers are
-//! fetched together, neighbouring invocations fetch neighbouring fours, and each number is used eight times.
+//! A tile is [`TILE`] rows times [`TILE`] columns of the outputs. It has 8 rows of 8 invocations, and each invocation
+//! has 8 rows and 8 columns of sums. Both come in fours that lie next to one another ([`Sums::place`]): four numbers
+//! are fetched together, neighbouring invocations fetch neighbouring fours, and each number is used eight times.
 
 use glam::Vec4;
 
@@ -23,8 +23,8 @@ pub struct Shape {
 /// How a device computes the tiles of a matrix product together.
 pub trait Tiles {
     /// Computes an invocation's part of the matrix product of `left(row, inner)` and `right(inner, column)`, and calls
-    /// `store(row, column, sum)`. All invocations of a workgroup take part, with outputs or without: beyond the matrices,
-    /// the last row or column is read and the sum is not stored.
+    /// `store(row, column, sum)`. All invocations of a workgroup take part, with outputs or without: beyond the
+    /// matrices, the last row or column is read and the sum is not stored.
     fn multiply(
         self,
         invocation: u32,

@@ -40,7 +40,8 @@ impl TransposedBlock {
         self.in_height * self.in_width
     }
 
-    /// Numbers that an input pixel becomes: the product's columns, `[row of the square][column of the square][channel]`.
+    /// Numbers that an input pixel becomes: the product's columns, `[row of the square][column of the
+    /// square][channel]`.
     #[inline]
     pub fn column_count(&self) -> u32 {
         self.size * self.size * self.out_channels

@@ -1,7 +1,7 @@
 //! Soft census: whether a pixel is lighter or darker than its neighbours, compared across all views.
 //!
-//! Greys and the pairs' weights enter in whole steps. Their products and sums then are whole numbers below `2^24`, which `f32`
-//! holds exactly: they are the same in any order, and a CPU may compute them with 16-bit integers.
+//! Greys and the pairs' weights enter in whole steps. Their products and sums then are whole numbers below `2^24`,
+//! which `f32` holds exactly: they are the same in any order, and a CPU may compute them with 16-bit integers.
 
 use super::evidence::{UNSEEN, ViewPair};
 use super::frustum::FrustumBlock;
@@ -48,8 +48,8 @@ pub fn weight_steps(pair: &ViewPair) -> i32 {
 
 /// Cost of a group of planes at a pixel of a band, times its weight, and the weight.
 ///
-/// `grey[view][row][column][group]` and `evidence[row][column][group][difference, weight, dissent, hull]` are of the band;
-/// `pixel` is counted in it.
+/// `grey[view][row][column][group]` and `evidence[row][column][group][difference, weight, dissent, hull]` are of the
+/// band; `pixel` is counted in it.
 #[inline(always)]
 pub fn census_cost(
     frustum: &FrustumBlock,
@@ -108,8 +108,8 @@ pub fn census_cost(
     cost_of_sums(frustum, evidence, here, &[sum, count, texture])
 }
 
-/// Cost and weight of a group of planes, from the pairs' sums `[difference, weight, contrast]` over the census window, in steps,
-/// and the group's `evidence[here][difference, weight, dissent, hull]`.
+/// Cost and weight of a group of planes, from the pairs' sums `[difference, weight, contrast]` over the census window,
+/// in steps, and the group's `evidence[here][difference, weight, dissent, hull]`.
 #[inline(always)]
 pub fn cost_of_sums(frustum: &FrustumBlock, evidence: &[Planes], here: usize, sums: &[Planes; 3]) -> [Planes; 2] {
     let (difference, weight) = (&evidence[4 * here], &evidence[4 * here + 1]);

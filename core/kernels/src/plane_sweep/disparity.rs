@@ -13,10 +13,10 @@ pub const DOUBTFUL_COST: f32 = 0.12;
 /// Width of the logistic step of the confidence, in cost.
 pub const DOUBT_WIDTH: f32 = 0.02;
 
-/// Disparity and confidence in `[0, 1]` of a pixel, from `costs[row][column][group]`. The disparity is that of the plane of
-/// least cost, moved to the vertex of the parabola through it and its neighbours; the confidence is the share of the softmax
-/// within [`NEAR_PLANES`] of it, times a logistic step on the least cost. Of equal costs the farthest plane's is the least. The
-/// softmax is summed over the groups for each place in a group, then over the places.
+/// Disparity and confidence in `[0, 1]` of a pixel, from `costs[row][column][group]`. The disparity is that of the
+/// plane of least cost, moved to the vertex of the parabola through it and its neighbours; the confidence is the share
+/// of the softmax within [`NEAR_PLANES`] of it, times a logistic step on the least cost. Of equal costs the farthest
+/// plane's is the least. The softmax is summed over the groups for each place in a group, then over the places.
 #[inline(always)]
 pub fn pick_disparity(frustum: &FrustumBlock, costs: &[Planes], pixel: u32) -> [f32; 2] {
     let groups = frustum.group_count as usize;

@@ -44,8 +44,8 @@ pub struct Evidence {
     pub hull: Planes,
 }
 
-/// How far a point lies behind the surface that a view sees, in planes of which `density` fill a unit of disparity; negative in
-/// front of it.
+/// How far a point lies behind the surface that a view sees, in planes of which `density` fill a unit of disparity;
+/// negative in front of it.
 #[inline(always)]
 pub fn planes_behind(surface: f32, disparity: f32, density: f32) -> f32 {
     (surface - disparity) * density

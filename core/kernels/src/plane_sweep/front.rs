@@ -1,8 +1,8 @@
-//! The nearer surface wins: how opaque planes are by the sources' own disparities, and a preference for the first opaque plane
-//! of each ray.
+//! The nearer surface wins: how opaque planes are by the sources' own disparities, and a preference for the first
+//! opaque plane of each ray.
 //!
-//! Most support alone would take a floor that five views see for the body before it that two see: both are surfaces. A view whose
-//! surface lies before a point says nothing about it; one that sees through it contradicts it.
+//! Most support alone would take a floor that five views see for the body before it that two see: both are surfaces. A
+//! view whose surface lies before a point says nothing about it; one that sees through it contradicts it.
 
 use super::evidence::planes_behind;
 use super::frustum::{FrustumBlock, SweptView};
@@ -43,9 +43,9 @@ pub struct FrontBlock {
 
 const _: () = assert!(size_of::<FrontBlock>() == 16);
 
-/// Opacities in `[0, 1)` of a group of planes at a pixel: support over the sum of support, [`SEEN_THROUGH`] times free-space
-/// violation, and [`TRANSPARENT`]. A view's support is its confidence times a bell of one plane around its surface. All views count
-/// alike. `disparities[view's map][row][column]` are disparity and confidence.
+/// Opacities in `[0, 1)` of a group of planes at a pixel: support over the sum of support, [`SEEN_THROUGH`] times
+/// free-space violation, and [`TRANSPARENT`]. A view's support is its confidence times a bell of one plane around its
+/// surface. All views count alike. `disparities[view's map][row][column]` are disparity and confidence.
 #[inline(always)]
 pub fn plane_opacity(
     frustum: &FrustumBlock,
@@ -104,10 +104,10 @@ impl Front {
     /// Before the nearest group.
     pub const START: Front = Front { hides: [0.0; PLANES] };
 
-    /// A pixel's costs of the next group of planes, `costs[pixel][group]`, with the preference added: `front_share` times 1 less the
-    /// plane's opacity times the transmittance before it. The opacity is the mean over three by three pixels of
-    /// `opacities[row][column][group]` (those in the image); the transmittance is 1 less what the most opaque plane hides of those at
-    /// least [`GUARD`] planes before.
+    /// A pixel's costs of the next group of planes, `costs[pixel][group]`, with the preference added: `front_share`
+    /// times 1 less the plane's opacity times the transmittance before it. The opacity is the mean over three by three
+    /// pixels of `opacities[row][column][group]` (those in the image); the transmittance is 1 less what the most opaque
+    /// plane hides of those at least [`GUARD`] planes before.
     #[inline(always)]
     pub fn advance(
         &mut self,

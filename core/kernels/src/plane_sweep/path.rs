@@ -36,7 +36,8 @@ impl CostBlock {
         2 * (self.width + self.height)
     }
 
-    /// A line's direction, its number among those of the direction, and how many pixels it has. Directions are right, left, down, up.
+    /// A line's direction, its number among those of the direction, and how many pixels it has. Directions are right,
+    /// left, down, up.
     #[inline(always)]
     pub fn line(&self, line: u32) -> (u32, u32, u32) {
         if line < 2 * self.height {

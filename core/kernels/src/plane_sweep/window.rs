@@ -49,8 +49,8 @@ impl WindowBlock {
 }
 
 /// Sums over a row's parts of the three windows: `[window][cost times weight, weight]`, from
-/// `costs[row][column][group][cost times weight, weight]`. `pixel` is counted in the image. From the middle outwards, the
-/// smaller window first.
+/// `costs[row][column][group][cost times weight, weight]`. `pixel` is counted in the image. From the middle outwards,
+/// the smaller window first.
 #[inline(always)]
 pub fn row_sums(block: &WindowBlock, costs: &[Planes], pixel: u32, group: u32) -> [[Planes; 2]; 3] {
     let column = (pixel % block.width) as i32;
@@ -79,9 +79,10 @@ pub fn row_sums(block: &WindowBlock, costs: &[Planes], pixel: u32, group: u32) -
     sums
 }
 
-/// The rows of a window around a row, in two parts: `first..split` and `split..end`. Rows are counted in runs that are as long as
-/// the window; `split` is where the run begins in which the window ends, so that each part reaches to an end of its run, and
-/// neighbouring windows share the sums of it. At the image's lower border, where a window lies inside a run, the second part is empty.
+/// The rows of a window around a row, in two parts: `first..split` and `split..end`. Rows are counted in runs that are
+/// as long as the window; `split` is where the run begins in which the window ends, so that each part reaches to an end
+/// of its run, and neighbouring windows share the sums of it. At the image's lower border, where a window lies inside a
+/// run, the second part is empty.
 #[inline(always)]
 pub fn rows_of_window(row: u32, height: u32, reach: u32) -> [u32; 3] {
     let first = less(row, reach);
@@ -97,9 +98,9 @@ fn less(at: u32, reach: u32) -> u32 {
     if at > reach { at - reach } else { 0 }
 }
 
-/// The cost of a group of planes at a pixel: the three windows' means, from `sums[row][column][group][window][2]`. Of the rows of a
-/// window ([`rows_of_window`]) those of the first part are summed from the last to the first, those of the second from the first to
-/// the last, then both parts.
+/// The cost of a group of planes at a pixel: the three windows' means, from `sums[row][column][group][window][2]`. Of
+/// the rows of a window ([`rows_of_window`]) those of the first part are summed from the last to the first, those of
+/// the second from the first to the last, then both parts.
 #[inline(always)]
 pub fn window_cost(block: &WindowBlock, sums: &[Planes], pixel: u32, group: u32) -> Planes {
     let (column, row) = (pixel % block.width, pixel / block.width);

@@ -16,16 +16,16 @@ pub const fn tile_elements(row_count: u32, column_count: u32) -> u32 {
     row_count.div_ceil(TILE) * column_count.div_ceil(TILE) * WORKGROUP
 }
 
-/// How a workgroup computes a tile of a matrix product, 64 rows and 64 columns. The sums of an output run along the inner
-/// index in every form: the results are the same bits.
+/// How a workgroup computes a tile of a matrix product, 64 rows and 64 columns. The sums of an output run along the
+/// inner index in every form: the results are the same bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[repr(u32)]
 pub enum Form {
     /// Rows and columns go through the workgroup's memory. The definition of the others, and what small products take.
     #[default]
     Single,
-    /// Rows pass between the invocations of a subgroup instead of through the workgroup's memory. There are no barriers. Only
-    /// for devices with [subgroups that fit](Form::needs_subgroups).
+    /// Rows pass between the invocations of a subgroup instead of through the workgroup's memory. There are no
+    /// barriers. Only for devices with [subgroups that fit](Form::needs_subgroups).
     Subgroup,
 }
 
@@ -33,8 +33,8 @@ impl Form {
     /// Every form.
     pub const ALL: [Form; 2] = [Form::Single, Form::Subgroup];
 
-    /// Whether it passes numbers between the invocations of a subgroup. Its entry points are in a module of their own, which
-    /// only devices with these operations take. A subgroup is full and has 8 to 64 invocations, a power of two.
+    /// Whether it passes numbers between the invocations of a subgroup. Its entry points are in a module of their own,
+    /// which only devices with these operations take. A subgroup is full and has 8 to 64 invocations, a power of two.
     pub const fn needs_subgroups(self) -> bool {
         matches!(self, Form::Subgroup)
     }
@@ -235,8 +235,8 @@ macro_rules! list {
                 }
             }
 
-            /// Whether the CPU runs a faster form of its own. The body is then a definition without a caller in production
-            /// on the CPU.
+            /// Whether the CPU runs a faster form of its own. The body is then a definition without a caller in
+            /// production on the CPU.
             pub const fn has_twin(self) -> bool {
                 match self {
                     $(Kernel::$Kernel => crate::has_mark!(twin: $($mark)*),)+

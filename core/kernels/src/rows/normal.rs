@@ -1,7 +1,7 @@
 //! The grammar of a row, and the one form in which macros get rows.
 
-/// Hands rows in their normal form to `$callback!`: only this macro knows how a row is written. A macro takes the columns
-/// that it needs and leaves the rest to a `$($rest:tt)*`:
+/// Hands rows in their normal form to `$callback!`: only this macro knows how a row is written. A macro takes the
+/// columns that it needs and leaves the rest to a `$($rest:tt)*`:
 ///
 /// ```text
 /// {
@@ -15,8 +15,8 @@
 /// }
 /// ```
 ///
-/// What is in inner braces or brackets may be missing. [`elements`](crate::elements) and [`has_mark`](crate::has_mark) read
-/// their columns.
+/// What is in inner braces or brackets may be missing. [`elements`](crate::elements) and [`has_mark`](crate::has_mark)
+/// read their columns.
 #[macro_export]
 macro_rules! normal_rows {
     ($callback:ident $(
@@ -48,8 +48,8 @@ macro_rules! normal_rows {
     };
 }
 
-/// The range of a dispatch's elements, from the column `elements` of [`normal_rows`](crate::normal_rows). Those of tiles are
-/// counted in [`Form::Single`](crate::rows::Form).
+/// The range of a dispatch's elements, from the column `elements` of [`normal_rows`](crate::normal_rows). Those of
+/// tiles are counted in [`Form::Single`](crate::rows::Form).
 #[macro_export]
 macro_rules! elements {
     (for $element:ident in [$elements:expr] $($rest:tt)*) => {

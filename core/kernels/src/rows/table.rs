@@ -19,8 +19,8 @@ macro_rules! for_each_kernel {
                 read pixels: u32,
                 write depths: f32,
             }
-            /// Points of the samples in a list, which number rays and samples flat, or of all samples: `points[point]` from
-            /// `depths[ray][sample]`. An element is a point.
+            /// Points of the samples in a list, which number rays and samples flat, or of all samples: `points[point]`
+            /// from `depths[ray][sample]`. An element is a point.
             PlacePoints place_points(block: PlaceBlock; point_count) for point in [0..point_count; 1024 a core] {
                 optional samples: u32 = depths if !block.has_samples,
                 read rays: TargetRay,
@@ -52,8 +52,8 @@ macro_rules! for_each_kernel {
                 optional residual: f32 = grid if !block.has_residual,
                 write gathered: f32,
             }
-            /// Features where points lie in a view's volume: its part of `gathered[view][point][feature]`, from the view's
-            /// `volume[row][column][depth][feature]`. An element is a feature of a point.
+            /// Features where points lie in a view's volume: its part of `gathered[view][point][feature]`, from the
+            /// view's `volume[row][column][depth][feature]`. An element is a feature of a point.
             GatherVolume gather_volume(block: VolumeBlock) for feature in [0..block.point_count * block.feature_count], twin {
                 read views: CameraBlock as vectors,
                 read points: RayPoint as vectors,
@@ -82,8 +82,8 @@ macro_rules! for_each_kernel {
                 read volume: u32,
                 write gathered: f32,
             }
-            /// Convolutions of an image, summed in an order of the device's choice. An element is an 8x8 part of a tile of
-            /// `TILE` pixels and channels.
+            /// Convolutions of an image, summed in an order of the device's choice. An element is an 8x8 part of a tile
+            /// of `TILE` pixels and channels.
             Convolve convolve(block: ConvolveBlock) tiles [block.pixel_count(), block.patch_len(), block.out_channels], twin {
                 filled inputs: f32,
                 layer weights: f32,
@@ -99,8 +99,8 @@ macro_rules! for_each_kernel {
                 filled weights: f32,
                 write outputs: f32,
             }
-            /// Transposed convolutions, summed in an order of the device's choice, with `bias[output channel]`. An element
-            /// is an 8x8 part of a tile of `TILE` input pixels and what they become.
+            /// Transposed convolutions, summed in an order of the device's choice, with `bias[output channel]`. An
+            /// element is an 8x8 part of a tile of `TILE` input pixels and what they become.
             ConvolveTransposed convolve_transposed(block: TransposedBlock)
             tiles [block.pixel_count(), block.in_channels, block.column_count()], twin {
                 filled inputs: f32,
@@ -121,8 +121,8 @@ macro_rules! for_each_kernel {
                 filled inputs: f32,
                 write outputs[block.place(channel as usize)]: f32,
             }
-            /// Linear layers (a matrix product with bias, residual and rectification), summed in an order of the device's
-            /// choice. An element is an 8x8 part of a tile of `TILE` rows and columns.
+            /// Linear layers (a matrix product with bias, residual and rectification), summed in an order of the
+            /// device's choice. An element is an 8x8 part of a tile of `TILE` rows and columns.
             Linear linear(block: LinearBlock) tiles [block.row_count, block.inner_count, block.column_count], twin {
                 filled inputs: f32,
                 layer weights: f32,
@@ -135,15 +135,15 @@ macro_rules! for_each_kernel {
                 filled inputs: f32,
                 write means: f32,
             }
-            /// Group-norm statistics of parts of an image, mean and squared deviations: `partials[part][group]`. An element
-            /// is a group of channels in a part.
+            /// Group-norm statistics of parts of an image, mean and squared deviations: `partials[part][group]`. An
+            /// element is a group of channels in a part.
             GroupNormPartials group_norm_partials(block: GroupNormBlock)
             for group in [0..block.part_count() * block.group_count], twin {
                 filled inputs: f32,
                 write partials: [f32; 2],
             }
-            /// Group-norm statistics of an image from those of its parts, mean and factor: `statistics[group]`. An element
-            /// is a group of channels.
+            /// Group-norm statistics of an image from those of its parts, mean and factor: `statistics[group]`. An
+            /// element is a group of channels.
             GroupNormStatistics group_norm_statistics(block: GroupNormBlock)
             for group in [0..block.group_count; 4096 a core] {
                 read partials: [f32; 2],
@@ -158,8 +158,8 @@ macro_rules! for_each_kernel {
                 filled bias: f32,
                 write outputs: f32,
             }
-            /// Products of two computed matrices, which may lie in one buffer, summed in an order of the device's choice.
-            /// An element is an 8x8 part of a tile of `TILE` rows and columns.
+            /// Products of two computed matrices, which may lie in one buffer, summed in an order of the device's
+            /// choice. An element is an 8x8 part of a tile of `TILE` rows and columns.
             MatrixProduct matrix_product(block: MatrixBlock)
             tiles [block.row_count, block.inner_count, block.column_count], twin {
                 filled left: f32,
@@ -178,16 +178,16 @@ macro_rules! for_each_kernel {
                 read latents: f32,
                 write fused: f32,
             }
-            /// Colour and optical depth of points: each point's sample of `samples[ray][sample]` (red, green, blue, optical
-            /// depth), from `raw[point][4]`. An element is a point.
+            /// Colour and optical depth of points: each point's sample of `samples[ray][sample]` (red, green, blue,
+            /// optical depth), from `raw[point][4]`. An element is a point.
             Radiance radiance(; point_count) for point in [0..point_count], serial {
                 read raw: f32,
                 read points: RayPoint as vectors,
                 write samples: [f32; 4],
             }
-            /// Pixels from the samples on their rays: `colours[ray]` (red, green, blue, opacity) and `depths[ray]`, from
-            /// `samples[ray][sample]` (red, green, blue, optical depth) and `sample_depths[ray][sample]`. An element is a
-            /// ray.
+            /// Pixels from the samples on their rays: `colours[ray]` (red, green, blue, opacity) and `depths[ray]`,
+            /// from `samples[ray][sample]` (red, green, blue, optical depth) and `sample_depths[ray][sample]`. An
+            /// element is a ray.
             Composite composite(block: CompositeBlock; ray_count) for ray in [0..ray_count; 64 a core] {
                 read samples: [f32; 4],
                 read sample_depths: f32,
@@ -225,8 +225,8 @@ macro_rules! for_each_kernel {
                 read fine: f32,
                 write merged: f32,
             }
-            /// The sample mask, which samples are computed: `mask[ray][sample]` is 1 or 0, by `seen[seen ray][part]`. An
-            /// element is a sample.
+            /// The sample mask, which samples are computed: `mask[ray][sample]` is 1 or 0, by `seen[seen ray][part]`.
+            /// An element is a sample.
             SampleMask sample_mask(block: SampleMaskBlock; ray_count)
             for sample in [0..ray_count * block.sample_count; 1024 a core] {
                 read seen: [f32; 2],
@@ -241,8 +241,8 @@ macro_rules! for_each_kernel {
                 read mask: u32,
                 write counts: u32,
             }
-            /// Where each run's part of a list begins, `offsets[run]`, with one run more than `counts[run]`, and the length
-            /// of it all, `total[0]`. There is one element.
+            /// Where each run's part of a list begins, `offsets[run]`, with one run more than `counts[run]`, and the
+            /// length of it all, `total[0]`. There is one element.
             SumCounts sum_counts(run_count: u32) for all in [0..1], serial {
                 read counts: u32,
                 write offsets: u32,
@@ -281,16 +281,16 @@ macro_rules! for_each_kernel {
                 read condition: f32,
                 write inputs: f32,
             }
-            /// Where the rays of one view's pixels enter the visual hull: the view's part of `entries[view][row][column]`.
-            /// An element is a pixel of the view.
+            /// Where the rays of one view's pixels enter the visual hull: the view's part of
+            /// `entries[view][row][column]`. An element is a pixel of the view.
             HullEntry hull_entry(view: u32; pixel_count) for pixel in [0..pixel_count; 64 a core] {
                 one object: ObjectBlock,
                 read views: CameraBlock as vectors,
                 paged texels: [f32; 4],
                 write_paged entries[views[*view as usize].first_texel + pixel]: f32,
             }
-            /// How badly other views match, at all planes: `costs[row][column][plane]` of a band. An element is a pixel of
-            /// the band.
+            /// How badly other views match, at all planes: `costs[row][column][plane]` of a band. An element is a pixel
+            /// of the band.
             MatchCost match_cost(block: SweepBlock) for pixel in [0..block.row_count * block.width; 16 a core] {
                 one object: ObjectBlock,
                 read views: CameraBlock as vectors,
@@ -299,8 +299,8 @@ macro_rules! for_each_kernel {
                 read pair_weights: f32,
                 write costs[pixel * block.plane_count]: f32,
             }
-            /// Costs summed over a window's columns: `row_sums[row][column][plane]` = sum, count. An element is a plane of
-            /// a pixel of the band.
+            /// Costs summed over a window's columns: `row_sums[row][column][plane]` = sum, count. An element is a plane
+            /// of a pixel of the band.
             SumRow sum_row(block: SweepBlock)
             for plane in [0..block.row_count * block.width * block.plane_count; 4096 a core] {
                 read costs: f32,
@@ -324,8 +324,8 @@ macro_rules! for_each_kernel {
                 paged guess: f32,
                 write_paged picked[views[block.view as usize].first_texel + block.first_row * block.width + pixel]: f32,
             }
-            /// Rays through the solid, for some rows of a target: `colours[row][column]` (red, green, blue, opacity) and
-            /// `pixel_depths[row][column]`. An element is a pixel of the target.
+            /// Rays through the solid, for some rows of a target: `colours[row][column]` (red, green, blue, opacity)
+            /// and `pixel_depths[row][column]`. An element is a pixel of the target.
             MarchRays march_rays(block: MarchBlock; first_row, row_count)
             for pixel in [first_row * block.target.width..(first_row + row_count) * block.target.width; 16 a core] {
                 one object: ObjectBlock,
@@ -365,48 +365,52 @@ macro_rules! for_each_kernel {
                 read costs: Planes,
                 write sums[6 * group]: Planes,
             }
-            /// Costs averaged over three windows: `means[row][column][group]`. An element is a group of planes of a pixel.
+            /// Costs averaged over three windows: `means[row][column][group]`. An element is a group of planes of a
+            /// pixel.
             WindowCost window_cost(block: WindowBlock)
             for group in [0..block.width * block.height * block.group_count; 1024 a core], twin {
                 read sums: Planes,
                 write means: Planes,
             }
-            /// How opaque planes are by the views' own disparities: `opacities[row][column][group]`. An element is a group of
-            /// planes of a pixel.
+            /// How opaque planes are by the views' own disparities: `opacities[row][column][group]`. An element is a
+            /// group of planes of a pixel.
             PlaneOpacity plane_opacity(block: FrustumBlock)
             for group in [0..block.camera.width * block.camera.height * block.group_count; 128 a core], twin {
                 read views: SweptView as vectors,
                 read disparities: [f32; 2] as vectors,
                 write opacities: Planes as vectors,
             }
-            /// Costs with a preference for the first opaque plane of each ray: `costs[row][column][group]`. An element is a
-            /// pixel.
+            /// Costs with a preference for the first opaque plane of each ray: `costs[row][column][group]`. An element
+            /// is a pixel.
             FrontCost front_cost(block: FrontBlock)
             for pixel in [0..block.width * block.height; 64 a core], wide {
                 read opacities: Planes as vectors,
                 read means: Planes as vectors,
                 write costs[block.group_count * pixel]: Planes as vectors,
             }
-            /// Costs joined along lines in four directions: `paths[direction][line][step][group]`. An element is a line.
+            /// Costs joined along lines in four directions: `paths[direction][line][step][group]`. An element is a
+            /// line.
             FollowPaths follow_paths(block: CostBlock) for line in [0..block.line_count(); 1 a core], wide {
                 read means: Planes as vectors,
                 write paths[block.first_of_line(line)]: Planes as vectors,
             }
-            /// The mean of the four directions' costs: `costs[row][column][group]`. An element is a group of planes of a pixel.
+            /// The mean of the four directions' costs: `costs[row][column][group]`. An element is a group of planes of
+            /// a pixel.
             JoinPaths join_paths(block: CostBlock)
             for group in [0..block.width * block.height * block.group_count; 1024 a core], wide {
                 read paths: Planes,
                 write costs: Planes,
             }
-            /// Disparity and confidence of a view's pixels: the view's part of `disparities[view][row][column]`. An element is
-            /// a pixel.
+            /// Disparity and confidence of a view's pixels: the view's part of `disparities[view][row][column]`. An
+            /// element is a pixel.
             PickDisparity pick_disparity(block: FrustumBlock)
             for pixel in [0..block.camera.width * block.camera.height; 64 a core], wide {
                 read costs: Planes,
                 write disparities[block.camera.first_texel + pixel]: [f32; 2],
             }
-            /// Pixels blended from planes, for some rows of a target: `colours[row][column]` (red, green, blue, opacity),
-            /// `pixel_depths[row][column]` and `confidences[row][column]`. An element is a pixel of the target.
+            /// Pixels blended from planes, for some rows of a target: `colours[row][column]` (red, green, blue,
+            /// opacity), `pixel_depths[row][column]` and `confidences[row][column]`. An element is a pixel of the
+            /// target.
             BlendPlanes blend_planes(block: BlendBlock; first_row, row_count)
             for pixel in [first_row * block.target.width..(first_row + row_count) * block.target.width; 64 a core], twin {
                 read views: SweptView as vectors,
@@ -422,9 +426,10 @@ macro_rules! for_each_kernel {
                 read gaussians: GaussianBlock as vectors,
                 write splats: ProjectedGaussian as vectors,
             }
-            /// Pixels from the splats of their tile, which the list `entries[starts[tile]..starts[tile + 1]]` numbers front to
-            /// back: `colours[row][column]` (red, green, blue over the background, opacity) and `depths[row][column]`,
-            /// weighted sums. An element is a pixel, counted tile by tile; outside of the picture nothing is written.
+            /// Pixels from the splats of their tile, which the list `entries[starts[tile]..starts[tile + 1]]` numbers
+            /// front to back: `colours[row][column]` (red, green, blue over the background, opacity) and
+            /// `depths[row][column]`, weighted sums. An element is a pixel, counted tile by tile; outside of the
+            /// picture nothing is written.
             BlendSplats blend_splats(block: TileBlock) for pixel in [0..block.pixels_of_tiles(); 128 a core], twin {
                 read starts: u32,
                 read entries: u32,
@@ -432,8 +437,8 @@ macro_rules! for_each_kernel {
                 write colours: [f32; 4] as vectors,
                 write depths: f32,
             }
-            /// What the pixels of a tile say of each splat of its list: `sums[entry]`, from the derivatives of a loss by the
-            /// pixels, `gradients[row][column]` (by red, green, blue and opacity). An element is a tile.
+            /// What the pixels of a tile say of each splat of its list: `sums[entry]`, from the derivatives of a loss
+            /// by the pixels, `gradients[row][column]` (by red, green, blue and opacity). An element is a tile.
             BlendGradient blend_gradient(block: TileBlock) for tile in [0..block.tile_count(); 1 a core], together, wide {
                 filled starts: u32,
                 filled entries: u32,
@@ -442,9 +447,9 @@ macro_rules! for_each_kernel {
                 filled gradients: [f32; 4] as vectors,
                 write sums[starts[tile as usize]]: SplatGradient as vectors,
             }
-            /// Derivatives by the Gaussians' parameters, in the places of these: `gradients[gaussian]`, from the entries of the
-            /// tiles' lists that are the Gaussian's, `uses[use_starts[gaussian]..use_starts[gaussian + 1]]`. An element is a
-            /// Gaussian.
+            /// Derivatives by the Gaussians' parameters, in the places of these: `gradients[gaussian]`, from the
+            /// entries of the tiles' lists that are the Gaussian's, `uses[use_starts[gaussian]..use_starts[gaussian +
+            /// 1]]`. An element is a Gaussian.
             ProjectGradients project_gradients(block: SplatBlock) for gaussian in [0..block.gaussian_count; 128 a core] {
                 read gaussians: GaussianBlock as vectors,
                 read splats: ProjectedGaussian as vectors,
@@ -453,8 +458,8 @@ macro_rules! for_each_kernel {
                 read sums: SplatGradient as vectors,
                 write gradients: GaussianBlock as vectors,
             }
-            /// Linear combinations of pictures: `mixed[element]` of `state[element]` and four results, the newest first.
-            /// What has coefficient 0 is not read and may be any buffer. An element is a channel of a pixel.
+            /// Linear combinations of pictures: `mixed[element]` of `state[element]` and four results, the newest
+            /// first. What has coefficient 0 is not read and may be any buffer. An element is a channel of a pixel.
             MixPictures mix_pictures(block: Mix; element_count) for channel in [0..element_count; 4096 a core] {
                 read state: f32,
                 read newest: f32,
@@ -479,7 +484,8 @@ macro_rules! for_each_kernel {
                 read starts: f32,
                 write ends: f32,
             }
-            /// Texels looked up, to measure how fast a device does that: `sums[element]`. An element is several look-ups.
+            /// Texels looked up, to measure how fast a device does that: `sums[element]`. An element is several
+            /// look-ups.
             LookUpTexels look_up_texels(block: LookUpBlock; element_count)
             for element in [0..element_count; 1024 a core], measured, wide {
                 read texels: [f32; 4] as vectors,

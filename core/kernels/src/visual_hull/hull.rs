@@ -31,9 +31,9 @@ pub fn look_up_alpha(view: &CameraBlock, texels: &(impl Fetch<[f32; 4]> + ?Sized
     bilinear_channel_from(texels, view.first_texel as usize, view.width, view.height, x, y, 3)
 }
 
-/// How far the silhouettes allow a point to belong to the object: the least alpha over the views that have it in front of
-/// them, in `[0, 1]`. Beyond a view's image its border's alpha goes on: an image with background at its border says that
-/// the object is not there. 0 if the alpha falls below `least`, or if too few images contain the point.
+/// How far the silhouettes allow a point to belong to the object: the least alpha over the views that have it in front
+/// of them, in `[0, 1]`. Beyond a view's image its border's alpha goes on: an image with background at its border says
+/// that the object is not there. 0 if the alpha falls below `least`, or if too few images contain the point.
 #[inline]
 pub fn hull_alpha(
     object: &ObjectBlock,

@@ -30,8 +30,8 @@ const _: () = assert!(size_of::<MarchBlock>() == 96);
 /// Colour, depth along the principal axis and opacity of the target's ray through the image coordinate `(x, y)`.
 ///
 /// The ray is marched through the object's box in equal steps of at most a footprint; it ends where the transmittance
-/// is at most `block.termination` (early termination), which changes no channel by more than that. The depth of a ray that
-/// is less than half hidden is 0: its mean depth is not meaningful.
+/// is at most `block.termination` (early termination), which changes no channel by more than that. The depth of a ray
+/// that is less than half hidden is 0: its mean depth is not meaningful.
 #[inline]
 #[allow(clippy::too_many_arguments)]
 pub fn march_ray(

@@ -1,7 +1,8 @@
 //! Depth of a source's pixels: planes swept through the hull, colours compared with the other views.
 //!
-//! Costs are laid out `[row][column][plane]`, planes from near to far, for the band of rows being worked on. A cost is a
-//! mean absolute difference of colour in `[0, MAX_DIFFERENCE]`; a negative one says that the place is outside the hull.
+//! Costs are laid out `[row][column][plane]`, planes from near to far, for the band of rows being worked on. A cost is
+//! a mean absolute difference of colour in `[0, MAX_DIFFERENCE]`; a negative one says that the place is outside the
+//! hull.
 
 use super::hull::{SWEPT_ALPHA, look_up};
 use super::{NO_SURFACE, ObjectBlock, fade};
@@ -161,11 +162,11 @@ impl SweptPixel {
     }
 
     /// How badly the other views' colours match the pixel's at the depth of a plane: a mean of absolute differences,
-    /// weighted by `pair_weights[view][other]` (how relevant the other view is to this one; 0 on the diagonal) and by how
-    /// likely the other view sees the place. `entries` are the depths of entry into the hull of all views.
+    /// weighted by `pair_weights[view][other]` (how relevant the other view is to this one; 0 on the diagonal) and by
+    /// how likely the other view sees the place. `entries` are the depths of entry into the hull of all views.
     ///
-    /// [`OUTSIDE`] where the pixel shows background, or the place is outside the hull, in front of its ray's entry or too
-    /// far behind it.
+    /// [`OUTSIDE`] where the pixel shows background, or the place is outside the hull, in front of its ray's entry or
+    /// too far behind it.
     #[inline]
     #[allow(clippy::too_many_arguments)]
     pub fn match_cost(

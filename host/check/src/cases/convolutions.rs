@@ -1,6 +1,6 @@
-//! [`Kernel::Convolve`] and [`Kernel::ConvolveTransposed`]: images of awkward sizes, inputs, residuals and outputs that are
-//! some of the channels of wider images, every parameter of a convolution. Behind the inputs there is NaN, and beside the
-//! outputs no number may change.
+//! [`Kernel::Convolve`] and [`Kernel::ConvolveTransposed`]: images of awkward sizes, inputs, residuals and outputs that
+//! are some of the channels of wider images, every parameter of a convolution. Behind the inputs there is NaN, and
+//! beside the outputs no number may change.
 
 use super::linear::{Counts, LayerArrays, expected};
 use super::*;
@@ -31,8 +31,8 @@ impl Window {
     }
 }
 
-/// The first layer of a residual network and its others, a lone pixel, more border than image; gaps, enlarged images, parts
-/// of wider ones; layers for large images, which on small ones are right as well.
+/// The first layer of a residual network and its others, a lone pixel, more border than image; gaps, enlarged images,
+/// parts of wider ones; layers for large images, which on small ones are right as well.
 const WINDOWS: [Window; 15] = [
     Window::new([7, 2, 3], [3, 64]),
     Window::new([3, 1, 1], [5, 7]),

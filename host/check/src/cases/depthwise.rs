@@ -1,10 +1,11 @@
-//! [`Kernel::ConvolveDepthwise`]: images from one pixel on, windows with gaps and reaching over borders, weights that channels
-//! share, inputs that are some of the channels of wider images.
+//! [`Kernel::ConvolveDepthwise`]: images from one pixel on, windows with gaps and reaching over borders, weights that
+//! channels share, inputs that are some of the channels of wider images.
 
 use super::*;
 use crate::network_oracle;
 
-/// Side of the window, stride, dilation, padding; channels, numbers between the pixels' channels, whether weights are shared.
+/// Side of the window, stride, dilation, padding; channels, numbers between the pixels' channels, whether weights are
+/// shared.
 const WINDOWS: [[u32; 7]; 7] = [
     [3, 1, 1, 1, 65, 0, 0],
     [3, 1, 12, 12, 4, 3, 0],

@@ -1,6 +1,6 @@
 //! [`Kernel::GatherLatents`] and [`Kernel::GatherLatentsF16`]: grids of any size under images of any size, with points
-//! inside, at borders, far outside and behind the camera; grids of odd and even numbers of channels in half precision. A
-//! dispatch for each view gathers its part.
+//! inside, at borders, far outside and behind the camera; grids of odd and even numbers of channels in half precision.
+//! A dispatch for each view gathers its part.
 
 use super::half_precision::{packed, unpacked};
 use super::*;

@@ -1,5 +1,5 @@
-//! [`Kernel::ProjectGaussians`], [`Kernel::BlendSplats`] and their derivatives: Gaussians of all shapes before a camera, and splats in
-//! the lists of a picture's tiles.
+//! [`Kernel::ProjectGaussians`], [`Kernel::BlendSplats`] and their derivatives: Gaussians of all shapes before a
+//! camera, and splats in the lists of a picture's tiles.
 
 use super::*;
 use crate::gaussian_oracle;

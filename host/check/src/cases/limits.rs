@@ -1,5 +1,6 @@
-//! [`Kernel::CopyNumbers`], [`Kernel::MultiplyAdd`] and [`Kernel::LookUpTexels`]: numbers of all sizes; chains that tend to one number
-//! and chains that tend to 0, also without a round; images of one row, of one column and larger ones.
+//! [`Kernel::CopyNumbers`], [`Kernel::MultiplyAdd`] and [`Kernel::LookUpTexels`]: numbers of all sizes; chains that
+//! tend to one number and chains that tend to 0, also without a round; images of one row, of one column and larger
+//! ones.
 
 use super::*;
 use crate::camera_oracle::{bilinear, tents};

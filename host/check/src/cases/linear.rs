@@ -64,8 +64,8 @@ impl LayerArrays {
     }
 }
 
-/// The expected array of a layer: `output(index)` for each output, then the numbers behind them; `None` for numbers that
-/// are not outputs.
+/// The expected array of a layer: `output(index)` for each output, then the numbers behind them; `None` for numbers
+/// that are not outputs.
 pub(super) fn expected(
     outputs: &Output<f32>,
     output: impl Fn(usize) -> Option<Bounded> + Sync,

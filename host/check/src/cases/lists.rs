@@ -1,6 +1,6 @@
 //! [`Kernel::CountMarked`], [`Kernel::SumCounts`], [`Kernel::ListMarked`] and [`Kernel::FindNonFinite`]: masks of all
-//! densities over whole runs and parts of one, and numbers with infinity and NaN in any place. Whole numbers: exact. Inputs
-//! are one longer than their count says: what lies behind must not be taken along.
+//! densities over whole runs and parts of one, and numbers with infinity and NaN in any place. Whole numbers: exact.
+//! Inputs are one longer than their count says: what lies behind must not be taken along.
 
 use super::*;
 

@@ -1,5 +1,5 @@
-//! [`Kernel::PickDepth`]: some rows of a band of every view, with and without depths from an earlier pass. A dispatch for each
-//! view picks its part.
+//! [`Kernel::PickDepth`]: some rows of a band of every view, with and without depths from an earlier pass. A dispatch
+//! for each view picks its part.
 
 use super::*;
 use crate::hull_oracle;

@@ -1,6 +1,6 @@
-//! [`Kernel::GatherVolume`] and [`Kernel::GatherVolumeF16`]: volumes of any size over images of any size, with points inside,
-//! between the last nodes and the zeros around them, far outside and behind the camera; volumes of odd and even numbers of
-//! features in half precision. A dispatch for each view gathers its part.
+//! [`Kernel::GatherVolume`] and [`Kernel::GatherVolumeF16`]: volumes of any size over images of any size, with points
+//! inside, between the last nodes and the zeros around them, far outside and behind the camera; volumes of odd and even
+//! numbers of features in half precision. A dispatch for each view gathers its part.
 
 use super::half_precision::{packed, unpacked};
 use super::*;

@@ -1,4 +1,5 @@
-//! [`Kernel::SumRow`] and [`Kernel::MeanColumn`]: costs of a plausible sweep, a quarter of them outside the visual hull.
+//! [`Kernel::SumRow`] and [`Kernel::MeanColumn`]: costs of a plausible sweep, a quarter of them outside the visual
+//! hull.
 
 use super::*;
 use crate::hull_oracle;

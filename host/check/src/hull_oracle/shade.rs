@@ -73,8 +73,8 @@ pub fn depth_at(camera: &CameraBlock, depths: &[f32], x: Bounded, y: Bounded, ju
 /// Views by index, with the projection of a point and their depth and colour there.
 type Witnesses = Vec<(usize, BoundedProjection, [Bounded; 4])>;
 
-/// The views that contain a point, and the least alpha over all views that have it in front of them; the inner `None` if it
-/// projects to the background of one of them.
+/// The views that contain a point, and the least alpha over all views that have it in front of them; the inner `None`
+/// if it projects to the background of one of them.
 fn containing(scene: &Scene, place: Vector) -> Option<Option<(Witnesses, Bounded)>> {
     let mut undecided = false;
     let (mut views, mut hull) = (Vec::new(), Bounded::ONE);
@@ -154,11 +154,12 @@ pub struct Pixel {
     pub opacity: Bounded,
 }
 
-/// If it depends on rounding whether a ray terminates, it does at this transmittance or less, and its error grows by the
-/// transmittance.
+/// If it depends on rounding whether a ray terminates, it does at this transmittance or less, and its error grows by
+/// the transmittance.
 const DARK: f64 = 1.0e-3;
 
-/// A target's ray: in equal steps of at most a footprint through the box, until the transmittance is at most `termination`.
+/// A target's ray: in equal steps of at most a footprint through the box, until the transmittance is at most
+/// `termination`.
 #[allow(clippy::too_many_arguments)]
 pub fn march_ray(
     scene: &Scene,
@@ -226,8 +227,9 @@ pub fn march_ray(
     Some(Pixel { colour, depth, opacity: Bounded { error: opacity.error + lost, ..opacity } })
 }
 
-/// A channel of layers before a background, by parts: `sum (T_i - T_(i+1)) c_i` is `c_0 + sum T_i (c_i - c_(i-1))`, so that
-/// an error of a transmittance contributes the change of the colour there. `layers` have the transmittance behind each.
+/// A channel of layers before a background, by parts: `sum (T_i - T_(i+1)) c_i` is `c_0 + sum T_i (c_i - c_(i-1))`, so
+/// that an error of a transmittance contributes the change of the colour there. `layers` have the transmittance behind
+/// each.
 fn blended(layers: &[(Bounded, [Bounded; 3])], channel: usize, background: f32) -> Bounded {
     let background = Bounded::from(background);
     let colour = |layer: usize| layers.get(layer).map_or(background, |(_, colour)| colour[channel]);

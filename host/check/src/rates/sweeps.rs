@@ -38,11 +38,11 @@ pub(super) fn works<D: Device>(device: &D) -> Result<Vec<Work<'_>>, DeviceError>
         costs: Output::Zeros(2 * group_count),
     };
     let look_ups = (views.len() * PLANES * group_count) as f64;
-    // Of each plane and each of the twelve pixels of half a census window: of a view a difference, a product, two limits and an
-    // amount; of a pair a difference, its amount, a limit, a greater one, two products and three sums.
+    // Of each plane and each of the twelve pixels of half a census window: of a view a difference, a product, two
+    // limits and an amount; of a pair a difference, its amount, a limit, a greater one, two products and three sums.
     let comparisons = (12 * (5 * views.len() + 9 * pairs.len()) * PLANES * group_count) as f64;
-    // Of a plane and a view: 19 of the projection, 23 of support and free space. Not counted: that three of them are divisions,
-    // and that each look-up of 8 bytes is a scattered load of its own.
+    // Of a plane and a view: 19 of the projection, 23 of support and free space. Not counted: that three of them are
+    // divisions, and that each look-up of 8 bytes is a scattered load of its own.
     let opacity_operations = 42.0 * look_ups;
     let census_bytes = bytes((views.len() + 4 + 2) * band_len);
     let compare_bytes = texel_bytes + bytes((views.len() + 4) * band_len);

@@ -54,8 +54,8 @@ fn visibility(view: &SweptView, disparities: &[[f32; 2]], seen: &PlaneProjection
     mixed(node, &columns, &rows)
 }
 
-/// What the views show at a plane: the mean colour, the sum of their parts, the weight of those that have it in the image,
-/// and how far the silhouettes contain it.
+/// What the views show at a plane: the mean colour, the sum of their parts, the weight of those that have it in the
+/// image, and how far the silhouettes contain it.
 struct PlaneColour {
     colour: [Bounded; 3],
     weight: Bounded,

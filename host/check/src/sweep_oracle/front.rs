@@ -56,7 +56,8 @@ fn of_view(
     Some(Some([confidence * shape(behind), confidence * (Bounded::ONE - shape(free))]))
 }
 
-/// The costs of a pixel's planes with the preference, from `opacities[row][column][group]` and `costs[row][column][group]`.
+/// The costs of a pixel's planes with the preference, from `opacities[row][column][group]` and
+/// `costs[row][column][group]`.
 pub fn front_cost(block: &FrontBlock, opacities: &[Planes], costs: &[Planes], pixel: u32) -> Vec<Bounded> {
     let groups = block.group_count as usize;
     let (column, row) = (pixel % block.width, pixel / block.width);

@@ -20,9 +20,9 @@ fn pixels(block: &CostBlock, direction: u32, number: u32) -> Vec<u32> {
 
 /// The joined costs of a line: `[step][group][plane]`, flat.
 ///
-/// The least of shifted costs changes by no more than they do, and all alike if they do. Errors therefore do not grow with
-/// the costs but only by the roundings of each step: the difference of the largest and the least error, `spread`, by twice
-/// them, and an error is at most that difference and the step's roundings.
+/// The least of shifted costs changes by no more than they do, and all alike if they do. Errors therefore do not grow
+/// with the costs but only by the roundings of each step: the difference of the largest and the least error, `spread`,
+/// by twice them, and an error is at most that difference and the step's roundings.
 pub fn follow_path(block: &CostBlock, means: &[Planes], direction: u32, number: u32) -> Vec<Bounded> {
     let plane_count = block.group_count as usize * PLANES;
     let (step_cost, jump_cost) = (f64::from(STEP_COST), f64::from(JUMP_COST));

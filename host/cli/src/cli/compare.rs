@@ -58,7 +58,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What pictures with transparency are laid over: `None` for nothing, as a render does with photographs of whole scenes.
+/// What pictures with transparency are laid over: `None` for nothing, as a render does with photographs of whole
+/// scenes.
 struct Background {
     colour: Option<[f32; 3]>,
     /// Where it comes from, for a person.

@@ -22,7 +22,8 @@ use viewfuse_weighting::attention::{AttentionModel, c_header};
 pub(crate) struct Arguments {
     /// The checkpoint
     input: PathBuf,
-    /// The output, as safetensors; for learned attention with the Fourier embedding also a C header, or Rust with 8 bits
+    /// The output, as safetensors; for learned attention with the Fourier embedding also a C header, or Rust with 8
+    /// bits
     #[arg(value_name = "OUT.safetensors|OUT.h|OUT.rs")]
     output: PathBuf,
     /// Round floating point numbers to half precision (f16)

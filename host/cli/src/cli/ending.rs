@@ -1,5 +1,5 @@
-//! The end of a process that was told to end: work stops between its pieces; where a piece takes long (a decoder, a pipe that
-//! nobody writes), the process is ended here. Outputs are whole or not there in both cases.
+//! The end of a process that was told to end: work stops between its pieces; where a piece takes long (a decoder, a
+//! pipe that nobody writes), the process is ended here. Outputs are whole or not there in both cases.
 
 use std::process::exit;
 use std::thread::sleep;

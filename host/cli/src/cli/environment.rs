@@ -6,8 +6,8 @@ use std::time::Duration;
 use viewfuse_device::choice::DeviceOptions;
 use viewfuse_vulkan::{GpuOptions, InstanceOptions};
 
-/// `VIEWFUSE_VULKAN_LOADER` is the path of another Vulkan loader; `VIEWFUSE_VALIDATION=1` turns on the validation layers,
-/// each of whose messages is an error.
+/// `VIEWFUSE_VULKAN_LOADER` is the path of another Vulkan loader; `VIEWFUSE_VALIDATION=1` turns on the validation
+/// layers, each of whose messages is an error.
 pub(crate) fn instance_options() -> InstanceOptions {
     InstanceOptions {
         loader: env::var_os("VIEWFUSE_VULKAN_LOADER").map(PathBuf::from),
@@ -29,8 +29,8 @@ pub(crate) fn device_options(gpu: GpuOptions) -> DeviceOptions {
     DeviceOptions { instance: instance_options(), gpu, memory: cache_folder() }
 }
 
-/// The program that finds poses: `VIEWFUSE_OPENMVG`, or the one that lies beside this command; where neither is, one of this
-/// name that the system finds.
+/// The program that finds poses: `VIEWFUSE_OPENMVG`, or the one that lies beside this command; where neither is, one of
+/// this name that the system finds.
 pub(crate) fn openmvg() -> PathBuf {
     let name = format!("viewfuse-openmvg{}", env::consts::EXE_SUFFIX);
     let beside = || env::current_exe().ok().map(|own| own.with_file_name(&name)).filter(|path| path.is_file());
@@ -47,8 +47,8 @@ pub(crate) fn python() -> PathBuf {
     env::var_os("VIEWFUSE_PYTHON").map_or_else(|| "python3".into(), PathBuf::from)
 }
 
-/// Where devices remember what they compiled and measured: `VIEWFUSE_CACHE`, or the folder for such files that the system
-/// has for the user. Nowhere if the variable is empty.
+/// Where devices remember what they compiled and measured: `VIEWFUSE_CACHE`, or the folder for such files that the
+/// system has for the user. Nowhere if the variable is empty.
 fn cache_folder() -> Option<PathBuf> {
     if let Some(folder) = env::var_os("VIEWFUSE_CACHE") {
         return (!folder.is_empty()).then(|| folder.into());

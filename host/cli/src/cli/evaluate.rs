@@ -56,7 +56,8 @@ pub(crate) struct Arguments {
     /// Take the scenes of a data set: those for train, val or test
     #[arg(long, value_name = "SPLIT")]
     split: Option<Split>,
-    /// Views to render and compare, as for --sources [default: all views, each left out in turn; with --sources all others]
+    /// Views to render and compare, as for --sources [default: all views, each left out in turn; with --sources all
+    /// others]
     #[arg(long, value_name = "VIEWS")]
     targets: Option<String>,
     #[command(flatten)]

@@ -1,4 +1,5 @@
-//! The help: `-h` has what a person needs first, `--help` everything; and what a network's option says without a network.
+//! The help: `-h` has what a person needs first, `--help` everything; and what a network's option says without a
+//! network.
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Command, Error};

@@ -32,11 +32,12 @@ pub(crate) struct Arguments {
     /// Background of the object: auto, black, white, or RED,GREEN,BLUE (0 to 255)
     #[arg(long, value_name = "COLOUR", default_value = "auto")]
     background: BackgroundChoice,
-    /// List the views: index, name, size, and the nearest views with the angle to each, seen from what the cameras look at
+    /// List the views: index, name, size, and the nearest views with the angle to each, seen from what the cameras look
+    /// at
     #[arg(long, conflicts_with = "output")]
     views: bool,
-    /// Leave photographs out, one at a time, render them coarsely from the others, and say which PSNR to expect: as long as
-    /// `render` takes before its first picture, seconds for a dozen photographs
+    /// Leave photographs out, one at a time, render them coarsely from the others, and say which PSNR to expect: as
+    /// long as `render` takes before its first picture, seconds for a dozen photographs
     #[arg(long, conflicts_with = "views")]
     quality: bool,
     /// Print JSON instead of text

@@ -20,14 +20,15 @@ const METRICS: &str = "Options of metrics";
 /// Metrics besides PSNR and SSIM.
 #[derive(Args)]
 pub(crate) struct MetricOptions {
-    /// Score with LPIPS: its network (alex, vgg or squeeze) and torchvision's state_dict of it; may be given once for each
-    /// network. The published heads are built in
+    /// Score with LPIPS: its network (alex, vgg or squeeze) and torchvision's state_dict of it; may be given once for
+    /// each network. The published heads are built in
     #[arg(long, value_name = "NETWORK=FILE[,heads=FILE]", value_parser = parse_lpips, help_heading = METRICS)]
     lpips: Vec<(LpipsTrunk, NetworkFile)>,
     /// Score with DISTS: torchvision's state_dict of VGG16. The published weights are built in
     #[arg(long, value_name = "FILE[,heads=FILE]", value_parser = parse_file, help_heading = METRICS)]
     dists: Option<NetworkFile>,
-    /// Score sets of pictures with FID and KID: the Inception of pytorch-fid (pt_inception-2015-12-05), or torchvision's
+    /// Score sets of pictures with FID and KID: the Inception of pytorch-fid (pt_inception-2015-12-05), or
+    /// torchvision's
     #[arg(long, value_name = "FILE", help_heading = METRICS)]
     fid: Option<PathBuf>,
     /// Convention of the scores: plain, pixelnerf or viewattention, as in published evaluations

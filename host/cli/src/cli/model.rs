@@ -36,8 +36,8 @@ pub(crate) struct NetworkOptions {
 pub(crate) struct ModelOptions {
     #[command(flatten)]
     network: NetworkOptions,
-    /// The exact effort: leave nothing out, compute every view, layer and sample, and with GeNVS every call of the published run, heun
-    /// over 25 levels, unless --sampler, --steps or --tolerance are given
+    /// The exact effort: leave nothing out, compute every view, layer and sample, and with GeNVS every call of the
+    /// published run, heun over 25 levels, unless --sampler, --steps or --tolerance are given
     #[arg(long, conflicts_with_all = ["compute", "leave_out", "early_termination"], help_heading = EFFORTS)]
     pub(crate) exact: bool,
     /// Switch omissions of the default effort off: compute what the scene does not need

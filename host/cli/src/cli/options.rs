@@ -22,8 +22,8 @@ pub(crate) const EFFORTS: &str = "Efforts: what is left out, for which time and 
 /// Options of pictures.
 #[derive(Args)]
 pub(crate) struct PictureOptions {
-    /// Size of the pictures; without --model the sources are resampled to the same scale [default: the views' size, at most
-    /// 512, of a GeNVS at most the size that it was trained for]
+    /// Size of the pictures; without --model the sources are resampled to the same scale [default: the views' size, at
+    /// most 512, of a GeNVS at most the size that it was trained for]
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<[u32; 2]>,
     /// Background of the object: auto, black, white, or RED,GREEN,BLUE (0 to 255)
@@ -32,8 +32,8 @@ pub(crate) struct PictureOptions {
     /// Leave out the least relevant sources while their weights together stay at or below this
     #[arg(long, value_name = "TOTAL", default_value_t = DEFAULT_LEAVE_OUT, value_parser = parse_share, help_heading = EFFORTS)]
     leave_out: f32,
-    /// Early termination: leave out samples behind the point where a ray's transmittance falls below this; not with a GeNVS
-    /// [default: 1/256]
+    /// Early termination: leave out samples behind the point where a ray's transmittance falls below this; not with a
+    /// GeNVS [default: 1/256]
     #[arg(long, alias = "settled", value_name = "SHARE", value_parser = parse_share, help_heading = EFFORTS)]
     early_termination: Option<f32>,
     /// Work on this many threads [default: all cores]
@@ -64,11 +64,12 @@ const CHOSEN_BY_A_BOUND: [&str; 2] = ["exact", "compute"];
 /// A bound on the error or the time of each picture.
 #[derive(Args)]
 pub(crate) struct BoundOptions {
-    /// Choose the effort: leave out what the pictures do not need for this root mean square difference from the exact ones, in decibels (40dB)
-    /// or with colours from 0 to 1 (0.01)
+    /// Choose the effort: leave out what the pictures do not need for this root mean square difference from the exact
+    /// ones, in decibels (40dB) or with colours from 0 to 1 (0.01)
     #[arg(long, value_name = "ERROR", value_parser = parse_error, conflicts_with_all = CHOSEN_BY_A_BOUND, help_heading = EFFORTS)]
     max_error: Option<f32>,
-    /// Choose the effort: leave out what does not fit into this time for each picture: seconds, or milliseconds as 250ms
+    /// Choose the effort: leave out what does not fit into this time for each picture: seconds, or milliseconds as
+    /// 250ms
     #[arg(long, value_name = "TIME", value_parser = parse_seconds, conflicts_with_all = CHOSEN_BY_A_BOUND, conflicts_with = "max_error", help_heading = EFFORTS)]
     max_time: Option<Duration>,
 }
@@ -100,8 +101,8 @@ impl DeviceOptions {
 /// The choice of source views.
 #[derive(Args)]
 pub(crate) struct SourceOptions {
-    /// Source views: names or their numbers, '#3' for the view of index 3 (`inspect --views` lists them), ranges A..B with both
-    /// ends included, `all`, each with /STEP, separated by commas [default: all but the targets]
+    /// Source views: names or their numbers, '#3' for the view of index 3 (`inspect --views` lists them), ranges A..B
+    /// with both ends included, `all`, each with /STEP, separated by commas [default: all but the targets]
     #[arg(long, value_name = "VIEWS")]
     sources: Option<String>,
     /// Use at most this many sources, as far apart as possible

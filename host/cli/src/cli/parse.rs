@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-/// Memory for each pixel of a picture while it is rendered: colours, depths and confidences as 32-bit numbers, the picture and
-/// what is written of it. Measured with a network, 45 bytes.
+/// Memory for each pixel of a picture while it is rendered: colours, depths and confidences as 32-bit numbers, the
+/// picture and what is written of it. Measured with a network, 45 bytes.
 const PIXEL_BYTES: u64 = 48;
 
 /// Most memory for a picture.

@@ -97,8 +97,8 @@ pub(crate) fn find_with_defaults(photographs: &Path, output: &Path) -> anyhow::R
     Ok(format!("{}: written, {registered} of {all} photographs with poses", output.display()))
 }
 
-/// Finds poses and writes the scene; the verdict is an accepted one. Finished attempts of a run that is stopped are kept beside the
-/// output for the next one.
+/// Finds poses and writes the scene; the verdict is an accepted one. Finished attempts of a run that is stopped are
+/// kept beside the output for the next one.
 fn found(
     photographs: &Path,
     from: &[Box<dyn Solver>],

@@ -1,4 +1,5 @@
-//! What the command prints: results on standard output, errors on standard error. Nothing from a file controls the terminal.
+//! What the command prints: results on standard output, errors on standard error. Nothing from a file controls the
+//! terminal.
 
 use super::shown::{shown, shown_in_line};
 use std::fmt::Display;
@@ -15,7 +16,8 @@ pub fn say(text: impl Display) -> io::Result<()> {
     }
 }
 
-/// Prints an error in one line on standard error, which may be full or closed: what went wrong is in the exit code, too.
+/// Prints an error in one line on standard error, which may be full or closed: what went wrong is in the exit code,
+/// too.
 pub(crate) fn complain(message: impl Display) {
     let _ = writeln!(io::stderr().lock(), "viewfuse: {}", shown_in_line(message));
 }

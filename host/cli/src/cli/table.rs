@@ -1,4 +1,5 @@
-//! Tables on the terminal. Few lines for what they need: the crates for tables take as long to compile as a whole command.
+//! Tables on the terminal. Few lines for what they need: the crates for tables take as long to compile as a whole
+//! command.
 
 use std::fmt;
 use unicode_width::UnicodeWidthStr;

@@ -26,8 +26,8 @@ use viewfuse_job::progress::Progress;
 /// Set by Ctrl-C and by SIGTERM.
 static CANCELLED: AtomicBool = AtomicBool::new(false);
 
-/// Makes Ctrl-C (and SIGTERM) set the flag instead of ending the process. Work that does not stop soon, and a second signal,
-/// end it at once.
+/// Makes Ctrl-C (and SIGTERM) set the flag instead of ending the process. Work that does not stop soon, and a second
+/// signal, end it at once.
 ///
 /// # Errors
 /// If another handler is already installed.
@@ -51,7 +51,8 @@ pub(crate) fn silence_caught_panics() {
     }));
 }
 
-/// On standard error: a bar on a terminal, elsewhere a line every few seconds, and warnings. Messages on standard output.
+/// On standard error: a bar on a terminal, elsewhere a line every few seconds, and warnings. Messages on standard
+/// output.
 pub struct Terminal {
     display: Arc<ProgressDisplay>,
     /// Shows the time that is left also while nothing else changes. `None` where there is nothing to show it on.

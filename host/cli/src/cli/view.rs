@@ -69,7 +69,8 @@ pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> 
     let (weighting, chooses) = match &arguments.weights {
         Some(WeightingChoice::Given(spec)) => (spec.open()?, false),
         Some(WeightingChoice::Auto) => (Weighting::default_scheme(), true),
-        // As `render`: a network's pictures take too long to try out schemes unasked, and Gaussians show the same under all.
+        // As `render`: a network's pictures take too long to try out schemes unasked, and Gaussians show the same under
+        // all.
         None => (Weighting::default_scheme(), arguments.model.label().is_none() && arguments.gaussians.is_none()),
     };
     let (folder, scene) = arguments.pose.open(&arguments.scene)?;

@@ -1,5 +1,6 @@
-//! A target's pixels blended from the planes of a sweep, the planes that have a share some at a time. The sums are those of the
-//! body, in their order, so the results are the same bits; a view's track is made once for a pixel, not for every plane.
+//! A target's pixels blended from the planes of a sweep, the planes that have a share some at a time. The sums are
+//! those of the body, in their order, so the results are the same bits; a view's track is made once for a pixel, not
+//! for every plane.
 
 use super::tracks::{Corners, Points, image, map};
 use crate::parallel::{Rest, for_each_piece};

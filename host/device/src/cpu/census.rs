@@ -1,6 +1,7 @@
-//! The census of a plane sweep, in 16-bit integers: a group of planes is a vector. The body's numbers are whole, and their sums exact
-//! in any order, so the results are the same bits. Here each pair sums up the window by itself, and its weight multiplies the sum.
-//! Most pixels are seen by all views, in all planes of a group: then no pair needs to ask who sees what.
+//! The census of a plane sweep, in 16-bit integers: a group of planes is a vector. The body's numbers are whole, and
+//! their sums exact in any order, so the results are the same bits. Here each pair sums up the window by itself, and
+//! its weight multiplies the sum. Most pixels are seen by all views, in all planes of a group: then no pair needs to
+//! ask who sees what.
 
 use super::tracks::whole;
 use crate::parallel::for_each_row;
@@ -117,7 +118,8 @@ impl Greys {
     }
 }
 
-/// A grey in steps, as the body's. Where the view does not see the point it is some negative number, which no sum takes.
+/// A grey in steps, as the body's. Where the view does not see the point it is some negative number, which no sum
+/// takes.
 #[inline(always)]
 fn grey_steps(grey: f32) -> i16 {
     whole(max(min(grey * GREY_STEPS, MAX_GREY), -1.0)) as i16

@@ -43,8 +43,9 @@ pub(super) fn group_norm(
     });
 }
 
-/// Some pixels, as [`viewfuse_kernels::network::group_norm::group_norm_element`] defines them. A struct and not a closure, as
-/// all that must run with the machine's widest instructions: a closure becomes a function of its own, without them.
+/// Some pixels, as [`viewfuse_kernels::network::group_norm::group_norm_element`] defines them. A struct and not a
+/// closure, as all that must run with the machine's widest instructions: a closure becomes a function of its own,
+/// without them.
 struct Normalised<'a> {
     block: &'a GroupNormBlock,
     inputs: &'a [f32],
@@ -80,8 +81,8 @@ impl WithSimd for Normalised<'_> {
     }
 }
 
-/// [`viewfuse_kernels::network::group_norm::group_norm_partials`] of all groups of a part: channel by channel first, the
-/// channels of a group then summed.
+/// [`viewfuse_kernels::network::group_norm::group_norm_partials`] of all groups of a part: channel by channel first,
+/// the channels of a group then summed.
 struct GroupNormPartials<'a> {
     block: &'a GroupNormBlock,
     inputs: &'a [f32],

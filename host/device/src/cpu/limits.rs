@@ -7,7 +7,8 @@ use viewfuse_kernels::limits::{CHAINS, ChainBlock, ROUND_STEPS};
 
 /// Fours of a part, 1 MiB.
 const PART: usize = 1 << 16;
-/// Elements of a part: a multiple of all vectors' lanes, and tens of microseconds, beside which handing it out takes no time.
+/// Elements of a part: a multiple of all vectors' lanes, and tens of microseconds, beside which handing it out takes no
+/// time.
 const ELEMENTS: usize = 1024;
 
 pub(super) fn copy_numbers(element_count: u32, numbers: &[[f32; 4]], copies: &mut [[f32; 4]]) {

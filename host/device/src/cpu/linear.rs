@@ -1,11 +1,11 @@
 //! A matrix product on one core: a tile of the outputs stays in registers while a panel of the weights is read.
 //!
-//! With 32 vector registers a tile is 12 rows of two vectors (24 sums, two vectors of weights, one input in every lane),
-//! with 16 it is 6 rows: per step of the inner index the arithmetic takes longer than the loads. Rows are copied into a
-//! small array first, so that their offsets are constants and they stay in the first-level cache. Weights are packed
-//! once ([`Panels`]): a panel is read from front to back. Bias, residual and rectification are part of
-//! writing a tile. Sums run along the inner index, [`DEPTH`] products at a time; a multiplication is fused with its
-//! addition where the core can.
+//! With 32 vector registers a tile is 12 rows of two vectors (24 sums, two vectors of weights, one input in every
+//! lane), with 16 it is 6 rows: per step of the inner index the arithmetic takes longer than the loads. Rows are copied
+//! into a small array first, so that their offsets are constants and they stay in the first-level cache. Weights are
+//! packed once ([`Panels`]): a panel is read from front to back. Bias, residual and rectification are part of writing a
+//! tile. Sums run along the inner index, [`DEPTH`] products at a time; a multiplication is fused with its addition
+//! where the core can.
 //!
 //! The crate `pulp` chooses the widest vector instructions of the machine; no code here is specific to one of them.
 

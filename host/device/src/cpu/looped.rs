@@ -1,4 +1,5 @@
-//! Loops over bodies that are written by hand: what elements write is not in their order, or a row's elements share work.
+//! Loops over bodies that are written by hand: what elements write is not in their order, or a row's elements share
+//! work.
 
 use crate::parallel::for_each_row;
 use pulp::Arch;

@@ -190,8 +190,8 @@ fn chunk_rows(row_count: usize) -> usize {
     share.clamp(ROW_STEP, MAX_ROWS)
 }
 
-/// The patch of output pixel `pixel`, as [`viewfuse_kernels::network::convolve::patch_value`] defines it: whole pixels at
-/// a time.
+/// The patch of output pixel `pixel`, as [`viewfuse_kernels::network::convolve::patch_value`] defines it: whole pixels
+/// at a time.
 fn read_patch(block: &ConvolveBlock, inputs: &[f32], pixel: u32, patch: &mut [f32]) {
     let (out_row, out_column) = (pixel / block.out_width, pixel % block.out_width);
     for (place, values) in (0..).zip(patch.chunks_exact_mut(block.in_channels as usize)) {

@@ -122,7 +122,8 @@ fn mixed_f16(place: &GridPlace, a: u32, b: u32, c: u32, d: u32) -> f32 {
     upper + (lower - upper) * place.share_y
 }
 
-/// As [`f16_value`], without branches: the CPU keeps subnormal numbers, so that a product with 2^112 moves the exponent.
+/// As [`f16_value`], without branches: the CPU keeps subnormal numbers, so that a product with 2^112 moves the
+/// exponent.
 ///
 /// [`f16_value`]: viewfuse_core::half_precision::f16_value
 #[inline(always)]

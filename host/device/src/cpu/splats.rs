@@ -1,5 +1,5 @@
-//! Pixels from the splats of their tile, a tile's part of a row at a time: eight lanes, each of which has the body's operations in their
-//! order, so the results are the same bits.
+//! Pixels from the splats of their tile, a tile's part of a row at a time: eight lanes, each of which has the body's
+//! operations in their order, so the results are the same bits.
 
 use crate::parallel::{Rest, for_each_piece};
 use pulp::Arch;

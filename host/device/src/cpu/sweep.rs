@@ -1,6 +1,7 @@
-//! The plane sweep's views compared on a group of planes at a time. The sums are those of the bodies, in their order, so the results
-//! are the same bits; what the bodies do for one plane after the other is done here for all planes of a group: projections,
-//! places and shares of a look-up first, in vectors, then the loads, then what follows from the texels.
+//! The plane sweep's views compared on a group of planes at a time. The sums are those of the bodies, in their order,
+//! so the results are the same bits; what the bodies do for one plane after the other is done here for all planes of a
+//! group: projections, places and shares of a look-up first, in vectors, then the loads, then what follows from the
+//! texels.
 #![expect(
     clippy::needless_range_loop,
     reason = "loops over the planes of a group index several arrays, and become vectors"

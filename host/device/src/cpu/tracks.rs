@@ -1,5 +1,5 @@
-//! Points of a ray in a view, some planes at a time: in vectors what is computed for each plane, then the loads. The numbers are
-//! those of `Track::at` and `viewfuse_core::lookup`, the same bits.
+//! Points of a ray in a view, some planes at a time: in vectors what is computed for each plane, then the loads. The
+//! numbers are those of `Track::at` and `viewfuse_core::lookup`, the same bits.
 #![expect(clippy::needless_range_loop, reason = "loops over planes index several arrays, and become vectors")]
 
 use viewfuse_core::math::clamp;
@@ -29,7 +29,8 @@ impl<const N: usize> Points<N> {
         points
     }
 
-    /// Whether the view's map says anything about the points: tracks leave an image for good, often before they reach it.
+    /// Whether the view's map says anything about the points: tracks leave an image for good, often before they reach
+    /// it.
     #[inline(always)]
     pub(super) fn are_any_in_image(&self) -> bool {
         self.in_image.iter().fold(false, |any, in_image| any | (*in_image > 0.0))
@@ -106,8 +107,9 @@ pub(super) fn map<'a>(view: &SweptView, disparities: &'a [[f32; 2]]) -> &'a [[f3
     &disparities[view.first_disparity as usize..][..(view.map_width * view.map_height) as usize]
 }
 
-/// The whole part of a number from 0 to 2^22, such as a coordinate in an image; for -1 a negative number. A cast, which saturates and
-/// knows NaN, would leave the vectors and convert one number after the other: that took a third of the time of opacities.
+/// The whole part of a number from 0 to 2^22, such as a coordinate in an image; for -1 a negative number. A cast, which
+/// saturates and knows NaN, would leave the vectors and convert one number after the other: that took a third of the
+/// time of opacities.
 #[inline(always)]
 pub(super) fn whole(at: f32) -> i32 {
     // From here on floats are 1 apart: a sum is rounded to a whole number, and its bits count up from these.

@@ -1,6 +1,7 @@
-//! The plane sweep's windows, with sums of rows that neighbouring windows share. A window's rows are summed in two parts, each of which
-//! is an end of a run of rows (`rows_of_window`): here the second part grows by a row as the window goes down, and the first parts
-//! of a whole run are summed once. The order is the body's, so the results are the same bits.
+//! The plane sweep's windows, with sums of rows that neighbouring windows share. A window's rows are summed in two
+//! parts, each of which is an end of a run of rows (`rows_of_window`): here the second part grows by a row as the
+//! window goes down, and the first parts of a whole run are summed once. The order is the body's, so the results are
+//! the same bits.
 
 use crate::parallel::for_each;
 use pulp::{Arch, Simd, WithSimd};
@@ -9,8 +10,8 @@ use viewfuse_kernels::plane_sweep::window::{
 };
 use viewfuse_kernels::plane_sweep::{PLANES, Planes};
 
-/// Groups of planes whose columns are summed at once: two cache lines of each row for each group, and all rows of a run of 25 in the
-/// second-level cache.
+/// Groups of planes whose columns are summed at once: two cache lines of each row for each group, and all rows of a run
+/// of 25 in the second-level cache.
 const STRIP: usize = 32;
 
 pub(super) fn window_cost(block: &WindowBlock, sums: &[Planes], means: &mut [Planes]) {
@@ -125,8 +126,8 @@ fn set_sums(sums: &mut Sums, first: &Sums, second: &Sums) {
     }
 }
 
-/// Adds the mean over a window of which both parts' sums are given. In vectors that are written out: of a loop over groups the
-/// compiler would make vectors across them.
+/// Adds the mean over a window of which both parts' sums are given. In vectors that are written out: of a loop over
+/// groups the compiler would make vectors across them.
 #[inline(always)]
 fn add_mean<S: Simd>(simd: S, mean: &mut Planes, share: f32, prior: f32, before: &Sums, after: &Sums) {
     let (share, prior_cost, prior) =

@@ -1,5 +1,5 @@
-//! Convolution with windows of 3x3 by Winograd's algorithm: tiles of 4x4 outputs from 6x6 inputs with 36 products a channel
-//! instead of 144.
+//! Convolution with windows of 3x3 by Winograd's algorithm: tiles of 4x4 outputs from 6x6 inputs with 36 products a
+//! channel instead of 144.
 //!
 //! Source: Lavin and Gray, "Fast algorithms for convolutional neural networks" (2016), F(4x4, 3x3). With the matrices
 //! `B`, `G`, `A` below, inputs `d` and weights `g`: `A^T ((G g G^T) * (B^T d B)) A`, where `*` is the element-wise
@@ -186,8 +186,8 @@ impl<T: Iterator<Item = [usize; 2]>> WithSimd for InputTransform<'_, T> {
     }
 }
 
-/// `B^T` times six numbers. No closures here and in what calls it: they would be functions of their own, without the wide
-/// instructions of the one around them.
+/// `B^T` times six numbers. No closures here and in what calls it: they would be functions of their own, without the
+/// wide instructions of the one around them.
 #[inline(always)]
 fn input_transform_along<S: Simd>(simd: S, d: [S::f32s; REACH]) -> [S::f32s; REACH] {
     let [d0, d1, d2, d3, d4, d5] = d;

@@ -1,9 +1,9 @@
 //! The homography between two cameras that a plane induces, and sampling of a photograph.
 //!
-//! A target pixel `(x, y)` has the direction `u = ((x - cx) / fx, (y - cy) / fy, 1)` in the target camera's coordinates.
-//! The plane at depth `z` along the target's axis holds the point `z u`. With the rotation `R` and translation `t` from
-//! target to source coordinates the source sees it along `R u + t / z`: linear in `u`, so one 3x3 matrix
-//! (Hartley and Zisserman, Multiple View Geometry, section 13.1).
+//! A target pixel `(x, y)` has the direction `u = ((x - cx) / fx, (y - cy) / fy, 1)` in the target camera's
+//! coordinates. The plane at depth `z` along the target's axis holds the point `z u`. With the rotation `R` and
+//! translation `t` from target to source coordinates the source sees it along `R u + t / z`: linear in `u`, so one 3x3
+//! matrix (Hartley and Zisserman, Multiple View Geometry, section 13.1).
 
 use glam::{DMat3, DVec3};
 use image::RgbImage;
@@ -61,8 +61,8 @@ fn frame(pose: &Pose) -> (DMat3, DVec3) {
     (DMat3::from_cols(axes[0], axes[1], axes[2]), pose.centre_world().as_dvec3())
 }
 
-/// Levels at a continuous image coordinate (pixel centres at halves), between the four pixels around it; outside, those of
-/// the nearest pixels.
+/// Levels at a continuous image coordinate (pixel centres at halves), between the four pixels around it; outside, those
+/// of the nearest pixels.
 fn bilinear(picture: &RgbImage, x: f64, y: f64) -> [f64; 3] {
     let (x, right, left) = between(x, picture.width());
     let (y, below, above) = between(y, picture.height());

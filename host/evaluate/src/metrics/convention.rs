@@ -7,8 +7,9 @@
 //! | `viewattention` | of prediction and photograph, each stretched to its own least and largest level | AlexNet, of the stretched prediction and the photograph as it is | likewise |
 //!
 //! SSIM is everywhere that of scikit-image with a uniform window of 7x7. Read off `eval/calc_metrics.py` of
-//! sxyu/pixel-nerf, and `eval.py`, `eval_fid_lpips_dists.py` and `utils.py` of alexberian/ViewAttention, whose GeNVS is the
-//! only one with published code for scores; the GeNVS paper's own is not published, so there is no convention of that name.
+//! sxyu/pixel-nerf, and `eval.py`, `eval_fid_lpips_dists.py` and `utils.py` of alexberian/ViewAttention, whose GeNVS is
+//! the only one with published code for scores; the GeNVS paper's own is not published, so there is no convention of
+//! that name.
 //!
 //! Two things are not copied: both codes truncate levels where `plain` rounds (a prediction of 0.9 steps is 0 there),
 //! which cannot be recovered from an 8-bit picture; and stretching uses integers here, where `f32` is sometimes one

@@ -6,9 +6,9 @@
 //!
 //! With `S1 = A' A` and `S2 = B' B`, `A` and `B` the centred points divided by the root of the count less one, the last
 //! trace is the sum of the singular values of `A B'`: the eigenvalues of the symmetric `S1^(1/2) S2 S1^(1/2)` are their
-//! squares. They are real and not negative by construction, no covariance and no root of one is ever formed, and sets with
-//! fewer points than dimensions are only smaller matrices: the imaginary parts of the published code, and its offset
-//! for singular products, do not arise. All arithmetic is `f64`.
+//! squares. They are real and not negative by construction, no covariance and no root of one is ever formed, and sets
+//! with fewer points than dimensions are only smaller matrices: the imaginary parts of the published code, and its
+//! offset for singular products, do not arise. All arithmetic is `f64`.
 //!
 //! A warning: few points underestimate spreads. FID of fewer pictures than its 2048 dimensions says little; report
 //! [`super::kernel`] next to it.
@@ -43,8 +43,8 @@ fn mean(points: &Features) -> Vec<f64> {
     sum.into_iter().map(|sum| sum / count).collect()
 }
 
-/// A matrix whose product with itself is the covariance: the points less their mean, divided by the root of the count less
-/// one.
+/// A matrix whose product with itself is the covariance: the points less their mean, divided by the root of the count
+/// less one.
 fn spread(points: &Features, mean: &[f64]) -> Mat<f64> {
     let scale = 1.0 / ((points.count() - 1) as f64).sqrt();
     Mat::from_fn(points.count(), points.dimension(), |row, column| (points.row(row)[column] - mean[column]) * scale)

@@ -1,8 +1,8 @@
 //! Heads: the few numbers on top of a trunk that were fitted to human judgement.
 //!
 //! The published ones are part of this project: LPIPS version 0.1 (`lin*.model.1.weight` for AlexNet, VGG16 and
-//! SqueezeNet; BSD 2-clause, `heads/LICENSE-LPIPS.txt`) and DISTS (`alpha`, `beta`; MIT, `heads/LICENSE-DISTS.txt`). Others
-//! are read from files with the same names.
+//! SqueezeNet; BSD 2-clause, `heads/LICENSE-LPIPS.txt`) and DISTS (`alpha`, `beta`; MIT, `heads/LICENSE-DISTS.txt`).
+//! Others are read from files with the same names.
 
 use super::lpips::LpipsTrunk;
 use safetensors::SafeTensors;

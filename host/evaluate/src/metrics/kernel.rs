@@ -1,7 +1,7 @@
 //! The kernel distance of two sets of points, KID where the points are Inception's.
 //!
-//! The square of the maximum mean discrepancy with the kernel `k(x, y) = (x.y / d + 1)^3`, `d` the dimension, without bias:
-//! the mean of `k` within each set (no point with itself), minus twice its mean between the sets (Binkowski,
+//! The square of the maximum mean discrepancy with the kernel `k(x, y) = (x.y / d + 1)^3`, `d` the dimension, without
+//! bias: the mean of `k` within each set (no point with itself), minus twice its mean between the sets (Binkowski,
 //! Sutherland, Arbel, Gretton: "Demystifying MMD GANs", ICLR 2018). Unlike that of the Frechet distance, its
 //! expectation does not depend on the number of points, so it is valid for few pictures; near 0 it may be negative.
 //!

@@ -1,9 +1,10 @@
 //! LPIPS: the distance of two pictures in a network's features.
 //!
 //! At each tap of the trunk, every pixel's channels are scaled to length 1; the squares of the differences, weighted by
-//! the head, are added up over channels and averaged over pixels; the taps are added up. Version 0.1 of the published code
-//! (Zhang, Isola, Efros, Shechtman, Wang: "The unreasonable effectiveness of deep features as a perceptual metric", CVPR
-//! 2018; richzhang/PerceptualSimilarity), not its spatial variant. The trunk computes in `f32`, the rest is `f64`.
+//! the head, are added up over channels and averaged over pixels; the taps are added up. Version 0.1 of the published
+//! code (Zhang, Isola, Efros, Shechtman, Wang: "The unreasonable effectiveness of deep features as a perceptual
+//! metric", CVPR 2018; richzhang/PerceptualSimilarity), not its spatial variant. The trunk computes in `f32`, the rest
+//! is `f64`.
 
 use super::trunk::{Convolution, Pooling, Step, Trunk, alexnet, squeezenet, vgg16};
 use super::{MetricError, same_size, seen};

@@ -12,8 +12,8 @@ const DEVIATION: f64 = 1.5;
 
 /// Mean structural similarity with a Gaussian window of deviation 1.5, population covariance and the constants 0.01 and
 /// 0.03 of a range of 255, over every window that lies inside of the image, averaged over the channels: scikit-image's
-/// `structural_similarity` with `gaussian_weights` and without `use_sample_covariance`, in `f64`. `None` if the pictures
-/// have different sizes or are smaller than the window.
+/// `structural_similarity` with `gaussian_weights` and without `use_sample_covariance`, in `f64`. `None` if the
+/// pictures have different sizes or are smaller than the window.
 pub fn ssim_gaussian(prediction: &RgbImage, truth: &RgbImage) -> Option<f64> {
     let (width, height) = (truth.width() as usize, truth.height() as usize);
     if prediction.dimensions() != truth.dimensions() || width.min(height) < GAUSSIAN_WINDOW {

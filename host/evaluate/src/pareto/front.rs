@@ -4,8 +4,8 @@ use super::Point;
 
 /// Largest invisible loss against the photographs, decibels.
 pub const MAX_LOSS: f64 = 0.1;
-/// Peak signal to noise ratio against the exact picture from which two pictures look the same, decibels: a difference of
-/// 1 % of the range.
+/// Peak signal to noise ratio against the exact picture from which two pictures look the same, decibels: a difference
+/// of 1 % of the range.
 pub const SAME_LOOK: f64 = 40.0;
 
 /// Marks the points, given as time and error, that no other point dominates: none is at most as slow and at most as far

@@ -38,8 +38,8 @@ const RING: i32 = 8;
 type Failure = Box<dyn Error>;
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// Draws the points of all devices. Points whose time or difference is NaN are left out. Settings that are chosen by a bound
-/// ([`BOUNDED`]) are a line of their own.
+/// Draws the points of all devices. Points whose time or difference is NaN are left out. Settings that are chosen by a
+/// bound ([`BOUNDED`]) are a line of their own.
 ///
 /// # Errors
 /// [`PlotError`]; none is known to happen.

@@ -89,7 +89,8 @@ pub struct PointRecord {
     pub gain: f64,
     /// How the pictures differ from the exact ones, not rounded.
     pub versus_exact: DifferenceRecord,
-    /// Peak signal to noise ratio against the photographs, decibels, of 8-bit values, mean over the targets that have one.
+    /// Peak signal to noise ratio against the photographs, decibels, of 8-bit values, mean over the targets that have
+    /// one.
     pub truth_psnr: Option<f64>,
     /// Its loss compared with the exact pictures.
     pub truth_loss: Option<f64>,
@@ -103,7 +104,8 @@ pub struct PointRecord {
     pub repeatable: bool,
 }
 
-/// Longest time and largest ratio of a record, up to the sign: larger ones are not of this program, and no axis holds them.
+/// Longest time and largest ratio of a record, up to the sign: larger ones are not of this program, and no axis holds
+/// them.
 const MAX_NUMBER: f64 = 1.0e9;
 
 impl PointRecord {

@@ -11,8 +11,9 @@ const GRAMMAR: &str = "random[:sources=N], close[:sources=N,degrees=D], count[:s
      fixed[:cars|chairs|pixelnerf-1|pixelnerf-2], fixed:SOURCES:TARGETS, nearest:K[:TARGETS], llff:K (3, 6, 9), \
      dtu:K[,masks=given] (3, 6, 9), blender:8";
 
-/// Lists of views by name, sources and targets. `cars` and `chairs` are those of the paper's published evaluation scripts
-/// for SRN's test scenes; `pixelnerf-1` and `pixelnerf-2` are those of pixelNeRF's (one and two sources, all other views).
+/// Lists of views by name, sources and targets. `cars` and `chairs` are those of the paper's published evaluation
+/// scripts for SRN's test scenes; `pixelnerf-1` and `pixelnerf-2` are those of pixelNeRF's (one and two sources, all
+/// other views).
 const PUBLISHED: [(&str, &str, &str); 4] = [
     ("cars", "56,58,67,75,91,113,241,244", "40,44,54,149,159,173,181,245"),
     ("chairs", "5,8,14", "3,10,18"),

@@ -1,9 +1,9 @@
 //! Published figures for a benchmark, to be shown next to a table of the same protocol.
 //!
-//! They are means over all scenes of the benchmark, as the papers report them, with *fixed* sources far apart. Figures of
-//! networks that choose the nearest sources for every target are another task and are not here. Some could not be
-//! reproduced by others (LLFF with 3 sources: reported 21.35, ten reruns 20.34 ± 0.19; DTU with 3: reported 19.21, rerun
-//! 17.86): they rank a field, but differences of tenths of a decibel are not significant.
+//! They are means over all scenes of the benchmark, as the papers report them, with *fixed* sources far apart. Figures
+//! of networks that choose the nearest sources for every target are another task and are not here. Some could not be
+//! reproduced by others (LLFF with 3 sources: reported 21.35, ten reruns 20.34 ± 0.19; DTU with 3: reported 19.21,
+//! rerun 17.86): they rank a field, but differences of tenths of a decibel are not significant.
 
 use super::Protocol;
 use super::benchmark::Benchmark;
@@ -27,8 +27,8 @@ const DIFFUSION: &str = "a diffusion prior";
 const STEREO: &str = "points from dense stereo";
 
 /// LLFF at 504x378, full metric, 8 scenes. mip-NeRF (Barron 2021) and RegNeRF (Niemeyer 2022) from RegNeRF; FreeNeRF
-/// (Yang 2023); DNGaussian (Li 2024); 3DGS (Kerbl 2023) from stereo as in later comparisons; FrugalNeRF (Lin 2024); FSGS
-/// (Zhu 2024); CoR-GS (Zhang 2024); DropGaussian (Park 2025); Binocular3DGS (Han 2024); ICO-GS; ReconFusion (Wu
+/// (Yang 2023); DNGaussian (Li 2024); 3DGS (Kerbl 2023) from stereo as in later comparisons; FrugalNeRF (Lin 2024);
+/// FSGS (Zhu 2024); CoR-GS (Zhang 2024); DropGaussian (Park 2025); Binocular3DGS (Han 2024); ICO-GS; ReconFusion (Wu
 /// 2024); CAT3D (Gao 2024); See3D (Ma 2025).
 const LLFF: [Method; 14] = [
     ("mip-NeRF", "", &[(3, 16.11)]),
@@ -47,8 +47,8 @@ const LLFF: [Method; 14] = [
     ("See3D", DIFFUSION, &[(3, 23.23)]),
 ];
 
-/// DTU at 400x300, masked metric, 15 scenes, no masks for the methods. As above; NexusGS (Zheng 2025), MuRF (Xu 2024) and
-/// SparseSurf.
+/// DTU at 400x300, masked metric, 15 scenes, no masks for the methods. As above; NexusGS (Zheng 2025), MuRF (Xu 2024)
+/// and SparseSurf.
 const DTU: [Method; 11] = [
     ("3DGS", "", &[(3, 17.65)]),
     ("RegNeRF", "", &[(3, 18.89), (6, 22.20), (9, 24.93)]),

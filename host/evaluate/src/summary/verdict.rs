@@ -65,8 +65,8 @@ pub(super) fn comparisons(rows: &[Row], difference: impl Fn(&str, &str) -> Optio
 const MAX_LINE: usize = 100;
 
 impl Table {
-    /// Where schemes are below a baseline, or not shown to be above one, a line of at most 100 characters for each such scheme;
-    /// one line if there is none. Nothing without schemes or baselines.
+    /// Where schemes are below a baseline, or not shown to be above one, a line of at most 100 characters for each such
+    /// scheme; one line if there is none. Nothing without schemes or baselines.
     pub fn verdicts(&self) -> Vec<String> {
         let Some(metric) = self.metrics.get(self.headline) else { return Vec::new() };
         let lines: Vec<String> = self.schemes_in_doubt().map(|row| self.line(&row.scheme)).collect();

@@ -1,9 +1,9 @@
 //! Estimates a picture's error from few exact pixels.
 //!
-//! Most errors are where colours change: half of the pixels are drawn with probabilities that follow the contrast around them, the
-//! others evenly where the picture shows something, and evenly everywhere. Each
-//! squared difference counts by the inverse of its probability, which makes the estimate unbiased whatever the
-//! probabilities are (importance sampling).
+//! Most errors are where colours change: half of the pixels are drawn with probabilities that follow the contrast
+//! around them, the others evenly where the picture shows something, and evenly everywhere. Each squared difference
+//! counts by the inverse of its probability, which makes the estimate unbiased whatever the probabilities are
+//! (importance sampling).
 
 use super::Estimate;
 use crate::Rendered;
@@ -11,12 +11,13 @@ use viewfuse_core::random::uniform;
 
 /// Share of the draws that goes to all pixels alike: what is missing altogether leaves no contrast.
 const EVEN_SHARE: f64 = 0.2;
-/// Share of the draws that goes to all pixels alike that show something: errors of flat surfaces leave no contrast either.
+/// Share of the draws that goes to all pixels alike that show something: errors of flat surfaces leave no contrast
+/// either.
 const SEEN_SHARE: f64 = 0.3;
 /// A pixel shows something if its opacity is at least this.
 const MIN_OPACITY: f32 = 1.0 / 256.0;
-/// Standard errors from the estimate to its upper end: a one-sided 95 % of Student's distribution with 23 degrees of freedom is
-/// 1.7; squared differences are skewed.
+/// Standard errors from the estimate to its upper end: a one-sided 95 % of Student's distribution with 23 degrees of
+/// freedom is 1.7; squared differences are skewed.
 const STANDARD_ERRORS: f64 = 2.0;
 
 /// A drawn pixel, and the inverse of its probability over the number of pixels.
@@ -26,9 +27,9 @@ pub(super) struct Draw {
     pub(super) weight: f64,
 }
 
-/// `count` pixels of a picture, with repetition: along the rows, one at random from each of `count` parts of equal probability
-/// (stratified sampling). Neighbours are seldom drawn together. Equal steps from a single random begin would do that too, but where
-/// a step is about a row all draws are in one column.
+/// `count` pixels of a picture, with repetition: along the rows, one at random from each of `count` parts of equal
+/// probability (stratified sampling). Neighbours are seldom drawn together. Equal steps from a single random begin
+/// would do that too, but where a step is about a row all draws are in one column.
 pub(super) fn draw(picture: &Rendered, count: usize, seed: u64) -> Vec<Draw> {
     let contrasts = contrasts(picture);
     let contrast: f64 = contrasts.iter().sum();
@@ -93,8 +94,8 @@ impl Sample {
         self.terms.extend(draws.iter().zip(exact).map(term));
     }
 
-    /// Adds what is expected before the first draw, as if it had been drawn this many times: without it, a few draws that
-    /// meet none of the large differences would promise too much.
+    /// Adds what is expected before the first draw, as if it had been drawn this many times: without it, a few draws
+    /// that meet none of the large differences would promise too much.
     pub(super) fn expect(&mut self, error: f64, times: usize) {
         self.terms.extend(vec![error * error; times]);
     }

@@ -14,9 +14,9 @@ pub(super) struct Pair {
     pub(super) cheaper: Estimate,
 }
 
-/// The errors of `better` and of `cheaper`, from their difference; that of `cheaper` is larger by the factor `ratio` above 1. What
-/// `better` resolves and `cheaper` does not is taken to be uncorrelated with what neither resolves: the squares of the
-/// errors then differ by the square of the difference.
+/// The errors of `better` and of `cheaper`, from their difference; that of `cheaper` is larger by the factor `ratio`
+/// above 1. What `better` resolves and `cheaper` does not is taken to be uncorrelated with what neither resolves: the
+/// squares of the errors then differ by the square of the difference.
 pub(super) fn estimate(better: &Rendered, cheaper: &Rendered, ratio: f64) -> Pair {
     let count = better.colours.len().max(1) as f64;
     let squares: f64 = better.colours.iter().zip(&cheaper.colours).map(|(a, b)| square(a, b)).sum();

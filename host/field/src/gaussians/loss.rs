@@ -1,8 +1,8 @@
 //! How far a picture is from a photograph, `(1 - s) mean |x - y| + s (1 - SSIM)`, and the derivative by the picture.
 //!
-//! SSIM (Wang et al. 2004) with Gaussian windows of standard deviation 1.5 and radius [`RADIUS`], which end at the picture's edge: what
-//! lies outside counts as 0, in both pictures. Its derivative goes through the windows' means of `x`, `x x` and `x y`, and these
-//! windows are symmetric, so it is again three blurs.
+//! SSIM (Wang et al. 2004) with Gaussian windows of standard deviation 1.5 and radius [`RADIUS`], which end at the
+//! picture's edge: what lies outside counts as 0, in both pictures. Its derivative goes through the windows' means of
+//! `x`, `x x` and `x y`, and these windows are symmetric, so it is again three blurs.
 
 /// Radius of a window in pixels.
 const RADIUS: usize = 4;

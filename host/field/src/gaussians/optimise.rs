@@ -53,9 +53,9 @@ pub trait Optimisation {
     fn optimised(&self) -> Optimised;
 }
 
-/// An optimisation at its beginning: on the device, or, where that is a software driver, by the CPU's own loops, which take a part of its
-/// time. Mesa's llvmpipe, besides, ends the loops of an invocation after 65,535 iterations, so that the derivatives of tiles with
-/// some 250 splats or more are wrong there. `None` if there are too few points.
+/// An optimisation at its beginning: on the device, or, where that is a software driver, by the CPU's own loops, which
+/// take a part of its time. Mesa's llvmpipe, besides, ends the loops of an invocation after 65,535 iterations, so that
+/// the derivatives of tiles with some 250 splats or more are wrong there. `None` if there are too few points.
 ///
 /// # Errors
 /// [`FieldError`].

@@ -61,7 +61,8 @@ impl<'d, D: Device> Splatter<'d, D> {
         Ok(Splatted { block, tiles, lists, starts, entries, splats, colours, depths })
     }
 
-    /// The same as a field gives it: depths where the opacity is at least `least_opacity`, 0 elsewhere; confidences are the opacities.
+    /// The same as a field gives it: depths where the opacity is at least `least_opacity`, 0 elsewhere; confidences are
+    /// the opacities.
     ///
     /// # Errors
     /// [`DeviceError`].

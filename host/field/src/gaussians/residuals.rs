@@ -6,9 +6,9 @@
 //! v_s           = exp(-((depth_s(q_s) - z_s) / (TOLERANCE z_s))^2)
 //! ```
 //!
-//! `q_s` is where source `s` sees the surface point of the target's pixel `p`, `z_s` its depth there, `w_s` the weight of the source for
-//! the target. Gaussians of a few hundred iterations are softer than the photographs; what they lack there is what they lack
-//! beside it. Where no source sees the point nothing is added.
+//! `q_s` is where source `s` sees the surface point of the target's pixel `p`, `z_s` its depth there, `w_s` the weight
+//! of the source for the target. Gaussians of a few hundred iterations are softer than the photographs; what they lack
+//! there is what they lack beside it. Where no source sees the point nothing is added.
 
 use super::picture::Splatter;
 use crate::{FieldError, Rendered};
@@ -20,11 +20,14 @@ use viewfuse_device::parallel::for_each_row;
 use viewfuse_kernels::rows::GaussianBlock;
 use viewfuse_scene::photographs::{SourceImage, SourceImages};
 
-/// Share of the residuals that is added: of whole photographs, and of objects with silhouettes, where the Gaussians are few and large.
+/// Share of the residuals that is added: of whole photographs, and of objects with silhouettes, where the Gaussians are
+/// few and large.
 const SHARES: [f32; 2] = [1.0, 0.5];
-/// Relative difference of the depths of a point and of the surface that a source sees, at which the source counts by `1 / e`.
+/// Relative difference of the depths of a point and of the surface that a source sees, at which the source counts by `1
+/// / e`.
 const TOLERANCE: f32 = 0.03;
-/// Share of all weights from which on sources that see a point count nearly in full: residuals that few sources tell are less sure.
+/// Share of all weights from which on sources that see a point count nearly in full: residuals that few sources tell
+/// are less sure.
 const LEAST: f32 = 0.2;
 /// Fewest values of a picture that are work for a thread.
 const MIN_PIXELS: usize = 256;
@@ -51,8 +54,8 @@ impl Residuals {
         Residuals { views: vec![None; count] }
     }
 
-    /// Makes that of a source, if it is not there yet: `gain` is how much brighter the source is than the Gaussians, and depths count
-    /// from an opacity of `least_opacity` on.
+    /// Makes that of a source, if it is not there yet: `gain` is how much brighter the source is than the Gaussians,
+    /// and depths count from an opacity of `least_opacity` on.
     ///
     /// # Errors
     /// [`FieldError`].

@@ -1,4 +1,5 @@
-//! The Gaussians to begin with: the sources' surfaces, a cube of points each, and faint ones at random for what no surface was found of.
+//! The Gaussians to begin with: the sources' surfaces, a cube of points each, and faint ones at random for what no
+//! surface was found of.
 
 use super::recipe::Recipe;
 use crate::point_cloud::CloudPoint;
@@ -115,7 +116,8 @@ fn ball(position: Vec3, scale: f32, opacity: f32, colour: Vec3) -> GaussianBlock
     }
 }
 
-/// A faint Gaussian on a ray of a source, at a disparity between those of the points; `None` if fewer than two sources see its place.
+/// A faint Gaussian on a ray of a source, at a disparity between those of the points; `None` if fewer than two sources
+/// see its place.
 fn at_random(draw: u32, images: &SourceImages, extent: &Extent, recipe: &Recipe) -> Option<GaussianBlock> {
     let random = |sample: u32| uniform(recipe.seed, draw, sample);
     let cameras: Vec<CameraBlock> = images.images.iter().map(|image| image.camera.block(0)).collect();

@@ -1,13 +1,13 @@
 //! The family of networks: which tensors a checkpoint must have, by its sizes.
 //!
-//! Names and shapes are those of the official `state_dict` (ViewAttention, `genvs/cars/genvs/models/{genvs,genvs_encoder,
-//! pixel_nerf_net}.py` and `training/networks.py`). It has unused tensors: all batch norms of the
-//! encoder are switched off, and a segmentation head remains from the network that the encoder is based on. They are part
-//! of the architecture; their values are not read.
+//! Names and shapes are those of the official `state_dict` (ViewAttention,
+//! `genvs/cars/genvs/models/{genvs,genvs_encoder, pixel_nerf_net}.py` and `training/networks.py`). It has unused
+//! tensors: all batch norms of the encoder are switched off, and a segmentation head remains from the network that the
+//! encoder is based on. They are part of the architecture; their values are not read.
 //!
 //! Sizes are read from the tensors' names and shapes. Other sizes are the same in all members ([`ASPP_RATES`],
-//! [`group_count`]), except the side of the images: it is part of the denoiser's names, and a checkpoint without denoiser
-//! has it in its metadata.
+//! [`group_count`]), except the side of the images: it is part of the denoiser's names, and a checkpoint without
+//! denoiser has it in its metadata.
 
 mod denoiser;
 mod encoder;
@@ -57,8 +57,8 @@ impl Architecture {
         }
     }
 
-    /// A small member for machines without a GPU: images of half the side, a quarter of the encoder's widths, a denoiser
-    /// of three levels. It has every kind of layer of the published network.
+    /// A small member for machines without a GPU: images of half the side, a quarter of the encoder's widths, a
+    /// denoiser of three levels. It has every kind of layer of the published network.
     pub fn small() -> Architecture {
         let encoder = Encoder::small();
         Architecture {
@@ -82,7 +82,8 @@ impl Architecture {
         }
     }
 
-    /// Reads the sizes from a checkpoint's tensors, and checks that it has every tensor of the architecture and no other.
+    /// Reads the sizes from a checkpoint's tensors, and checks that it has every tensor of the architecture and no
+    /// other.
     ///
     /// # Errors
     /// [`CheckpointError`] if it is not of this family.

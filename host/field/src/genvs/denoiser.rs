@@ -1,9 +1,9 @@
 //! The denoiser's network: a U-Net of residual blocks with group norm and self-attention, conditioned on the noise
 //! level. Its encoder receives the halved input again at every level.
 //!
-//! Source: `networks.py` (`SongUNet` with `residual` encoder and `positional` embedding), from Karras et al. 2022 and Song
-//! et al. 2021. The image of a skip connection is written directly behind the channels that the decoder concatenates
-//! it with: nothing is copied.
+//! Source: `networks.py` (`SongUNet` with `residual` encoder and `positional` embedding), from Karras et al. 2022 and
+//! Song et al. 2021. The image of a skip connection is written directly behind the channels that the decoder
+//! concatenates it with: nothing is copied.
 
 use viewfuse_device::DeviceError;
 mod block;

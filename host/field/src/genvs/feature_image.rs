@@ -106,8 +106,9 @@ pub(super) fn render<D: Device>(
     Ok(image)
 }
 
-/// Rays through a grid whose corners are the picture's corners (published: `linspace(-1, 1)` over half the pixels), with
-/// this many samples between two depths along the target's principal axis. Rows and columns of the target are even.
+/// Rays through a grid whose corners are the picture's corners (published: `linspace(-1, 1)` over half the pixels),
+/// with this many samples between two depths along the target's principal axis. Rows and columns of the target are
+/// even.
 pub fn cast_block(target: &CameraBlock, [near, far]: [f32; 2], sample_count: u32) -> CastBlock {
     let [width, height] = [target.width / 2, target.height / 2];
     let scale = |nodes: u32, pixels: u32| nodes.saturating_sub(1).max(1) as f32 / pixels as f32;

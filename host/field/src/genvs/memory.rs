@@ -4,8 +4,8 @@ use super::architecture::Architecture;
 use super::options::GenvsOptions;
 use viewfuse_device::Device;
 
-/// Bytes that a run takes beside photographs and pictures: packed parameters, each view's volume and its last layer's input
-/// (or half of the volume), and the images of the largest level of one network at a time.
+/// Bytes that a run takes beside photographs and pictures: packed parameters, each view's volume and its last layer's
+/// input (or half of the volume), and the images of the largest level of one network at a time.
 pub(super) fn estimate<D: Device>(
     _device: &D,
     architecture: &Architecture,

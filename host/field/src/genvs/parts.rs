@@ -158,8 +158,8 @@ impl<D: Device> Parts<D> {
         Ok(Condition { features, colours })
     }
 
-    /// The denoiser's estimate of the picture behind a noisy one of a level; see [`Estimate`]. Without a denoiser, nothing
-    /// is written.
+    /// The denoiser's estimate of the picture behind a noisy one of a level; see [`Estimate`]. Without a denoiser,
+    /// nothing is written.
     pub(super) fn denoise(
         &self,
         device: &D,

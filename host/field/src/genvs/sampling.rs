@@ -1,7 +1,7 @@
 //! Diffusion sampling: the driver of the samplers in [`viewfuse_core::sampler`], for any device and any denoiser.
 //!
-//! A denoiser is a function from a noisy picture and its level to an estimate of the picture; its calls take nearly all the
-//! time. The state is in `f32` (`tests/numerics/sampler.rs` measures the error against `f64`).
+//! A denoiser is a function from a noisy picture and its level to an estimate of the picture; its calls take nearly all
+//! the time. The state is in `f32` (`tests/numerics/sampler.rs` measures the error against `f64`).
 //!
 //! ```text
 //! plan    sampler, noise levels, noise, seed             Plan, Steps
@@ -49,18 +49,19 @@ pub struct Sampled<D: Device> {
     pub picture: D::Buffer<f32>,
     /// The levels at which the denoiser was called, in the order of the calls.
     pub levels: Vec<f32>,
-    /// The planned calls that were left out, because of an earlier picture or because the picture did not change any more.
-    /// With adaptive levels no number is planned, and this is 0.
+    /// The planned calls that were left out, because of an earlier picture or because the picture did not change any
+    /// more. With adaptive levels no number is planned, and this is 0.
     pub left_out: u32,
     /// How little the steps over levels may have erred.
     pub accuracy: Accuracy,
 }
 
-/// What a run over levels tells of its error without further calls. Root mean squares over the values, 0 where there are none.
+/// What a run over levels tells of its error without further calls. Root mean squares over the values, 0 where there
+/// are none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Accuracy {
-    /// The steps' differences from steps by one result less (embedded solutions of two orders): the root of their squares' sum. 0
-    /// without [`Plan::compares_orders`].
+    /// The steps' differences from steps by one result less (embedded solutions of two orders): the root of their
+    /// squares' sum. 0 without [`Plan::compares_orders`].
     pub steps: f32,
     /// What the last call changed in the picture.
     pub last_change: f32,

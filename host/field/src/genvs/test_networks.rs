@@ -1,4 +1,5 @@
-//! Test networks: checkpoints with deterministic initialisation, for comparison with other implementations and for timing.
+//! Test networks: checkpoints with deterministic initialisation, for comparison with other implementations and for
+//! timing.
 
 use super::architecture::Architecture;
 use viewfuse_nn::checkpoint::Checkpoint;
@@ -8,8 +9,8 @@ use viewfuse_nn::initialisation;
 const GAINS: [(&str, f32); 2] =
     [("pixel_nerf_net.encoder.volume_head.reshape_conv.weight", 8.0), ("pixel_nerf_net.mlp.layers.2.weight", 4.0)];
 
-/// Every tensor by [`initialisation`], computed when it is read. With [`Architecture::published`] it is the network of the
-/// reference values.
+/// Every tensor by [`initialisation`], computed when it is read. With [`Architecture::published`] it is the network of
+/// the reference values.
 pub fn deterministic(architecture: &Architecture) -> Checkpoint {
     Checkpoint::computed("genvs", architecture.tensors(), architecture.metadata(), |tensor| {
         let mut values = initialisation::tensor(&tensor.name, &tensor.shape);

@@ -1,5 +1,5 @@
-//! A view's volume of features. Its rows are computed when a target's rays first reach them, or all at once and then kept
-//! in half precision (f16).
+//! A view's volume of features. Its rows are computed when a target's rays first reach them, or all at once and then
+//! kept in half precision (f16).
 
 use super::encoder::Encoder;
 use super::ray_sampling::RaySampling;
@@ -167,7 +167,8 @@ impl<D: Device> Volume<D> {
                 seen = seen.start.min(at.y)..seen.end.max(at.y);
             }
         }
-        // Nodes lie at halves of the image's rows: a look-up reads one before and one behind, and one more is for rounding.
+        // Nodes lie at halves of the image's rows: a look-up reads one before and one behind, and one more is for
+        // rounding.
         let scale = self.row_count() as f32 / view.height as f32;
         let (first, last) = (seen.start * scale - 2.0, seen.end * scale + 3.0);
         // Saturating: outside there are no rows.

@@ -1,8 +1,8 @@
 //! The family of networks: which tensors a checkpoint must have, by its sizes.
 //!
 //! Names and shapes are those of the official `state_dict` (pixelNeRF, `src/model/{models,encoder,resnetfc}.py`; the
-//! trunk is torchvision's ResNet of basic blocks). Sizes are read from the tensors: trunk width and depth, the number of
-//! trunk levels for latents, the width and depth of the two point networks, the number of `lin_z` layers.
+//! trunk is torchvision's ResNet of basic blocks). Sizes are read from the tensors: trunk width and depth, the number
+//! of trunk levels for latents, the width and depth of the two point networks, the number of `lin_z` layers.
 
 pub use viewfuse_nn::resnet::Level;
 
@@ -34,8 +34,8 @@ pub struct Architecture {
     pub has_fine: bool,
     /// Where in a pixel its centre is; see [`viewfuse_core::rays::CastBlock::pixel_centre`]. 0 as published.
     pub pixel_centre: f32,
-    /// Longest side of source photographs, pixels: the size at which the network was trained. Larger ones are resized, since
-    /// the trunk's features are of that size.
+    /// Longest side of source photographs, pixels: the size at which the network was trained. Larger ones are resized,
+    /// since the trunk's features are of that size.
     pub source_side: u32,
 }
 
@@ -93,7 +93,8 @@ impl Architecture {
         }
     }
 
-    /// The same with `count` levels of the trunk: each new one has twice the channels of the one before it, and one block.
+    /// The same with `count` levels of the trunk: each new one has twice the channels of the one before it, and one
+    /// block.
     pub fn with_levels(mut self, count: usize) -> Architecture {
         self.levels.truncate(count);
         while self.levels.len() < count {
@@ -118,7 +119,8 @@ impl Architecture {
         if self.has_fine { &[Pass::Coarse, Pass::Fine] } else { &[Pass::Coarse] }
     }
 
-    /// Reads the sizes from a checkpoint's tensors, and checks that it has every tensor of the architecture and no other.
+    /// Reads the sizes from a checkpoint's tensors, and checks that it has every tensor of the architecture and no
+    /// other.
     ///
     /// # Errors
     /// [`CheckpointError`] if it is not of this family.
@@ -199,8 +201,8 @@ impl Architecture {
         tensors
     }
 
-    /// Optional tensors of official checkpoints: unused trunk levels, counters, and buffers that are computed from other
-    /// values.
+    /// Optional tensors of official checkpoints: unused trunk levels, counters, and buffers that are computed from
+    /// other values.
     fn is_optional(&self, name: &str) -> bool {
         let unused_level = name
             .strip_prefix("encoder.model.layer")

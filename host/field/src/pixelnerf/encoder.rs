@@ -22,8 +22,9 @@ pub(super) struct ViewLatents<D: Device> {
     pub(super) grid_size: [u32; 2],
 }
 
-/// Encodes an image (red, green, blue in `[-1, 1]`). With `latent_layers` left out at points, the grids are the outputs of each
-/// network's `lin_z`; otherwise the only grid holds the latents. Each grid is packed before the next one is computed.
+/// Encodes an image (red, green, blue in `[-1, 1]`). With `latent_layers` left out at points, the grids are the outputs
+/// of each network's `lin_z`; otherwise the only grid holds the latents. Each grid is packed before the next one is
+/// computed.
 pub(super) fn encode<D: Device>(
     device: &D,
     architecture: &Architecture,

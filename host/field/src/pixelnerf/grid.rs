@@ -1,4 +1,5 @@
-//! A view's grid of latents, or of a layer's outputs for them, that points look up: in `f32`, or in half precision (f16).
+//! A view's grid of latents, or of a layer's outputs for them, that points look up: in `f32`, or in half precision
+//! (f16).
 
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::half_precision::word_count;

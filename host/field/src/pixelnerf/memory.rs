@@ -8,9 +8,9 @@ use super::pass::{ray_bytes, rays_at_once};
 use viewfuse_device::Device;
 
 /// Bytes that a run takes beside the photographs and the pictures: parameters (on the host, on the device, and packed
-/// there), the encoding of every view (`source_sizes[view]` is width and height), activations, the rays of a tile. Probes
-/// take 8 bytes more a first-pass sample of one ray in every square, which is half a byte a pixel and sample for squares
-/// of 4.
+/// there), the encoding of every view (`source_sizes[view]` is width and height), activations, the rays of a tile.
+/// Probes take 8 bytes more a first-pass sample of one ray in every square, which is half a byte a pixel and sample for
+/// squares of 4.
 pub(super) fn estimate<D: Device>(
     device: &D,
     architecture: &Architecture,
@@ -26,8 +26,8 @@ pub(super) fn estimate<D: Device>(
     let nodes = |[width, height]: &[u32; 2]| width.div_ceil(2) as usize * height.div_ceil(2) as usize;
     let grids = |nodes: usize| grid_bytes((nodes * known) as u32, half) as usize;
     let views: usize = source_sizes.iter().map(|size| grids(nodes(size)) + nodes(size) * 12 * float).sum();
-    // The trunk's own images, of one view at a time: the first one's size, the latents beside them, and a grid in full while
-    // it is packed.
+    // The trunk's own images, of one view at a time: the first one's size, the latents beside them, and a grid in full
+    // while it is packed.
     let largest = source_sizes.iter().map(nodes).max().unwrap_or(0);
     let whole = if half && maps { architecture.width } else { 0 };
     let trunk = largest * (latents + 4 * architecture.stem_channels + whole) * float;

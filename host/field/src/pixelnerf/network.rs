@@ -16,8 +16,8 @@ use viewfuse_kernels::finite::{ALL_FINITE, FINITE_RUN};
 use viewfuse_kernels::pixelnerf::{EmbedBlock, GatherBlock};
 use viewfuse_nn::linear::{Linear, LinearOptions};
 
-/// Floats of a buffer of activations on the CPU: 4 MiB, which fit into the caches of a few cores. A quarter and four times
-/// as many took the same time.
+/// Floats of a buffer of activations on the CPU: 4 MiB, which fit into the caches of a few cores. A quarter and four
+/// times as many took the same time.
 const MIN_ACTIVATIONS: usize = 1 << 20;
 /// Outputs of a matrix product that an invocation computes.
 const OUTPUTS_AN_INVOCATION: usize = 64;
@@ -196,7 +196,8 @@ impl<D: Device> Network<'_, D> {
         Ok(())
     }
 
-    /// Adds a block's `lin_z` output for the latents: interpolated in the grids that hold it, or computed at the points.
+    /// Adds a block's `lin_z` output for the latents: interpolated in the grids that hold it, or computed at the
+    /// points.
     fn add_latents(
         &self,
         workspace: &mut Workspace<D>,

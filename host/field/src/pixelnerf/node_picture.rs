@@ -1,8 +1,9 @@
 //! A picture from rays whose samples are interpolated between nodes: which nodes of which rays are evaluated.
 //!
-//! Grids of rays follow one another, the widest first. On a ray of the first grid all nodes are candidates, on the others those
-//! that its neighbours on the grid before did not find empty (in small pictures these and the next ones: see [`SMALL`]); the others
-//! are the mean of the neighbours' nodes, so that thin mist is not lost. Candidates are evaluated some at a time, from the front, until the ray is opaque.
+//! Grids of rays follow one another, the widest first. On a ray of the first grid all nodes are candidates, on the
+//! others those that its neighbours on the grid before did not find empty (in small pictures these and the next ones:
+//! see [`SMALL`]); the others are the mean of the neighbours' nodes, so that thin mist is not lost. Candidates are
+//! evaluated some at a time, from the front, until the ray is opaque.
 
 use super::network::Workspace;
 use super::node_ray::NodeRay;
@@ -20,11 +21,12 @@ pub(super) const MAX_NODES: u32 = 128;
 /// The widest first grid, in pixels, and the rows and columns that it has at least.
 const WIDEST_FIRST_STEP: u32 = 16;
 const MIN_FIRST_GRID: u32 = 8;
-/// In a picture of fewer pixels, a single one of the background's colour instead of the object's is more than an error of 40 dB, and
-/// few checked pixels hardly meet it: a corner of one pixel, whose neighbours on the grid before are empty, may not be lost.
+/// In a picture of fewer pixels, a single one of the background's colour instead of the object's is more than an error
+/// of 40 dB, and few checked pixels hardly meet it: a corner of one pixel, whose neighbours on the grid before are
+/// empty, may not be lost.
 const SMALL: u32 = 2000;
-/// A node is empty if a whole ray of its density has less optical depth than the first over the square of the number of nodes,
-/// and than the second.
+/// A node is empty if a whole ray of its density has less optical depth than the first over the square of the number of
+/// nodes, and than the second.
 const MIN_OPTICAL_DEPTH: [f32; 2] = [512.0, 1.0];
 /// A node that nothing is known of.
 const EMPTY: [f32; 4] = [0.0; 4];
@@ -37,7 +39,8 @@ struct Unfinished {
     picture: Rendered,
     /// `[pixel]`: bit `node` says that the ray is empty there.
     empty: Vec<u128>,
-    /// `[row / 2][column / 2][node]` of the pixels in even rows and columns, as [`NodeRay::values`]: all grids but the last.
+    /// `[row / 2][column / 2][node]` of the pixels in even rows and columns, as [`NodeRay::values`]: all grids but the
+    /// last.
     values: Vec<[f32; 4]>,
     node_count: usize,
 }
@@ -231,8 +234,8 @@ impl<D: Device> Renderer<'_, D> {
 }
 
 impl Unfinished {
-    /// The neighbours of a pixel on the grid of `step`, left and right above and below; those outside of the picture are those
-    /// inside.
+    /// The neighbours of a pixel on the grid of `step`, left and right above and below; those outside of the picture
+    /// are those inside.
     fn around(&self, [column, row]: [u32; 2], step: u32) -> [usize; 4] {
         let Rendered { width, height, .. } = self.picture;
         let ends = |place: u32, side: u32| {
@@ -244,7 +247,8 @@ impl Unfinished {
             .map(|[column, row]| (row * width + column) as usize)
     }
 
-    /// The nodes that are empty at the four neighbours of a pixel on the grid of `step`, and at those up to `reach` pixels beyond.
+    /// The nodes that are empty at the four neighbours of a pixel on the grid of `step`, and at those up to `reach`
+    /// pixels beyond.
     fn empty_around(&self, around: [usize; 4], step: u32, reach: u32) -> u128 {
         let Rendered { width, height, .. } = self.picture;
         let place = |pixel: usize| [pixel as u32 % width, pixel as u32 / width];

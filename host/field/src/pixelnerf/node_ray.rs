@@ -1,7 +1,8 @@
 //! A ray whose samples are interpolated between nodes, at which alone the network was evaluated.
 //!
-//! Along a ray a network is smooth: its highest frequency spans several samples. The samples of both passes lie where the
-//! exact picture has them, so that their random places cost nothing; only their colours and densities are interpolated.
+//! Along a ray a network is smooth: its highest frequency spans several samples. The samples of both passes lie where
+//! the exact picture has them, so that their random places cost nothing; only their colours and densities are
+//! interpolated.
 
 use super::options::{MIN_OPACITY, Sampling};
 use viewfuse_core::composite::{Composite, Compositor};
@@ -25,7 +26,8 @@ impl NodeRay<'_> {
         stratified_depth(ray.near, ray.far, node as u32, count as u32, 0.5)
     }
 
-    /// Red, green, blue from 0 to 1 and the rectified density at a depth, by cubic polynomials, at the ends by straight lines.
+    /// Red, green, blue from 0 to 1 and the rectified density at a depth, by cubic polynomials, at the ends by straight
+    /// lines.
     fn value(&self, depth: f32) -> [f32; 4] {
         let count = self.values.len();
         let place = (depth - self.ray.near) / (self.ray.far - self.ray.near) * count as f32 - 0.5;

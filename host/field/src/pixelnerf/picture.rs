@@ -77,7 +77,8 @@ impl<D: Device> Renderer<'_, D> {
         Ok(())
     }
 
-    /// The most that pixels may differ from one another in any channel, and in depth, for a pixel between to be interpolated.
+    /// The most that pixels may differ from one another in any channel, and in depth, for a pixel between to be
+    /// interpolated.
     pub(super) fn interpolation(&self) -> (f32, f32) {
         (self.omissions.interpolation, SAME_SURFACE * self.cast.far)
     }

@@ -1,4 +1,5 @@
-//! Test networks: checkpoints with deterministic initialisation, for comparison with other implementations and for timing.
+//! Test networks: checkpoints with deterministic initialisation, for comparison with other implementations and for
+//! timing.
 
 use super::architecture::Architecture;
 use std::collections::BTreeMap;
@@ -19,8 +20,8 @@ pub fn deterministic(architecture: &Architecture) -> Checkpoint {
     })
 }
 
-/// A solid, nearly spherical body around the world's origin, of a radius near 0.3, coloured by the views, with empty space
-/// outside: a network for measuring omissions.
+/// A solid, nearly spherical body around the world's origin, of a radius near 0.3, coloured by the views, with empty
+/// space outside: a network for measuring omissions.
 ///
 /// It is [`deterministic`] with one channel of the residual stream reserved: its input is the sum of the cosines of the
 /// lowest frequency, which decreases with the distance from the origin for any axes of the view; it passes all blocks

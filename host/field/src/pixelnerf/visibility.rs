@@ -1,7 +1,8 @@
 //! Which views see a point. Behind its camera a view's weight is 0: nothing of the view is looked up or computed there.
 //!
-//! Points are evaluated in groups that the same views see, each with these views alone and their weights at its points. Rows of
-//! the network do not depend on one another and sums over views run in the same order, so outputs have the same bits.
+//! Points are evaluated in groups that the same views see, each with these views alone and their weights at its points.
+//! Rows of the network do not depend on one another and sums over views run in the same order, so outputs have the same
+//! bits.
 
 use super::network::{Network, Views, Workspace};
 use std::collections::BTreeMap;
@@ -95,7 +96,8 @@ fn frustum(cast: &CastBlock) -> [Vec3; 8] {
 }
 
 impl<D: Device> Network<'_, D> {
-    /// As [`Network::evaluate`], without views at points where their weight is 0. Returns how many views of points were left out.
+    /// As [`Network::evaluate`], without views at points where their weight is 0. Returns how many views of points were
+    /// left out.
     pub(super) fn evaluate_visible(
         &self,
         workspace: &mut Workspace<D>,

@@ -30,8 +30,8 @@ pub struct Frame {
     pub confidences: Vec<f32>,
     /// What share of its surfaces few photographs show; `None` for fields without depths, and for coarse pictures.
     pub seen: Option<Seen>,
-    /// The mean share of each part of the mixture ([`Mixture`](crate::Mixture)), the rest that of the picture under the chosen settings;
-    /// empty without a mixture.
+    /// The mean share of each part of the mixture ([`Mixture`](crate::Mixture)), the rest that of the picture under the
+    /// chosen settings; empty without a mixture.
     pub shares: Vec<f32>,
     /// The ground truth at the same size and the scores, if there is a photograph.
     pub truth: Option<Truth>,

@@ -2,7 +2,8 @@
 
 use viewfuse_weighting::sources::SourceWeights;
 
-/// The sum of all but the `count` greatest weights, from the least one on, and a hundred thousandth more for the order of the sum.
+/// The sum of all but the `count` greatest weights, from the least one on, and a hundred thousandth more for the order
+/// of the sum.
 pub(super) fn weight_beyond(weights: &SourceWeights, count: usize) -> f32 {
     let mut all = *weights.values();
     all.sort_unstable_by(f32::total_cmp);

@@ -15,8 +15,8 @@ pub struct Seen {
     pub by_one: f32,
 }
 
-/// Of a picture of this width and height with these depths (row-major, along the principal axis; 0: no surface, which does not
-/// count), from the depth maps of the sources that were used. `None` without surfaces, or without maps.
+/// Of a picture of this width and height with these depths (row-major, along the principal axis; 0: no surface, which
+/// does not count), from the depth maps of the sources that were used. `None` without surfaces, or without maps.
 pub(super) fn seen(camera: &Camera, [width, height]: [u32; 2], depths: &[f32], maps: &[DepthMap]) -> Option<Seen> {
     if maps.is_empty() || depths.len() != width as usize * height as usize {
         return None;

@@ -6,8 +6,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// A folder that is filled under a temporary name beside its own and appears when it is finished. Dropped before that, it
-/// leaves nothing.
+/// A folder that is filled under a temporary name beside its own and appears when it is finished. Dropped before that,
+/// it leaves nothing.
 #[derive(Debug)]
 pub struct WholeFolder {
     path: PathBuf,

@@ -1,5 +1,5 @@
-//! Journals: files of lines that say what is finished, and survive a kill at any time. A last line without its line break is
-//! not whole and does not count.
+//! Journals: files of lines that say what is finished, and survive a kill at any time. A last line without its line
+//! break is not whole and does not count.
 
 use super::ordinary::{append_ordinary, open_ordinary, read_line};
 use std::fs::{File, TryLockError};
@@ -68,8 +68,8 @@ impl Journal {
         append_ordinary(path).map(Journal)
     }
 
-    /// Keeps other processes from locking it as long as it is open; `false` if one has. File systems without locks still
-    /// work: nothing is locked there.
+    /// Keeps other processes from locking it as long as it is open; `false` if one has. File systems without locks
+    /// still work: nothing is locked there.
     pub fn lock(&self) -> bool {
         !matches!(self.0.try_lock(), Err(TryLockError::WouldBlock))
     }

@@ -9,7 +9,8 @@ use std::path::Path;
 pub struct FolderLock(Option<File>);
 
 impl FolderLock {
-    /// Locks a folder. File systems without locks, and systems that do not open folders, still work: then nothing is locked.
+    /// Locks a folder. File systems without locks, and systems that do not open folders, still work: then nothing is
+    /// locked.
     ///
     /// # Errors
     /// [`WriteError::Busy`] while another process has locked it.

@@ -8,8 +8,8 @@ use std::path::Path;
 /// Whether there is a file.
 ///
 /// # Errors
-/// If what is there is a link or no ordinary file: reading from it could wait, or go on, without end, and writing to it could
-/// change a file elsewhere.
+/// If what is there is a link or no ordinary file: reading from it could wait, or go on, without end, and writing to it
+/// could change a file elsewhere.
 pub fn is_ordinary(path: &Path) -> io::Result<bool> {
     let refused = |what| Err(io::Error::other(format!("it is {what}, and is left alone")));
     match fs::symlink_metadata(path) {

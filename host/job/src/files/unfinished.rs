@@ -1,8 +1,8 @@
 //! Temporary files and folders of outputs that are not finished.
 //!
 //! Each is locked by its process. A process that ends at once removes its own ([`remove_all`]). What a kill leaves is
-//! removed by the next process that writes to the same folder, which finds it without a lock. On file systems without locks
-//! it stays.
+//! removed by the next process that writes to the same folder, which finds it without a lock. On file systems without
+//! locks it stays.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -27,8 +27,8 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes the temporary files and folders of this process, which must end next: from here on every output waits forever
-/// instead of being finished or begun.
+/// Removes the temporary files and folders of this process, which must end next: from here on every output waits
+/// forever instead of being finished or begun.
 pub fn remove_all() {
     let own = lock(&OWN);
     for path in own.iter() {

@@ -56,7 +56,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Refuses an existing file in one of these folders, or in a folder in them, that is no page: it belongs to the folder's run.
+/// Refuses an existing file in one of these folders, or in a folder in them, that is no page: it belongs to the
+/// folder's run.
 fn keep_runs<'a>(folders: impl IntoIterator<Item = &'a Path>, output: &Path) -> anyhow::Result<()> {
     let is_page = output.extension().is_some_and(|extension| extension == "html" || extension == "htm");
     let Some(output) = canonicalize(output).ok().filter(|_| !is_page) else { return Ok(()) };

@@ -86,8 +86,8 @@ struct PixelNerfArguments {
     /// Width of the point network
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = count)]
     width: usize,
-    /// Levels of the trunk, 1 to 4: with more, a pixel's features depend on more of the photograph. More than those of the
-    /// file of --from are added [default: 3, or those of the file]
+    /// Levels of the trunk, 1 to 4: with more, a pixel's features depend on more of the photograph. More than those of
+    /// the file of --from are added [default: 3, or those of the file]
     #[arg(long, value_name = "N", value_parser = levels)]
     levels: Option<usize>,
     /// Side of the pictures, pixels, a multiple of 16
@@ -115,7 +115,8 @@ struct PixelNerfArguments {
 /// What differs from step to step.
 #[derive(Args)]
 struct AugmentationOptions {
-    /// Numbers of sources; each step draws one of the list [default: 1,2,3,3,3,3,4,6 for a PixelNeRF, 1,2,3,3 for a GeNVS]
+    /// Numbers of sources; each step draws one of the list [default: 1,2,3,3,3,3,4,6 for a PixelNeRF, 1,2,3,3 for a
+    /// GeNVS]
     #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=256))]
     sources: Vec<u16>,
     /// Let each source show only a square of its photograph, somewhere in it, of at least this share of its side

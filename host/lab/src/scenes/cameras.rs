@@ -54,7 +54,8 @@ pub fn random_views(sphere: &Orbit, seed: u64, object: u32, count: u32) -> Resul
 }
 
 /// The spiral on which SRN's test views stand: with `t` from 0 to 1, elevation `t pi / 2` and azimuth `20 (1 - t)`
-/// radians. So say the poses of the published scenes, which have 251 views; the last one, at the pole, is here beside it.
+/// radians. So say the poses of the published scenes, which have 251 views; the last one, at the pole, is here beside
+/// it.
 ///
 /// # Errors
 /// [`PoseError`]; none for a sphere of [`sphere`].

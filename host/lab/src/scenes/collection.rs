@@ -162,8 +162,8 @@ struct Job {
     on_spiral: bool,
 }
 
-/// Makes what is missing of a collection in `out`, on all threads. A scene appears whole or not at all, and what is there
-/// is kept: after an interruption the same call goes on.
+/// Makes what is missing of a collection in `out`, on all threads. A scene appears whole or not at all, and what is
+/// there is kept: after an interruption the same call goes on.
 ///
 /// # Errors
 /// [`MakeError`]; scenes that were finished before stay.

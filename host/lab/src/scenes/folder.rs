@@ -87,8 +87,8 @@ pub enum WriteError {
 }
 
 /// Renders `object` from every camera and writes the scene to `folder`, which must not exist; its parent is created
-/// where it is missing. Views are named by the index of their camera. A pixel is the mean of `rays_per_side` squared rays
-/// ([`render_with`]). It checks `progress` between the views and stops if it says so.
+/// where it is missing. Views are named by the index of their camera. A pixel is the mean of `rays_per_side` squared
+/// rays ([`render_with`]). It checks `progress` between the views and stops if it says so.
 ///
 /// # Errors
 /// [`WriteError`], always with the path.

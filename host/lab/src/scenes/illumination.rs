@@ -5,9 +5,9 @@
 //! ```
 //!
 //! Every ray tries one random point of each lamp and one random direction around the normal: a pixel's many rays make
-//! shadows soft. `open` is 1 where the direction is free for [`AROUND_REACH`], and otherwise goes down to what the surface there
-//! gives back, in its colour: nooks are dark, and a red book reddens the shelf. Of all terms only the highlight (Blinn and
-//! Phong's) depends on where one looks from.
+//! shadows soft. `open` is 1 where the direction is free for [`AROUND_REACH`], and otherwise goes down to what the
+//! surface there gives back, in its colour: nooks are dark, and a red book reddens the shelf. Of all terms only the
+//! highlight (Blinn and Phong's) depends on where one looks from.
 
 use crate::scenes::lamp::{across, on_disc};
 use crate::scenes::scenery::Scenery;

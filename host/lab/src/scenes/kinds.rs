@@ -1,10 +1,11 @@
-//! Objects: cars to learn from, and chairs that stand in rooms. Each is a whole distribution, of which one is named by a
-//! seed and an index.
+//! Objects: cars to learn from, and chairs that stand in rooms. Each is a whole distribution, of which one is named by
+//! a seed and an index.
 //!
 //! Everything about an object is drawn with counter-based random numbers (`viewfuse_core::random`): proportions, parts,
 //! colours, patterns, lamps. The same seed and index give the same object bit for bit, whatever was drawn before.
 //! They stand upright along world z, face along world x, and are normalised as ShapeNet's are: the diagonal of the box
-//! around them is about 1 (0.8 to 1), its middle about the origin. No car reaches farther than [`MAX_RADIUS`], so that no camera of [`crate::scenes::cameras`] cuts anything off.
+//! around them is about 1 (0.8 to 1), its middle about the origin. No car reaches farther than [`MAX_RADIUS`], so that
+//! no camera of [`crate::scenes::cameras`] cuts anything off.
 
 pub(crate) mod build;
 mod cars;

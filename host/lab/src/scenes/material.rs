@@ -1,8 +1,9 @@
 //! Materials: patterns with structure at every size, as surfaces in a room and outdoors have them.
 //!
 //! A material is a function of the point like a texture, most of them flat: they look at two of the three coordinates.
-//! None repeats itself exactly. Every brick, plank and motif differs a little from its neighbours, so that a place in one
-//! photograph can be told from its neighbours in another one. Colours are display values, lengths are in world units.
+//! None repeats itself exactly. Every brick, plank and motif differs a little from its neighbours, so that a place in
+//! one photograph can be told from its neighbours in another one. Colours are display values, lengths are in world
+//! units.
 
 mod cloth;
 mod font;

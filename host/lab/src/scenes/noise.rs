@@ -1,7 +1,7 @@
 //! Random numbers that belong to places: the same place has the same number, whatever was asked before.
 //!
-//! Cheaper than the counter-based generator that draws objects, and good enough for grain, stains and bricks. The hash is
-//! PCG4D (M. Jarzynski and M. Olano, "Hash functions for GPU rendering", JCGT 9 (2020)).
+//! Cheaper than the counter-based generator that draws objects, and good enough for grain, stains and bricks. The hash
+//! is PCG4D (M. Jarzynski and M. Olano, "Hash functions for GPU rendering", JCGT 9 (2020)).
 
 use viewfuse_core::Vec3;
 use viewfuse_core::math::floor_to_i32;

@@ -1,8 +1,9 @@
 //! A camera's photograph of a scenery, and its exact depth.
 //!
 //! Every pixel is the mean light of n x n rays through the image coordinates `column + (2 i + 1) / (2 n)` and
-//! `row + (2 j + 1) / (2 n)`, made a display value afterwards. The random numbers of a ray are a grid over the unit square,
-//! moved by an amount of the pixel's own: the same seed gives the same picture bit for bit, on any number of threads.
+//! `row + (2 j + 1) / (2 n)`, made a display value afterwards. The random numbers of a ray are a grid over the unit
+//! square, moved by an amount of the pixel's own: the same seed gives the same picture bit for bit, on any number of
+//! threads.
 
 use crate::scenes::illumination::{Chances, illuminate};
 use crate::scenes::noise::fractions;

@@ -1,8 +1,9 @@
 //! A camera's picture of an object.
 //!
 //! Every pixel is the mean of n x n rays (4 x 4 if not told otherwise) on a fixed grid, through the image coordinates
-//! `column + (2 i + 1) / (2 n)` and `row + (2 j + 1) / (2 n)` of [`Camera::ray`]'s convention. Alpha is the fraction of them that hit; the colour is the mean
-//! over those alone, in display values, so it is straight (not premultiplied) and has no fringe of any background.
+//! `column + (2 i + 1) / (2 n)` and `row + (2 j + 1) / (2 n)` of [`Camera::ray`]'s convention. Alpha is the fraction of
+//! them that hit; the colour is the mean over those alone, in display values, so it is straight (not premultiplied) and
+//! has no fringe of any background.
 
 use crate::scenes::object::Object;
 use crate::scenes::shade::shade;

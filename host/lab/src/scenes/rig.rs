@@ -1,7 +1,7 @@
 //! How a person goes around something with a camera: on an arc in front of it, looking at it, with an unsteady hand.
 //!
-//! The subject lies around the world's origin, with world z up. Every number is drawn for a seed, so that two seeds are two
-//! walks with the same habits.
+//! The subject lies around the world's origin, with world z up. Every number is drawn for a seed, so that two seeds are
+//! two walks with the same habits.
 
 use core::f32::consts::FRAC_PI_2;
 use viewfuse_core::Vec3;

@@ -1,8 +1,8 @@
 //! A room: a table with things on it, and furniture, pictures and a window around it.
 //!
-//! The world's origin is the middle of the table's top, which lies in the plane `z = 0`; a unit is about a third of a metre. The
-//! room is closed: floor, ceiling and four walls. Everything is drawn for a seed: materials, colours, what stands on the
-//! table and where, what hangs on the walls.
+//! The world's origin is the middle of the table's top, which lies in the plane `z = 0`; a unit is about a third of a
+//! metre. The room is closed: floor, ceiling and four walls. Everything is drawn for a seed: materials, colours, what
+//! stands on the table and where, what hangs on the walls.
 
 pub(crate) mod furniture;
 mod hangings;

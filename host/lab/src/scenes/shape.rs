@@ -2,7 +2,8 @@
 //!
 //! Every primitive is centred at its own origin; those with an axis stand along local z. The distance is negative
 //! inside. It is exact outside for all but the ellipsoid and the prism, whose value is a lower bound of the distance;
-//! sphere tracing needs no more than a lower bound. Formulas: J. C. Hart, "Sphere tracing", The Visual Computer 12 (1996).
+//! sphere tracing needs no more than a lower bound. Formulas: J. C. Hart, "Sphere tracing", The Visual Computer 12
+//! (1996).
 
 use crate::scenes::prism::Prism;
 use viewfuse_core::Vec3;

@@ -1,8 +1,9 @@
 //! The sample scene: a toy lorry with its load, and the cameras around it.
 //!
-//! The lorry is 0.8 units long (0.9 along its diagonal), drives along world x and stands upright along z. It has an open bed (concave), an
-//! exhaust, mirrors, bumpers and rails (thin, but nowhere thinner than three pixels of the sample's pictures), and no
-//! two sides of one colour: cameras on opposite sides see different things, and weighting the views has a point.
+//! The lorry is 0.8 units long (0.9 along its diagonal), drives along world x and stands upright along z. It has an
+//! open bed (concave), an exhaust, mirrors, bumpers and rails (thin, but nowhere thinner than three pixels of the
+//! sample's pictures), and no two sides of one colour: cameras on opposite sides see different things, and weighting
+//! the views has a point.
 
 mod load;
 

@@ -24,8 +24,8 @@ const NORMAL_STEP: f32 = 4.0e-4;
 /// How much larger a part's box is taken, in world units: a ray that passes it by is far from arriving.
 const BOX_MARGIN: f32 = 1.0e-3;
 
-/// Parts whose ball is larger than this, in world units, are walls and the like: a ray begins at their box. With smaller
-/// ones that would save no more than a step.
+/// Parts whose ball is larger than this, in world units, are walls and the like: a ray begins at their box. With
+/// smaller ones that would save no more than a step.
 const LARGE: f32 = 1.0;
 
 /// Where a ray meets an object.
@@ -121,8 +121,8 @@ fn ball_interval(origin: Vec3, direction: Vec3, radius: f32) -> Option<(f32, f32
     if middle + half > 0.0 { Some((max(middle - half, 0.0), middle + half)) } else { None }
 }
 
-/// The stretch of a line inside a box around the coordinates' origin, taken a little larger than told. Long and flat parts
-/// fill little of their balls.
+/// The stretch of a line inside a box around the coordinates' origin, taken a little larger than told. Long and flat
+/// parts fill little of their balls.
 fn box_interval(origin: Vec3, direction: Vec3, half_box: Vec3) -> Option<(f32, f32)> {
     let (mut enter, mut leave) = (f32::MIN, f32::MAX);
     for axis in 0..3 {

@@ -1,5 +1,5 @@
-//! Adam (Kingma and Ba, ICLR 2015), with moments that can be saved and loaded. The library's own does not expose them, so a
-//! continued run would give other results.
+//! Adam (Kingma and Ba, ICLR 2015), with moments that can be saved and loaded. The library's own does not expose them,
+//! so a continued run would give other results.
 
 use super::parameters::Parameters;
 use candle_core::backprop::GradStore;

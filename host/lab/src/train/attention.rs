@@ -1,5 +1,5 @@
-//! The paper's cross-attention weighting as a graph: poses are embedded, and a softmax of products gives the weights. The
-//! same as [`viewfuse_core::attention::cross_attention`], with the same parameters.
+//! The paper's cross-attention weighting as a graph: poses are embedded, and a softmax of products gives the weights.
+//! The same as [`viewfuse_core::attention::cross_attention`], with the same parameters.
 
 use super::TrainError;
 use super::parameters::{Parameters, fan_in, random};

@@ -7,19 +7,20 @@ use serde::{Serialize, Serializer};
 use viewfuse_core::weighting::Scheme;
 use viewfuse_weighting::sources::MAX_SOURCES;
 
-/// What differs from step to step, so that a network works with more than one kind of sources: of each list one is drawn.
+/// What differs from step to step, so that a network works with more than one kind of sources: of each list one is
+/// drawn.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Augmentation {
     /// Numbers of sources, at least 1.
     pub sources: Vec<usize>,
-    /// Sides of the sources' pictures, pixels, multiples of 16 up to the settings' side. Empty: that side. Rays are always of
-    /// pictures of the settings' side. A GeNVS has pictures of one side only: its volumes are made for it.
+    /// Sides of the sources' pictures, pixels, multiples of 16 up to the settings' side. Empty: that side. Rays are
+    /// always of pictures of the settings' side. A GeNVS has pictures of one side only: its volumes are made for it.
     pub sides: Vec<u32>,
-    /// Each source shows a square somewhere in its photograph, of at least this share of its side and at most the whole,
-    /// above 0; 1: always the whole.
+    /// Each source shows a square somewhere in its photograph, of at least this share of its side and at most the
+    /// whole, above 0; 1: always the whole.
     pub least_crop: f32,
-    /// Weighting schemes. With any other than the mean, an object has one target view in a step, as weights are for one.
-    /// Validation has the first of the list.
+    /// Weighting schemes. With any other than the mean, an object has one target view in a step, as weights are for
+    /// one. Validation has the first of the list.
     #[serde(serialize_with = "texts")]
     pub schemes: Vec<Scheme>,
 }
@@ -30,8 +31,8 @@ impl Augmentation {
         Augmentation { sources: sources.to_vec(), sides: Vec::new(), least_crop: 1.0, schemes: vec![Scheme::MEAN] }
     }
 
-    /// The default of a PixelNeRF, as published but for the number of sources: mostly three, so that the network works with
-    /// few sources, sometimes one or more, so that it works with any weights.
+    /// The default of a PixelNeRF, as published but for the number of sources: mostly three, so that the network works
+    /// with few sources, sometimes one or more, so that it works with any weights.
     #[must_use]
     pub fn pixelnerf() -> Augmentation {
         Augmentation::whole(&[1, 2, 3, 3, 3, 3, 4, 6])

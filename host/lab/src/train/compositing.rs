@@ -43,8 +43,8 @@ pub(crate) fn fine_depths(
     all
 }
 
-/// The samples of two passes, each `[object][ray][sample]`, sorted by depth on every ray: their numbers among all samples,
-/// the first pass's before the second's, and their depths.
+/// The samples of two passes, each `[object][ray][sample]`, sorted by depth on every ray: their numbers among all
+/// samples, the first pass's before the second's, and their depths.
 pub(crate) fn merged(first: &[Vec<f32>], second: &[Vec<f32>], ray_count: usize) -> (Vec<u32>, Vec<Vec<f32>>) {
     let [before, behind] = [first, second].map(|pass| pass.first().map_or(0, |depths| depths.len() / ray_count));
     let first_count = first.iter().map(Vec::len).sum::<usize>();

@@ -51,8 +51,8 @@ fn unused(tensors: &[TensorShape]) -> BTreeSet<String> {
 }
 
 impl Genvs {
-    /// Initial parameters: He's initialisation in front of rectifications, zero in the last layers of residual branches, as
-    /// published for the denoiser, whose other layers without a norm in front copy their inputs.
+    /// Initial parameters: He's initialisation in front of rectifications, zero in the last layers of residual
+    /// branches, as published for the denoiser, whose other layers without a norm in front copy their inputs.
     pub(crate) fn new(architecture: Architecture, dtype: DType, seed: u64) -> std::result::Result<Genvs, TrainError> {
         let parameters = Parameters::new(&used(&architecture), dtype, |tensor| {
             Ok(denoiser::handed_on(&architecture, tensor).unwrap_or_else(|| first_values(tensor, seed)))
@@ -153,8 +153,8 @@ impl Genvs {
         Tensor::cat(&all, 0)
     }
 
-    /// The denoiser's network `F` on noisy pictures `[image][row][column][3]`, each at its own level, with their features.
-    /// Its estimate of the pictures is `c_skip noisy + c_out F`, see [`Preconditioning`].
+    /// The denoiser's network `F` on noisy pictures `[image][row][column][3]`, each at its own level, with their
+    /// features. Its estimate of the pictures is `c_skip noisy + c_out F`, see [`Preconditioning`].
     pub(crate) fn network(&self, noisy: &Tensor, features: &Tensor, at: &[Preconditioning]) -> Result<Tensor> {
         let Some(sizes) = &self.architecture.denoiser else { candle_core::bail!("the network has no denoiser") };
         let scales = each(at.iter().map(|at| at.input), noisy)?;

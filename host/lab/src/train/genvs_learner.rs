@@ -1,11 +1,11 @@
 //! A small GeNVS. With equal weights of the views, as published, unless schemes are given.
 //!
-//! The loss is that of "Elucidating the design space of diffusion-based generative models" (Karras et al. 2022): noise of a
-//! random level on the ground truth, the squared error of the network's output, all levels with one weight. Two changes are
-//! for small data and short runs. The first three features are also trained to be the difference of white and a ray's
-//! colour, so that volumes learn shapes before the denoiser learns to use them. And a share of the pictures has the largest
-//! noise level, where the best output is the mean of all pictures that the sources allow: the result of a single call, and
-//! the minimum of the squared error.
+//! The loss is that of "Elucidating the design space of diffusion-based generative models" (Karras et al. 2022): noise
+//! of a random level on the ground truth, the squared error of the network's output, all levels with one weight. Two
+//! changes are for small data and short runs. The first three features are also trained to be the difference of white
+//! and a ray's colour, so that volumes learn shapes before the denoiser learns to use them. And a share of the pictures
+//! has the largest noise level, where the best output is the mean of all pictures that the sources allow: the result of
+//! a single call, and the minimum of the squared error.
 
 use super::TrainError;
 use super::augmentation::Augmentation;
@@ -28,8 +28,8 @@ use viewfuse_nn::checkpoint::Checkpoint;
 /// The settings of a run besides its schedule and scenes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct GenvsSettings {
-    /// Channels of the denoiser's first level; see [`Architecture::narrow`]. A network that continues from a file has the
-    /// file's.
+    /// Channels of the denoiser's first level; see [`Architecture::narrow`]. A network that continues from a file has
+    /// the file's.
     pub width: usize,
     /// Side of the pictures.
     pub side: u32,
@@ -182,8 +182,8 @@ pub(super) fn loss(
     error + (colour_error * FEATURES_WEIGHT)?
 }
 
-/// Mean PSNR over scenes of one call for noise of the largest level, and of the features' colours, with the weights `weigh`
-/// of the views: the same views and noise every time, for any seed of the run.
+/// Mean PSNR over scenes of one call for noise of the largest level, and of the features' colours, with the weights
+/// `weigh` of the views: the same views and noise every time, for any seed of the run.
 pub(super) fn scores(
     network: &Genvs,
     scenes: &[TrainingScene],

@@ -1,4 +1,5 @@
-//! Helpers of the training tests: toy photographs, random draws, comparison, and gradients compared with difference quotients.
+//! Helpers of the training tests: toy photographs, random draws, comparison, and gradients compared with difference
+//! quotients.
 
 use super::scenes::TrainingScene;
 use crate::scenes::{Orbit, render, toy};

@@ -14,8 +14,8 @@ pub(crate) fn convolve(
     convolve_with(images, [weights, &biases], window, differentiates_input, false)
 }
 
-/// A convolution with weights `[out][in][row][column]` and biases `[out]` or, each image its own, `[image][out]`, rectified
-/// or not.
+/// A convolution with weights `[out][in][row][column]` and biases `[out]` or, each image its own, `[image][out]`,
+/// rectified or not.
 pub(crate) fn convolve_with(
     images: &Tensor,
     [weights, biases]: [&Tensor; 2],

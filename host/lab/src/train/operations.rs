@@ -1,8 +1,8 @@
-//! Custom operations of the automatic differentiation: each computes its value and its gradient on plain numbers, in `f32`
-//! for training and in `f64` for the tests that compare gradients with central differences.
+//! Custom operations of the automatic differentiation: each computes its value and its gradient on plain numbers, in
+//! `f32` for training and in `f64` for the tests that compare gradients with central differences.
 //!
-//! There is a custom operation only where the library has none with the published conventions, or where the library would
-//! write whole images of intermediate numbers to memory that fit into a processor's caches.
+//! There is a custom operation only where the library has none with the published conventions, or where the library
+//! would write whole images of intermediate numbers to memory that fit into a processor's caches.
 
 mod convolve;
 mod density;

@@ -72,7 +72,8 @@ impl PixelNerf {
     /// A trained network, which is not changed.
     ///
     /// # Errors
-    /// [`TrainError`] if the checkpoint is of another family, has a second point network, or batch norms with statistics.
+    /// [`TrainError`] if the checkpoint is of another family, has a second point network, or batch norms with
+    /// statistics.
     pub(crate) fn frozen(checkpoint: &Checkpoint, dtype: DType) -> std::result::Result<PixelNerf, TrainError> {
         let architecture = Architecture::of(checkpoint)?;
         let refuse = |reason: String| TrainError::Checkpoint { path: checkpoint.path().to_path_buf(), reason };
@@ -94,8 +95,9 @@ impl PixelNerf {
         Ok(PixelNerf { architecture, parameters, is_frozen: true })
     }
 
-    /// The network of a checkpoint, to be trained further, with `levels` levels of the trunk if it has fewer. New levels are
-    /// as in a new network, and the point network's weights for them are zero: what it says is the same at first.
+    /// The network of a checkpoint, to be trained further, with `levels` levels of the trunk if it has fewer. New
+    /// levels are as in a new network, and the point network's weights for them are zero: what it says is the same at
+    /// first.
     ///
     /// # Errors
     /// As [`PixelNerf::frozen`].
@@ -229,8 +231,8 @@ impl PixelNerf {
         network.grids.apply_op3(network.weights, network.parameters, Apply(operation))
     }
 
-    /// The colours of a batch's rays, `[object and ray][3]` in `[0, 1]`, over white, with weights `[object][view]` of the
-    /// views. The samples of both passes are differentiated, the depths of the second are not.
+    /// The colours of a batch's rays, `[object and ray][3]` in `[0, 1]`, over white, with weights `[object][view]` of
+    /// the views. The samples of both passes are differentiated, the depths of the second are not.
     pub(crate) fn render(&self, batch: &Batch, weights: &Tensor, draw: &Draw, counts: SampleCounts) -> Result<Tensor> {
         let (mut grids, mut parameters) = (self.grids(&batch.pictures)?, self.point_parameters()?);
         if self.is_frozen {

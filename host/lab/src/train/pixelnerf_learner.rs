@@ -18,10 +18,11 @@ use viewfuse_nn::checkpoint::Checkpoint;
 /// The settings of a run besides its schedule and scenes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PixelNerfSettings {
-    /// Width of the point network; the trunk's width follows from it. A network that continues from a file has the file's.
+    /// Width of the point network; the trunk's width follows from it. A network that continues from a file has the
+    /// file's.
     pub width: usize,
-    /// Levels of the trunk behind its first convolution, 1 to 4; see [`Architecture::with_levels`]. `None`: 3, or those of the
-    /// file that a network continues from. More than the file's are added, and change nothing at first.
+    /// Levels of the trunk behind its first convolution, 1 to 4; see [`Architecture::with_levels`]. `None`: 3, or those
+    /// of the file that a network continues from. More than the file's are added, and change nothing at first.
     pub levels: Option<usize>,
     /// Side of the pictures, which the network is then given when it renders.
     pub side: u32,

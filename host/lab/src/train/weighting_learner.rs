@@ -1,5 +1,5 @@
-//! The paper's learned weighting: the network is fixed, and only the weighting of its views is trained, with the network's
-//! own loss.
+//! The paper's learned weighting: the network is fixed, and only the weighting of its views is trained, with the
+//! network's own loss.
 //!
 //! A network whose weighting can be trained has a file here and a line in [`NETWORKS`].
 

@@ -6,8 +6,8 @@ use viewfuse_core::pose::Pose;
 use viewfuse_core::weighting::{Scheme, weigh};
 use viewfuse_weighting::sources::SourcePoses;
 
-/// Weights `[object][view]` by a scheme, for one target of each object, from the objects' sources `[object][view]`, of which
-/// each object has as many.
+/// Weights `[object][view]` by a scheme, for one target of each object, from the objects' sources `[object][view]`, of
+/// which each object has as many.
 pub(crate) fn of_scheme<'a>(
     scheme: Scheme,
     sources: &[Vec<Camera>],

@@ -1,5 +1,5 @@
-//! The format of `torch.save` before PyTorch 1.6: pickles one after another (a magic number, a version, the machine, the
-//! description, the keys of the storages), then each storage as its number of elements (`i64`) and their bytes.
+//! The format of `torch.save` before PyTorch 1.6: pickles one after another (a magic number, a version, the machine,
+//! the description, the keys of the storages), then each storage as its number of elements (`i64`) and their bytes.
 
 use super::error::{Problem, shortened};
 use super::input::Input;

@@ -39,8 +39,8 @@ pub(super) fn element_count(shape: &[usize]) -> Option<u64> {
     shape.iter().try_fold(1u64, |product, &length| product.checked_mul(length as u64))
 }
 
-/// Checks the size of a tensor of this shape against the limits, and returns the number of its elements. For the check, an
-/// axis of length 0 counts as 1.
+/// Checks the size of a tensor of this shape against the limits, and returns the number of its elements. For the check,
+/// an axis of length 0 counts as 1.
 pub(super) fn check_size(name: &str, shape: &[usize]) -> Result<u64, Problem> {
     let bytes = shape.iter().fold(4u128, |product, &length| product.saturating_mul(length.max(1) as u128));
     if bytes > MAX_TENSOR_BYTES.into() {

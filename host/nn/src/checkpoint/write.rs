@@ -58,7 +58,8 @@ enum Entry<'a> {
 }
 
 impl Checkpoint {
-    /// Writes it as safetensors, completely or not at all, with its metadata. At most one piece of a tensor is in memory.
+    /// Writes it as safetensors, completely or not at all, with its metadata. At most one piece of a tensor is in
+    /// memory.
     ///
     /// # Errors
     /// [`CheckpointError`] if a tensor cannot be read, holds a NaN or an infinity or a number that the precision cannot

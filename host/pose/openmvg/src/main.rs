@@ -1,5 +1,5 @@
-//! Structure from motion for `viewfuse pose`, as a process of its own: one job as JSON from standard input, progress and the
-//! answer as lines of JSON to standard output.
+//! Structure from motion for `viewfuse pose`, as a process of its own: one job as JSON from standard input, progress
+//! and the answer as lines of JSON to standard output.
 //!
 //! ```text
 //! job      photographs and what is known of their cameras
@@ -7,9 +7,9 @@
 //! solve    OpenMVG's front end and its incremental engine
 //! ```
 //!
-//! A process, because what it calls is a young library: what breaks it, or takes too much, ends here, and whoever started it
-//! says so. It reads no environment variables and writes no files. Exit code 0 with an answer, also one without poses; 1 for
-//! a job that cannot be read.
+//! A process, because what it calls is a young library: what breaks it, or takes too much, ends here, and whoever
+//! started it says so. It reads no environment variables and writes no files. Exit code 0 with an answer, also one
+//! without poses; 1 for a job that cannot be read.
 
 mod answer;
 mod job;

@@ -28,7 +28,8 @@ pub(super) fn cut_short(path: &Path) -> io::Result<bool> {
     Ok(bytes.starts_with(&[0xff, 0xd8]) && !has_end(&bytes))
 }
 
-/// Whether the marker of the end stands behind that of the first scan. Pictures within segments (thumbnails) do not count.
+/// Whether the marker of the end stands behind that of the first scan. Pictures within segments (thumbnails) do not
+/// count.
 fn has_end(bytes: &[u8]) -> bool {
     let mut place = 2;
     while let Some([0xff, marker, high, low]) = bytes.get(place..place + 4) {

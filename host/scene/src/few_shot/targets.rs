@@ -7,8 +7,8 @@ use std::collections::HashMap;
 use unicode_normalization::UnicodeNormalization;
 use viewfuse_core::camera::Camera;
 
-/// Refuses targets whose files would be the same: file systems ignore case (Windows, macOS), and some give names back in
-/// another Unicode form (macOS).
+/// Refuses targets whose files would be the same: file systems ignore case (Windows, macOS), and some give names back
+/// in another Unicode form (macOS).
 pub(super) fn check_names(scene: &Scene, targets: &[Target]) -> Result<(), SelectionError> {
     let mut seen: HashMap<String, &str> = HashMap::new();
     for Target { name, .. } in targets {
@@ -24,8 +24,8 @@ pub(super) fn check_names(scene: &Scene, targets: &[Target]) -> Result<(), Selec
     Ok(())
 }
 
-/// A warning about targets that look where no source looks: neither at what the sources look at, nor in any direction that a
-/// source shows.
+/// A warning about targets that look where no source looks: neither at what the sources look at, nor in any direction
+/// that a source shows.
 pub fn away_warning(scene: &Scene, job: &FewShot) -> Option<String> {
     let sources: Vec<Camera> = job.sources.iter().map(|&view| scene.views[view].camera).collect();
     let focus = Rig::of(&sources).focus;

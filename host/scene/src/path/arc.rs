@@ -35,8 +35,8 @@ impl Arc {
         Arc { start: 0.0, width: TAU, cameras: (0..cameras.len()).collect(), across: [ahead, up.cross(ahead)] }
     }
 
-    /// The arc from photograph to photograph, no two neighbours more than 60 degrees apart, on which most of the cameras (at
-    /// least one) stand; of several, the widest. It has at least 20 degrees. The whole circle if no gap is
+    /// The arc from photograph to photograph, no two neighbours more than 60 degrees apart, on which most of the
+    /// cameras (at least one) stand; of several, the widest. It has at least 20 degrees. The whole circle if no gap is
     /// larger, or if all cameras are straight above the focus.
     pub fn covered(cameras: &[Camera]) -> Arc {
         let Rig { focus, up, .. } = Rig::of(cameras);

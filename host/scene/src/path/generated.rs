@@ -21,8 +21,8 @@ const FAR_SHARE: f32 = 0.75;
 /// Least length of the mean principal axis of forward-facing cameras: 45 degrees from it on average.
 const MIN_COMMON: f32 = 0.7;
 
-/// `count` cameras on an arc around the focus of some cameras (at least one), at the mean height and distance of those that
-/// stand on it, their principal axes through the focus, with the rig's up direction.
+/// `count` cameras on an arc around the focus of some cameras (at least one), at the mean height and distance of those
+/// that stand on it, their principal axes through the focus, with the rig's up direction.
 ///
 /// # Errors
 /// [`PoseError`] if the circle degenerates (all cameras at the focus, or straight above it).
@@ -41,10 +41,11 @@ pub fn orbit(cameras: &[Camera], arc: &Arc, pinhole: Pinhole, count: usize) -> R
 
 /// `count` cameras from the first to the last one, both included (one alone is the first).
 ///
-/// If both principal axes meet in a point in front of them, the centre goes around it, the shorter way about `up` (unit): height,
-/// distance from the axis and angle change at constant rates, and the point moves in the pictures as little as the ends
-/// demand. Otherwise, and where an end is straight above the point, the centre moves on a line and the rotation at a
-/// constant rate (slerp). Focal length and principal point change with the step; the size is that of the first.
+/// If both principal axes meet in a point in front of them, the centre goes around it, the shorter way about `up`
+/// (unit): height, distance from the axis and angle change at constant rates, and the point moves in the pictures as
+/// little as the ends demand. Otherwise, and where an end is straight above the point, the centre moves on a line and
+/// the rotation at a constant rate (slerp). Focal length and principal point change with the step; the size is that of
+/// the first.
 ///
 /// # Errors
 /// [`PoseError`] if a pose between them is none: never for finite cameras.
@@ -108,9 +109,9 @@ impl Around {
     }
 }
 
-/// `count` cameras on LLFF's spiral for forward-facing cameras: around their middle, two turns within the offsets that nine
-/// of ten cameras do not exceed, their principal axes through one point ahead of it. Its depth is between the near and far `bounds` of
-/// the views, nearer to the far one; without bounds, that of the cameras' focus.
+/// `count` cameras on LLFF's spiral for forward-facing cameras: around their middle, two turns within the offsets that
+/// nine of ten cameras do not exceed, their principal axes through one point ahead of it. Its depth is between the near
+/// and far `bounds` of the views, nearer to the far one; without bounds, that of the cameras' focus.
 ///
 /// `None` if the cameras are not forward-facing, or are all in one place.
 pub fn spiral(cameras: &[Camera], pinhole: Pinhole, bounds: &[[f32; 2]], count: usize) -> Option<Vec<Camera>> {

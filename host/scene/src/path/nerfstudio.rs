@@ -1,12 +1,13 @@
 //! nerfstudio's `camera_path.json`, as its viewer exports it.
 //!
 //! `camera_path[]` holds for each frame `camera_to_world` (16 numbers, row-major, OpenGL axes) and `fov`, the full
-//! vertical opening angle in degrees; `render_width` and `render_height` are the size of all frames, `fps` the frames per
-//! second.
+//! vertical opening angle in degrees; `render_width` and `render_height` are the size of all frames, `fps` the frames
+//! per second.
 //!
-//! The viewer's world is that of nerfstudio's training: oriented, centred and scaled by its data parser, which writes what
-//! it did to `dataparser_transforms.json` in the folder of the run. If that file is beside the path, it is undone, together
-//! with `applied_transform` and `applied_scale` of the scene's `transforms.json`; otherwise the poses are taken as they are.
+//! The viewer's world is that of nerfstudio's training: oriented, centred and scaled by its data parser, which writes
+//! what it did to `dataparser_transforms.json` in the folder of the run. If that file is beside the path, it is undone,
+//! together with `applied_transform` and `applied_scale` of the scene's `transforms.json`; otherwise the poses are
+//! taken as they are.
 
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,6 @@
-//! A `transforms.json` as a camera path: the poses of `frames`, in its order, with the intrinsics that it states in any of
-//! the ways of the layout. Photographs need not be there; the stem of `file_path`, if there is one, is the camera's name.
+//! A `transforms.json` as a camera path: the poses of `frames`, in its order, with the intrinsics that it states in any
+//! of the ways of the layout. Photographs need not be there; the stem of `file_path`, if there is one, is the camera's
+//! name.
 
 use std::path::Path;
 

@@ -2,8 +2,9 @@
 
 use super::SourceImage;
 
-/// Ratio of the brightness of two photographs, in linear light, from which on their exposures are warned of. Views of one scene
-/// seldom differ by half of that; gains between sources are equalised up to 2 in stored values, which is about 5.
+/// Ratio of the brightness of two photographs, in linear light, from which on their exposures are warned of. Views of
+/// one scene seldom differ by half of that; gains between sources are equalised up to 2 in stored values, which is
+/// about 5.
 const MAX_RATIO: f64 = 6.0;
 
 /// Brightness of a black photograph: half a step of 8 bits, in linear light.
@@ -15,8 +16,8 @@ const MIN_SAMPLES: usize = 4096;
 /// Exponent of stored values, about that of sRGB.
 const GAMMA: f64 = 2.2;
 
-/// Every so many pixels count, from the first on, row by row. A power takes most of the time, and a mean needs few; no usual width is a
-/// multiple of it, which would leave columns out.
+/// Every so many pixels count, from the first on, row by row. A power takes most of the time, and a mean needs few; no
+/// usual width is a multiple of it, which would leave columns out.
 const STRIDE: usize = 13;
 
 /// The mean of red, green and blue over what a photograph shows, in linear light; `None` if it shows nothing.

@@ -11,13 +11,13 @@ use std::path::Path;
 pub struct GroundTruth {
     /// The picture, opaque.
     pub picture: RgbImage,
-    /// 255 where the photograph shows the whole pixel, otherwise 0: the photograph's lens did not see the corners of the
-    /// pinhole's picture. `None` if it shows all of them.
+    /// 255 where the photograph shows the whole pixel, otherwise 0: the photograph's lens did not see the corners of
+    /// the pinhole's picture. `None` if it shows all of them.
     pub seen: Option<GrayImage>,
 }
 
-/// A picture file as a render would compare it: laid over the background, or without its transparency if there is none, and
-/// resampled by area averages to a size, or kept in its own.
+/// A picture file as a render would compare it: laid over the background, or without its transparency if there is none,
+/// and resampled by area averages to a size, or kept in its own.
 ///
 /// # Errors
 /// [`SceneError`] if it cannot be read.

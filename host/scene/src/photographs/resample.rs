@@ -6,12 +6,12 @@ use image::{GrayImage, Luma, Rgba, RgbaImage};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-/// Weight of a transparent pixel's colour beside opaque ones' 255. What a mask hides is kept: a scene can be used without its
-/// masks.
+/// Weight of a transparent pixel's colour beside opaque ones' 255. What a mask hides is kept: a scene can be used
+/// without its masks.
 const TRANSPARENT_WEIGHT: f32 = 1.0 / 64.0;
 
-/// A photograph at a smaller size, its colours weighted by their alpha; where all is transparent, their mean. Output pixels
-/// that are partly outside the seen area count as not seen.
+/// A photograph at a smaller size, its colours weighted by their alpha; where all is transparent, their mean. Output
+/// pixels that are partly outside the seen area count as not seen.
 pub(super) fn reduced(photograph: &Photograph, (width, height): (u32, u32)) -> Photograph {
     let (own_width, own_height) = photograph.pixels.dimensions();
     let (columns, rows) = (spans(own_width, width), spans(own_height, height));

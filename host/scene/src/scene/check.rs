@@ -166,7 +166,8 @@ fn world_from_camera(raw: &RawPose) -> [f64; 16] {
     }
 }
 
-/// The pinhole of a view: of the intrinsics' own size, or of a photograph that may be a resampled copy of such an image.
+/// The pinhole of a view: of the intrinsics' own size, or of a photograph that may be a resampled copy of such an
+/// image.
 ///
 /// # Errors
 /// [`SceneError::SizeMismatch`] if the photograph cannot be the whole image at another scale,

@@ -40,8 +40,8 @@ pub(crate) fn unreadable(path: &Path, cause: io::Error) -> SceneError {
 /// length is judged before anything is read.
 ///
 /// # Errors
-/// [`SceneError::Missing`], [`SceneError::Read`] if it cannot be read, or [`SceneError::Damaged`] with the line if it is
-/// not UTF-8.
+/// [`SceneError::Missing`], [`SceneError::Read`] if it cannot be read, or [`SceneError::Damaged`] with the line if it
+/// is not UTF-8.
 pub fn read_text(path: &Path) -> Result<String, SceneError> {
     read_text_of(path, MAX_TEXT)
 }

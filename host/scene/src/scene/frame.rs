@@ -22,12 +22,12 @@ const MIN_DIGITS: f64 = 6.0;
 /// Range of the cameras' spread, in units of the file, for which the unit is kept.
 const USUAL_SPREADS: std::ops::RangeInclusive<f64> = 1.0e-3..=1.0e4;
 
-/// Least determinant, over the cube of the count, of the matrix of lines that are not parallel; of perpendicular ones it is
-/// about 1/4.
+/// Least determinant, over the cube of the count, of the matrix of lines that are not parallel; of perpendicular ones
+/// it is about 1/4.
 const MIN_DETERMINANT: f64 = 1.0e-6;
 
-/// The frame for cameras with these centres and principal axes (unit), in the coordinates of the files, and a warning where
-/// the files' own numbers cannot hold the distances between the cameras.
+/// The frame for cameras with these centres and principal axes (unit), in the coordinates of the files, and a warning
+/// where the files' own numbers cannot hold the distances between the cameras.
 pub(super) fn of(axes: &[(DVec3, DVec3)]) -> (SceneFrame, Option<String>) {
     let count = axes.len().max(1) as f64;
     let centroid = axes.iter().map(|(centre, _)| *centre / count).sum::<DVec3>();
@@ -58,8 +58,8 @@ pub(super) fn of(axes: &[(DVec3, DVec3)]) -> (SceneFrame, Option<String>) {
     (SceneFrame { origin, scale }, warning)
 }
 
-/// The unit in which cameras, which spread so far, are as far from what they look at as SRN's; where they look at nothing in
-/// common, in which their spread is that distance.
+/// The unit in which cameras, which spread so far, are as far from what they look at as SRN's; where they look at
+/// nothing in common, in which their spread is that distance.
 fn unit(axes: &[(DVec3, DVec3)], spread: f64) -> f64 {
     let mean = |focus: DVec3| axes.iter().map(|(centre, _)| centre.distance(focus)).sum::<f64>() / axes.len() as f64;
     let distance = nearest_point_to_lines(axes).map(mean).filter(|distance| distance.is_normal());

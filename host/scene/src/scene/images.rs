@@ -27,24 +27,24 @@ const RGBA_BYTES: u64 = 4;
 /// Decoded pixels of more bytes than this must have a file of fitting length.
 const SMALL_IMAGE: u64 = 32 << 20;
 
-/// Most decoded bytes for each byte of a file: twice what a plane of one colour takes in the format that packs it best but one
-/// (PNG: 1032). A header of a few bytes must not take memory for pixels that cannot be in the file.
+/// Most decoded bytes for each byte of a file: twice what a plane of one colour takes in the format that packs it best
+/// but one (PNG: 1032). A header of a few bytes must not take memory for pixels that cannot be in the file.
 const MAX_RATIO: u64 = 2064;
 
-/// Memory of a decoder in addition to the pixels: its rows, tables, colour profiles. The profile of a PNG is compressed: a
-/// file of one megabyte may hold one of a gigabyte, which is then ignored.
+/// Memory of a decoder in addition to the pixels: its rows, tables, colour profiles. The profile of a PNG is
+/// compressed: a file of one megabyte may hold one of a gigabyte, which is then ignored.
 const DECODER_ALLOWANCE: u64 = 16 << 20;
 
-/// Most memory for the pixels of a photograph while it is decoded: as they are stored, and as 8-bit RGBA. 150 megapixels of
-/// 8-bit RGB fit.
+/// Most memory for the pixels of a photograph while it is decoded: as they are stored, and as 8-bit RGBA. 150
+/// megapixels of 8-bit RGB fit.
 const MAX_DECODING: u64 = 1 << 30;
 
 /// Bytes of a JPEG file that are read first for its header: the tags with their thumbnail, colour profiles. The decoder
 /// would read the whole file.
 const JPEG_HEADER: u64 = 256 << 10;
 
-/// What decoders read from: one type for files and bytes in memory, because the decoders of every format are compiled again
-/// for each type that they read from. Nothing outside this module decodes or encodes pictures of several formats.
+/// What decoders read from: one type for files and bytes in memory, because the decoders of every format are compiled
+/// again for each type that they read from. Nothing outside this module decodes or encodes pictures of several formats.
 trait Source: BufRead + Seek {}
 
 impl<T: BufRead + Seek> Source for T {}
@@ -62,8 +62,8 @@ pub(super) struct Header {
 /// Size and orientation; nothing of the size that the header states is allocated.
 ///
 /// # Errors
-/// [`SceneError::TooLarge`] if a side has more than [`MAX_SIDE`] pixels, [`SceneError::TooMuch`] if all pixels together take
-/// too much memory; otherwise as for any unreadable image.
+/// [`SceneError::TooLarge`] if a side has more than [`MAX_SIDE`] pixels, [`SceneError::TooMuch`] if all pixels together
+/// take too much memory; otherwise as for any unreadable image.
 pub(super) fn header(path: &Path) -> Result<Header, SceneError> {
     let found = match beginning_of_jpeg(path)? {
         Some(found) => found,

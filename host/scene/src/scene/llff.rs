@@ -1,12 +1,12 @@
 //! The layout of Local Light Field Fusion (Mildenhall et al. 2019): `poses_bounds.npy` next to the photographs.
 //!
-//! A row for each photograph, in the order of the photographs' names: 15 numbers are a 3x5 matrix, row-major, whose first
-//! three columns are the camera's axes in the world (down, right, backwards), whose fourth is its centre and whose fifth holds
-//! height, width and focal length of the full photograph in pixels; two numbers are the near and the far bound of the
-//! photograph. The principal point is the centre of the photograph.
+//! A row for each photograph, in the order of the photographs' names: 15 numbers are a 3x5 matrix, row-major, whose
+//! first three columns are the camera's axes in the world (down, right, backwards), whose fourth is its centre and
+//! whose fifth holds height, width and focal length of the full photograph in pixels; two numbers are the near and the
+//! far bound of the photograph. The principal point is the centre of the photograph.
 //!
-//! Photographs are those of `images`, or without it of `images_2`, `images_4`, `images_8` and so on: of the folders with as
-//! many photographs as there are rows, the one with the largest photographs. Intrinsics scale with them.
+//! Photographs are those of `images`, or without it of `images_2`, `images_4`, `images_8` and so on: of the folders
+//! with as many photographs as there are rows, the one with the largest photographs. Intrinsics scale with them.
 //!
 //! The poses are made from a COLMAP model. If the model is in the same folder, its points are the scene's.
 

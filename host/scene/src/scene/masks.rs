@@ -2,8 +2,8 @@
 //!
 //! A mask is 0 where the photograph does not count and has the greatest value where it does: in NeuS's data objects are
 //! white on black, in COLMAP's and nerfstudio's ignored pixels are black. Values between are fractions of a pixel. It
-//! has the photograph's size, or another of the same shape; of a photograph that carries an orientation (EXIF), it may be
-//! a mask of the stored or of the upright picture.
+//! has the photograph's size, or another of the same shape; of a photograph that carries an orientation (EXIF), it may
+//! be a mask of the stored or of the upright picture.
 //!
 //! A layout may name masks itself. Otherwise they are searched in a folder `mask` or `masks` in the scene, beside the
 //! photograph's folder or one above it: `images/left/1.jpg` has `masks/left/1.jpg.png` (COLMAP) or `masks/left/1.png`

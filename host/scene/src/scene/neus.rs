@@ -1,13 +1,14 @@
 //! The layout of NeuS and IDR (DTU, BlendedMVS): `cameras_sphere.npz` (or another `cameras*.npz`), `image/`, `mask/`.
 //!
-//! For each photograph the archive has `world_mat_N`, a 4x4 matrix whose first three rows project world points to pixels, and
-//! mostly `scale_mat_N`, which places the unit sphere around the object in that world. The scene's world is the unit sphere's: the
-//! projection is `P = world_mat_N scale_mat_N`, decomposed in f64 into `K [R | t]` by an RQ decomposition. The near and
-//! far bounds are those of the sphere, if the archive has one and the camera is outside of it.
+//! For each photograph the archive has `world_mat_N`, a 4x4 matrix whose first three rows project world points to
+//! pixels, and mostly `scale_mat_N`, which places the unit sphere around the object in that world. The scene's world is
+//! the unit sphere's: the projection is `P = world_mat_N scale_mat_N`, decomposed in f64 into `K [R | t]` by an RQ
+//! decomposition. The near and far bounds are those of the sphere, if the archive has one and the camera is outside of
+//! it.
 //!
-//! A photograph belongs to the matrix with the number that its name ends in, if all have one and these differ; otherwise
-//! to that of its position. `mask/` holds masks of the same names or numbers. Pixel `(0, 0)` is the centre of the top left pixel there; here that is
-//! `(0.5, 0.5)`.
+//! A photograph belongs to the matrix with the number that its name ends in, if all have one and these differ;
+//! otherwise to that of its position. `mask/` holds masks of the same names or numbers. Pixel `(0, 0)` is the centre of
+//! the top left pixel there; here that is `(0.5, 0.5)`.
 
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -187,7 +188,8 @@ fn product(a: &[[f64; 4]; 4], b: &[[f64; 4]; 4]) -> [[f64; 4]; 4] {
     std::array::from_fn(|row| std::array::from_fn(|column| entry(row, column)))
 }
 
-/// A projection `K R (X - centre)`; `K` upper triangular with a positive diagonal and a last entry of 1, `R` a rotation.
+/// A projection `K R (X - centre)`; `K` upper triangular with a positive diagonal and a last entry of 1, `R` a
+/// rotation.
 struct Parts {
     k: DMat3,
     camera_from_world: DMat3,

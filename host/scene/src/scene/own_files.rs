@@ -13,8 +13,8 @@ const FOLDERS: [&str; 9] = ["mask", "masks", "pose", "target_pose", "sparse", "d
 const LISTS: [&str; 6] = ["json", "txt", "npy", "npz", "bin", "ply"];
 
 impl Scene {
-    /// Whether pictures written into `folder`, which need not exist, would replace files of the scene or be read as some: it is
-    /// the scene's own folder, one with its photographs or masks, or one below it that layouts read.
+    /// Whether pictures written into `folder`, which need not exist, would replace files of the scene or be read as
+    /// some: it is the scene's own folder, one with its photographs or masks, or one below it that layouts read.
     pub fn reads_folder(&self, folder: &Path) -> bool {
         let (root, folder) = (self.root(), absolute(folder));
         folder == root || self.is_inside(&root, &folder) || self.picture_folders().contains(&folder)

@@ -6,8 +6,8 @@
 //! missing `fl_y` is `fl_x`, a missing `cx`, `cy` the centre of the image, missing `w`, `h` the photograph's size.
 //! Their image coordinates are COLMAP's, with pixel centres at halves, as ours.
 //!
-//! The lens is `camera_model` (or `is_fisheye`) with `k1 .. k6 p1 p2` in OpenCV's meaning; other lenses are refused. `mask_path`
-//! names a frame's mask, `train_filenames` and the like the splits of the scene. Without `transforms.json`,
+//! The lens is `camera_model` (or `is_fisheye`) with `k1 .. k6 p1 p2` in OpenCV's meaning; other lenses are refused.
+//! `mask_path` names a frame's mask, `train_filenames` and the like the splits of the scene. Without `transforms.json`,
 //! `transforms_train.json`, `transforms_val.json` and `transforms_test.json` are one scene with splits; if there are
 //! several of them, each view's name begins with its split. A missing photograph of `images` is searched in `images_2`,
 //! `images_4` and so on. Frames whose photograph is missing are skipped, with one warning.

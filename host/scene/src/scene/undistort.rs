@@ -1,8 +1,8 @@
 //! Undistortion: a photograph with lens distortion becomes that of a pinhole camera with the same focal length.
 //!
 //! Each pixel of the result is mapped through the lens in f64, and interpolated between the four nearest pixels
-//! (premultiplied by alpha if there is any). Pixels outside the photograph, or where the lens's polynomials fold the image over, are
-//! marked as not seen.
+//! (premultiplied by alpha if there is any). Pixels outside the photograph, or where the lens's polynomials fold the
+//! image over, are marked as not seen.
 
 use image::{GrayImage, RgbaImage};
 use pulp::{Arch, Simd, WithSimd};
@@ -99,8 +99,8 @@ impl Mapping {
         [(x - self.principal[0]) / self.focal[0], (y - self.principal[1]) / self.focal[1]]
     }
 
-    /// The places of so many pixels of a row, and whether the photograph shows them: 255 or 0; some pixels behind the last one of the
-    /// row are mapped as well. A loop without branches, which becomes vectors.
+    /// The places of so many pixels of a row, and whether the photograph shows them: 255 or 0; some pixels behind the
+    /// last one of the row are mapped as well. A loop without branches, which becomes vectors.
     #[inline(always)]
     fn places<const FISHEYE: bool>(&self, first: u32, row: u32, seen: &mut [u8]) -> Places {
         let [width, height] = self.size;
@@ -124,8 +124,8 @@ impl Mapping {
 /// Bits of a place's fraction.
 const FRACTION_BITS: u32 = 16;
 
-/// The distance of an image coordinate (pixel centres at halves) from the first pixel's centre, in units of 2^-16 pixels, at most to
-/// the last pixel's. Outside the image, and for NaN, that of its nearest end.
+/// The distance of an image coordinate (pixel centres at halves) from the first pixel's centre, in units of 2^-16
+/// pixels, at most to the last pixel's. Outside the image, and for NaN, that of its nearest end.
 #[inline(always)]
 fn fixed(at: f64, side: u32) -> u32 {
     const { assert!(crate::MAX_SIDE as u64 <= 1 << (32 - FRACTION_BITS)) }
@@ -134,7 +134,8 @@ fn fixed(at: f64, side: u32) -> u32 {
     (place * f64::from(1 << FRACTION_BITS) + 4_503_599_627_370_496.0).to_bits() as u32
 }
 
-/// The four pixels nearest to each of some places: the upper left one, steps to its neighbours, and the shares of these.
+/// The four pixels nearest to each of some places: the upper left one, steps to its neighbours, and the shares of
+/// these.
 struct Corners {
     upper: [u32; PART],
     right: [u32; PART],

@@ -1,9 +1,9 @@
 //! NeuS's layout, as its preprocessed DTU scenes have it: `cameras_sphere.npz`, `image/`, `mask/`.
 //!
-//! `world_mat_N` is the projection `K [R | t]` from the coordinates of the scene's own files, with `(0, 0)` at the centre
-//! of the top left pixel. `scale_mat_N`, the same for all views, maps the unit sphere to what the cameras have in
-//! common: the ball around the point nearest to their principal axes ([`Rig::subject_radius`]). A scene that was read
-//! in this layout is in the sphere's coordinates already, and keeps them.
+//! `world_mat_N` is the projection `K [R | t]` from the coordinates of the scene's own files, with `(0, 0)` at the
+//! centre of the top left pixel. `scale_mat_N`, the same for all views, maps the unit sphere to what the cameras have
+//! in common: the ball around the point nearest to their principal axes ([`Rig::subject_radius`]). A scene that was
+//! read in this layout is in the sphere's coordinates already, and keeps them.
 //!
 //! `N` is the number that the view's name ends in, if these differ; otherwise its place in natural order. Photographs
 //! of a pinhole and their masks are copied; others are written undistorted, with the mask as a picture of its own.

@@ -1,18 +1,18 @@
 //! Learned attention with parameters of 8 bits: made from those of 32 bits, bounded, and written as Rust for firmware.
 //!
-//! A row of weights becomes whole numbers from -127 to 127 times one scale, the largest weight's part of 127. Everything is
-//! computed in `f64`.
+//! A row of weights becomes whole numbers from -127 to 127 times one scale, the largest weight's part of 127.
+//! Everything is computed in `f64`.
 //!
-//! The bound: the network with the rounded weights is evaluated in `f64` beside the exact one; that is the larger part of the
-//! change. What remains is how far a processor's numbers may be from that: with inputs known to `e`, a layer's outputs are
-//! known to
+//! The bound: the network with the rounded weights is evaluated in `f64` beside the exact one; that is the larger part
+//! of the change. What remains is how far a processor's numbers may be from that: with inputs known to `e`, a layer's
+//! outputs are known to
 //!
 //! ```text
 //! |y' - y| <= |W'| (e + step / 2) + rounding,     step = max (|x| + e) / 32767
 //! ```
 //!
-//! A ReLU does not make this larger. The same for keys, products and offsets bounds each logit, and so each weight of the
-//! softmax.
+//! A ReLU does not make this larger. The same for keys, products and offsets bounds each logit, and so each weight of
+//! the softmax.
 
 use viewfuse_core::attention::quantised::{
     FOUR, MAX_LEVEL, MIN_INPUT, QuantisedAttention, QuantisedLinear, feature_error,
@@ -248,8 +248,8 @@ fn weight_change(exact: &[f64], known: &[Known], view: usize) -> f64 {
     (at(1.0) - before).abs().max((at(-1.0) - before).abs())
 }
 
-/// Rust's source of the parameters: a constant named `ATTENTION`, for a firmware that depends on `viewfuse-core`. `origin`
-/// names where they are from, in a comment.
+/// Rust's source of the parameters: a constant named `ATTENTION`, for a firmware that depends on `viewfuse-core`.
+/// `origin` names where they are from, in a comment.
 pub fn rust_source(parameters: &QuantisedAttention, origin: &str) -> String {
     let QuantisedAttention { first, second, key, offset, offset_scale } = parameters;
     let layers = [layer("first", first), layer("second", second), layer("key", key)];

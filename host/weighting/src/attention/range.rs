@@ -1,11 +1,11 @@
-//! The largest numbers that attention's parameters can give: finite parameters may overflow together, after which a softmax
-//! has nothing to tell sources apart by.
+//! The largest numbers that attention's parameters can give: finite parameters may overflow together, after which a
+//! softmax has nothing to tell sources apart by.
 
 use super::AttentionModel;
 use viewfuse_core::attention::{EMBEDDING, Linear, POSE_FEATURES};
 
-/// Largest coordinate of a camera that the bounds hold for, in the unit of weightings, in which cameras are 1.3 from what they
-/// look at.
+/// Largest coordinate of a camera that the bounds hold for, in the unit of weightings, in which cameras are 1.3 from
+/// what they look at.
 const MAX_COORDINATE: f64 = 1.0e4;
 
 /// Logits from which on sums may overflow in `f32`; half of its range, for the roundings.

@@ -1,7 +1,7 @@
 //! What core computes, as a list of named numbers from a few inputs.
 //!
-//! The firmware and `tests/embedded/firmware.rs` call these same functions, the one on a Cortex-M4F, the other on the host; the
-//! lists must agree in every bit. All numbers are finite: the bits of a NaN are not a result.
+//! The firmware and `tests/embedded/firmware.rs` call these same functions, the one on a Cortex-M4F, the other on the
+//! host; the lists must agree in every bit. All numbers are finite: the bits of a NaN are not a result.
 #![no_std]
 #![forbid(unsafe_code)]
 

@@ -1,5 +1,5 @@
-//! The calls of attention with parameters of 32 bits, measured as those of `calls`. 60 kB of parameters lie on the stack: for a
-//! processor with an FPU, and memory.
+//! The calls of attention with parameters of 32 bits, measured as those of `calls`. 60 kB of parameters lie on the
+//! stack: for a processor with an FPU, and memory.
 #![no_std]
 #![no_main]
 

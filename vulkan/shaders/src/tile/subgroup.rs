@@ -1,11 +1,12 @@
-//! One tile, whose rows pass between the invocations of a subgroup ([`Form::Subgroup`](viewfuse_kernels::rows::Form::Subgroup)).
+//! One tile, whose rows pass between the invocations of a subgroup
+//! ([`Form::Subgroup`](viewfuse_kernels::rows::Form::Subgroup)).
 //!
 //! Eight neighbours of a subgroup need the same eight rows and different columns. Each of them loads one of these rows,
-//! eight inner indices at once, and gets the other rows from the others. The columns come straight from the buffer: neighbours
-//! load what lies next to one another. No memory of the workgroup and no barrier is used.
+//! eight inner indices at once, and gets the other rows from the others. The columns come straight from the buffer:
+//! neighbours load what lies next to one another. No memory of the workgroup and no barrier is used.
 //!
-//! A subgroup has 8, 16, 32 or 64 invocations, all of which take part: the pipeline demands full subgroups of the size that
-//! its specialisation constant says.
+//! A subgroup has 8, 16, 32 or 64 invocations, all of which take part: the pipeline demands full subgroups of the size
+//! that its specialisation constant says.
 
 use super::{InvocationTile, store_sums};
 use spirv_std::arch::{subgroup_broadcast_const, subgroup_shuffle};

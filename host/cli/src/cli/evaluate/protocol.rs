@@ -47,10 +47,11 @@ const NAMED: usize = 8;
 
 #[derive(Args)]
 pub(crate) struct ProtocolOptions {
-    /// Choose sources and targets by a protocol: random[:sources=N] (3), close[:sources=N,degrees=D] (5 sources, exactly one
-    /// within 10 degrees of the target), count[:sources=N+N+...] (2+8+16+32), fixed[:cars|chairs|pixelnerf-1|pixelnerf-2]
-    /// (published lists) or fixed:SOURCES:TARGETS, nearest:K (each view, or each of --targets, from the K nearest others), or
-    /// a benchmark's views, size and metric: llff:3|6|9, dtu:3|6|9[,masks=given], blender:8
+    /// Choose sources and targets by a protocol: random[:sources=N] (3), close[:sources=N,degrees=D] (5 sources,
+    /// exactly one within 10 degrees of the target), count[:sources=N+N+...] (2+8+16+32),
+    /// fixed[:cars|chairs|pixelnerf-1|pixelnerf-2] (published lists) or fixed:SOURCES:TARGETS, nearest:K (each view, or
+    /// each of --targets, from the K nearest others), or a benchmark's views, size and metric: llff:3|6|9,
+    /// dtu:3|6|9[,masks=given], blender:8
     #[arg(long, value_name = "PROTOCOL", conflicts_with_all = ["sources", "views"], help_heading = PROTOCOLS)]
     pub(super) protocol: Option<Protocol>,
     /// Draw sources and targets this many times for every scene

@@ -1,5 +1,5 @@
-//! Flags of the fields, made from their rows. One that several fields have is stated once, and checked when the field is
-//! known.
+//! Flags of the fields, made from their rows. One that several fields have is stated once, and checked when the field
+//! is known.
 
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
 use viewfuse_field::options::{Flag, FlagAbout, Given};

@@ -65,8 +65,8 @@ impl Prepared {
         RenderRun { scene: &self.scene, job: &self.job, renderer, options: &self.options, progress }
     }
 
-    /// Says where an orbit ends, and warns if cameras without a photograph leave what the sources show. Not with a network,
-    /// which is there to guess what they do not.
+    /// Says where an orbit ends, and warns if cameras without a photograph leave what the sources show. Not with a
+    /// network, which is there to guess what they do not.
     pub(super) fn leaving(&self, arguments: &Arguments, progress: &Terminal) -> Option<String> {
         let cameras = self.job.source_cameras(&self.scene);
         progress.aside(|| arguments.path.tell_arc(&cameras));

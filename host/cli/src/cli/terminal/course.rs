@@ -1,9 +1,10 @@
 //! How far the work is: a share that never falls, and the time that is left, which is told while it falls.
 //!
-//! Rates are measured over pieces of the work of about a hundredth. What is left of the stage goes at the median of its own
-//! rates, what follows at the median of all or at the mean of all so far, whichever is slower: a machine that is busy for a moment
-//! moves neither far, and stages that do nothing do not hide those that take the time. Time that would rise is worse than none:
-//! nothing is told until it is below what was told again, in the first seconds, and while a piece takes longer than was expected.
+//! Rates are measured over pieces of the work of about a hundredth. What is left of the stage goes at the median of its
+//! own rates, what follows at the median of all or at the mean of all so far, whichever is slower: a machine that is
+//! busy for a moment moves neither far, and stages that do nothing do not hide those that take the time. Time that
+//! would rise is worse than none: nothing is told until it is below what was told again, in the first seconds, and
+//! while a piece takes longer than was expected.
 
 use std::ops::Range;
 use std::time::{Duration, Instant};
@@ -280,7 +281,8 @@ mod tests {
         assert!(faked.told_share() > 0.3, "{}", faked.told_share());
     }
 
-    /// Half-way everything becomes five times as slow: the time that was told was wrong, and no greater one replaces it.
+    /// Half-way everything becomes five times as slow: the time that was told was wrong, and no greater one replaces
+    /// it.
     #[test]
     fn a_time_that_would_rise_is_not_told() {
         let mut faked = Faked::new();
@@ -301,7 +303,8 @@ mod tests {
             faked.stage(stage, 20, 1, |_| if stage < 2 || stage % 2 == 0 { 0.05 } else { 4.0 });
         }
         faked.never_rises();
-        // 36 s in all. Of what is left at least a third is told: a second of 36, as the fast stages alone would have it, is none.
+        // 36 s in all. Of what is left at least a third is told: a second of 36, as the fast stages alone would have
+        // it, is none.
         let beats = faked.told.len();
         for (beat, told) in faked.told.iter().enumerate() {
             let left = 36.0 * (beats - beat) as f64 / beats as f64;

@@ -127,7 +127,8 @@ impl Lines {
     }
 }
 
-/// The words, a bar in what they leave of the width, and the share; shorter than the width, so that no terminal wraps it.
+/// The words, a bar in what they leave of the width, and the share; shorter than the width, so that no terminal wraps
+/// it.
 fn bar(words: &str, share: f64, width: usize) -> String {
     let end = format!(" {:>3} %", (100.0 * share) as u64);
     let room = width.saturating_sub(end.len() + 1);

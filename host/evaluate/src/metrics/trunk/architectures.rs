@@ -21,8 +21,8 @@ pub enum Pooling {
 /// Which Inception v3 it is: the files have the same names, and the networks pool differently.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InceptionKind {
-    /// The one that FID is defined with, `pt_inception-2015-12-05` of pytorch-fid: average pools do not count the border,
-    /// the last block has a max pool instead, and it has 1008 classes.
+    /// The one that FID is defined with, `pt_inception-2015-12-05` of pytorch-fid: average pools do not count the
+    /// border, the last block has a max pool instead, and it has 1008 classes.
     Fid,
     /// Torchvision's, of 1000 classes: average pools count zeros outside of the image. Distances differ from those of
     /// published tables.

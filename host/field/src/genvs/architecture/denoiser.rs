@@ -1,5 +1,5 @@
-//! The denoiser's architecture: the U-Net of DDPM++ with residual inputs (`SongUNet` in the code of "Elucidating the Design
-//! Space of Diffusion-Based Generative Models"), block by block.
+//! The denoiser's architecture: the U-Net of DDPM++ with residual inputs (`SongUNet` in the code of "Elucidating the
+//! Design Space of Diffusion-Based Generative Models"), block by block.
 
 use super::{COLOUR_CHANNELS, with_bias};
 use serde::Serialize;

@@ -12,12 +12,12 @@ pub(in crate::genvs) const PREFIX: &str = "pixel_nerf_net.encoder";
 
 /// Sizes of the encoder.
 ///
-/// With `s` the image's side: the stem (7x7, stride 2) has side `s / 2`; behind a 3x3 max pool with stride 2, the levels
-/// have `s / 4`, `s / 8`, `s / 16` and, with dilation 2 in place of the stride, `s / 16` again. On the last level follows
-/// the ASPP module. Three stages of convolutions lead up again, to `s / 4`: each sees the levels of its side (the last
-/// two levels and ASPP's result, the second level, the first). Their result and the first level's high-resolution
-/// channels are fused, two more stages lead up to `s` beside the stem's channels and the image's own, and a 1x1
-/// convolution maps every pixel to the features of a row of voxels. All norms are switched off.
+/// With `s` the image's side: the stem (7x7, stride 2) has side `s / 2`; behind a 3x3 max pool with stride 2, the
+/// levels have `s / 4`, `s / 8`, `s / 16` and, with dilation 2 in place of the stride, `s / 16` again. On the last
+/// level follows the ASPP module. Three stages of convolutions lead up again, to `s / 4`: each sees the levels of its
+/// side (the last two levels and ASPP's result, the second level, the first). Their result and the first level's
+/// high-resolution channels are fused, two more stages lead up to `s` beside the stem's channels and the image's own,
+/// and a 1x1 convolution maps every pixel to the features of a row of voxels. All norms are switched off.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Encoder {
     /// Channels after the first convolution.
@@ -30,7 +30,8 @@ pub struct Encoder {
     pub high_resolution_channels: usize,
     /// Features of a voxel.
     pub feature_count: usize,
-    /// Voxels in depth. The volume's channel `feature * volume_depth + depth` is that feature of the voxel at that depth.
+    /// Voxels in depth. The volume's channel `feature * volume_depth + depth` is that feature of the voxel at that
+    /// depth.
     pub volume_depth: usize,
 }
 

@@ -30,8 +30,8 @@ pub(crate) fn hue(turns: f32, saturation: f32, value: f32) -> Vec3 {
     Vec3::new(channel(0.0), channel(2.0 / 3.0), channel(1.0 / 3.0))
 }
 
-/// Any paint: white and silver, black, vivid, dull. Vivid ones are red, blue and yellow more often than others, as paints
-/// are.
+/// Any paint: white and silver, black, vivid, dull. Vivid ones are red, blue and yellow more often than others, as
+/// paints are.
 pub(crate) fn paint(draws: &mut Draws) -> Vec3 {
     let turns = match draws.below(8) {
         0 | 1 => draws.between(0.96, 1.05),

@@ -18,8 +18,8 @@ const GROUP: usize = 4;
 /// Ratio of the highest frequency of the embedding to the lowest.
 const FREQUENCY_RATIO: f32 = 10_000.0;
 
-/// The network's output `[image][row][column][3]` for its scaled input `[image][row][column][channel]` and the noise levels
-/// of the images as [`viewfuse_core::schedule::Preconditioning::noise`].
+/// The network's output `[image][row][column][3]` for its scaled input `[image][row][column][channel]` and the noise
+/// levels of the images as [`viewfuse_core::schedule::Preconditioning::noise`].
 pub(super) fn run(layers: Layers<'_>, sizes: &Denoiser, inputs: &Tensor, levels: &[f32]) -> Result<Tensor> {
     let waves: Vec<f32> = levels.iter().flat_map(|level| waves(*level, sizes.noise_channels)).collect();
     let waves = Tensor::from_vec(waves, (levels.len(), sizes.noise_channels), inputs.device())?;
@@ -52,8 +52,8 @@ pub(super) fn run(layers: Layers<'_>, sizes: &Denoiser, inputs: &Tensor, levels:
     layers.convolved(&convolution.name, &layers.normalised(&norm, &x, true)?, Window::same(3), false)
 }
 
-/// Initial values of layers that copy their inputs: the first convolution, those of the halved inputs, and the shortcuts of
-/// blocks; `None` for other tensors.
+/// Initial values of layers that copy their inputs: the first convolution, those of the halved inputs, and the
+/// shortcuts of blocks; `None` for other tensors.
 ///
 /// As published, the features are scaled down with the noisy picture, at the largest noise level to an eightieth,
 /// beside noise of variance 1. If layers mix both at random, short runs do not learn to use the features. Here noise

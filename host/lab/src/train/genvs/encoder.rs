@@ -1,5 +1,5 @@
-//! Volumes from pictures, as [`viewfuse_field::genvs`] encodes them: a residual trunk at output stride 16, spatial pyramid
-//! pooling, and a decoder up to the pictures' own size.
+//! Volumes from pictures, as [`viewfuse_field::genvs`] encodes them: a residual trunk at output stride 16, spatial
+//! pyramid pooling, and a decoder up to the pictures' own size.
 
 use super::super::images::{dims4, max_pool};
 use super::super::operations::Window;

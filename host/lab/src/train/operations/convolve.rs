@@ -57,8 +57,8 @@ impl Window {
     }
 }
 
-/// Inputs: images `[image][row][column][in]`, weights `[out][place][in]`, biases `[out]` of all images or `[image][out]` of
-/// each. Result `[image][row][column][out]`.
+/// Inputs: images `[image][row][column][in]`, weights `[out][place][in]`, biases `[out]` of all images or
+/// `[image][out]` of each. Result `[image][row][column][out]`.
 pub(crate) struct Convolution {
     /// Images, rows, columns, channels of the input.
     pub(crate) input: [usize; 4],

@@ -1,8 +1,8 @@
 //! Densities: negative values count as zero.
 //!
 //! With plain rectification, a network whose densities are all negative has no gradient and stays empty; training from
-//! scratch on objects before white mostly ends so. Therefore a part of the gradient passes where a density of zero should
-//! increase; where it should decrease, none passes, because it is minimal already.
+//! scratch on objects before white mostly ends so. Therefore a part of the gradient passes where a density of zero
+//! should increase; where it should decrease, none passes, because it is minimal already.
 
 use super::{Operation, Real};
 

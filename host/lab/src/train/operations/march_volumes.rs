@@ -1,5 +1,5 @@
-//! GeNVS's features of rays from volumes, as one operation: look-ups in the views' volumes at points, fusion of the views,
-//! the point network, compositing.
+//! GeNVS's features of rays from volumes, as one operation: look-ups in the views' volumes at points, fusion of the
+//! views, the point network, compositing.
 //!
 //! Chunks of rays go through all steps, so that intermediate values stay in a core's caches; the backward pass computes
 //! them again.
@@ -32,7 +32,8 @@ pub(crate) struct MarchSizes {
 }
 
 impl MarchSizes {
-    /// How many parameters there are, in this order: three layers, of each the weights `[output][input]`, then the biases.
+    /// How many parameters there are, in this order: three layers, of each the weights `[output][input]`, then the
+    /// biases.
     pub(crate) fn parameter_count(&self) -> usize {
         self.layer(2).end
     }
@@ -60,8 +61,8 @@ pub(crate) struct SampledRays {
     pub(crate) length_scale: f32,
 }
 
-/// Inputs: volumes `[object and view][row][column][depth][feature]`, weights of the views `[object][view]`, parameters (see
-/// [`MarchSizes::parameter_count`]). Result `[object and ray][feature]`.
+/// Inputs: volumes `[object and view][row][column][depth][feature]`, weights of the views `[object][view]`, parameters
+/// (see [`MarchSizes::parameter_count`]). Result `[object and ray][feature]`.
 #[derive(Clone)]
 pub(crate) struct MarchVolumes {
     pub(crate) sizes: MarchSizes,

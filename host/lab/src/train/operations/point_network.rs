@@ -1,8 +1,8 @@
 //! PixelNeRF's point network as one operation: a view's blocks, fusion of the views, the blocks behind.
 //!
-//! Chunks of some dozens of points go through all layers, so that activations stay in a core's caches; the backward pass
-//! computes them again, for the points that have a gradient: most of a ray's are in empty space or behind a surface. The
-//! library's operations would move 90 times the activations through memory for the same work.
+//! Chunks of some dozens of points go through all layers, so that activations stay in a core's caches; the backward
+//! pass computes them again, for the points that have a gradient: most of a ray's are in empty space or behind a
+//! surface. The library's operations would move 90 times the activations through memory for the same work.
 
 use super::convolve::sum;
 use super::linear::{layer_gradient, linear, linear_back, rectified};

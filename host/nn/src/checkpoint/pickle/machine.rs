@@ -1,5 +1,5 @@
-//! The stack machine of pickles. Every opcode builds a value, moves values on the stack, or fills a value; none has another
-//! effect.
+//! The stack machine of pickles. Every opcode builds a value, moves values on the stack, or fills a value; none has
+//! another effect.
 
 use super::super::input::Input;
 use super::{Fault, Id, LONGEST_TEXTS, MAX_VALUES, Object, Span, Value};

@@ -61,7 +61,8 @@ pub(super) fn images(path: &Path) -> Result<Vec<ModelImage>, SceneError> {
     Ok(all)
 }
 
-/// Whether a line lists points in an image: `X Y POINT3D_ID` each, or nothing. An image's line has a name in tenth place.
+/// Whether a line lists points in an image: `X Y POINT3D_ID` each, or nothing. An image's line has a name in tenth
+/// place.
 fn is_points(line: &str) -> bool {
     let mut words = 0;
     line.split_whitespace().inspect(|_| words += 1).all(|word| word.parse::<f64>().is_ok()) && words % 3 == 0

@@ -81,8 +81,8 @@ impl<'a> Frame<'a> {
         Ok(Listed::View(Box::new(view)))
     }
 
-    /// Its camera alone: photograph, mask and lens are ignored. A size that is not stated is `size`; without focal lengths
-    /// it has no intrinsics.
+    /// Its camera alone: photograph, mask and lens are ignored. A size that is not stated is `size`; without focal
+    /// lengths it has no intrinsics.
     pub(crate) fn camera_alone(&self, size: [u32; 2]) -> Result<RawView, SceneError> {
         let [frame, _] = &self.scopes;
         let pose = self.pose()?;
