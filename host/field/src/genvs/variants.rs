@@ -13,9 +13,8 @@ use viewfuse_core::sampler::control::HALF_A_LEVEL;
 use viewfuse_core::schedule::NoiseSchedule;
 
 /// Calls of the denoiser, with the error that is typical of so many, from noise alone and from the colours of the
-/// feature image, and what the error is relative to what the run itself tells (the experiment `efforts` of
-/// `viewfuse-research`, on the network of the published size, the included one, and one without colours after 200 steps
-/// of training).
+/// feature image, and what the error is relative to what the run itself tells (`host/results/efforts.md`,
+/// on the network of the published size, the included one, and one without colours after 200 steps of training).
 const CALLS: [(u32, [f32; 2], Relative); 8] = [
     (2, [0.12, 0.08], Relative::ToLastChange(4.3)),
     (3, [0.08, 0.033], Relative::ToLastChange(1.65)),

@@ -11,7 +11,7 @@ use crate::variant::{EXACT, Variant};
 
 /// Nodes between which samples are interpolated, in 64ths of the samples of the first pass, with the largest difference
 /// between the rays around an interpolated pixel, the error that is typical of it and its typical work. Measured on the
-/// included network (the experiment `efforts` of `viewfuse-research`).
+/// included network (`host/results/efforts.md`).
 const NODES: [(u32, f32, f32, f32); 9] = [
     (12, 0.25, 0.03, 0.01),
     (16, 0.2, 0.021, 0.012),

@@ -8,7 +8,7 @@ use viewfuse_device::Device;
 use viewfuse_scene::photographs::SourceImage;
 
 /// Shares of the side at which views are compared and of the planes, and the neighbours of each source, with the error
-/// and the work that are typical of them (`host/results/front_to_back.md`, "Efforts").
+/// and the work that are typical of them (`host/results/efforts.md`).
 const EFFORTS: [(f32, f32, usize, f32, f32); 4] =
     [(0.25, 0.5, 2, 0.055, 0.1), (0.5, 1.0, 1, 0.035, 0.22), (0.75, 1.0, 1, 0.027, 0.4), (1.0, 1.0, 1, 0.024, 0.8)];
 
