@@ -150,11 +150,10 @@ fn pictures_are_mixed_where_that_is_not_worse() -> Result<(), Box<dyn Error>> {
             // What is mixed is the pictures under the settings of the parts.
             let field = TrainingFree::default();
             let renderer = On { device: &Cpu, field: &field };
-            let (job, mut levels) = (middle(&scene), vec![Vec::new(); mixture.parts.len()]);
+            let (job, mut levels) = (middle(scene), vec![Vec::new(); mixture.parts.len()]);
             for (part, levels) in mixture.parts.iter().zip(&mut levels) {
                 let given = RenderOptions { field: Some(part.clone()), ..options() };
-                let run =
-                    RenderRun { scene: &scene, job: &job, renderer: &renderer, options: &given, progress: &Silent };
+                let run = RenderRun { scene, job: &job, renderer: &renderer, options: &given, progress: &Silent };
                 render(&run, &chosen.weighting, |_, frame| {
                     levels.extend(frame.colours.iter().map(|colour| colour[1]));
                     Ok::<(), RenderError>(())

@@ -76,8 +76,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     if output.exists() && !std::fs::read_dir(output).is_ok_and(|mut entries| entries.next().is_none()) {
         bail!("{}: exists already and is not an empty folder; give another name", output.display());
     }
-    let options =
-        Options { focal: arguments.focal, seed: arguments.seed, every: arguments.every.into(), ..Options::default() };
+    let options = Options { focal: arguments.focal, seed: arguments.seed, every: arguments.every.into() };
     let (from, to) = (solvers(&arguments.from), (arguments.layout, output.as_path()));
     let work = || found(photographs, &from, &options, to);
     let found = on_threads(arguments.threads, work)??;

@@ -22,7 +22,7 @@ use viewfuse_weighting::sources::SourceWeights;
 
 /// The error and the share of the optimisation's time that are typical of its first iterations: those at a quarter of
 /// the finest level's size, those at a half too, and half of those at the finest level too
-/// (`host/research/results/gaussians.md`).
+/// (`host/results/gaussians.md`).
 const EFFORTS: [(f32, f32); 3] = [(0.09, 0.31), (0.045, 0.56), (0.012, 0.75)];
 
 /// Pictures of Gaussians that are optimised for the sources. Nothing is learned but the scene itself.

@@ -150,7 +150,8 @@ impl<D: Device> Prepared for Mixed<'_, D> {
 
     fn reduced(&self, options: &AnyOptions, purpose: Purpose) -> AnyOptions {
         let Some(whole) = options.of::<TrainingFree>() else { return options.clone() };
-        let recipe = whole.recipe.reduced(purpose);
+        // Small silhouettes have no efforts, and their Gaussians take little time.
+        let recipe = if self.efforts(options).is_empty() { whole.recipe } else { whole.recipe.reduced(purpose) };
         AnyOptions::new(TrainingFree { recipe, ..whole.with(whole.sweep.reduced(purpose)) })
     }
 
