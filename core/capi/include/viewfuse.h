@@ -193,8 +193,8 @@ typedef struct {
    */
   float optical_depth;
   /*
-   Transmittance of the samples so far, from 0 to 1. Early termination: stop where it is below a threshold. The samples
-   behind change a colour by at most this fraction of its range.
+   Transmittance of the samples so far, from 0 to 1. Early termination: stop where it is below a threshold. The
+   samples behind change a colour by at most this fraction of its range.
    */
   float transmittance;
 } viewfuse_ray;
@@ -365,8 +365,8 @@ viewfuse_status viewfuse_fuse_views(const float *weights,
 viewfuse_status viewfuse_ray_start(viewfuse_ray *ray);
 
 /*
- Adds the next sample, front to back: its colour `[3]`, its optical depth (density times length; negative or NaN counts
- as 0, infinity as opaque) and its distance along the ray.
+ Adds the next sample, front to back: its colour `[3]`, its optical depth (density times length; negative or NaN
+ counts as 0, infinity as opaque) and its distance along the ray.
 
  # Safety
  Pointers are null or valid.
@@ -384,8 +384,8 @@ viewfuse_status viewfuse_ray_add(viewfuse_ray *ray, const float *rgb, float opti
 viewfuse_status viewfuse_ray_add_solid(viewfuse_ray *ray, const float *rgb, float occupancy, float depth);
 
 /*
- The pixel, with the background `[3]` behind everything; `empty_depth` is the depth of a ray that hit nothing. The ray
- is not changed.
+ The pixel, with the background `[3]` behind everything; `empty_depth` is the depth of a ray that hit nothing. The
+ ray is not changed.
 
  # Safety
  Pointers are null or valid.

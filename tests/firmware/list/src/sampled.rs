@@ -7,7 +7,7 @@ use viewfuse_core::sampler::{History, MAX_RESULTS, NoiseBlock, Sampler, noisy_el
 use viewfuse_core::schedule::{NoiseSchedule, Preconditioning};
 
 /// Levels of the samplers: few, so that steps are long.
-const FEW: u32 = 9;
+const FEW: u32 = 13;
 
 /// The list of the samplers: coefficients and a whole descent of one value for each, churn, and the step controller.
 pub fn sampling(inputs: Inputs, emit: Emit) {
