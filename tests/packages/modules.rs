@@ -250,8 +250,11 @@ fn modules_that_are_not_named_are_fields() {
 #[test]
 fn a_module_that_uses_a_later_one_is_found() {
     let folder = tempfile::tempdir().expect("a folder");
-    std::fs::create_dir_all(folder.path().join("src/first")).expect("a folder");
-    let write = |name: &str, text: &str| std::fs::write(folder.path().join("src").join(name), text).expect("a file");
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join("src").join(name);
+        std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+        std::fs::write(path, text).expect("a file");
+    };
     let library = "//! ```text\n//! first, second  what they do\n//! third          the last\n//! ```\n\
                    pub mod second;\nmod first;\npub mod third;\npub use third::Thing;\npub struct Shared;\n";
     write("lib.rs", library);

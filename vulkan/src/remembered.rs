@@ -107,7 +107,7 @@ mod tests {
     }
 
     fn choices() -> Choices {
-        Choices::parse("convolve 14 6 7 quadruple\nlinear 9 6 7 double\n").expect("choices")
+        Choices::parse("convolve 14 6 7 subgroup\nlinear 9 6 7 single\n").expect("choices")
     }
 
     #[test]
