@@ -1,7 +1,7 @@
 //! The traits of a field: [`Field`] states its requirements and takes source views to a device; [`Prepared`] encodes
 //! views and renders. A [`Stage`](crate::render::Stage) calls both: it alone decides when a view is encoded.
 //!
-//! A field renders in more than one way by values of its own options: a [`Variant`](crate::variant::Variant) is one of
+//! A field renders in more than one way by values of its own options: a [`Variant`] is one of
 //! them. Its efforts are what a [`Bound`](crate::budget::Bound) chooses from; its candidates are tried on held-out
 //! sources, and its parts mixed, because pictures become better. What the render loop omits of any field's work,
 //! sources of least weight and samples behind surfaces, is in [`RenderOptions`](crate::render::RenderOptions).

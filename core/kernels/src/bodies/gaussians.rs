@@ -68,8 +68,8 @@ pub fn blend_gradient(
     }
 }
 
-/// The derivative by a Gaussian, from the entries that are its splat's, `uses[use_starts[gaussian]..use_starts[gaussian
-/// + 1]]`, in their order.
+/// The derivative by a Gaussian, from the entries that are its splat's,
+/// `uses[use_starts[gaussian]..use_starts[gaussian + 1]]`, in their order.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
 pub fn project_gradients(

@@ -28,7 +28,7 @@ impl JournalLines {
     /// The next whole line, with its line break; `None` behind the last one.
     ///
     /// # Errors
-    /// As [`read_line`].
+    /// As reading a line of a file.
     pub fn next_line(&mut self) -> io::Result<Option<Vec<u8>>> {
         let line = read_line(&mut self.reader, self.most)?;
         if line.ends_with(b"\n") {
@@ -63,7 +63,7 @@ impl Journal {
     /// Opens a journal behind its last byte; it is made where there is none.
     ///
     /// # Errors
-    /// As [`append_ordinary`].
+    /// As opening an ordinary file to append to it.
     pub fn append(path: &Path) -> io::Result<Journal> {
         append_ordinary(path).map(Journal)
     }
