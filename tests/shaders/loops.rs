@@ -117,7 +117,6 @@ const RESULT: Word = 2;
 
 /// `sum = 0; i = 0; while i < limit { sum += i; i += 1 } result = sum + i`, where sum and i are 0 in the join if they
 /// come from the exit, as rust-gpu leaves them.
-#[expect(clippy::too_many_lines, reason = "a module, block by block")]
 fn module(shape: Shape) -> Module {
     let mut b = Builder::new();
     // The limit and the result have the first numbers.
