@@ -99,6 +99,6 @@ impl Reader for Posed<'_> {
     fn read(&self, found: &Path) -> Result<RawScene, SceneError> {
         let views = self.taken.iter().map(|photo| self.view(*photo)).collect::<Result<_, _>>()?;
         let points = self.solution.points.iter().filter_map(|point| self.point(point)).collect();
-        Ok(RawScene { views, points, points_path: found.to_path_buf(), warnings: Vec::new() })
+        Ok(RawScene { views, points, points_path: found.to_path_buf(), ..RawScene::default() })
     }
 }

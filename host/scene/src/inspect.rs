@@ -70,6 +70,8 @@ pub struct Inspection {
     pub near: f32,
     /// Greatest depth.
     pub far: f32,
+    /// Conventions of the files that were applied, one line each.
+    pub conventions: Vec<String>,
     /// Warnings, one line each.
     pub warnings: Vec<String>,
 }
@@ -132,6 +134,7 @@ pub fn inspect(
         object: object.map(|object| [object.low, object.high].map(|c| [c[0], c[1], c[2]])),
         near,
         far,
+        conventions: scene.conventions.clone(),
         warnings,
     })
 }

@@ -170,6 +170,8 @@ pub struct Scene {
     pub points: Vec<ScenePoint>,
     /// Warnings from opening the scene, a line each: missing photographs, ignored keys.
     pub warnings: Vec<String>,
+    /// Conventions of the files that were applied, a line each (host/scene/CONVENTIONS.md).
+    pub conventions: Vec<String>,
     /// The world's place in the coordinates of the files.
     pub frame: SceneFrame,
 }
@@ -203,8 +205,9 @@ impl Scene {
                     return Err(SceneError::DuplicateName { path, name: view.name.clone() });
                 }
             }
-            let Checked { views, points, warnings, frame } = checked;
-            return Ok(Scene { path: path.to_path_buf(), layout: reader.name(), views, points, warnings, frame });
+            let Checked { views, points, warnings, conventions, frame } = checked;
+            let (path, layout) = (path.to_path_buf(), reader.name());
+            return Ok(Scene { path, layout, views, points, warnings, conventions, frame });
         }
         let (path, looked_for) = (path.to_path_buf(), looked_for(readers));
         Err(match files::photograph_count(&path) {

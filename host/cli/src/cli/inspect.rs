@@ -122,6 +122,7 @@ fn print_text(inspection: &Inspection) -> std::io::Result<()> {
         let (lenses, masks, points) = (i.lens_count, i.mask_count, i.point_count);
         say(format_args!("with       {lenses} lenses to undo, {masks} masks, {points} reconstructed points"))?;
     }
+    i.conventions.iter().try_for_each(|convention| say(format_args!("read as    {convention}")))?;
     if i.origin != [0.0; 3] || i.unit != 1.0 {
         let [x, y, z] = i.origin;
         say(format_args!("frame      the file's ({x}, {y}, {z}) is the origin, its {} the unit", i.unit))?;

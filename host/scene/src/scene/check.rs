@@ -21,12 +21,13 @@ pub(super) struct Checked {
     pub(super) views: Vec<View>,
     pub(super) points: Vec<ScenePoint>,
     pub(super) warnings: Vec<String>,
+    pub(super) conventions: Vec<String>,
     pub(super) frame: SceneFrame,
 }
 
 /// The scene, its views with photographs first.
 pub(super) fn scene(found: &Path, form: &'static str, raw: RawScene) -> Result<Checked, SceneError> {
-    let RawScene { views: raw_views, points, points_path, mut warnings } = raw;
+    let RawScene { views: raw_views, points, points_path, mut warnings, conventions } = raw;
     let mut order: Vec<usize> = (0..raw_views.len()).collect();
     // Stable: photographs first, otherwise in their order.
     order.sort_by_key(|&view| raw_views[view].image.is_none());
@@ -70,7 +71,7 @@ pub(super) fn scene(found: &Path, form: &'static str, raw: RawScene) -> Result<C
         place[before] = now as u32;
     }
     let points = points.into_iter().map(|raw| point(&points_path, raw, &frame, &place)).collect::<Result<_, _>>()?;
-    Ok(Checked { views, points, warnings, frame })
+    Ok(Checked { views, points, warnings, conventions, frame })
 }
 
 /// The camera of a view without a photograph, in the world of a scene that is open; `pinhole` is that of a view without

@@ -50,6 +50,8 @@ pub struct RawScene {
     pub points_path: PathBuf,
     /// What was left out or ignored, a line each.
     pub warnings: Vec<String>,
+    /// Conventions of the files that were applied, a line each, as `masks: pixels that do not count, 11 files`.
+    pub conventions: Vec<String>,
 }
 
 impl From<Vec<RawView>> for RawScene {
