@@ -78,8 +78,8 @@ impl<const I: usize, const O: usize> Linear<I, O> {
 
     /// Takes the parameters from the front of a list and returns the rest of it.
     fn take_flat<'a>(&mut self, parameters: &'a [f32]) -> &'a [f32] {
-        let own = self.weight.as_flattened_mut().iter_mut().chain(&mut self.bias);
-        own.zip(parameters).for_each(|(own, parameter)| *own = *parameter);
+        let target = self.weight.as_flattened_mut().iter_mut().chain(&mut self.bias);
+        target.zip(parameters).for_each(|(target, parameter)| *target = *parameter);
         parameters.get(I * O + O..).unwrap_or_default()
     }
 

@@ -166,14 +166,14 @@ pub fn merged_depth(
     let at = |index: u32| {
         if index < coarse_count { coarse.fetch(index as usize) } else { fine.fetch((index - coarse_count) as usize) }
     };
-    let own = at(index);
+    let depth_here = at(index);
     let (mut place, mut other) = (0, 0);
     while other < coarse_count + fine_count {
         let depth = at(other);
-        if depth < own || (depth == own && other < index) {
+        if depth < depth_here || (depth == depth_here && other < index) {
             place += 1;
         }
         other += 1;
     }
-    (own, place)
+    (depth_here, place)
 }

@@ -214,8 +214,8 @@ impl ProjectedGaussian {
 pub fn nearest_first(projected: &[ProjectedGaussian], order: &mut [u32]) {
     let count = if order.len() < projected.len() { order.len() } else { projected.len() };
     let order = &mut order[..count];
-    for (index, own) in order.iter_mut().enumerate() {
-        *own = index as u32;
+    for (index, place) in order.iter_mut().enumerate() {
+        *place = index as u32;
     }
     // Depths are positive or 0: their bits have their order.
     order.sort_unstable_by_key(|index| (projected[*index as usize].depth.to_bits(), *index));

@@ -136,7 +136,7 @@ impl Adapter {
         // SAFETY: the chained structs are known to 1.1, or ignored.
         unsafe { instance.raw.get_physical_device_properties2(raw, &mut properties) };
         let properties = properties.properties;
-        let own = &properties.limits;
+        let limits = &properties.limits;
         // SAFETY: the device is the instance's.
         let (families, memory_types, offered) = unsafe {
             (
@@ -171,21 +171,21 @@ impl Adapter {
             api_version: properties.api_version,
             memory,
             limits: Limits {
-                buffer_range: own.max_storage_buffer_range.into(),
+                buffer_range: limits.max_storage_buffer_range.into(),
                 // Devices may say 0 where they mean no limit.
                 allocation: match maintenance.max_memory_allocation_size {
                     0 => u64::MAX,
                     size => size,
                 },
-                workgroup_count: own.max_compute_work_group_count[0],
+                workgroup_count: limits.max_compute_work_group_count[0],
                 memory,
             },
             subgroup_size,
             missing: missing(&properties, has_model, family.is_some()),
             queue_family: family.unwrap_or(0),
             timestamp_bits: family.map_or(0, |family| families[family as usize].timestamp_valid_bits),
-            timestamp_period: own.timestamp_period,
-            offset_alignment: own.min_storage_buffer_offset_alignment,
+            timestamp_period: limits.timestamp_period,
+            offset_alignment: limits.min_storage_buffer_offset_alignment,
             extensions: extensions(
                 properties.api_version,
                 subgroup_size.is_some(),
@@ -262,11 +262,11 @@ fn extensions(
 
 /// Whether a device with the extension reports on its pipelines.
 fn reports_pipelines(instance: &Instance, raw: vk::PhysicalDevice) -> bool {
-    let mut own = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default();
-    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut own);
+    let mut executables = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default();
+    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut executables);
     // SAFETY: the device knows the chained struct.
     unsafe { instance.raw.get_physical_device_features2(raw, &mut features) };
-    own.pipeline_executable_info == vk::TRUE
+    executables.pipeline_executable_info == vk::TRUE
 }
 
 fn memory_model(instance: &Instance, raw: vk::PhysicalDevice, api_version: u32, has_extension: bool) -> bool {

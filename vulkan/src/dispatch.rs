@@ -66,8 +66,8 @@ impl Gpu {
                     (form, 0..tile_elements(shape.row_count, shape.column_count))
                 }
                 None => {
-                    let own = kernel.invocations();
-                    (Form::Single, elements.start * own..elements.end * own)
+                    let invocations = kernel.invocations();
+                    (Form::Single, elements.start * invocations..elements.end * invocations)
                 }
             };
             let count = u64::from(elements.end - elements.start);

@@ -29,9 +29,9 @@ fn instructions(module: &[u32]) -> impl Iterator<Item = (u32, &[u32])> {
     let mut rest = module.get(HEADER..).unwrap_or_default();
     std::iter::from_fn(move || {
         let first = *rest.first()?;
-        let (own, next) = rest.split_at_checked((first >> 16).max(1) as usize)?;
+        let (instruction, next) = rest.split_at_checked((first >> 16).max(1) as usize)?;
         rest = next;
-        Some((first & 0xffff, own))
+        Some((first & 0xffff, instruction))
     })
 }
 
@@ -47,15 +47,15 @@ pub(crate) fn excerpt(module: &[u32], entry_point: &str) -> Vec<u32> {
     let (mut calls, mut place) = (HashMap::<u32, Vec<u32>>::new(), HashMap::new());
     // Variables of the module, and those that a function may use: those whose numbers are among its words.
     let (mut variables, mut uses) = (HashSet::new(), HashMap::<u32, HashSet<u32>>::new());
-    for (code, own) in instructions(module) {
-        match (code, own) {
+    for (code, words) in instructions(module) {
+        match (code, words) {
             (ENTRY_POINT, [_, _, id, name @ ..]) if is_named(name) => (entry, interface) = (Some(*id), name),
             (VARIABLE, [_, _, id, ..]) if function.is_none() => drop(variables.insert(*id)),
             (FIRST_TYPE..=LAST_TYPE, [_, id, ..]) => drop(types.insert(*id)),
             (FUNCTION, [_, _, id, ..]) => function = Some(*id),
             _ => {}
         }
-        if let (Some(function), [_, kind, id, rest @ ..]) = (function, own)
+        if let (Some(function), [_, kind, id, rest @ ..]) = (function, words)
             && types.contains(kind)
         {
             // Only what has a type has a value.
@@ -65,16 +65,16 @@ pub(crate) fn excerpt(module: &[u32], entry_point: &str) -> Vec<u32> {
             }
         }
         if let Some(function) = function {
-            uses.entry(function).or_default().extend(own.iter().filter(|word| variables.contains(word)));
+            uses.entry(function).or_default().extend(words.iter().filter(|word| variables.contains(word)));
         }
         if code == FUNCTION_END {
             function = None;
         }
     }
     let (mut needed, mut open) = (HashSet::new(), Vec::from_iter(entry));
-    while let Some(own) = open.pop() {
-        if needed.insert(own) {
-            open.extend(calls.get(&own).into_iter().flatten());
+    while let Some(id) = open.pop() {
+        if needed.insert(id) {
+            open.extend(calls.get(&id).into_iter().flatten());
         }
     }
     let used = needed.iter().filter_map(|function| uses.get(function)).flatten();
@@ -82,11 +82,11 @@ pub(crate) fn excerpt(module: &[u32], entry_point: &str) -> Vec<u32> {
     let is_unused = |id: &u32| variables.contains(id) && !used.contains(id);
     let mut excerpt = module.get(..HEADER).unwrap_or_default().to_vec();
     let mut is_needed = true;
-    for (code, own) in instructions(module) {
-        if let (FUNCTION, [_, _, id, ..]) = (code, own) {
+    for (code, words) in instructions(module) {
+        if let (FUNCTION, [_, _, id, ..]) = (code, words) {
             is_needed = needed.contains(id);
         }
-        let is_kept = match (code, own) {
+        let is_kept = match (code, words) {
             (NAME | MEMBER_NAME, _) => false,
             (ENTRY_POINT, [_, _, id, ..]) | (EXECUTION_MODE, [_, id, ..]) => entry == Some(*id),
             (DECORATE | MEMBER_DECORATE, [_, id, ..]) => {
@@ -96,7 +96,7 @@ pub(crate) fn excerpt(module: &[u32], entry_point: &str) -> Vec<u32> {
             _ => is_needed,
         };
         if is_kept {
-            excerpt.extend(own);
+            excerpt.extend(words);
         }
         is_needed |= code == FUNCTION_END;
     }
@@ -127,8 +127,9 @@ mod tests {
         let mut seen = 0;
         for kernel in Kernel::ALL {
             for form in Form::ALL.into_iter().filter(|form| *form == Form::Single || kernel.is_tiled()) {
-                let own = excerpt(if form.needs_subgroups() { &subgroups } else { &kernels }, kernel.entry_point(form));
-                let of = |wanted| instructions(&own).filter(move |(code, _)| *code == wanted);
+                let module =
+                    excerpt(if form.needs_subgroups() { &subgroups } else { &kernels }, kernel.entry_point(form));
+                let of = |wanted| instructions(&module).filter(move |(code, _)| *code == wanted);
                 assert_eq!(of(ENTRY_POINT).count(), 1, "{} {}", kernel.name(), form.name());
                 for (_, capability) in of(CAPABILITY) {
                     let is_asked_for = OF_ALL.contains(&capability[1])
@@ -146,10 +147,10 @@ mod tests {
         let module = words(MODULE);
         for kernel in Kernel::ALL {
             for form in kernel.forms().iter().filter(|form| !form.needs_subgroups()) {
-                let own = excerpt(&module, kernel.entry_point(*form));
+                let part = excerpt(&module, kernel.entry_point(*form));
                 let declared =
-                    |module| instructions(module).filter(|(code, own)| *code == VARIABLE && own[3] == WORKGROUP);
-                let shared = declared(&own).count();
+                    |module| instructions(module).filter(|(code, words)| *code == VARIABLE && words[3] == WORKGROUP);
+                let shared = declared(&part).count();
                 assert_eq!(shared > 0, kernel.has_barriers(*form), "{} {}: {shared}", kernel.name(), form.name());
                 assert!(shared < declared(&module).count(), "{} {}", kernel.name(), form.name());
             }
@@ -161,9 +162,9 @@ mod tests {
         let module = words(MODULE);
         let count = |module: &[u32], wanted| instructions(module).filter(|(code, _)| *code == wanted).count();
         for kernel in Kernel::ALL {
-            let own = excerpt(&module, kernel.entry_point(Form::Single));
-            assert_eq!((count(&own, ENTRY_POINT), count(&own, EXECUTION_MODE)), (1, 1), "{}", kernel.name());
-            assert!(count(&own, FUNCTION) >= 1 && own.len() < module.len() / 4, "{}", kernel.name());
+            let part = excerpt(&module, kernel.entry_point(Form::Single));
+            assert_eq!((count(&part, ENTRY_POINT), count(&part, EXECUTION_MODE)), (1, 1), "{}", kernel.name());
+            assert!(count(&part, FUNCTION) >= 1 && part.len() < module.len() / 4, "{}", kernel.name());
         }
         assert_eq!(count(&excerpt(&module, "fuse"), ENTRY_POINT), 0, "only whole names");
     }

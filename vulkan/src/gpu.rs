@@ -159,12 +159,12 @@ impl Gpu {
             let (device, missing) = (adapter.name.clone(), adapter.missing.clone());
             return Err(VulkanError::Missing { device, missing });
         }
-        let (own, lower) = (adapter.limits, options.limits);
+        let (limits, lower) = (adapter.limits, options.limits);
         let limits = Limits {
-            buffer_range: own.buffer_range.min(lower.buffer_range),
-            allocation: own.allocation.min(lower.allocation),
-            workgroup_count: own.workgroup_count.min(lower.workgroup_count).max(1),
-            memory: own.memory.min(lower.memory),
+            buffer_range: limits.buffer_range.min(lower.buffer_range),
+            allocation: limits.allocation.min(lower.allocation),
+            workgroup_count: limits.workgroup_count.min(lower.workgroup_count).max(1),
+            memory: limits.memory.min(lower.memory),
         };
         if options.form.is_some_and(Form::needs_subgroups) && adapter.subgroup_size.is_none() {
             let missing = vec![Missing::Feature("subgroups of 8 to 64 invocations")];

@@ -33,8 +33,8 @@ impl Gpu {
             let rest = elements.end - first;
             let time = state.rates[job.kernel as usize].time_of(counted(elements.end) - counted(first));
             let len = time.map_or(FIRST, |time| within(longest, time, rest)).min(rest);
-            let own = counted(first + len) - counted(first);
-            dispatches += self.record_job(state, job, form, first..first + len, own)?;
+            let count = counted(first + len) - counted(first);
+            dispatches += self.record_job(state, job, form, first..first + len, count)?;
             if time.is_none() && len < rest {
                 let start = Instant::now();
                 state.wait()?;

@@ -99,7 +99,7 @@ impl Pipelines {
 
     /// The size of subgroups that the driver reports of a kernel's pipelines, where it reports one.
     pub(crate) fn reported(&self, kernel: Kernel) -> Option<u32> {
-        self.reported.iter().find(|((own, ..), _)| *own == kernel).map(|(_, size)| *size)
+        self.reported.iter().find(|((reported, ..), _)| *reported == kernel).map(|(_, size)| *size)
     }
 
     fn layouts(&mut self, kernel: Kernel) -> Result<(vk::DescriptorSetLayout, vk::PipelineLayout), VulkanError> {

@@ -96,8 +96,8 @@ impl TileBlock {
     #[inline]
     pub fn pixel_of_tiles(&self, pixel: u32) -> Option<[u32; 2]> {
         const SIDE: u32 = SPLAT_TILE as u32;
-        let ([column, row], own) = (self.first_of(pixel / (SIDE * SIDE)), pixel % (SIDE * SIDE));
-        let (column, row) = (column + own % SIDE, row + own / SIDE);
+        let ([column, row], pixel_of_tile) = (self.first_of(pixel / (SIDE * SIDE)), pixel % (SIDE * SIDE));
+        let (column, row) = (column + pixel_of_tile % SIDE, row + pixel_of_tile / SIDE);
         if column < self.width && row < self.height { Some([column, row]) } else { None }
     }
 

@@ -190,11 +190,11 @@ pub fn weigh_features(
         let density = max(given, 0.0);
         let is_last = index + 1 == block.sample_count as usize;
         let length = if is_last { block.last_length } else { points.fetch(sample).length * block.length_scale };
-        let own = density * length;
-        passed += if has_nan_bits(given) { given } else { own };
+        let absorbed = density * length;
+        passed += if has_nan_bits(given) { given } else { absorbed };
         let behind = exp(-passed);
         let stopped = before - behind;
-        let weight = if block.inclusive != 0 { stopped * exp(-own) } else { stopped };
+        let weight = if block.inclusive != 0 { stopped * exp(-absorbed) } else { stopped };
         // The exponential of NaN is 0.
         weigh(sample, if has_nan_bits(passed) { passed } else { weight });
         before = behind;
@@ -246,12 +246,12 @@ pub fn denoiser_input(
     block: &DenoiserInputBlock,
     element: usize,
 ) -> f32 {
-    let (own, beside) = (block.picture_channels as usize, block.condition_channels as usize);
-    let (pixel, channel) = (element / (own + beside), element % (own + beside));
-    let value = if channel < own {
-        noisy.fetch(pixel * own + channel)
+    let (picture_channels, beside) = (block.picture_channels as usize, block.condition_channels as usize);
+    let (pixel, channel) = (element / (picture_channels + beside), element % (picture_channels + beside));
+    let value = if channel < picture_channels {
+        noisy.fetch(pixel * picture_channels + channel)
     } else {
-        condition.fetch(pixel * beside + channel - own)
+        condition.fetch(pixel * beside + channel - picture_channels)
     };
     block.scale * value
 }

@@ -82,7 +82,7 @@ pub fn visible_weight(
     view: u32,
 ) -> f32 {
     let position = Vec3::from_array(point.position);
-    let (mut own, mut all, mut seen) = (0.0, 0.0, 0);
+    let (mut of_view, mut all, mut seen) = (0.0, 0.0, 0);
     let mut other = 0;
     while other < view_count {
         if is_in_front(&views.fetch(other as usize), position) {
@@ -90,7 +90,7 @@ pub fn visible_weight(
             all += weight;
             seen += 1;
             if other == view {
-                own = weight;
+                of_view = weight;
             }
         }
         other += 1;
@@ -98,7 +98,7 @@ pub fn visible_weight(
     if seen == view_count || !(all > 0.0) {
         return weights.fetch(view as usize);
     }
-    own / all
+    of_view / all
 }
 
 /// Whether a world point is in front of a view, whose weight is 0 there if it is not; not for NaN.

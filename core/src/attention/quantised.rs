@@ -259,23 +259,23 @@ impl<const S: usize> SourceKeys<S> {
     /// Worst case: as many sources as there are, each 10,944 products of whole numbers, 18 sines and cosines.
     pub fn new(parameters: &QuantisedAttention, sources: &Sources<S>) -> SourceKeys<S> {
         const { assert!(S > 0) };
-        let mut own = SourceKeys { keys: [Levels::ZERO; S], offsets: [0.0; S], count: sources.count() };
+        let mut keys_of_sources = SourceKeys { keys: [Levels::ZERO; S], offsets: [0.0; S], count: sources.count() };
         let mut hidden = Levels::ZERO;
         let mut outputs = [[0.0; FOUR]; HIDDEN_FOURS];
         let mut view = 0;
         while view < sources.count() {
             parameters.hidden(sources.pose(view), &mut hidden);
             let largest = parameters.key.apply::<false>(&hidden, &mut outputs);
-            own.keys[view as usize].fill(outputs.as_flattened(), largest);
+            keys_of_sources.keys[view as usize].fill(outputs.as_flattened(), largest);
             let mut sum = 0;
             for (weight, pair) in parameters.offset.chunks_exact(2).zip(hidden.pairs.as_flattened()) {
                 let (x, y) = halves(*pair);
                 sum += weight[0] as i32 * x + weight[1] as i32 * y;
             }
-            own.offsets[view as usize] = parameters.offset_scale * hidden.scale * sum as f32;
+            keys_of_sources.offsets[view as usize] = parameters.offset_scale * hidden.scale * sum as f32;
             view += 1;
         }
-        own
+        keys_of_sources
     }
 
     /// The weights of the sources for a target. Where hidden numbers overflow they are weights that mean nothing.
@@ -289,8 +289,8 @@ impl<const S: usize> SourceKeys<S> {
         while view < (self.count as usize).min(S) {
             let key = &self.keys[view];
             let mut sum = 0_i64;
-            for (own, pair) in key.pairs.as_flattened().iter().zip(hidden.pairs.as_flattened()) {
-                let ((a, b), (x, y)) = (halves(*own), halves(*pair));
+            for (pair_of_key, pair) in key.pairs.as_flattened().iter().zip(hidden.pairs.as_flattened()) {
+                let ((a, b), (x, y)) = (halves(*pair_of_key), halves(*pair));
                 // 15 bits and a sign each: a product fits into 31 bits.
                 sum += i64::from(a * x);
                 sum += i64::from(b * y);

@@ -41,24 +41,24 @@ pub(super) fn weights(places: &Row, count: u32, moments: &Row) -> Row {
     let count = count as usize;
     let mut weights = [0.0; MAX_RESULTS];
     let mut rest = moments[0];
-    let mut own = 1;
-    while own < count {
+    let mut node = 1;
+    while node < count {
         // Lagrange's polynomial, 1 at its own place and 0 at the others: coefficients of 1, t, t^2, t^3.
         let mut polynomial = [1.0, 0.0, 0.0, 0.0];
         let mut other = 0;
         while other < count {
-            if other != own {
+            if other != node {
                 let [a, b, c, d] = polynomial;
-                let (place, gap) = (places[other], places[own] - places[other]);
+                let (place, gap) = (places[other], places[node] - places[other]);
                 polynomial = [-place * a / gap, (a - place * b) / gap, (b - place * c) / gap, (c - place * d) / gap];
             }
             other += 1;
         }
         let [a, b, c, d] = polynomial;
         let weight = a * moments[0] + b * moments[1] + c * moments[2] + d * moments[3];
-        weights[own] = weight;
+        weights[node] = weight;
         rest -= weight;
-        own += 1;
+        node += 1;
     }
     weights[0] = rest;
     weights

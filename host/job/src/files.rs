@@ -57,7 +57,7 @@ pub enum WriteError {
 pub struct WholeFile {
     path: PathBuf,
     writer: BufWriter<NamedTempFile>,
-    own: Own,
+    unfinished: Own,
 }
 
 impl WholeFile {
@@ -82,8 +82,8 @@ impl WholeFile {
             }
             builder.tempfile_in(folder)
         };
-        let (file, own) = Own::make(folder, make, |file| file.path().to_path_buf()).map_err(failed)?;
-        Ok(WholeFile { path: path.to_path_buf(), writer: BufWriter::new(file), own })
+        let (file, unfinished) = Own::make(folder, make, |file| file.path().to_path_buf()).map_err(failed)?;
+        Ok(WholeFile { path: path.to_path_buf(), writer: BufWriter::new(file), unfinished })
     }
 
     /// Appends bytes.
@@ -100,10 +100,10 @@ impl WholeFile {
     /// # Errors
     /// [`WriteError::Io`]; then no temporary file remains.
     pub fn finish(self) -> Result<(), WriteError> {
-        let WholeFile { path, writer, own } = self;
+        let WholeFile { path, writer, unfinished } = self;
         let finished = writer.into_inner().map_err(|error| error.into_error()).and_then(|file| {
             file.as_file().sync_data()?;
-            own.finish(|| file.persist(&path).map_err(|error| error.error))
+            unfinished.finish(|| file.persist(&path).map_err(|error| error.error))
         });
         finished.map(drop).map_err(|cause| WriteError::Io { path, cause })
     }

@@ -73,11 +73,11 @@ impl Progress for Part<'_> {
     /// Each of the whole's parts is cut into as many as this part has.
     fn stage(&self, name: &str, place: Range<usize>, of: usize) {
         let of = of.max(1);
-        let at = |own: usize| self.place.start * of + self.place.len() * own.min(of);
+        let at = |step: usize| self.place.start * of + self.place.len() * step.min(of);
         let place = at(place.start)..at(place.end);
         match self.name.as_str() {
             "" => self.whole.stage(name, place, self.of * of),
-            own => self.whole.stage(&format!("{own}: {name}"), place, self.of * of),
+            stage => self.whole.stage(&format!("{stage}: {name}"), place, self.of * of),
         }
     }
 

@@ -16,7 +16,7 @@ pub fn quoted(word: impl AsRef<OsStr>) -> String {
     let is_plain = |byte: &u8| byte.is_ascii_alphanumeric() || b"_@%+=:,./-".contains(byte);
     match std::str::from_utf8(bytes) {
         Ok(text) if !text.is_empty() && bytes.iter().all(is_plain) => text.to_owned(),
-        Ok(text) if !text.contains(|own: char| own.is_control() || turns(own)) => {
+        Ok(text) if !text.contains(|letter: char| letter.is_control() || turns(letter)) => {
             format!("'{}'", text.replace('\'', "'\\''"))
         }
         _ => numbered(bytes),
@@ -31,10 +31,10 @@ fn numbered(bytes: &[u8]) -> String {
         for character in chunk.valid().chars() {
             match character {
                 '\'' | '\\' => word.extend(['\\', character]),
-                own if own.is_control() || turns(own) => {
-                    own.encode_utf8(&mut [0; 4]).bytes().for_each(|byte| as_number(&mut word, byte));
+                letter if letter.is_control() || turns(letter) => {
+                    letter.encode_utf8(&mut [0; 4]).bytes().for_each(|byte| as_number(&mut word, byte));
                 }
-                own => word.push(own),
+                letter => word.push(letter),
             }
         }
         chunk.invalid().iter().for_each(|byte| as_number(&mut word, *byte));

@@ -73,7 +73,7 @@ impl ResNet<ResNetLayer> {
         let stem =
             ResNetLayer { name: "conv1".to_owned(), norm: "bn1".to_owned(), level: 0, shape: [stem_channels, 3, 7, 7] };
         let mut channels = stem_channels;
-        let mut block = |level: usize, block: usize, own: usize| {
+        let mut block = |level: usize, block: usize, outputs: usize| {
             let layer = |name: &str, norm: &str, shape: [usize; 4]| ResNetLayer {
                 name: format!("layer{level}.{block}.{name}"),
                 norm: format!("layer{level}.{block}.{norm}"),
@@ -81,12 +81,12 @@ impl ResNet<ResNetLayer> {
                 shape,
             };
             let own_block = BasicBlock {
-                conv1: layer("conv1", "bn1", [own, channels, 3, 3]),
-                conv2: layer("conv2", "bn2", [own, own, 3, 3]),
-                shortcut: (block == 0 && has_shortcut(level, channels, own))
-                    .then(|| layer("downsample.0", "downsample.1", [own, channels, 1, 1])),
+                conv1: layer("conv1", "bn1", [outputs, channels, 3, 3]),
+                conv2: layer("conv2", "bn2", [outputs, outputs, 3, 3]),
+                shortcut: (block == 0 && has_shortcut(level, channels, outputs))
+                    .then(|| layer("downsample.0", "downsample.1", [outputs, channels, 1, 1])),
             };
-            channels = own;
+            channels = outputs;
             own_block
         };
         let levels = (1..).zip(levels);

@@ -106,7 +106,8 @@ impl Connections {
         state.is_closed = true;
         self.ended.notify_all();
         // A connection that is gone already cannot be shut down, which is no error.
-        let shut_down = |state: &State, how| state.open.iter().for_each(|own| drop(own.stream.shutdown(how)));
+        let shut_down =
+            |state: &State, how| state.open.iter().for_each(|connection| drop(connection.stream.shutdown(how)));
         shut_down(&state, Shutdown::Read);
         let waited = self.ended.wait_timeout_while(state, patience, |state| !state.open.is_empty());
         shut_down(&waited.unwrap_or_else(PoisonError::into_inner).0, Shutdown::Both);
@@ -116,8 +117,8 @@ impl Connections {
 impl State {
     /// The connection that is known for the least, the oldest of those, unless all wait for pictures.
     fn least(&self) -> Option<usize> {
-        let least = self.open.iter().enumerate().min_by_key(|(_, own)| own.standing);
-        least.filter(|(_, own)| own.standing < Standing::Waits).map(|(place, _)| place)
+        let least = self.open.iter().enumerate().min_by_key(|(_, connection)| connection.standing);
+        least.filter(|(_, connection)| connection.standing < Standing::Waits).map(|(place, _)| place)
     }
 
     /// The time until there is a place for another one; `None` if all wait for pictures.
@@ -143,14 +144,18 @@ impl Admission<'_> {
     /// From now on it is known for this.
     pub(crate) fn stands(&self, standing: Standing) {
         let mut state = self.connections.state();
-        state.open.iter_mut().filter(|own| own.number == self.number).for_each(|own| own.standing = standing);
+        state
+            .open
+            .iter_mut()
+            .filter(|connection| connection.number == self.number)
+            .for_each(|connection| connection.standing = standing);
     }
 }
 
 impl Drop for Admission<'_> {
     fn drop(&mut self) {
         let mut state = self.connections.state();
-        state.open.retain(|own| own.number != self.number);
+        state.open.retain(|connection| connection.number != self.number);
         state.threads -= 1;
         drop(state);
         self.connections.ended.notify_all();
@@ -181,14 +186,14 @@ mod tests {
             (client, connections.admit(&stream))
         };
         let mut all: Vec<_> = (0..MAX_CONNECTIONS).map(|_| open()).collect();
-        let known = |all: &[(TcpStream, Option<super::Admission<'_>>)], own: usize, standing| {
-            all[own].1.as_ref().expect("it is admitted").stands(standing);
+        let known = |all: &[(TcpStream, Option<super::Admission<'_>>)], index: usize, standing| {
+            all[index].1.as_ref().expect("it is admitted").stands(standing);
         };
         known(&all, 0, Standing::OfPage);
         known(&all, 1, Standing::Waits);
         all.push(open());
         let closed = |all: &[(TcpStream, Option<super::Admission<'_>>)]| -> Vec<usize> {
-            (0..all.len()).filter(|own| !is_open(&all[*own].0)).collect()
+            (0..all.len()).filter(|index| !is_open(&all[*index].0)).collect()
         };
         assert_eq!(closed(&all), [2]);
         // One that leaves makes room.
@@ -199,7 +204,7 @@ mod tests {
         known(&all, 9, Standing::Refused);
         all.push(open());
         assert_eq!(closed(&all), [2, 3, 9]);
-        (4..all.len()).for_each(|own| known(&all, own, Standing::Waits));
+        (4..all.len()).for_each(|index| known(&all, index, Standing::Waits));
         all.push(open());
         assert_eq!(closed(&all), [0, 2, 3, 9], "the page's own, before those that wait for pictures");
         known(&all, MAX_CONNECTIONS + 3, Standing::Waits);

@@ -44,7 +44,7 @@ impl Message {
         let mut message = Message {
             method: parsed.method.unwrap_or_default().to_owned(),
             target: parsed.path.unwrap_or_default().to_owned(),
-            headers: parsed.headers.iter().map(|own| (own.name.to_owned(), text(own.value))).collect(),
+            headers: parsed.headers.iter().map(|header| (header.name.to_owned(), text(header.value))).collect(),
             body: Vec::new(),
             is_last: false,
         };
@@ -60,7 +60,7 @@ impl Message {
 
     /// The value of a header; empty if there are two of them, which is a trick.
     pub(crate) fn header(&self, name: &str) -> Option<&str> {
-        let mut values = self.headers.iter().filter(|(own, _)| own.eq_ignore_ascii_case(name));
+        let mut values = self.headers.iter().filter(|(header, _)| header.eq_ignore_ascii_case(name));
         let first = values.next().map(|(_, value)| value.as_str());
         if values.next().is_some() { Some("") } else { first }
     }

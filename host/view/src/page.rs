@@ -22,8 +22,8 @@ const fn style(name: &'static str, text: &'static str) -> PageFile {
 }
 
 /// A script that pages share.
-const fn shared(own: Script) -> PageFile {
-    script(own.name, own.text)
+const fn shared(source: Script) -> PageFile {
+    script(source.name, source.text)
 }
 
 /// All of them. Scripts are modules in the order of their imports.
@@ -110,7 +110,7 @@ mod tests {
                         before.text.split(export.as_str()).skip(1).any(|rest| rest.starts_with(['(', ' ']))
                     });
                     assert!(is_there, "{from} does not export {name}, which {} imports", file.name);
-                    let words = file.text.split(|own: char| !own.is_ascii_alphanumeric() && own != '_');
+                    let words = file.text.split(|letter: char| !letter.is_ascii_alphanumeric() && letter != '_');
                     assert!(words.filter(|word| *word == name).count() > 1, "{} does not use {name}", file.name);
                 }
             }

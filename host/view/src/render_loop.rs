@@ -123,8 +123,8 @@ impl<'a> Weighed<'a> {
 
     /// Whether this weighting has begun.
     fn is_under(&self, scheme: &str, options: Option<&AnyOptions>, mixture: Option<&Mixture>) -> bool {
-        let is_same = |(own, varied, mixed): &(String, Option<AnyOptions>, Option<Mixture>)| {
-            own == scheme && varied.as_ref() == options && mixed.as_ref() == mixture
+        let is_same = |(known, varied, mixed): &(String, Option<AnyOptions>, Option<Mixture>)| {
+            known == scheme && varied.as_ref() == options && mixed.as_ref() == mixture
         };
         self.under.as_ref().is_some_and(is_same)
     }
@@ -329,11 +329,11 @@ impl<'a> RenderLoop<'a> {
         let most = request.most_side.min(self.viewer.size[0].max(self.viewer.size[1]));
         let size = scaled_size(&camera, self.pace.side(most)).into();
         let start = Instant::now();
-        let Some(own) = self.coarse.as_mut().or(self.full.as_mut()) else {
+        let Some(renderer) = self.coarse.as_mut().or(self.full.as_mut()) else {
             self.prepare(&watch)?;
             return self.soon(request);
         };
-        let frame = own.stage.frame_of_size(&request.weighting, &camera, size, &watch)?;
+        let frame = renderer.stage.frame_of_size(&request.weighting, &camera, size, &watch)?;
         self.pace.took(start.elapsed());
         Ok((frame, false))
     }

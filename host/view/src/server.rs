@@ -220,7 +220,7 @@ fn check<'a>(
 ) -> Result<Route<'a>, Answer> {
     let forbidden = || Answer::error(403, "this address is for the page of this program alone");
     let is_own = |host: &str| {
-        ["127.0.0.1", "localhost"].into_iter().any(|own| match host.strip_prefix(own) {
+        ["127.0.0.1", "localhost"].into_iter().any(|local| match host.strip_prefix(local) {
             Some("") => port == USUAL_PORT,
             Some(rest) => rest == format!(":{port}"),
             None => false,
@@ -278,10 +278,10 @@ mod tests {
     fn other_hosts_and_sites_are_refused() {
         let url = format!("/{TOKEN}/");
         let get = |headers| status("GET", &url, headers);
-        let own = Some("127.0.0.1:8000");
-        assert_eq!(get([own, None, None]), 200);
+        let local = Some("127.0.0.1:8000");
+        assert_eq!(get([local, None, None]), 200);
         assert_eq!(get([Some("localhost:8000"), Some("http://localhost:8000"), Some("same-origin")]), 200);
-        assert_eq!(get([own, None, Some("none")]), 200, "typed in, or opened by another program");
+        assert_eq!(get([local, None, Some("none")]), 200, "typed in, or opened by another program");
         for host in [
             None,
             Some(""),
@@ -295,10 +295,10 @@ mod tests {
             assert_eq!(get([host, None, None]), 403, "{host:?}");
         }
         for origin in ["null", "http://evil.example", "https://127.0.0.1:8000", "http://127.0.0.1:81", ""] {
-            assert_eq!(get([own, Some(origin), None]), 403, "{origin}");
+            assert_eq!(get([local, Some(origin), None]), 403, "{origin}");
         }
         for site in ["cross-site", "same-site", ""] {
-            assert_eq!(get([own, None, Some(site)]), 403, "{site}");
+            assert_eq!(get([local, None, Some(site)]), 403, "{site}");
         }
     }
 
@@ -319,8 +319,8 @@ mod tests {
 
     #[test]
     fn nothing_without_the_token_and_nothing_else_with_it() {
-        let own = [Some("127.0.0.1:8000"), None, None];
-        let get = |url: &str| status("GET", url, own);
+        let headers = [Some("127.0.0.1:8000"), None, None];
+        let get = |url: &str| status("GET", url, headers);
         for url in [
             "",
             "/",
@@ -338,10 +338,10 @@ mod tests {
             assert_eq!(get(&format!("/{TOKEN}/{rest}")), expected, "{rest}");
         }
         for method in ["PUT", "DELETE", "OPTIONS", "get"] {
-            assert_eq!(status(method, &format!("/{TOKEN}/scene"), own), 405);
+            assert_eq!(status(method, &format!("/{TOKEN}/scene"), headers), 405);
         }
         let url = format!("/{TOKEN}/source/7");
-        assert_eq!(check(8000, TOKEN, "GET", &url, own), Ok(Route::Source("7")));
+        assert_eq!(check(8000, TOKEN, "GET", &url, headers), Ok(Route::Source("7")));
     }
 
     #[test]

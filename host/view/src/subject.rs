@@ -181,11 +181,12 @@ fn start(cameras: &[Camera], rig: &Rig) -> Pose {
     let Some(first) = cameras.first() else { return Pose::IDENTITY };
     let centre = |camera: &Camera| camera.pose.centre_world();
     let middle = cameras.iter().map(centre).sum::<Vec3>() / cameras.len() as f32;
-    let nearest = |point: Vec3, own: Option<usize>| {
-        let others = (0..cameras.len()).filter(|other| Some(*other) != own);
+    let nearest = |point: Vec3, excluded: Option<usize>| {
+        let others = (0..cameras.len()).filter(|other| Some(*other) != excluded);
         others.min_by(|a, b| centre(&cameras[*a]).distance(point).total_cmp(&centre(&cameras[*b]).distance(point)))
     };
-    let pair = nearest(middle, None).and_then(|own| Some([own, nearest(centre(&cameras[own]), Some(own))?]));
+    let pair = nearest(middle, None)
+        .and_then(|nearest_view| Some([nearest_view, nearest(centre(&cameras[nearest_view]), Some(nearest_view))?]));
     let Some(pair) = pair.map(|pair| pair.map(|view| &cameras[view])) else { return first.pose };
     let place = 0.5 * (centre(pair[0]) + centre(pair[1]));
     let ahead = pair[0].pose.forward_world() + pair[1].pose.forward_world();
@@ -196,11 +197,11 @@ fn start(cameras: &[Camera], rig: &Rig) -> Pose {
 fn scheme_rows() -> Vec<SchemeRow> {
     let formulas = ROWS.iter().map(|row| SchemeRow {
         name: row.name,
-        parameter: row.parameter.map(|own| ParameterRow {
-            key: own.key,
-            least: own.least,
-            most: (own.most < MAX_LIMIT).then_some(own.most),
-            default: own.default,
+        parameter: row.parameter.map(|parameter| ParameterRow {
+            key: parameter.key,
+            least: parameter.least,
+            most: (parameter.most < MAX_LIMIT).then_some(parameter.most),
+            default: parameter.default,
         }),
         choice: row.choice.map(|choice| ChoiceRow { key: choice.key, options: choice.options }),
     });
@@ -223,9 +224,11 @@ mod tests {
         let rows = scheme_rows();
         assert!(rows.len() >= 8 && rows.iter().any(|row| row.name == "cross-attention"));
         for row in rows {
-            let parameter = row.parameter.iter().map(|own| format!("{}={}", own.key, own.default));
-            let choices =
-                row.choice.iter().flat_map(|own| own.options.iter().map(move |is| format!("{}={is}", own.key)));
+            let parameter = row.parameter.iter().map(|parameter| format!("{}={}", parameter.key, parameter.default));
+            let choices = row
+                .choice
+                .iter()
+                .flat_map(|choice| choice.options.iter().map(move |is| format!("{}={is}", choice.key)));
             for pair in parameter.chain(choices) {
                 assert_eq!(quoted(&pair), pair, "the page puts it on a command line as it is");
                 Weighting::open(&format!("{}:{pair}", row.name)).expect("a scheme");

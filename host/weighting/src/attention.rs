@@ -132,9 +132,9 @@ impl AttentionModel {
         let mut largest: Option<(String, f32)> = None;
         let mut read = |name: &str, shape: &[usize]| {
             let values = read_tensor(path, &file, name, shape)?;
-            let own = values.iter().fold(0.0_f32, |most, value| most.max(value.abs()));
-            if largest.as_ref().is_none_or(|(_, most)| own > *most) {
-                largest = Some((name.to_owned(), own));
+            let magnitude = values.iter().fold(0.0_f32, |most, value| most.max(value.abs()));
+            if largest.as_ref().is_none_or(|(_, most)| magnitude > *most) {
+                largest = Some((name.to_owned(), magnitude));
             }
             Ok(values)
         };

@@ -9,21 +9,22 @@ use crate::sources::SourceWeights;
 /// none to a further one for a target that has. The sum is within `1 - 1/e` of the greatest possible, as of every
 /// greedy choice for such a function (monotone and submodular). Empty without targets.
 pub fn select_sources(weights: &[SourceWeights], count: usize) -> Vec<usize> {
-    let source_count = weights.first().map_or(0, |own| own.count() as usize);
+    let source_count = weights.first().map_or(0, |first| first.count() as usize);
     let mut covered = vec![0.0_f64; weights.len()];
     let mut chosen: Vec<usize> = Vec::new();
     while chosen.len() < count.min(source_count) {
         let gain = |source: usize| -> f64 {
-            let of = |(own, so_far): (&SourceWeights, &f64)| (so_far + weight(own, source)).sqrt() - so_far.sqrt();
+            let of =
+                |(target, so_far): (&SourceWeights, &f64)| (so_far + weight(target, source)).sqrt() - so_far.sqrt();
             weights.iter().zip(&covered).map(of).sum()
         };
         let left = (0..source_count).filter(|source| !chosen.contains(source));
         let better = |best: Option<(usize, f64)>, source: usize| {
-            let own = gain(source);
-            if best.is_none_or(|(_, most)| own > most) { Some((source, own)) } else { best }
+            let gain_of_source = gain(source);
+            if best.is_none_or(|(_, most)| gain_of_source > most) { Some((source, gain_of_source)) } else { best }
         };
         let Some((next, _)) = left.fold(None, better) else { break };
-        weights.iter().zip(&mut covered).for_each(|(own, so_far)| *so_far += weight(own, next));
+        weights.iter().zip(&mut covered).for_each(|(target, so_far)| *so_far += weight(target, next));
         chosen.push(next);
     }
     chosen.sort_unstable();

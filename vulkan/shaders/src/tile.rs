@@ -29,7 +29,7 @@ pub(crate) type Shared = [Vec4; (STEP * STRIDE) as usize];
 #[derive(Clone, Copy)]
 pub(crate) struct InvocationTile {
     /// Its number in the workgroup.
-    pub(crate) own: u32,
+    pub(crate) invocation: u32,
     /// First row and column of the tile.
     pub(crate) first_row: u32,
     pub(crate) first_column: u32,
@@ -41,14 +41,14 @@ pub(crate) struct InvocationTile {
 impl InvocationTile {
     /// That of invocation `own` in a workgroup.
     #[inline(always)]
-    pub(crate) fn of(group: u32, own: u32, shape: Shape) -> InvocationTile {
+    pub(crate) fn of(group: u32, invocation: u32, shape: Shape) -> InvocationTile {
         let group_columns = shape.column_count.div_ceil(TILE);
         InvocationTile {
-            own,
+            invocation,
             first_row: group / group_columns * TILE,
             first_column: group % group_columns * TILE,
-            own_row: own / Sums::SIDE,
-            own_column: own % Sums::SIDE,
+            own_row: invocation / Sums::SIDE,
+            own_column: invocation % Sums::SIDE,
         }
     }
 }
@@ -74,8 +74,8 @@ impl Tiles for Single<'_> {
         let mut sums = Sums::ZERO;
         let mut start = 0;
         while start < shape.inner_count {
-            fetch_rows(rows, place.own, start, place.first_row, shape, left);
-            fetch_columns(columns, place.own, start, place.first_column, shape, right);
+            fetch_rows(rows, place.invocation, start, place.first_row, shape, left);
+            fetch_columns(columns, place.invocation, start, place.first_column, shape, right);
             wait_for_all();
             let count = STEP.min(shape.inner_count - start);
             let mut inner = 0;
@@ -92,9 +92,16 @@ impl Tiles for Single<'_> {
 
 /// Fetches a step of a tile's rows.
 #[inline(always)]
-fn fetch_rows(rows: &mut Shared, own: u32, start: u32, first_row: u32, shape: Shape, left: impl Fn(u32, u32) -> f32) {
+fn fetch_rows(
+    rows: &mut Shared,
+    invocation: u32,
+    start: u32,
+    first_row: u32,
+    shape: Shape,
+    left: impl Fn(u32, u32) -> f32,
+) {
     let left = move |row: u32, inner: u32| left(row.min(shape.row_count - 1), inner.min(shape.inner_count - 1));
-    let mut index = own;
+    let mut index = invocation;
     while index < STEP * FOURS {
         // Neighbours fetch what lies next to one another in the buffers.
         let (inner, four) = (index % STEP, index / STEP);
@@ -109,7 +116,7 @@ fn fetch_rows(rows: &mut Shared, own: u32, start: u32, first_row: u32, shape: Sh
 #[inline(always)]
 fn fetch_columns(
     columns: &mut Shared,
-    own: u32,
+    invocation: u32,
     start: u32,
     first_column: u32,
     shape: Shape,
@@ -117,7 +124,7 @@ fn fetch_columns(
 ) {
     let right =
         move |inner: u32, column: u32| right(inner.min(shape.inner_count - 1), column.min(shape.column_count - 1));
-    let mut index = own;
+    let mut index = invocation;
     while index < STEP * FOURS {
         let (inner, four) = (index / FOURS, index % FOURS);
         let (at, column) = (start + inner, first_column + 4 * four);
@@ -160,8 +167,8 @@ fn place(inner: u32, four: u32) -> usize {
 
 /// The numbers of an inner index that invocation `own` needs.
 #[inline(always)]
-fn read_fours(shared: &Shared, inner: u32, own: u32) -> [Vec4; 2] {
-    [read(shared, inner, Sums::place(own, 0) / 4), read(shared, inner, Sums::place(own, 4) / 4)]
+fn read_fours(shared: &Shared, inner: u32, invocation: u32) -> [Vec4; 2] {
+    [read(shared, inner, Sums::place(invocation, 0) / 4), read(shared, inner, Sums::place(invocation, 4) / 4)]
 }
 
 #[inline(always)]

@@ -32,10 +32,10 @@ pub fn blend_splats(
     pixel: u32,
 ) {
     if let Some([column, row]) = block.pixel_of_tiles(pixel) {
-        let own = BlendedLanes::<1>::of(block, starts, entries, splats, [column, row]);
+        let blended = BlendedLanes::<1>::of(block, starts, entries, splats, [column, row]);
         let at = (row * block.width + column) as usize;
-        colours.store(at, own.pixel(0));
-        depths.store(at, own.depth[0]);
+        colours.store(at, blended.pixel(0));
+        depths.store(at, blended.depth[0]);
     }
 }
 
@@ -56,14 +56,14 @@ pub fn blend_gradient(
     let (mut entry, end) = (starts[tile as usize], starts[tile as usize + 1]);
     let mut is_over = false;
     while entry < end {
-        let mut own = SplatGradient::ZERO;
+        let mut gradient = SplatGradient::ZERO;
         if !is_over {
-            own = through.next(&splats.fetch(entries[entry as usize] as usize));
+            gradient = through.next(&splats.fetch(entries[entry as usize] as usize));
             if entry % SPLAT_TILE as u32 == 0 {
                 is_over = through.is_over();
             }
         }
-        sums.store(entry as usize, own);
+        sums.store(entry as usize, gradient);
         entry += 1;
     }
 }
@@ -89,6 +89,6 @@ pub fn project_gradients(
         all.add(&sums.fetch(uses[index as usize] as usize));
         index += 1;
     }
-    let own = project_gradient::project_gradient(&gaussians.fetch(at), &block.camera, &splats.fetch(at), &all);
-    gradients.store(at, own);
+    let gradient = project_gradient::project_gradient(&gaussians.fetch(at), &block.camera, &splats.fetch(at), &all);
+    gradients.store(at, gradient);
 }

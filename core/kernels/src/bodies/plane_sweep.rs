@@ -51,8 +51,8 @@ pub fn census_cost(
     costs: &mut (impl Store<Planes> + ?Sized),
     group: u32,
 ) {
-    let (pixel, own) = (group / block.group_count, group % block.group_count);
-    let [cost, weight] = census::census_cost(block, pairs, grey, evidence, pixel, own);
+    let (pixel, group_of_pixel) = (group / block.group_count, group % block.group_count);
+    let [cost, weight] = census::census_cost(block, pairs, grey, evidence, pixel, group_of_pixel);
     let first = block.first_row * block.camera.width * block.group_count;
     let at = 2 * (first + group) as usize;
     costs.store(at, cost);
@@ -88,8 +88,8 @@ pub fn plane_opacity(
     opacities: &mut (impl Store<Planes> + ?Sized),
     group: u32,
 ) {
-    let (pixel, own) = (group / block.group_count, group % block.group_count);
-    opacities.store(group as usize, front::plane_opacity(block, views, disparities, pixel, own));
+    let (pixel, group_of_pixel) = (group / block.group_count, group % block.group_count);
+    opacities.store(group as usize, front::plane_opacity(block, views, disparities, pixel, group_of_pixel));
 }
 
 /// The costs of a pixel's planes, with the preference for the first opaque one.

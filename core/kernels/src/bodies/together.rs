@@ -48,10 +48,10 @@ pub fn blend_gradient(
     mut group: impl Workgroup,
     invocation: u32,
 ) {
-    let (tile, own) = (invocation / WORKGROUP, invocation % WORKGROUP);
+    let (tile, thread) = (invocation / WORKGROUP, invocation % WORKGROUP);
     let mut pixel = GradientLanes::<1>::OUTSIDE;
     let [column, row] = block.first_of(tile);
-    let (column, row) = (column + own % SPLAT_TILE as u32, row + own / SPLAT_TILE as u32);
+    let (column, row) = (column + thread % SPLAT_TILE as u32, row + thread / SPLAT_TILE as u32);
     if column < block.width && row < block.height {
         let at = (row * block.width + column) as usize;
         pixel.set(0, colours.fetch(at), gradients.fetch(at));
@@ -62,30 +62,31 @@ pub fn blend_gradient(
     // All invocations of the tile see the same here, so all come to the barriers.
     while entry < end && !is_over {
         let fetched = if end - entry < FETCHED { end - entry } else { FETCHED };
-        if own < fetched {
-            put_splat(&mut group, own, &splats.fetch(entries.fetch((entry + own) as usize) as usize));
+        if thread < fetched {
+            put_splat(&mut group, thread, &splats.fetch(entries.fetch((entry + thread) as usize) as usize));
         }
         group.wait();
         let mut first = 0;
         while first < fetched && !is_over {
             let count = if fetched - first < BATCH { fetched - first } else { BATCH };
-            put_numbers(&mut group, own, &mut pixel, centre, first, count);
+            put_numbers(&mut group, thread, &mut pixel, centre, first, count);
             group.wait();
-            if own <= SUMMED {
-                let of_pixels = own as usize * STRIDE;
-                let total = if own < SUMMED { sum_of_tile(&group, of_pixels) } else { most_of_tile(&group, of_pixels) };
-                group.put(SUMS + own as usize, total);
+            if thread <= SUMMED {
+                let of_pixels = thread as usize * STRIDE;
+                let total =
+                    if thread < SUMMED { sum_of_tile(&group, of_pixels) } else { most_of_tile(&group, of_pixels) };
+                group.put(SUMS + thread as usize, total);
             }
             group.wait();
-            if own < count {
-                sums.store((entry + first + own) as usize, sum_of_splat(&group, own));
+            if thread < count {
+                sums.store((entry + first + thread) as usize, sum_of_splat(&group, thread));
             }
             is_over = group.get(SUMS + SUMMED as usize) < MIN_TRANSMITTANCE;
             first += count;
         }
         entry += first;
     }
-    let mut behind = entry + own;
+    let mut behind = entry + thread;
     while behind < end {
         sums.store(behind as usize, SplatGradient::ZERO);
         behind += WORKGROUP;
@@ -125,7 +126,7 @@ fn splat_at(group: &impl Workgroup, place: u32) -> ProjectedGaussian {
 #[inline(always)]
 fn put_numbers(
     group: &mut impl Workgroup,
-    own: u32,
+    thread: u32,
     pixel: &mut GradientLanes<1>,
     [x, y]: [f32; 2],
     first: u32,
@@ -137,12 +138,12 @@ fn put_numbers(
         pixel.add(x, y, &splat_at(group, first + place), &mut said);
         let mut number = 0;
         while number < NUMBERS {
-            group.put((place as usize * NUMBERS + number) * STRIDE + own as usize, said.0[number][0]);
+            group.put((place as usize * NUMBERS + number) * STRIDE + thread as usize, said.0[number][0]);
             number += 1;
         }
         place += 1;
     }
-    group.put(SUMMED as usize * STRIDE + own as usize, pixel.most_seen());
+    group.put(SUMMED as usize * STRIDE + thread as usize, pixel.most_seen());
 }
 
 /// The sums of a splat of a batch.
@@ -179,8 +180,8 @@ fn most_of_tile(group: &impl Workgroup, first: usize) -> f32 {
     let mut most = 0.0;
     let mut pixel = 0;
     while pixel < WORKGROUP as usize {
-        let own = group.get(first + pixel);
-        most = if own > most { own } else { most };
+        let seen = group.get(first + pixel);
+        most = if seen > most { seen } else { most };
         pixel += 1;
     }
     most

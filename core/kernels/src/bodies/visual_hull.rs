@@ -56,8 +56,8 @@ pub fn match_cost(
 /// Costs summed over a window's columns at a plane of a pixel of the band.
 #[inline]
 pub fn sum_row(block: &SweepBlock, costs: &[f32], row_sums: &mut (impl Store<[f32; 2]> + ?Sized), plane: u32) {
-    let (pixel, own) = (plane / block.plane_count, plane % block.plane_count);
-    row_sums.store(plane as usize, sweep::sum_row(block, costs, pixel, own));
+    let (pixel, plane_of_pixel) = (plane / block.plane_count, plane % block.plane_count);
+    row_sums.store(plane as usize, sweep::sum_row(block, costs, pixel, plane_of_pixel));
 }
 
 /// Costs averaged over a window at a plane of a pixel of the band.
@@ -69,8 +69,8 @@ pub fn mean_column(
     means: &mut (impl Store<f32> + ?Sized),
     plane: u32,
 ) {
-    let (pixel, own) = (plane / block.plane_count, plane % block.plane_count);
-    means.store(plane as usize, sweep::mean_column(block, costs, row_sums, pixel, own));
+    let (pixel, plane_of_pixel) = (plane / block.plane_count, plane % block.plane_count);
+    means.store(plane as usize, sweep::mean_column(block, costs, row_sums, pixel, plane_of_pixel));
 }
 
 /// The depth of least cost of a pixel of the band. `entries`, `guess` and `picked` are maps of all views, of which the

@@ -33,7 +33,7 @@ impl<const N: usize> BlendedLanes<N> {
     ) -> BlendedLanes<N> {
         let tile = block.tile_of(column, row) as usize;
         let (x, y) = (column as f32 + 0.5, row as f32 + 0.5);
-        let mut own = BlendedLanes { colour: [[0.0; N]; 3], depth: [0.0; N], transmittance: [1.0; N] };
+        let mut blended = BlendedLanes { colour: [[0.0; N]; 3], depth: [0.0; N], transmittance: [1.0; N] };
         let end = starts[tile + 1];
         let mut entry = starts[tile];
         let mut seen = 0;
@@ -41,11 +41,11 @@ impl<const N: usize> BlendedLanes<N> {
             let splat = splats.fetch(entries[entry as usize] as usize);
             entry += 1;
             if abs(y - splat.mean[1]) <= splat.extent[1] {
-                own.add(&splat, x, y);
+                blended.add(&splat, x, y);
                 seen += 1;
                 if seen == CHECK {
                     seen = 0;
-                    if greatest(&own.transmittance) < MIN_TRANSMITTANCE {
+                    if greatest(&blended.transmittance) < MIN_TRANSMITTANCE {
                         entry = end;
                     }
                 }
@@ -55,12 +55,12 @@ impl<const N: usize> BlendedLanes<N> {
         while channel < 3 {
             let mut lane = 0;
             while lane < N {
-                own.colour[channel][lane] += own.transmittance[lane] * block.background[channel];
+                blended.colour[channel][lane] += blended.transmittance[lane] * block.background[channel];
                 lane += 1;
             }
             channel += 1;
         }
-        own
+        blended
     }
 
     /// A pixel's colour and opacity.

@@ -168,7 +168,7 @@ impl TileGradient {
         tile: u32,
     ) -> TileGradient {
         let [first_column, first_row] = block.first_of(tile);
-        let mut own =
+        let mut gradients_of_rows =
             TileGradient { rows: [GradientLanes::OUTSIDE; SPLAT_TILE], first_row, x: first_column as f32 + 0.5 };
         let columns = block.columns_in(tile % block.tile_columns) as usize;
         let mut row = 0;
@@ -176,12 +176,12 @@ impl TileGradient {
             let first = ((first_row + row as u32) * block.width + first_column) as usize;
             let mut lane = 0;
             while lane < columns {
-                own.rows[row].set(lane, colours.fetch(first + lane), gradients.fetch(first + lane));
+                gradients_of_rows.rows[row].set(lane, colours.fetch(first + lane), gradients.fetch(first + lane));
                 lane += 1;
             }
             row += 1;
         }
-        own
+        gradients_of_rows
     }
 
     /// What the pixels say of the next splat. Sums run over the rows in each column, then over the columns.
@@ -209,8 +209,8 @@ impl TileGradient {
         let mut most = 0.0;
         let mut row = 0;
         while row < SPLAT_TILE {
-            let own = self.rows[row].most_seen();
-            most = if own > most { own } else { most };
+            let most_of_row = self.rows[row].most_seen();
+            most = if most_of_row > most { most_of_row } else { most };
             row += 1;
         }
         most < MIN_TRANSMITTANCE

@@ -102,11 +102,11 @@ pub fn group_norm_statistics(
     let mut part = 0;
     while part < block.part_count() {
         let [own_mean, own_deviations] = partials.fetch(part as usize * block.group_count as usize + group);
-        let own = (block.pixels_of(part) * block.group_channels()) as f32;
-        let all = count + own;
+        let part_count = (block.pixels_of(part) * block.group_channels()) as f32;
+        let all = count + part_count;
         let difference = own_mean - mean;
-        mean += difference * (own / all);
-        deviations += own_deviations + difference * difference * (count * (own / all));
+        mean += difference * (part_count / all);
+        deviations += own_deviations + difference * difference * (count * (part_count / all));
         count = all;
         part += 1;
     }

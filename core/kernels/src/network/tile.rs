@@ -48,8 +48,8 @@ impl Sums {
 
     /// Where in a tile row (or column) number `index` of the invocation lies that is number `own` in that direction.
     #[inline(always)]
-    pub fn place(own: u32, index: u32) -> u32 {
-        index / 4 * (TILE / 2) + own * 4 + index % 4
+    pub fn place(line: u32, index: u32) -> u32 {
+        index / 4 * (TILE / 2) + line * 4 + index % 4
     }
 
     /// Adds the products of each row's number and each column's.

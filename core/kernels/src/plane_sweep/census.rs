@@ -77,12 +77,12 @@ pub fn census_cost(
             let mut valid = [[0.0; PLANES]; MAX_MATCHED];
             let mut slot = 0;
             while slot < frustum.view_count as usize {
-                let (own, other) = (&grey[slot * slice + here], &grey[slot * slice + there]);
+                let (here_grey, other) = (&grey[slot * slice + here], &grey[slot * slice + there]);
                 let mut plane = 0;
                 while plane < PLANES {
-                    let (own, other) = (grey_steps(own[plane]) as f32, grey_steps(other[plane]) as f32);
-                    lighter[slot][plane] = clamp(own - other, -CONTRAST, CONTRAST);
-                    valid[slot][plane] = if min(own, other) >= 0.0 { 1.0 } else { 0.0 };
+                    let (here_grey, other) = (grey_steps(here_grey[plane]) as f32, grey_steps(other[plane]) as f32);
+                    lighter[slot][plane] = clamp(here_grey - other, -CONTRAST, CONTRAST);
+                    valid[slot][plane] = if min(here_grey, other) >= 0.0 { 1.0 } else { 0.0 };
                     plane += 1;
                 }
                 slot += 1;

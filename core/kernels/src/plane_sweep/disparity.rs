@@ -28,10 +28,10 @@ pub fn pick_disparity(frustum: &FrustumBlock, costs: &[Planes], pixel: u32) -> [
     let (mut near, mut all) = ([0.0; PLANES], [0.0; PLANES]);
     let mut group = 0;
     while group < groups {
-        let own = &costs[first + group];
+        let cost = &costs[first + group];
         let mut plane = 0;
         while plane < PLANES {
-            let share = exp((least - own[plane]) * (1.0 / TEMPERATURE));
+            let share = exp((least - cost[plane]) * (1.0 / TEMPERATURE));
             let away = (group * PLANES + plane) as i32 - best as i32;
             let is_near = (away >= -(NEAR_PLANES as i32)) & (away <= NEAR_PLANES as i32);
             all[plane] += share;
@@ -72,10 +72,10 @@ fn first_plane_of(costs: &[Planes], first: usize, groups: usize, least: f32) -> 
     let mut group = groups;
     while group > 0 {
         group -= 1;
-        let own = &costs[first + group];
+        let cost = &costs[first + group];
         let mut plane = 0;
         while plane < PLANES {
-            found[plane] = if own[plane] == least { (group * PLANES + plane) as i32 } else { found[plane] };
+            found[plane] = if cost[plane] == least { (group * PLANES + plane) as i32 } else { found[plane] };
             plane += 1;
         }
     }

@@ -102,7 +102,7 @@ impl Line {
         while group < group_count {
             let before = self.costs[group];
             let right = if group + 1 < group_count { self.costs[group + 1][0] } else { f32::MAX };
-            let own = costs.fetch(first + group);
+            let cost = costs.fetch(first + group);
             let mut beside = [0.0; PLANES];
             beside[0] = min(left, before[1]);
             beside[PLANES - 1] = min(before[PLANES - 2], right);
@@ -114,7 +114,7 @@ impl Line {
             let mut plane = 0;
             while plane < PLANES {
                 let reached = min(min(before[plane], beside[plane] + STEP_COST), jump);
-                self.costs[group][plane] = own[plane] + (reached - self.least);
+                self.costs[group][plane] = cost[plane] + (reached - self.least);
                 plane += 1;
             }
             lessen(&mut least, &self.costs[group]);

@@ -117,7 +117,7 @@ pub fn match_cost(
 #[derive(Clone, Copy, Debug)]
 pub struct SweptPixel {
     /// Its colour.
-    own: [f32; 3],
+    colour: [f32; 3],
     /// The source's centre.
     origin: Vec3,
     /// Along its ray, 1 along the principal axis.
@@ -140,7 +140,7 @@ impl SweptPixel {
         let texel = (camera.first_texel + pixel) as usize;
         let (column, row) = (pixel % camera.width, pixel / camera.width);
         SweptPixel {
-            own: straight(&texels.fetch(texel)),
+            colour: straight(&texels.fetch(texel)),
             origin: camera.centre_world(),
             direction: camera.towards(column as f32 + 0.5, row as f32 + 0.5),
             entry: entries.fetch(texel),
@@ -205,7 +205,7 @@ impl SweptPixel {
                     let share = weight * fade(max(seen.depth - entry, 0.0) * reach);
                     // For a view that does not see the point only the silhouette counts.
                     if share > 0.0 {
-                        sum += share * min(mean_difference(&straight(&colour), &self.own), MAX_DIFFERENCE);
+                        sum += share * min(mean_difference(&straight(&colour), &self.colour), MAX_DIFFERENCE);
                         share_sum += share;
                     }
                 }

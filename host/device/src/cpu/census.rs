@@ -143,15 +143,15 @@ impl Window {
     /// A group at a place, and at the places around it.
     #[inline(always)]
     fn compare(&mut self, greys: &Greys, here: usize, around: impl Iterator<Item = usize>) {
-        let own = greys.of(here);
+        let grey = greys.of(here);
         self.are_all_seen = greys.are_all_seen[here];
         for (index, there) in around.enumerate() {
             self.are_all_seen &= greys.are_all_seen[there];
-            for (slot, (own, other)) in own.iter().zip(greys.of(there)).enumerate() {
+            for (slot, (grey, other)) in grey.iter().zip(greys.of(there)).enumerate() {
                 let (lighter, valid) = (&mut self.lighter[slot][index], &mut self.valid[slot][index]);
                 for plane in 0..PLANES {
-                    lighter[plane] = (own[plane] - other[plane]).clamp(-MOST, MOST);
-                    valid[plane] = if own[plane].min(other[plane]) >= 0 { ALL } else { 0 };
+                    lighter[plane] = (grey[plane] - other[plane]).clamp(-MOST, MOST);
+                    valid[plane] = if grey[plane].min(other[plane]) >= 0 { ALL } else { 0 };
                 }
             }
         }

@@ -99,14 +99,15 @@ impl WithSimd for GroupNormPartials<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         let GroupNormPartials { block, inputs, part, sums, statistics } = self;
-        let (channels, own) = (block.channels as usize, block.group_channels() as usize);
+        let (channels, group_channels) = (block.channels as usize, block.group_channels() as usize);
         let first = part * PART as usize;
         let pixels = first..block.pixel_count.min((first + PART as usize) as u32) as usize;
-        let count = (pixels.len() * own) as f32;
+        let count = (pixels.len() * group_channels) as f32;
         let (sums, means) = sums.split_at_mut(channels);
         sums.fill(0.0);
         // First the group's first value, then its mean.
-        for (means, inputs) in means.chunks_mut(own).zip(row_of(block, inputs, first).chunks(own)) {
+        for (means, inputs) in means.chunks_mut(group_channels).zip(row_of(block, inputs, first).chunks(group_channels))
+        {
             means.fill(inputs[0]);
         }
         for pixel in pixels.clone() {
@@ -114,7 +115,9 @@ impl WithSimd for GroupNormPartials<'_> {
                 *sum += input - mean;
             }
         }
-        for ((sums, means), statistics) in sums.chunks(own).zip(means.chunks_mut(own)).zip(&mut *statistics) {
+        for ((sums, means), statistics) in
+            sums.chunks(group_channels).zip(means.chunks_mut(group_channels)).zip(&mut *statistics)
+        {
             *statistics = [means[0] + sums.iter().sum::<f32>() / count, 0.0];
             means.fill(statistics[0]);
         }
@@ -124,7 +127,7 @@ impl WithSimd for GroupNormPartials<'_> {
                 *sum += (input - mean) * (input - mean);
             }
         }
-        for (sums, statistics) in sums.chunks(own).zip(statistics) {
+        for (sums, statistics) in sums.chunks(group_channels).zip(statistics) {
             statistics[1] = sums.iter().sum();
         }
     }

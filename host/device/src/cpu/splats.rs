@@ -28,11 +28,11 @@ pub(super) fn blend_splats(
             || {
                 for part in parts {
                     let (column, row) = (part % block.tile_columns * SPLAT_TILE as u32, part / block.tile_columns);
-                    let own = BlendedLanes::<SPLAT_TILE>::of(block, starts, entries, splats, [column, row]);
+                    let blended = BlendedLanes::<SPLAT_TILE>::of(block, starts, entries, splats, [column, row]);
                     let first = block.first_pixel(part) as usize;
                     for lane in 0..block.columns_in(part % block.tile_columns) as usize {
-                        colours.store(first + lane, own.pixel(lane));
-                        depths.store(first + lane, own.depth[lane]);
+                        colours.store(first + lane, blended.pixel(lane));
+                        depths.store(first + lane, blended.depth[lane]);
                     }
                 }
             },

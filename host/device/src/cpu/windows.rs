@@ -83,8 +83,8 @@ impl Columns<'_, '_> {
         let mut after = vec![NONE; len];
         let (mut after_split, mut after_end) = (0, 0);
         for (row, means) in (0..).zip(rows.iter_mut()) {
-            let own = rows_of_window(row, block.height, block.reach[window]);
-            let [first, split, end] = [own[0] as usize, own[1] as usize, own[2] as usize];
+            let rows = rows_of_window(row, block.height, block.reach[window]);
+            let [first, split, end] = [rows[0] as usize, rows[1] as usize, rows[2] as usize];
             if before_split != split {
                 for (count, row) in (first..split).rev().enumerate() {
                     let (known, rest) = before.split_at_mut(count * len);
@@ -109,7 +109,7 @@ impl Columns<'_, '_> {
             let before = if first < split { &before[(split - 1 - first) * len..] } else { &none[..] };
             for (group, (mean, (before, after))) in (first_group..).zip(means.iter_mut().zip(before.iter().zip(&after)))
             {
-                let prior = prior_weight(block, window, group as u32 / block.group_count, own);
+                let prior = prior_weight(block, window, group as u32 / block.group_count, rows);
                 add_mean(simd, mean, SHARE[window], prior, before, after);
             }
         }

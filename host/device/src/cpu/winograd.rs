@@ -87,14 +87,14 @@ impl Winograd {
                 transformed,
             });
             for (place, panels) in self.places.iter().enumerate() {
-                let own = place * tiles;
+                let offset = place * tiles;
                 panels.multiply(Rows {
                     row_count: count,
-                    inputs: &transformed[own * self.channels..],
+                    inputs: &transformed[offset * self.channels..],
                     in_pitch: self.channels,
                     relu_inputs: 0,
                     ending: Ending { bias: &zeros, residual: None, scale: 1.0, relu: 0 },
-                    outputs: &mut products[own * self.columns..][..count * self.columns],
+                    outputs: &mut products[offset * self.columns..][..count * self.columns],
                     out_pitch: self.columns,
                 });
             }

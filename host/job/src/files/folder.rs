@@ -12,7 +12,7 @@ use tempfile::TempDir;
 pub struct WholeFolder {
     path: PathBuf,
     temporary: TempDir,
-    own: Own,
+    unfinished: Own,
 }
 
 impl WholeFolder {
@@ -27,11 +27,11 @@ impl WholeFolder {
             _ => Path::new("."),
         };
         fs::create_dir_all(parent)?;
-        let (temporary, own) =
+        let (temporary, unfinished) =
             Own::make(parent, |builder| builder.tempdir_in(parent), |made: &TempDir| made.path().to_path_buf())?;
         // A temporary folder is closed to others; the result, a folder inside it, has the ordinary permissions.
         fs::create_dir(temporary.path().join(name))?;
-        Ok(WholeFolder { path: path.to_path_buf(), temporary, own })
+        Ok(WholeFolder { path: path.to_path_buf(), temporary, unfinished })
     }
 
     /// Where to put its files.
@@ -45,8 +45,8 @@ impl WholeFolder {
     /// If the system reports an error; then nothing remains.
     pub fn finish(self) -> io::Result<()> {
         let from = self.path();
-        let WholeFolder { path, temporary, own } = self;
-        own.finish(|| {
+        let WholeFolder { path, temporary, unfinished } = self;
+        unfinished.finish(|| {
             if path.is_dir() {
                 fs::remove_dir(&path)?;
             }

@@ -30,14 +30,14 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 /// Removes the temporary files and folders of this process, which must end next: from here on every output waits
 /// forever instead of being finished or begun.
 pub fn remove_all() {
-    let own = lock(&OWN);
-    for path in own.iter() {
+    let paths = lock(&OWN);
+    for path in paths.iter() {
         // A folder is no file. What cannot be removed stays, as after a kill.
         if fs::remove_file(path).is_err() {
             let _ = fs::remove_dir_all(path);
         }
     }
-    std::mem::forget(own);
+    std::mem::forget(paths);
 }
 
 /// A temporary file or folder of this process, until it is finished.
@@ -61,7 +61,7 @@ impl Own {
         let mut attempt = 0;
         loop {
             // Nothing is begun while the process ends.
-            let mut own = lock(&OWN);
+            let mut paths = lock(&OWN);
             let made = make(&mut builder)?;
             let path = place(&made);
             // A folder cannot be opened on every system: it is then not recognised after a kill.
@@ -69,7 +69,7 @@ impl Own {
             attempt += 1;
             // Between making and locking, another process may have taken it for one that a kill left.
             if path.exists() || attempt == ATTEMPTS {
-                own.insert(path.clone());
+                paths.insert(path.clone());
                 return Ok((made, Own { path, _locked: locked }));
             }
         }
@@ -77,9 +77,9 @@ impl Own {
 
     /// Renames it to its final name by `rename`; while the process ends, this waits forever.
     pub(super) fn finish<T>(self, rename: impl FnOnce() -> io::Result<T>) -> io::Result<T> {
-        let own = lock(&OWN);
+        let paths = lock(&OWN);
         let renamed = rename();
-        drop(own);
+        drop(paths);
         renamed
     }
 }

@@ -38,8 +38,8 @@ impl Tiles for Subgroup {
         mut store: impl FnMut(u32, u32, f32),
     ) {
         // Which invocations are in a subgroup is the driver's choice: the number in the workgroup follows from that.
-        let own = (self.subgroup * self.size + self.lane) % TILE;
-        let place = InvocationTile::of(invocation / TILE, own, shape);
+        let invocation_of_tile = (self.subgroup * self.size + self.lane) % TILE;
+        let place = InvocationTile::of(invocation / TILE, invocation_of_tile, shape);
         let row = (place.first_row + Sums::place(place.own_row, place.own_column)).min(shape.row_count - 1);
         let column = place.first_column + Sums::place(place.own_column, 0);
         let left = move |inner: u32| left(row, inner.min(shape.inner_count - 1));
@@ -75,15 +75,15 @@ impl Tiles for Subgroup {
 impl Subgroup {
     /// The numbers of the eight invocations that need the same rows, in the order of the rows.
     #[inline(always)]
-    fn rows_of_all(self, own: f32) -> [Vec4; 2] {
+    fn rows_of_all(self, value: f32) -> [Vec4; 2] {
         if self.size == CLUSTER {
             return [
-                Vec4::new(first::<0>(own), first::<1>(own), first::<2>(own), first::<3>(own)),
-                Vec4::new(first::<4>(own), first::<5>(own), first::<6>(own), first::<7>(own)),
+                Vec4::new(first::<0>(value), first::<1>(value), first::<2>(value), first::<3>(value)),
+                Vec4::new(first::<4>(value), first::<5>(value), first::<6>(value), first::<7>(value)),
             ];
         }
         let first = self.lane / CLUSTER * CLUSTER;
-        let of = move |row: u32| subgroup_shuffle(own, first + row);
+        let of = move |row: u32| subgroup_shuffle(value, first + row);
         [Vec4::new(of(0), of(1), of(2), of(3)), Vec4::new(of(4), of(5), of(6), of(7))]
     }
 }
@@ -91,7 +91,7 @@ impl Subgroup {
 /// The number of an invocation among the subgroup's first eight.
 #[inline(always)]
 #[allow(unsafe_code)]
-fn first<const LANE: u32>(own: f32) -> f32 {
+fn first<const LANE: u32>(value: f32) -> f32 {
     // SAFETY: a full subgroup has at least eight invocations, and all of them are here.
-    unsafe { subgroup_broadcast_const::<f32, LANE>(own) }
+    unsafe { subgroup_broadcast_const::<f32, LANE>(value) }
 }
