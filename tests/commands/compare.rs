@@ -1,12 +1,17 @@
 //! `viewfuse compare`.
 
 use super::{BINARY, assert_near, done};
+use image::DynamicImage;
+use image::metadata::Orientation;
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, f32_bytes, safetensors, toy};
+use viewfuse_tests::scenes::with_tag;
 
 viewfuse_tests::trials![
     one_picture_and_folders,
     scores_are_those_of_render,
     transparent_pictures_are_laid_over_a_background,
+    pictures_are_compared_upright,
+    pictures_of_every_depth_and_kind_are_compared_alike,
     what_cannot_be_compared,
 ];
 
@@ -98,6 +103,68 @@ fn transparent_pictures_are_laid_over_a_background() {
     }
     let printed = done(folder.path(), "compare clear.png green.png");
     assert!(number(&printed, "psnr", 1) < 10.0 && printed.contains("over 255,255,255 (the default)"), "{printed}");
+}
+
+/// Photographs as telephones save them: on either side of a comparison, alone and in folders, square or not.
+fn pictures_are_compared_upright() {
+    let folder = toy();
+    let square = image::open(folder.path().join("toy/rgb/000003.png")).expect("a picture").into_rgb8();
+    let oblong = image::DynamicImage::from(square.clone()).crop_imm(0, 20, 128, 80);
+    for (name, plain) in [("square", square.into()), ("oblong", oblong)] {
+        plain.save(folder.file(&format!("plain/{name}.png"))).expect("a picture");
+        for tag in 2..=8 {
+            let undone = Orientation::from_exif(match tag {
+                6 => 8,
+                8 => 6,
+                own => own,
+            });
+            let mut stored = plain.clone();
+            stored.apply_orientation(undone.expect("an orientation"));
+            folder.write(&format!("turned-{tag}/{name}.jpg"), with_tag(&stored, tag));
+        }
+    }
+    for tag in 2..=8 {
+        for pair in [format!("plain turned-{tag}"), format!("turned-{tag} plain")] {
+            let printed = done(folder.path(), &format!("compare {pair} --device cpu"));
+            assert!(printed.starts_with("2 pictures\n") && number(&printed, "psnr", 2) > 25.0, "{pair}: {printed}");
+        }
+    }
+}
+
+fn pictures_of_every_depth_and_kind_are_compared_alike() {
+    let folder = toy();
+    let photograph = image::open(folder.path().join("toy/rgb/000003.png")).expect("a picture");
+    let (colour, grey) = (photograph.to_rgb8(), photograph.to_luma8());
+    let same: [(&str, DynamicImage, Vec<DynamicImage>); 2] = [
+        (
+            "colour",
+            colour.clone().into(),
+            vec![
+                DynamicImage::from(colour.clone()).into_rgb16().into(),
+                DynamicImage::from(colour.clone()).into_rgba8().into(),
+                DynamicImage::from(colour).into_rgba16().into(),
+            ],
+        ),
+        (
+            "grey",
+            DynamicImage::from(grey.clone()).into_rgb8().into(),
+            vec![
+                grey.clone().into(),
+                DynamicImage::from(grey.clone()).into_luma16().into(),
+                DynamicImage::from(grey).into_luma_alpha8().into(),
+            ],
+        ),
+    ];
+    for (name, plain, others) in same {
+        plain.save(folder.file("plain.png")).expect("a picture");
+        for other in others {
+            other.save(folder.file("other.png")).expect("a picture");
+            for pair in ["plain.png other.png", "other.png plain.png"] {
+                let printed = done(folder.path(), &format!("compare {pair} --device cpu"));
+                assert_eq!(row(&printed, "psnr")[1], "inf", "{name}, {:?}: {printed}", other.color());
+            }
+        }
+    }
 }
 
 fn what_cannot_be_compared() {

@@ -8,7 +8,7 @@ use std::io::Cursor;
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
 use viewfuse::scene::write::{Layout, write};
-use viewfuse_tests::scenes::{self, Folder};
+use viewfuse_tests::scenes::{self, Folder, with_tag};
 
 /// A picture whose left half is red: turned, another half is.
 fn half_red(width: u32, height: u32) -> DynamicImage {
@@ -19,19 +19,6 @@ fn half_red(width: u32, height: u32) -> DynamicImage {
 /// A JPEG whose tag says how it must be turned to be upright.
 fn tagged(width: u32, height: u32, orientation: u8) -> Vec<u8> {
     with_tag(&half_red(width, height), orientation)
-}
-
-fn with_tag(picture: &DynamicImage, orientation: u8) -> Vec<u8> {
-    let mut jpeg = Cursor::new(Vec::new());
-    picture.write_to(&mut jpeg, ImageFormat::Jpeg).expect("a JPEG");
-    let mut exif = b"Exif\0\0II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0".to_vec();
-    exif.extend([orientation, 0, 0, 0, 0, 0, 0, 0]);
-    let mut bytes = jpeg.into_inner();
-    let mut segment = vec![0xff, 0xe1];
-    segment.extend((exif.len() as u16 + 2).to_be_bytes());
-    segment.extend(exif);
-    bytes.splice(2..2, segment);
-    bytes
 }
 
 /// `transforms.json` for cameras of this size with a photograph that is stored 32 x 24.

@@ -1,9 +1,10 @@
 //! Small scenes on disk, in each layout that viewfuse reads.
 
 use std::fs;
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use image::{Rgb, RgbImage};
+use image::{DynamicImage, ImageFormat, Rgb, RgbImage};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -57,6 +58,20 @@ impl Folder {
         fs::remove_file(self.path().join(name)).expect("a file to delete");
         self
     }
+}
+
+/// A picture as a JPEG whose tag (EXIF) says how it must be turned to be upright.
+pub fn with_tag(picture: &DynamicImage, orientation: u8) -> Vec<u8> {
+    let mut jpeg = Cursor::new(Vec::new());
+    picture.write_to(&mut jpeg, ImageFormat::Jpeg).expect("a JPEG");
+    let mut exif = b"Exif\0\0II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0".to_vec();
+    exif.extend([orientation, 0, 0, 0, 0, 0, 0, 0]);
+    let mut bytes = jpeg.into_inner();
+    let mut segment = vec![0xff, 0xe1];
+    segment.extend((exif.len() as u16 + 2).to_be_bytes());
+    segment.extend(exif);
+    bytes.splice(2..2, segment);
+    bytes
 }
 
 /// Numbers with blanks between them.

@@ -274,11 +274,10 @@ fn photo(path: &Path, scratch: &Path) -> Result<Photo, Refused> {
         return Err(Refused::Photograph("the file ends before the picture does".to_owned()));
     }
     let exif = Exif::read(path, header.size());
-    let mut picture = read_picture(path).map_err(unreadable)?;
+    let picture = read_picture(path).map_err(unreadable)?;
     let name = stem(path);
     let mut upright = path.to_path_buf();
     if header.orientation() != Orientation::NoTransforms {
-        picture.apply_orientation(header.orientation());
         upright = scratch.join(format!("{name}.png"));
         put(&upright, &picture).map_err(failed(&upright))?;
     }

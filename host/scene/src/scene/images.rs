@@ -227,20 +227,24 @@ fn decoding<T>(path: &Path, decode: impl FnOnce() -> image::ImageResult<T>) -> R
     }
 }
 
-/// The pixels of any picture as stored: PNG, JPEG, WebP or TIFF of at most [`MAX_SIDE`] pixels on a side.
+/// The pixels of any picture, upright as its orientation tag (EXIF) says: PNG, JPEG, WebP or TIFF of at most
+/// [`MAX_SIDE`] pixels on a side. Every picture that no camera belongs to is read here.
 ///
 /// # Errors
 /// [`SceneError`] if it cannot be read or decoded, or is too large.
 pub fn read_picture(path: &Path) -> Result<DynamicImage, SceneError> {
-    Ok(pixels(path)?.0)
+    let (mut picture, orientation) = pixels(path)?;
+    picture.apply_orientation(orientation);
+    Ok(picture)
 }
 
-/// Width and height of any picture as stored, from its header.
+/// Width and height of any upright picture, from its header.
 ///
 /// # Errors
 /// As [`read_picture`].
 pub fn picture_size(path: &Path) -> Result<[u32; 2], SceneError> {
-    Ok(header(path)?.size)
+    let Header { size, orientation, .. } = header(path)?;
+    Ok(turned(size, orientation))
 }
 
 /// A picture as a PNG file.
