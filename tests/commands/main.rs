@@ -19,6 +19,7 @@ mod interrupt;
 mod kill;
 mod limits;
 mod lists;
+mod masks;
 mod memory;
 mod moving;
 mod optimise;
@@ -100,6 +101,7 @@ fn main() -> ExitCode {
         races::trials(),
         limits::trials(),
         lists::trials(),
+        masks::trials(),
         memory::trials(),
         moving::trials(),
         optimise::trials(),

@@ -6,8 +6,8 @@ use image::{DynamicImage, GrayImage, ImageFormat, Luma, Rgb, RgbImage};
 use serde_json::json;
 use std::io::Cursor;
 use viewfuse::job::progress::Silent;
-use viewfuse::scene::Scene;
 use viewfuse::scene::write::{Layout, write};
+use viewfuse::scene::{MaskChoice, Scene};
 use viewfuse_tests::scenes::{self, Folder, with_tag};
 
 /// A picture whose left half is red: turned, another half is.
@@ -125,10 +125,15 @@ fn png(picture: &DynamicImage) -> Vec<u8> {
     bytes.into_inner()
 }
 
+/// The scene, whose masks say where an object is.
+fn of_object(folder: &Folder) -> Scene {
+    Scene::open_masked(folder.path(), MaskChoice::Object).expect("a scene")
+}
+
 /// The half of the photograph that is red is the one that its mask says counts.
 #[track_caller]
 fn assert_masked(folder: &Folder, size: [u32; 2]) {
-    let photograph = open(folder).photograph(0).expect("a photograph");
+    let photograph = of_object(folder).photograph(0).expect("a photograph");
     assert_eq!(photograph.pixels.dimensions(), size.into());
     let fits = |pixel: &image::Rgba<u8>| (pixel[0] > 100) == (pixel[3] > 128);
     let wrong = photograph.pixels.pixels().filter(|pixel| !fits(pixel)).count();
@@ -158,7 +163,7 @@ fn a_mask_is_turned_like_its_photograph() {
                 let folder = folder(Some(size), &tagged(32, 24, orientation));
                 folder.write("masks/1.png", mask);
                 assert_masked(&folder, size);
-                let scene = open(&folder);
+                let scene = of_object(&folder);
                 let out = Folder::new();
                 for layout in [Layout::Transforms, Layout::Colmap, Layout::Neus] {
                     let path = out.path().join(layout.to_string());

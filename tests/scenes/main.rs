@@ -12,6 +12,7 @@ mod large;
 mod layouts;
 mod lenses;
 mod made;
+mod masks;
 mod pages;
 mod paths;
 mod photographs;

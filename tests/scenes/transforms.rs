@@ -3,7 +3,7 @@
 use super::made::{assert_pixel, assert_refused, names, open};
 use serde_json::{Value, json};
 use viewfuse::scene::few_shot::view_list;
-use viewfuse::scene::{Scene, Split};
+use viewfuse::scene::{MaskChoice, Scene, Split};
 use viewfuse_core::lens::Projection;
 use viewfuse_tests::scenes::{self, Folder};
 
@@ -119,7 +119,7 @@ fn masks_are_named_or_stand_beside() {
     mask("masks/1.png", 255, 16, 12);
     mask("masks/2.png.png", 51, 16, 12);
     mask("masks/3.jpg", 255, 32, 24);
-    let scene = open(&folder);
+    let scene = Scene::open_masked(folder.path(), MaskChoice::Object).expect("a scene");
     let found: Vec<_> = scene.views.iter().map(|view| view.mask.as_ref().map(|mask| mask.file_name())).collect();
     let named = |name: &'static str| Some(Some(std::ffi::OsStr::new(name)));
     assert_eq!(found, [named("m.png"), named("2.png.png"), named("3.jpg"), None]);

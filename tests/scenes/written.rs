@@ -6,7 +6,7 @@ use serde_json::json;
 use std::path::Path;
 use viewfuse::job::progress::{Progress, Silent};
 use viewfuse::scene::write::{Layout, WriteSceneError, Written, write};
-use viewfuse::scene::{Scene, Split, View};
+use viewfuse::scene::{MaskChoice, MaskMeaning, Scene, Split, View};
 use viewfuse_tests::scenes::{self, Folder};
 
 fn written(scene: &Scene, layout: Layout) -> (Folder, Scene, Written) {
@@ -141,7 +141,14 @@ fn through_a_lens(model: &str, coefficient: f64) -> Folder {
 fn lenses_and_masks() {
     for (model, coefficient) in [("OPENCV", 0.15), ("FULL_OPENCV", -0.1), ("OPENCV_FISHEYE", 0.05)] {
         let folder = through_a_lens(model, coefficient);
-        let scene = open(&folder);
+        // Half the photograph: an ignore mask, unless a person says otherwise.
+        for layout in [Layout::Transforms, Layout::Colmap, Layout::ColmapBinary] {
+            let ignoring = open(&folder);
+            let (_folder, read, _) = written(&ignoring, layout);
+            assert_same(layout, &ignoring, &read);
+            assert_eq!(read.masks, MaskMeaning::Ignore);
+        }
+        let scene = Scene::open_masked(folder.path(), MaskChoice::Object).expect("a scene");
         assert!(scene.views[0].lens.is_some() && scene.views[0].mask.is_some());
         for layout in [Layout::Transforms, Layout::Colmap, Layout::ColmapBinary] {
             let (_folder, read, written) = written(&scene, layout);
@@ -240,7 +247,7 @@ fn names_without_numbers_of_their_own_find_their_cameras_and_masks() {
         }
     }
     folder.write("transforms.json", json!({ "fl_x": 20, "frames": frames }).to_string());
-    let scene = open(&folder);
+    let scene = Scene::open_masked(folder.path(), MaskChoice::Object).expect("a scene");
     assert_eq!(names(&scene), ["left_1", "right_1", "b"]);
     assert_eq!(scene.views.iter().filter(|view| view.mask.is_some()).count(), 2);
     let out = Folder::new();

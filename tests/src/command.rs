@@ -164,11 +164,16 @@ pub fn names_in(folder: &Path) -> Vec<String> {
 
 /// A folder that holds a copy of the sample scene as `toy`.
 pub fn toy() -> Folder {
+    sample("toy")
+}
+
+/// A folder that holds a copy of a sample scene under its name.
+pub fn sample(name: &str) -> Folder {
     let folder = Folder::new();
-    let sample = data("toy");
+    let sample = data(name);
     for (path, _) in files_below(&sample).into_iter().filter(|(path, _)| path.is_file()) {
-        let name = path.strip_prefix(&sample).expect("a file of the sample");
-        fs::copy(&path, folder.file(&Path::new("toy").join(name).to_string_lossy())).expect("a copy");
+        let inside = path.strip_prefix(&sample).expect("a file of the sample");
+        fs::copy(&path, folder.file(&Path::new(name).join(inside).to_string_lossy())).expect("a copy");
     }
     folder
 }

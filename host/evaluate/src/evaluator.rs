@@ -16,9 +16,9 @@ use viewfuse_field::held_out::nearest;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, open_album};
 use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_job::progress::{Part, Progress};
-use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{Selection, SelectionError, target_of, view_list};
 use viewfuse_scene::photographs::{Album, GroundTruth, PhotographsError, SourceImages};
+use viewfuse_scene::{MaskMeaning, Scene};
 use viewfuse_weighting::OpenedChoice;
 
 /// Why an evaluation failed.
@@ -94,10 +94,13 @@ pub struct Subject<'a> {
     pub masked: Option<&'a Scene>,
 }
 
-/// A scene whose photographs have no masks: whole photographs are used.
+/// A scene whose photographs have no objects' masks: whole photographs are used. What does not count does not here
+/// either.
 pub fn without_masks(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
-    scene.views.iter_mut().for_each(|view| view.mask = None);
+    if scene.masks == MaskMeaning::Object {
+        scene.views.iter_mut().for_each(|view| view.mask = None);
+    }
     scene
 }
 

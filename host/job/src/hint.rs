@@ -20,6 +20,8 @@ pub enum Hint {
     NoSpiral,
     /// The colour of the background.
     Background,
+    /// What masks mean.
+    Masks,
     /// Poses that meet in an object, or another background: there is nothing that all silhouettes show.
     NoObject,
     /// Another size of the pictures.

@@ -87,7 +87,7 @@ impl PyScene {
         array(py, [matrices.len(), 3, 3], matrices.into_flattened().into_flattened())
     }
 
-    /// Decodes the photograph of one view, undistorted, with its mask as alpha: uint8 [height][width][4].
+    /// Decodes the photograph of one view, undistorted, with its object mask as alpha: uint8 [height][width][4].
     fn photograph(&self, py: Python<'_>, view: &str) -> PyResult<Py<PyArray3<u8>>> {
         let pixels = interruptible(py, |_| {
             let chosen = view_list(&self.scene, view)?;

@@ -2,6 +2,7 @@
 
 mod exposure;
 mod ground_truth;
+mod ignored;
 mod matte;
 pub mod object_box;
 mod resample;
@@ -9,7 +10,7 @@ mod resample;
 pub use ground_truth::{GroundTruth, read_over};
 pub use matte::BackgroundChoice;
 
-use crate::{Photograph, Scene, SceneError, View};
+use crate::{MaskChoice, MaskMeaning, Photograph, Scene, SceneError, View};
 use image::RgbImage;
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -56,6 +57,7 @@ impl Hinted for PhotographsError {
     fn hint(&self) -> Option<Hint> {
         match self {
             PhotographsError::NoSilhouette { .. } => Some(Hint::Background),
+            PhotographsError::Scene(error) => error.hint(),
             _ => None,
         }
     }
@@ -92,7 +94,7 @@ pub struct SourceImages {
     /// The background's colour, red green blue in `[0, 1]`.
     pub background: [f32; 3],
     /// Whether alpha is an object's silhouette. Otherwise whole photographs are used, and alpha 0 marks pixels outside
-    /// them.
+    /// them, and those that do not count. In a silhouette the nearest pixels that count take their place.
     pub has_silhouettes: bool,
     /// Surface points in world coordinates that two or more of the sources saw, where the scene's files have them.
     pub points: Vec<Vec3>,
@@ -226,10 +228,12 @@ impl<'a> Album<'a> {
 
     fn read(&self, view: usize) -> Result<Photograph, SceneError> {
         let size = self.kept_size(view);
-        self.scene.photograph_after(view, |stored| match stored.pixels.dimensions() == size {
+        let photograph = self.scene.photograph_after(view, |stored| match stored.pixels.dimensions() == size {
             true => stored,
             false => resample::reduced(&stored, size),
-        })
+        })?;
+        let has_ignore_mask = self.scene.views[view].mask.is_some() && self.scene.masks == MaskMeaning::Ignore;
+        Ok(if has_ignore_mask { ignored::filled(photograph) } else { photograph })
     }
 
     fn photograph(&self, view: usize) -> Result<Cow<'_, Photograph>, SceneError> {
@@ -238,6 +242,20 @@ impl<'a> Album<'a> {
             _ if view < self.scene.views.len() => Ok(Cow::Owned(self.read(view)?)),
             _ => Ok(Cow::Owned(self.scene.photograph(view)?)),
         }
+    }
+
+    /// Whether a photograph has an alpha channel that is not its object's mask.
+    fn has_own_alpha(&self, view: usize, photograph: &Photograph) -> bool {
+        photograph.has_alpha && !self.scene.has_object_mask(&self.scene.views[view])
+    }
+
+    /// A photograph as a source; `ignores` if what is transparent in it does not count.
+    fn source(&self, view: usize, ignores: bool) -> Result<Cow<'_, Photograph>, SceneError> {
+        let photograph = self.photograph(view)?;
+        Ok(match ignores && self.has_own_alpha(view, &photograph) {
+            true => Cow::Owned(ignored::filled(ignored::by_alpha(photograph.into_owned()))),
+            false => photograph,
+        })
     }
 
     /// The sources, reduced to at most `longest_side` pixels on a side, the background removed according to `choice`.
@@ -254,11 +272,32 @@ impl<'a> Album<'a> {
         // Two passes over the photographs, so that at most one for each thread must be in memory.
         let look = |&view: &usize| {
             progress.check()?;
-            Ok(matte::Border::of(self.photograph(view)?.as_ref(), choice))
+            let photograph = self.photograph(view)?;
+            let share = self.has_own_alpha(view, &photograph).then(|| ignored::border_share(&photograph));
+            Ok((matte::Border::of(&photograph, choice), share))
         };
-        let mut borders = in_order(views.par_iter().map(look))?;
+        let (mut borders, shares): (Vec<_>, Vec<_>) = in_order(views.par_iter().map(look))?.into_iter().unzip();
+        let shares: Vec<f32> = shares.into_iter().flatten().collect();
+        let transparent_count = shares.len();
+        let ignores = match self.scene.mask_choice {
+            MaskChoice::Auto => ignored::is_of_ignored(shares),
+            asked => asked == MaskChoice::Ignore && transparent_count > 0,
+        };
+        if ignores {
+            let look = |&view: &usize| {
+                progress.check()?;
+                Ok(matte::Border::of(self.source(view, ignores)?.as_ref(), choice))
+            };
+            borders = in_order(views.par_iter().map(look))?;
+        }
         let backdrop = matte::Backdrop::of(borders.iter().flatten(), choice);
         let (background, mut warnings) = (backdrop.colour(), Vec::new());
+        if ignores && self.scene.mask_choice == MaskChoice::Auto {
+            warnings.push(format!(
+                "{transparent_count} photographs have an alpha channel that is opaque along the border: it is taken for pixels \
+                 that do not count, not for an object"
+            ));
+        }
         let whole_pictures = match choice {
             BackgroundChoice::None => true,
             BackgroundChoice::Colour(_) => false,
@@ -288,7 +327,9 @@ impl<'a> Album<'a> {
         let all = |borders: &[Option<matte::Border>]| {
             let images = views.par_iter().zip(borders).map(|(&view, border)| {
                 progress.check()?;
-                self.cut_out(view, longest_side, border.as_ref(), &backdrop, border.is_some() || !whole_pictures)
+                let photograph = self.source(view, ignores)?;
+                let must_show = border.is_some() || !whole_pictures;
+                self.cut_out(view, photograph, longest_side, border.as_ref(), &backdrop, must_show)
             });
             in_order(images)
         };
@@ -304,7 +345,7 @@ impl<'a> Album<'a> {
                 borders.iter_mut().for_each(|border| *border = None);
                 let images = in_order(views.par_iter().map(|&view| {
                     progress.check()?;
-                    self.cut_out(view, longest_side, None, &backdrop, false)
+                    self.cut_out(view, self.source(view, ignores)?, longest_side, None, &backdrop, false)
                 }))?;
                 warnings.extend(exposure::warning(&images, names()));
                 Ok(SourceImages { images, background, has_silhouettes: false, points, near_far, warnings })
@@ -335,15 +376,15 @@ impl<'a> Album<'a> {
     fn cut_out(
         &self,
         view: usize,
+        mut photograph: Cow<'_, Photograph>,
         longest_side: u32,
         border: Option<&matte::Border>,
         backdrop: &matte::Backdrop,
         must_show: bool,
     ) -> Result<SourceImage, PhotographsError> {
-        let View { name, camera, image, mask, .. } = &self.scene.views[view];
-        let mut photograph = self.photograph(view)?;
-        if mask.is_some() && !must_show {
-            photograph = Cow::Owned(without_alpha(photograph.into_owned()));
+        let View { name, camera, image, .. } = &self.scene.views[view];
+        if self.scene.has_object_mask(&self.scene.views[view]) && !must_show {
+            photograph = Cow::Owned(photograph.into_owned().without_alpha());
         }
         // Enlarging a source would add pixels but no detail.
         let (width, height) = reduced_size(camera, longest_side);
@@ -373,12 +414,6 @@ impl<'a> Album<'a> {
         };
         Ok(SourceImage { camera: Camera { pinhole, ..*camera }, texels })
     }
-}
-
-/// The whole photograph, without its mask.
-fn without_alpha(mut photograph: Photograph) -> Photograph {
-    photograph.pixels.pixels_mut().for_each(|pixel| pixel[3] = 255);
-    Photograph { has_alpha: false, ..photograph }
 }
 
 /// Longest side of a camera's image in pixels.

@@ -45,6 +45,7 @@ pub use fault::{FaultLocation, FileFault, IntrinsicsFault, NumpyFault, PlyFault}
 pub use frame::SRN_DISTANCE;
 use images::Turn;
 pub use images::{encode_png, picture_size, read_picture};
+pub use masks::meaning::{MaskChoice, MaskMeaning, UnknownMasks};
 use reader::Reader;
 pub use split::{Split, UnknownSplit};
 
@@ -75,7 +76,7 @@ pub struct View {
     pub image: Option<PathBuf>,
     /// The lens distortion of the stored photograph; `None` if it is a pinhole's. Normalised coordinates of `camera`.
     pub lens: Option<Lens>,
-    /// The mask's file (0: pixel does not count). It becomes the alpha channel.
+    /// The mask's file (0: pixel does not count); [`Scene::masks`] says what it means.
     pub mask: Option<PathBuf>,
     /// Near and far bound of the view, if its file states them: along the principal axis, in world units.
     pub near_far: Option<[f32; 2]>,
@@ -149,11 +150,20 @@ impl SceneFrame {
 pub struct Photograph {
     /// Straight (not premultiplied) 8-bit RGBA.
     pub pixels: image::RgbaImage,
-    /// Whether any pixel is not opaque, or there is a mask. If not, the background must be estimated from the colours.
+    /// Whether any pixel is not opaque, or there is an object's mask. If not, the background must be estimated from the
+    /// colours.
     pub has_alpha: bool,
-    /// 255 inside the stored photograph, 0 outside of it, where `pixels` repeat the nearest pixel of the photograph.
-    /// `None` if the undistorted picture is inside everywhere.
+    /// What counts: 255 inside the stored photograph, 0 outside of it, where `pixels` repeat the nearest pixel of the
+    /// photograph, and where its ignore mask says that pixels do not count. `None` if all pixels count.
     pub seen: Option<image::GrayImage>,
+}
+
+impl Photograph {
+    /// The whole photograph: its transparency is ignored.
+    pub(crate) fn without_alpha(mut self) -> Photograph {
+        self.pixels.pixels_mut().for_each(|pixel| pixel[3] = u8::MAX);
+        Photograph { has_alpha: false, ..self }
+    }
 }
 
 /// A scene whose poses and image headers have been read and checked.
@@ -172,6 +182,10 @@ pub struct Scene {
     pub warnings: Vec<String>,
     /// Conventions of the files that were applied, a line each (host/scene/CONVENTIONS.md).
     pub conventions: Vec<String>,
+    /// What the masks of the views say.
+    pub masks: MaskMeaning,
+    /// What a person says of alpha channels and masks; masks that are not used are no view's.
+    pub mask_choice: MaskChoice,
     /// The world's place in the coordinates of the files.
     pub frame: SceneFrame,
 }
@@ -185,19 +199,36 @@ impl Scene {
         Scene::open_with(path, &READERS)
     }
 
+    /// As [`Scene::open`], where a person says what masks and alpha channels mean.
+    ///
+    /// # Errors
+    /// As [`Scene::open_with`].
+    pub fn open_masked(path: impl AsRef<Path>, masks: MaskChoice) -> Result<Scene, SceneError> {
+        Scene::open_by(path.as_ref(), &READERS, masks)
+    }
+
     /// Opens a scene with the first of these readers that recognises it: reads every pose and every image header, and
     /// checks them. Other crates put their own readers before or after [`READERS`].
     ///
     /// # Errors
     /// [`SceneError`] with the path, and the line or key, of the first thing that is missing or wrong.
     pub fn open_with(path: impl AsRef<Path>, readers: &[&dyn Reader]) -> Result<Scene, SceneError> {
-        let path = path.as_ref();
+        Scene::open_by(path.as_ref(), readers, MaskChoice::Auto)
+    }
+
+    fn open_by(path: &Path, readers: &[&dyn Reader], mask_choice: MaskChoice) -> Result<Scene, SceneError> {
         fs::metadata(path).map_err(|cause| files::unreadable(path, cause))?;
         for reader in readers {
             let Some(found) = reader.recognise(path)? else { continue };
             let mut checked = check::scene(&found, reader.form(), reader.read(&found)?)?;
             distinguish(&mut checked.views);
-            checked.warnings.extend(masks::find(path, &mut checked.views));
+            if mask_choice == MaskChoice::None {
+                checked.views.iter_mut().for_each(|view| view.mask = None);
+            } else {
+                checked.warnings.extend(masks::find(path, &mut checked.views));
+            }
+            let (masks, line) = masks::meaning::decide(&checked.views, mask_choice, reader.masks());
+            checked.conventions.extend(line);
             let mut names = HashSet::new();
             for view in &checked.views {
                 if !names.insert(view.name.as_str()) {
@@ -207,7 +238,7 @@ impl Scene {
             }
             let Checked { views, points, warnings, conventions, frame } = checked;
             let (path, layout) = (path.to_path_buf(), reader.name());
-            return Ok(Scene { path, layout, views, points, warnings, conventions, frame });
+            return Ok(Scene { path, layout, views, points, warnings, conventions, masks, mask_choice, frame });
         }
         let (path, looked_for) = (path.to_path_buf(), looked_for(readers));
         Err(match files::photograph_count(&path) {
@@ -225,7 +256,7 @@ impl Scene {
     }
 
     /// Decodes the photograph of the view with this index: turned upright where the cameras are those of the upright
-    /// picture, with its mask as the alpha channel, undistorted to the view's pinhole.
+    /// picture, with an object's mask as the alpha channel, undistorted to the view's pinhole.
     ///
     /// # Errors
     /// [`SceneError`] if there is no such view, if it has no photograph, if a file cannot be decoded, or if its size
@@ -241,12 +272,8 @@ impl Scene {
         view: usize,
         reduce: impl FnOnce(Photograph) -> Photograph,
     ) -> Result<Photograph, SceneError> {
-        let (mut photograph, turn) = images::decode(self.photograph_file(view)?, self.size(view)?)?;
-        let View { camera, lens, mask, .. } = self.view(view)?;
-        if let Some(mask) = mask {
-            masks::apply(mask, &mut photograph, &turn)?;
-        }
-        let photograph = reduce(photograph);
+        let View { camera, lens, .. } = self.view(view)?;
+        let photograph = reduce(self.masked_photograph(view)?);
         Ok(match lens {
             Some(lens) => undistort::undistorted(&photograph, lens, &camera.pinhole),
             None => photograph,
@@ -259,6 +286,22 @@ impl Scene {
         Ok(photograph)
     }
 
+    /// The same with its mask.
+    pub(crate) fn masked_photograph(&self, view: usize) -> Result<Photograph, SceneError> {
+        let (mut photograph, turn) = images::decode(self.photograph_file(view)?, self.size(view)?)?;
+        match &self.view(view)?.mask {
+            Some(mask) => masks::apply(mask, &mut photograph, &turn, self.masks)?,
+            None if self.mask_choice == MaskChoice::None => photograph = photograph.without_alpha(),
+            None => {}
+        }
+        Ok(photograph)
+    }
+
+    /// Whether a view has an object's mask.
+    pub fn has_object_mask(&self, view: &View) -> bool {
+        view.mask.is_some() && self.masks == MaskMeaning::Object
+    }
+
     /// The mask of a view for the photograph of [`Scene::stored_photograph`], at the mask's own size; `None` without a
     /// mask, or if the mask's file is that already.
     pub(crate) fn stored_mask(&self, view: usize) -> Result<Option<GrayImage>, SceneError> {
@@ -267,7 +310,7 @@ impl Scene {
         if masks::is_as_stored(mask, &turn)? {
             return Ok(None);
         }
-        masks::read(mask, &turn).map(Some)
+        masks::read(mask, &turn, self.masks).map(Some)
     }
 
     /// The file of a view's photograph if its pixels are upright as they are stored.

@@ -2,7 +2,8 @@
 //!
 //! Poses are written in the coordinates of the scene's own files ([`crate::SceneFrame`]). Photographs are copied
 //! unchanged if the layout can hold their lens and their mask; otherwise they are written undistorted, with the mask as
-//! the alpha channel. A layout that cannot hold a scene refuses it with the reason; data that is lost without changing
+//! the alpha channel. In NeRF's and COLMAP's layouts masks say which pixels do not count: those of an object become the
+//! alpha channel, of photographs that are not undistorted. A layout that cannot hold a scene refuses it with the reason; data that is lost without changing
 //! what the cameras see (points, near and far bounds, splits) is listed in [`Written::left_out`].
 //!
 //! The folder appears whole or not at all: it is filled under a temporary name in the same folder, and renamed.
@@ -183,7 +184,8 @@ pub fn write_with(
     let unfit = |reason| WriteSceneError::Unfit { scene: scene.path.clone(), layout, reason };
     match layout {
         Layout::Transforms => all_photographed(scene),
-        Layout::Colmap | Layout::ColmapBinary | Layout::Neus => all_photographed(scene),
+        Layout::Colmap | Layout::ColmapBinary => all_photographed(scene),
+        Layout::Neus => all_photographed(scene).and_then(|()| neus::fits(scene)),
         Layout::Srn => srn::fits(scene),
         Layout::Middlebury => all_photographed(scene).and_then(|()| middlebury::fits(scene)),
         Layout::Llff => all_photographed(scene).and_then(|()| llff::fits(scene)),
@@ -254,6 +256,10 @@ fn left_out(scene: &Scene, layout: Layout) -> Vec<String> {
     let parts = views(|view| view.split.is_some());
     if layout != Layout::Transforms && parts > 0 {
         lines.push(format!("the part of the scene that {parts} views belong to"));
+    }
+    let masks = scene.views.iter().filter(|view| view.mask.is_some() && !scene.has_object_mask(view)).count();
+    if layout != Layout::Transforms && !layout.is_colmap() && masks > 0 {
+        lines.push(format!("the ignore masks of {masks} photographs: what does not count is transparent"));
     }
     let lenses = views(|view| view.lens.is_some());
     if layout != Layout::Transforms && !layout.is_colmap() && lenses > 0 {

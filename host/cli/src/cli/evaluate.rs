@@ -122,7 +122,7 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
     let Chosen { device, reason } = arguments.device.open()?;
     // All are opened before the first is computed: a wrong path shows at once.
     let paths = arguments.paths()?;
-    let scenes: Vec<Scene> = paths.iter().map(Scene::open).collect::<Result<_, _>>()?;
+    let scenes: Vec<Scene> = paths.iter().map(|path| arguments.picture.masks.open(path)).collect::<Result<_, _>>()?;
     arguments.output.as_deref().map_or(Ok(()), |path| keep_file_apart(&scenes, path))?;
     let (mut all, mut json_tables): (Vec<Vec<Score>>, Vec<serde_json::Value>) = (Vec::new(), Vec::new());
     let mut tell = |name: &str, results: &Table| -> anyhow::Result<()> {

@@ -1,12 +1,12 @@
 //! `viewfuse export`.
 
+use super::options::MaskOption;
 use super::outputs::keep_folder_apart;
 use super::printing::say;
 use super::terminal::Terminal;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use viewfuse_scene::Scene;
 use viewfuse_scene::write::{Layout, write};
 
 #[derive(Args)]
@@ -23,10 +23,12 @@ pub(crate) struct Arguments {
     /// Folder to write; must not be there yet, or be empty
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
+    #[command(flatten)]
+    masks: MaskOption,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    let scene = Scene::open(&arguments.scene)?;
+    let scene = arguments.masks.open(&arguments.scene)?;
     keep_folder_apart([&scene], &arguments.output)?;
     let progress = Terminal::new("writing the photographs");
     let written = write(&scene, arguments.layout, &arguments.output, &progress)?;

@@ -56,6 +56,7 @@ fn sentence(hint: Hint) -> Option<&'static str> {
         Hint::NoOrbit => "give --targets",
         Hint::NoSpiral => "give --orbit or --between",
         Hint::Background => "set the colour with --background",
+        Hint::Masks => "say it with --masks object or --masks ignore; --masks none does without them",
         Hint::NoObject => "`viewfuse inspect` shows the poses; --background sets the background",
         Hint::PictureSize => "give another --size",
         Hint::OtherRun => "give another folder, or --replace to remove them",

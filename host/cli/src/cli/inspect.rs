@@ -2,6 +2,7 @@
 
 mod quality;
 
+use super::options::MaskOption;
 use super::outputs::keep_file_apart;
 use super::posed::PoseOption;
 use super::printing::say;
@@ -32,6 +33,8 @@ pub(crate) struct Arguments {
     /// Background of the object: auto, black, white, or RED,GREEN,BLUE (0 to 255)
     #[arg(long, value_name = "COLOUR", default_value = "auto")]
     background: BackgroundChoice,
+    #[command(flatten)]
+    masks: MaskOption,
     /// List the views: index, name, size, and the nearest views with the angle to each, seen from what the cameras look
     /// at
     #[arg(long, conflicts_with = "output")]
@@ -49,7 +52,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    let (_, scene) = arguments.pose.open(&arguments.scene)?;
+    let (_, scene) = arguments.pose.open(&arguments.scene, &arguments.masks)?;
     if arguments.views {
         return print_views(&list_views(&scene), arguments.json);
     }

@@ -114,7 +114,7 @@ struct Ended {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let weighting = arguments.weights.open()?;
-    let scene = Scene::open(&arguments.scene)?;
+    let scene = arguments.picture.masks.open(&arguments.scene)?;
     let field = AnyField::default();
     let about = field.about();
     let views = |list: &Option<String>| -> anyhow::Result<Vec<Target>> {

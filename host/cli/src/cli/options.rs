@@ -6,6 +6,7 @@ use super::wrong::wrong;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, Command};
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::time::Duration;
 use viewfuse_device::choice::{self, Chosen, DeviceChoice};
 use viewfuse_field::About;
@@ -14,10 +15,27 @@ use viewfuse_field::render::{DEFAULT_EARLY_TERMINATION, DEFAULT_LEAVE_OUT, Rende
 use viewfuse_field::rows;
 use viewfuse_scene::few_shot::{PathChoice, Selection};
 use viewfuse_scene::photographs::BackgroundChoice;
+use viewfuse_scene::{MaskChoice, Scene, SceneError};
 use viewfuse_vulkan::{GpuOptions, VulkanError};
 
 /// Heading of the options that say what is left out.
 pub(crate) const EFFORTS: &str = "Efforts: what is left out, for which time and error";
+
+/// How a scene is opened, for every command that reads its photographs.
+#[derive(Args)]
+pub(crate) struct MaskOption {
+    /// What masks and alpha channels say: object (where it is), ignore (which pixels do not count), none (they are not
+    /// used), or auto: what their layout and the masks themselves show
+    #[arg(long, value_name = "MEANING", default_value = "auto")]
+    masks: MaskChoice,
+}
+
+impl MaskOption {
+    /// Opens a scene.
+    pub(crate) fn open(&self, scene: impl AsRef<Path>) -> Result<Scene, SceneError> {
+        Scene::open_masked(scene, self.masks)
+    }
+}
 
 /// Options of pictures.
 #[derive(Args)]
@@ -29,6 +47,8 @@ pub(crate) struct PictureOptions {
     /// Background of the object: auto, black, white, or RED,GREEN,BLUE (0 to 255)
     #[arg(long, value_name = "COLOUR", default_value = "auto")]
     background: BackgroundChoice,
+    #[command(flatten)]
+    pub(crate) masks: MaskOption,
     /// Leave out the least relevant sources while their weights together stay at or below this
     #[arg(long, value_name = "TOTAL", default_value_t = DEFAULT_LEAVE_OUT, value_parser = parse_share, help_heading = EFFORTS)]
     leave_out: f32,

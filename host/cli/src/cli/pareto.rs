@@ -24,7 +24,6 @@ use viewfuse_field::{AnyField, LeftOut};
 use viewfuse_job::files::{check_writable, write_whole};
 use viewfuse_job::progress::{Part, Progress};
 use viewfuse_output::record::source_names;
-use viewfuse_scene::Scene;
 use viewfuse_scene::photographs::Album;
 use viewfuse_vulkan::GpuOptions;
 use viewfuse_weighting::WeightingSpec;
@@ -88,7 +87,7 @@ fn parse_beside(text: &str) -> Result<Beside, String> {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let weighting = arguments.weights.open()?;
-    let scene = Scene::open(&arguments.scene)?;
+    let scene = arguments.picture.masks.open(&arguments.scene)?;
     let field = arguments.network.open(arguments.seed)?;
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);
     let job = selection.resolve(&scene, field.about().least_sources)?;

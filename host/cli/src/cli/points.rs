@@ -17,7 +17,6 @@ use viewfuse_field::render::Stage;
 use viewfuse_job::files::check_writable;
 use viewfuse_job::progress::{Part, Progress};
 use viewfuse_output::ply::write_ply;
-use viewfuse_scene::Scene;
 use viewfuse_scene::photographs::Album;
 use viewfuse_weighting::{WeightingSpec, grammar};
 
@@ -59,7 +58,7 @@ fn ply_file(path: PathBuf) -> Result<PathBuf, &'static str> {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let weighting = arguments.weights.open()?;
-    let scene = Scene::open(&arguments.scene)?;
+    let scene = arguments.picture.masks.open(&arguments.scene)?;
     let field = AnyField::default();
     let about = field.about();
     let sources = arguments.sources.to_selection(None, None).sources_without(&scene, &[], about.least_sources)?;

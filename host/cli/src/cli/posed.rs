@@ -2,6 +2,7 @@
 //!
 //! The scene is written beside the photographs, and used again as long as the photographs are the same.
 
+use super::options::MaskOption;
 use super::pose::find_with_defaults;
 use super::printing::complain;
 use anyhow::bail;
@@ -22,9 +23,9 @@ pub(crate) struct PoseOption {
 
 impl PoseOption {
     /// Opens a scene, or the one of the poses found where `--pose` is given and it has none; and the folder of it.
-    pub(crate) fn open(&self, scene: &Path) -> anyhow::Result<(PathBuf, Scene)> {
+    pub(crate) fn open(&self, scene: &Path, masks: &MaskOption) -> anyhow::Result<(PathBuf, Scene)> {
         let folder = if self.pose { posed(scene)? } else { scene.to_path_buf() };
-        let scene = Scene::open(&folder)?;
+        let scene = masks.open(&folder)?;
         Ok((folder, scene))
     }
 }

@@ -73,7 +73,7 @@ pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> 
         // all.
         None => (Weighting::default_scheme(), arguments.model.label().is_none() && arguments.gaussians.is_none()),
     };
-    let (folder, scene) = arguments.pose.open(&arguments.scene)?;
+    let (folder, scene) = arguments.pose.open(&arguments.scene, &arguments.picture.masks)?;
     let field = match &arguments.gaussians {
         Some(path) => AnyField::new(GivenGaussians { scene: GaussianScene::read(path, &scene.frame)? }),
         None => arguments.model.open(arguments.seed, None)?,

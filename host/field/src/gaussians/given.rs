@@ -136,14 +136,14 @@ pub fn behind(sources: &SourceImages) -> [f32; 3] {
     if sources.has_silhouettes { sources.background } else { mean_colour(sources) }
 }
 
-/// The mean of all photographs.
+/// The mean of what all photographs show.
 fn mean_colour(sources: &SourceImages) -> [f32; 3] {
     [0, 1, 2].map(|channel| {
-        let (mut sum, mut count) = (0.0_f64, 0);
+        let (mut sum, mut opacity) = (0.0_f64, 0.0_f64);
         for image in &sources.images {
             sum += image.texels.iter().map(|texel| f64::from(texel[channel])).sum::<f64>();
-            count += image.texels.len();
+            opacity += image.texels.iter().map(|texel| f64::from(texel[3])).sum::<f64>();
         }
-        (sum / count.max(1) as f64) as f32
+        (sum / opacity.max(1.0)) as f32
     })
 }

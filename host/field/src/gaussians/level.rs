@@ -12,7 +12,7 @@ pub(super) struct LevelView {
     pub(super) channels: [Vec<f32>; 4],
     /// What the photograph is compared by, once for all iterations.
     pub(super) structure: [Structure; 3],
-    /// `[row][column]`: 0 where the lens saw nothing, 1 elsewhere; empty if it saw everything.
+    /// `[row][column]`: 0 where the lens saw nothing or pixels do not count, 1 elsewhere; empty if all count.
     pub(super) seen: Vec<f32>,
     /// Whether the opacity is a silhouette.
     pub(super) has_silhouette: bool,

@@ -349,8 +349,11 @@ fn by_pixels(
     let (width, height) = (view.camera.width as usize, view.camera.height as usize);
     let factor = weight / (3 * width * height) as f32;
     let channels = map(3, 1, |channel| {
-        let picture: Vec<f32> = colours.iter().map(|colour| colour[channel] * gain[channel]).collect();
+        let mut picture: Vec<f32> = colours.iter().map(|colour| colour[channel] * gain[channel]).collect();
         let (photograph, structure, seen) = (&view.channels[channel], &view.structure[channel], &view.seen[..]);
+        // What the photograph does not show is the same in both: windows that hold some of it compare the rest.
+        let pixels = picture.iter_mut().zip(photograph).zip(seen);
+        pixels.filter(|(_, seen)| **seen == 0.0).for_each(|((x, y), _)| *x = *y);
         gradient(&Pair { picture: &picture, photograph, structure, seen, width, height }, recipe.structure_share)
     });
     let mut by_gain = [0.0; 3];

@@ -1,7 +1,7 @@
 //! Photographs at targets, to compare predictions with.
 
-use super::{Album, matte, resample, to_rgb8, without_alpha};
-use crate::{Photograph, SceneError, read_picture};
+use super::{Album, ignored, matte, resample, to_rgb8};
+use crate::{MaskChoice, Photograph, SceneError, read_picture};
 use image::{GrayImage, RgbImage};
 use std::borrow::Cow;
 use std::path::Path;
@@ -11,8 +11,8 @@ use std::path::Path;
 pub struct GroundTruth {
     /// The picture, opaque.
     pub picture: RgbImage,
-    /// 255 where the photograph shows the whole pixel, otherwise 0: the photograph's lens did not see the corners of
-    /// the pinhole's picture. `None` if it shows all of them.
+    /// 255 where the photograph shows the whole pixel and it counts, otherwise 0: the photograph's lens did not see the
+    /// corners of the pinhole's picture, its ignore mask takes pixels away. `None` if it shows all of them.
     pub seen: Option<GrayImage>,
 }
 
@@ -29,7 +29,7 @@ pub fn read_over(path: &Path, size: Option<[u32; 2]>, background: Option<[f32; 3
         return Ok(picture.into_rgb8());
     }
     let photograph = Photograph { pixels: picture.into_rgba8(), has_alpha, seen: None };
-    let photograph = if has_alpha { photograph } else { without_alpha(photograph) };
+    let photograph = if has_alpha { photograph } else { photograph.without_alpha() };
     let size = size.unwrap_or(own_size);
     let over = matte::laid_over(&photograph, background.unwrap_or_default());
     Ok(to_rgb8(&resample::area_average(&over, own_size, size), size))
@@ -37,14 +37,23 @@ pub fn read_over(path: &Path, size: Option<[u32; 2]>, background: Option<[f32; 3
 
 impl Album<'_> {
     /// The truth at a view, resampled to a size, rounded to 8 bits: composited over the background if there is one;
-    /// otherwise the whole photograph.
+    /// otherwise the whole photograph, of which transparent pixels do not count.
     ///
     /// # Errors
     /// [`SceneError`] if it cannot be read.
     pub fn truth(&self, view: usize, size: [u32; 2], background: Option<[f32; 3]>) -> Result<GroundTruth, SceneError> {
         let mut photograph = self.photograph(view)?;
-        if background.is_none() && self.scene.views[view].mask.is_some() {
-            photograph = Cow::Owned(without_alpha(photograph.into_owned()));
+        if self.has_own_alpha(view, &photograph) {
+            let ignores = match (background, self.scene.mask_choice) {
+                (None, _) | (_, MaskChoice::Ignore) => true,
+                (_, MaskChoice::Auto) => ignored::is_of_ignored(vec![ignored::border_share(&photograph)]),
+                _ => false,
+            };
+            if ignores {
+                photograph = Cow::Owned(ignored::by_alpha(photograph.into_owned()));
+            }
+        } else if background.is_none() && photograph.has_alpha {
+            photograph = Cow::Owned(photograph.into_owned().without_alpha());
         }
         let background = background.unwrap_or_default();
         let own_size = photograph.pixels.dimensions();

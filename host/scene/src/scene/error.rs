@@ -129,6 +129,17 @@ pub enum SceneError {
         /// The expected mask.
         mask: PathBuf,
     },
+    /// Masks that may say either of two things.
+    #[error(
+        "{path}: this mask and the others leave {percent} % of the photographs, and not one region inside each: it is not clear \
+         whether they say where an object is or which pixels do not count, or are inverted"
+    )]
+    UnclearMasks {
+        /// The mask's file.
+        path: PathBuf,
+        /// How much they leave.
+        percent: u32,
+    },
     /// A photograph whose pose is missing.
     #[error("{path}: this photograph has no pose: there is no {pose}")]
     ImageWithoutPose {
@@ -449,6 +460,7 @@ impl Hinted for SceneError {
     fn hint(&self) -> Option<Hint> {
         match self {
             SceneError::BarePhotographs { .. } => Some(Hint::Poses),
+            SceneError::UnclearMasks { .. } => Some(Hint::Masks),
             SceneError::Image { cause: ImageError::Unsupported(problem), .. }
                 if problem.format_hint() == ImageFormatHint::Exact(ImageFormat::Tiff) =>
             {

@@ -1,19 +1,23 @@
-//! Masks: images that state which pixels of the photographs count.
+//! Masks: images that state which pixels of the photographs count, or where the object is ([`meaning`]).
 //!
 //! A mask is 0 where the photograph does not count and has the greatest value where it does: in NeuS's data objects are
-//! white on black, in COLMAP's and nerfstudio's ignored pixels are black. Values between are fractions of a pixel. It
-//! has the photograph's size, or another of the same shape; of a photograph that carries an orientation (EXIF), it may
-//! be a mask of the stored or of the upright picture.
+//! white on black, in COLMAP's and nerfstudio's ignored pixels are black. Some programs write 1 for the greatest value.
+//! Values between are fractions of a pixel of an object; of an ignore mask, pixels count from half of the greatest on.
+//! instant-ngp's `dynamic_mask_NAME.png` beside the photograph is inverted: 0 where it counts. A mask has the
+//! photograph's size, or another of the same shape; of a photograph that carries an orientation (EXIF), it may be a mask
+//! of the stored or of the upright picture.
 //!
 //! A layout may name masks itself. Otherwise they are searched in a folder `mask` or `masks` in the scene, beside the
 //! photograph's folder or one above it: `images/left/1.jpg` has `masks/left/1.jpg.png` (COLMAP) or `masks/left/1.png`
 //! (nerfstudio), or one of another extension.
 
+pub(super) mod meaning;
+
 use std::path::{Path, PathBuf};
 
-use image::GrayImage;
 use image::imageops::{FilterType, resize};
 use image::metadata::Orientation;
+use image::{DynamicImage, GrayImage, Luma};
 
 use super::Photograph;
 use super::View;
@@ -21,25 +25,46 @@ use super::check::same_shape;
 use super::error::SceneError;
 use super::files::{self, IMAGE_EXTENSIONS};
 use super::images::{self, Turn};
+use meaning::MaskMeaning;
 
 /// Folders of masks.
 const FOLDERS: [&str; 2] = ["mask", "masks"];
 
-/// Gives views without a mask the one in a folder of masks; `root` is the scene's folder or a file in it. The warning
-/// counts photographs without a mask if others have one.
+/// What the names of instant-ngp's masks begin with.
+const INVERTED: &str = "dynamic_mask_";
+
+/// From this share of the greatest level on a pixel counts, of 255.
+const HALF: u8 = 128;
+
+/// Gives views without a mask the one in a folder of masks or beside the photograph; `root` is the scene's folder or a
+/// file in it. The warning counts photographs without a mask if others have one.
 pub(super) fn find(root: &Path, views: &mut [View]) -> Option<String> {
     let root = if root.is_dir() { root } else { root.parent()? };
     // Two photographs of one name in two folders may not share a mask.
     let mut taken: std::collections::HashSet<PathBuf> = views.iter().filter_map(|view| view.mask.clone()).collect();
     for view in views.iter_mut().filter(|view| view.mask.is_none()) {
-        let mask = view.image.as_deref().and_then(|image| beside(root, image));
+        let mask = view.image.as_deref().and_then(|image| beside(root, image).or_else(|| dynamic(image)));
         view.mask = mask.filter(|mask| taken.insert(mask.clone()));
     }
     let photographs = || views.iter().filter(|view| view.image.is_some());
-    let without = photographs().filter(|view| view.mask.is_none()).count();
-    let all = photographs().count();
-    let some = without > 0 && without < all;
-    some.then(|| format!("{}: {without} of {all} photographs have no mask", root.display()))
+    let mut without = photographs().filter(|view| view.mask.is_none());
+    let first = without.next()?.image.as_deref()?;
+    let (without, all) = (1 + without.count(), photographs().count());
+    let first = files::exact(first.file_name().unwrap_or_default());
+    let some = without < all;
+    some.then(|| format!("{}: {without} of {all} photographs have no mask, {first} the first", root.display()))
+}
+
+/// instant-ngp's mask of a photograph, if there is one.
+fn dynamic(image: &Path) -> Option<PathBuf> {
+    let names = [image.file_stem()?, image.file_name()?];
+    let masks = names.map(|name| image.with_file_name(format!("{INVERTED}{}.png", name.to_string_lossy())));
+    masks.into_iter().find(|mask| mask.is_file())
+}
+
+/// Whether a mask is 0 where its photograph counts.
+fn is_inverted(mask: &Path) -> bool {
+    mask.file_name().is_some_and(|name| name.to_string_lossy().starts_with(INVERTED))
 }
 
 /// The mask of a photograph, if there is one.
@@ -63,14 +88,15 @@ fn beside(root: &Path, image: &Path) -> Option<PathBuf> {
     None
 }
 
-/// A mask at its own size, turned like the pixels of its photograph in memory: 255 where they count.
+/// A mask at its own size, turned like the pixels of its photograph in memory: 255 where they count. Of an object's mask
+/// values between are fractions; of an ignore mask there are none.
 ///
 /// A mask with an orientation of its own is turned by it if it then has the upright photograph's shape. Otherwise its
 /// stored size decides whether it is a mask of the stored or of the upright photograph.
 ///
 /// # Errors
 /// [`SceneError`] if it cannot be decoded or does not have the photograph's shape.
-pub(super) fn read(path: &Path, photograph: &Turn) -> Result<GrayImage, SceneError> {
+pub(super) fn read(path: &Path, photograph: &Turn, meaning: MaskMeaning) -> Result<GrayImage, SceneError> {
     let (mut decoded, own) = images::pixels(path)?;
     let stored = [decoded.width(), decoded.height()];
     let Turn { orientation, is_applied, .. } = *photograph;
@@ -105,27 +131,64 @@ pub(super) fn read(path: &Path, photograph: &Turn) -> Result<GrayImage, SceneErr
     let has_alpha = decoded.color().has_alpha();
     let rgba = decoded.to_rgba8();
     let speaks = has_alpha && rgba.pixels().any(|pixel| pixel[3] < u8::MAX);
-    Ok(match speaks {
-        true => GrayImage::from_fn(rgba.width(), rgba.height(), |x, y| image::Luma([rgba.get_pixel(x, y)[3]])),
-        false => decoded.into_luma8(),
-    })
+    let mut mask = match speaks {
+        true => GrayImage::from_fn(rgba.width(), rgba.height(), |x, y| Luma([rgba.get_pixel(x, y)[3]])),
+        false => levels(decoded),
+    };
+    let greatest = mask.iter().copied().max().unwrap_or(0);
+    let (is_inverted, is_object) = (is_inverted(path), meaning == MaskMeaning::Object);
+    for level in mask.iter_mut() {
+        let counts = if *level > greatest / 2 { u8::MAX } else { 0 };
+        *level = match (is_inverted, is_object && greatest > 1) {
+            (true, _) => u8::MAX - counts,
+            (false, true) => *level,
+            (false, false) => counts,
+        };
+    }
+    Ok(mask)
 }
 
-/// Whether a mask's file is one of the photograph's pixels in memory as it is stored: neither carries an orientation.
+/// The levels of a picture. Those of 16 bits are taken as of 8 where they are no more than these hold.
+fn levels(picture: DynamicImage) -> GrayImage {
+    if !matches!(picture, DynamicImage::ImageLuma16(_)) {
+        return picture.into_luma8();
+    }
+    let wide = picture.into_luma16();
+    match wide.iter().all(|level| *level <= u16::from(u8::MAX)) {
+        true => GrayImage::from_fn(wide.width(), wide.height(), |x, y| Luma([wide.get_pixel(x, y)[0] as u8])),
+        false => DynamicImage::from(wide).into_luma8(),
+    }
+}
+
+/// Whether a mask's file is one of the photograph's pixels in memory as it is stored: neither carries an orientation,
+/// and it is not inverted.
 pub(super) fn is_as_stored(path: &Path, photograph: &Turn) -> Result<bool, SceneError> {
     let none = Orientation::NoTransforms;
-    Ok(photograph.orientation == none && images::header(path)?.orientation == none)
+    Ok(!is_inverted(path) && photograph.orientation == none && images::header(path)?.orientation == none)
 }
 
-/// Multiplies the photograph's alpha channel by the mask.
+/// Multiplies the photograph's alpha channel by an object's mask, or marks what an ignore mask takes away as not seen.
 ///
 /// # Errors
-/// As [`read`].
-pub(super) fn apply(path: &Path, photograph: &mut Photograph, turn: &Turn) -> Result<(), SceneError> {
-    let mut mask = read(path, turn)?;
+/// As [`read`]; [`SceneError::UnclearMasks`] if it is not known which of both the mask is.
+pub(super) fn apply(
+    path: &Path,
+    photograph: &mut Photograph,
+    turn: &Turn,
+    meaning: MaskMeaning,
+) -> Result<(), SceneError> {
+    if let MaskMeaning::Unclear { percent } = meaning {
+        return Err(SceneError::UnclearMasks { path: path.to_path_buf(), percent });
+    }
+    let mut mask = read(path, turn, meaning)?;
     let (width, height) = photograph.pixels.dimensions();
     if mask.dimensions() != (width, height) {
         mask = resize(&mask, width, height, FilterType::Triangle);
+    }
+    if meaning == MaskMeaning::Ignore {
+        mask.iter_mut().for_each(|share| *share = if *share >= HALF { u8::MAX } else { 0 });
+        photograph.seen = mask.as_raw().contains(&0).then_some(mask);
+        return Ok(());
     }
     for (pixel, share) in photograph.pixels.pixels_mut().zip(mask.pixels()) {
         let product = u32::from(pixel[3]) * u32::from(share[0]);

@@ -18,6 +18,7 @@ use glam::{DMat3, DVec3};
 use super::error::SceneError;
 use super::fault::{FaultLocation, IntrinsicsFault};
 use super::files::{self, IMAGE_EXTENSIONS};
+use super::masks::meaning::MaskMeaning;
 use super::missing::Missing;
 use super::numpy::{self, Array};
 use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawScene, RawView, Reader};
@@ -94,6 +95,10 @@ impl Reader for Neus {
             views.push(view);
         }
         Ok(RawScene { views, warnings: missing.warning(file)?.into_iter().collect(), ..RawScene::default() })
+    }
+
+    fn masks(&self) -> Option<MaskMeaning> {
+        Some(MaskMeaning::Object)
     }
 }
 

@@ -12,6 +12,7 @@ use viewfuse_core::lens::Lens;
 use super::error::SceneError;
 use super::fault::FaultLocation;
 use super::images;
+use super::masks::meaning::MaskMeaning;
 use super::split::Split;
 
 pub use super::files::{has_extension, list, number_lines, read_text, stem};
@@ -37,6 +38,11 @@ pub trait Reader {
     /// # Errors
     /// [`SceneError`] with the path, and the line or key, of the first thing that is missing or wrong.
     fn read(&self, found: &Path) -> Result<RawScene, SceneError>;
+
+    /// What the layout's masks say; `None` if that is to be seen in them.
+    fn masks(&self) -> Option<MaskMeaning> {
+        None
+    }
 }
 
 /// An unchecked scene, as on disk. A list of views alone becomes one by `RawScene::from`.

@@ -1,8 +1,8 @@
 //! Undistortion: a photograph with lens distortion becomes that of a pinhole camera with the same focal length.
 //!
 //! Each pixel of the result is mapped through the lens in f64, and interpolated between the four nearest pixels
-//! (premultiplied by alpha if there is any). Pixels outside the photograph, or where the lens's polynomials fold the
-//! image over, are marked as not seen.
+//! (premultiplied by alpha if there is any). Pixels outside the photograph, where the lens's polynomials fold the image
+//! over, and those of which any part does not count in the photograph are marked as not seen.
 
 use image::{GrayImage, RgbaImage};
 use pulp::{Arch, Simd, WithSimd};
@@ -30,9 +30,10 @@ pub(super) fn undistorted(photograph: &Photograph, lens: &Lens, pinhole: &Pinhol
     let mut seen = GrayImage::new(width, height);
     let lines = pixels.par_chunks_mut(4 * width as usize).zip(seen.par_chunks_mut(width as usize));
     let arch = Arch::new();
+    let stored = photograph.seen.as_ref().map(|stored| stored.as_raw().as_slice());
     lines.enumerate().for_each(|(row, (line, seen))| {
         let (mapping, pixels, has_alpha) = (&mapping, line.as_chunks_mut().0, photograph.has_alpha);
-        arch.dispatch(Line { texels, has_alpha, mapping, is_fisheye, row: row as u32, pixels, seen });
+        arch.dispatch(Line { texels, stored, has_alpha, mapping, is_fisheye, row: row as u32, pixels, seen });
     });
     let all_seen = seen.as_raw().iter().all(|seen| *seen > 0);
     Photograph { pixels, has_alpha: photograph.has_alpha, seen: (!all_seen).then_some(seen) }
@@ -41,6 +42,8 @@ pub(super) fn undistorted(photograph: &Photograph, lens: &Lens, pinhole: &Pinhol
 /// A line of the result.
 struct Line<'a> {
     texels: &'a [[u8; 4]],
+    /// What counts of them; `None` for all.
+    stored: Option<&'a [u8]>,
     has_alpha: bool,
     mapping: &'a Mapping,
     is_fisheye: bool,
@@ -54,7 +57,7 @@ impl WithSimd for Line<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let Line { texels, has_alpha, mapping, is_fisheye, row, pixels, seen } = self;
+        let Line { texels, stored, has_alpha, mapping, is_fisheye, row, pixels, seen } = self;
         let mut corners = Corners::NONE;
         for (part, (pixels, seen)) in (0_u32..).zip(pixels.chunks_mut(PART).zip(seen.chunks_mut(PART))) {
             let first = part * PART as u32;
@@ -63,6 +66,11 @@ impl WithSimd for Line<'_> {
                 false => mapping.places::<false>(first, row, seen),
             };
             corners.surround(&places, mapping.size);
+            if let Some(stored) = stored {
+                let counts =
+                    |index: usize| corners.of(index, stored).into_iter().all(|(seen, share)| seen > 0 || share == 0.0);
+                seen.iter_mut().enumerate().filter(|(index, _)| !counts(*index)).for_each(|(_, seen)| *seen = 0);
+            }
             for (index, pixel) in pixels.iter_mut().enumerate() {
                 *pixel = match has_alpha {
                     true => corners.premultiplied(index, texels),
@@ -163,7 +171,7 @@ impl Corners {
 
     /// The four pixels of a place, and their shares, which sum to 1.
     #[inline(always)]
-    fn of(&self, index: usize, texels: &[[u8; 4]]) -> [([u8; 4], f32); 4] {
+    fn of<T: Copy>(&self, index: usize, texels: &[T]) -> [(T, f32); 4] {
         let (upper, right, down) = (self.upper[index], self.right[index], self.down[index]);
         let (across, below) = (self.across[index], self.below[index]);
         [

@@ -52,8 +52,7 @@ pub(super) fn write(out: &mut Draft, form: Form) -> Result<usize, WriteSceneErro
     let (scene, mut seen) = (out.scene, observations(out.scene));
     let mut views = Vec::with_capacity(scene.views.len());
     for (index, view) in scene.views.iter().enumerate() {
-        let name = out.stored_photograph(index, "images")?;
-        out.mask(index, "masks", &name)?;
+        let (name, _) = out.stored_photograph_and_mask(index)?;
         let pinhole = &view.camera.pinhole;
         let (model, parameters) = parameters(view);
         let (rotation, translation) = rigid(scene, view);

@@ -28,6 +28,17 @@ pub(super) fn is_own(scene: &Scene) -> bool {
     scene.layout == Layout::Neus.reader() && scene.views.iter().any(|view| view.near_far.is_some())
 }
 
+/// Refuses masks that do not say where an object is.
+pub(super) fn fits(scene: &Scene) -> Result<(), String> {
+    match scene.views.iter().find(|view| view.mask.is_some() && !scene.has_object_mask(view)) {
+        Some(view) => {
+            let name = &view.name;
+            Err(format!("its masks say where the object is, and that of view {name:?} says which pixels do not count"))
+        }
+        None => Ok(()),
+    }
+}
+
 pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
     let count = out.scene.views.len();
     let files = (0..count).map(|view| photograph(out, view)).collect::<Result<Vec<_>, _>>()?;

@@ -33,6 +33,22 @@ impl Draft<'_> {
         }))
     }
 
+    /// Writes the stored photograph of a view into `images`, as [`Draft::stored_photograph`], and its ignore mask into
+    /// `masks`, as [`Draft::mask`]; an object's mask becomes the alpha channel, which says in these layouts where an
+    /// object is. Returns both names.
+    pub(super) fn stored_photograph_and_mask(&self, index: usize) -> Result<(String, Option<String>), WriteSceneError> {
+        let view = &self.scene.views[index];
+        if !self.scene.has_object_mask(view) {
+            let name = self.stored_photograph(index, "images")?;
+            let mask = self.mask(index, "masks", &name)?;
+            return Ok((name, mask));
+        }
+        self.progress.check()?;
+        let name = self.png("images", &view.name, rgb_or_rgba(self.scene.masked_photograph(index)?))?;
+        self.progress.step();
+        Ok((name, None))
+    }
+
     /// Writes the undistorted picture of a view, its mask as the alpha channel: the unchanged file if possible,
     /// otherwise a PNG.
     pub(super) fn pinhole_photograph(&self, view: usize, folder: &str) -> Result<String, WriteSceneError> {
@@ -41,7 +57,11 @@ impl Draft<'_> {
             return self.stored_photograph(view, folder);
         }
         self.progress.check()?;
-        let name = self.png(folder, &changed.name, rgb_or_rgba(self.scene.photograph(view)?))?;
+        let mut photograph = self.scene.photograph(view)?;
+        if changed.mask.is_some() && !self.scene.has_object_mask(changed) {
+            photograph = with_hidden(photograph);
+        }
+        let name = self.png(folder, &changed.name, rgb_or_rgba(photograph))?;
         self.progress.step();
         Ok(name)
     }
@@ -82,6 +102,13 @@ impl Draft<'_> {
         fs::write(&path, bytes).map_err(|cause| WriteSceneError::Io { path, cause })?;
         Ok(file)
     }
+}
+
+/// The photograph with what does not count in it transparent.
+fn with_hidden(mut photograph: Photograph) -> Photograph {
+    let pixels = photograph.pixels.pixels_mut().zip(photograph.seen.iter().flat_map(|seen| seen.as_raw()));
+    pixels.filter(|(_, seen)| **seen == 0).for_each(|(pixel, _)| pixel[3] = 0);
+    Photograph { has_alpha: photograph.has_alpha || photograph.seen.is_some(), ..photograph }
 }
 
 /// Without the alpha channel where it says nothing.

@@ -10,7 +10,7 @@ pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
     let mut frames = Vec::new();
     let mut lists: Map<String, Value> = Map::new();
     for (index, view) in out.scene.views.iter().enumerate() {
-        let photograph = out.stored_photograph(index, "images")?;
+        let (photograph, mask) = out.stored_photograph_and_mask(index)?;
         let file_path = format!("images/{photograph}");
         let mut matrix = out.scene.frame.file_from_camera(&view.camera.pose);
         for row in &mut matrix[..3] {
@@ -30,7 +30,7 @@ pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
                 frame[name] = coefficient.into();
             }
         }
-        if let Some(mask) = out.mask(index, "masks", &photograph)? {
+        if let Some(mask) = mask {
             frame["mask_path"] = format!("masks/{mask}").into();
         }
         let list = view.split.map(|split| match split {

@@ -80,7 +80,8 @@ pub(super) fn run(
     let field = arguments.model.open(arguments.seed, None)?;
     let about = field.about();
     let render_options = arguments.bound.bounded(arguments.picture.to_render_options(arguments.model.exact, &about)?);
-    let scenes: Vec<Scene> = arguments.paths()?.iter().map(Scene::open).collect::<Result<_, _>>()?;
+    let scenes: Vec<Scene> =
+        arguments.paths()?.iter().map(|path| arguments.picture.masks.open(path)).collect::<Result<_, _>>()?;
     folder.map_or(Ok(()), |folder| keep_folder_apart(&scenes, folder))?;
     let draws = Draws {
         seed: arguments.seed,

@@ -41,7 +41,7 @@ impl Prepared {
     pub(super) fn open(arguments: &Arguments) -> anyhow::Result<Prepared> {
         let start = Instant::now();
         let weighting = arguments.weighting()?;
-        let (folder, scene) = arguments.pose.open(&arguments.scene)?;
+        let (folder, scene) = arguments.pose.open(&arguments.scene, &arguments.picture.masks)?;
         if !arguments.is_stream() {
             keep_folder_apart([&scene], &arguments.output)?;
         }

@@ -1,0 +1,112 @@
+//! `--masks`: what masks and alpha channels hide takes no part in pictures and scores.
+
+use super::{BINARY, done};
+use image::{DynamicImage, GrayImage, ImageFormat, Luma, Rgb, RgbImage, Rgba, RgbaImage};
+use serde_json::Value;
+use std::fs;
+use viewfuse_tests::command::{Outcome, assert_refused, assert_wrong_arguments, run, sample};
+use viewfuse_tests::scenes::Folder;
+
+viewfuse_tests::trials![what_masks_hide_takes_no_part, what_is_unclear_is_asked,];
+
+/// Rows that show the car that carried the camera: 8 % of the photograph, the same in all.
+const BONNET: u32 = 221;
+
+/// The scene `room` with the bonnet of a car in the photographs, of whose pixels `shown` makes files.
+fn driven(shown: impl Fn(&Folder, &str, RgbImage)) -> Folder {
+    let folder = sample("room");
+    for view in 0..11 {
+        let name = format!("{view:03}");
+        let mut photograph =
+            image::open(folder.path().join(format!("room/images/{name}.jpg"))).expect("a photograph").into_rgb8();
+        for (x, y, pixel) in photograph.enumerate_pixels_mut().filter(|(_, y, _)| *y >= BONNET) {
+            *pixel = Rgb([if (x / 7 + y / 5) % 2 == 0 { 230 } else { 10 }, 20, 120]);
+        }
+        shown(&folder, &name, photograph);
+    }
+    folder
+}
+
+fn put(folder: &Folder, name: &str, picture: impl Into<DynamicImage>) {
+    picture.into().save_with_format(folder.file(&format!("room/{name}")), ImageFormat::Png).expect("a picture");
+}
+
+/// The score of view 5 from the others, and what was said.
+fn rendered(folder: &Folder, more: &str) -> (f64, String) {
+    let render = "render room --targets 5 --size 160x120 --weights error:alpha=1 --device cpu --no-sheets -o out";
+    let Outcome { code, stderr, .. } = run(BINARY, folder.path(), &format!("{render} --replace {more}"));
+    assert_eq!(code, Some(0), "{stderr}");
+    let record = fs::read(folder.path().join("out/run.json")).expect("a record");
+    let record: Value = serde_json::from_slice(&record).expect("JSON");
+    (record["frames"][0]["psnr"].as_f64().expect("a score"), stderr)
+}
+
+/// The score where nothing is said.
+fn score(folder: &Folder, more: &str) -> f64 {
+    let (psnr, said) = rendered(folder, more);
+    assert_eq!(said, "");
+    psnr
+}
+
+fn what_masks_hide_takes_no_part() {
+    let plain = score(&sample("room"), "");
+    let mask = |counts: bool| GrayImage::from_fn(320, 240, |_, y| Luma([if (y < BONNET) == counts { 255 } else { 0 }]));
+    let colmap = driven(|folder, name, photograph| {
+        put(folder, &format!("images/{name}.jpg"), photograph);
+        put(folder, &format!("masks/{name}.jpg.png"), mask(true));
+    });
+    let printed = done(colmap.path(), "inspect room");
+    let line = "read as    masks: pixels that do not count, 11 files, 8 % of the pixels";
+    assert!(printed.lines().any(|printed| printed == line), "{printed}");
+    let masked = score(&colmap, "");
+    assert!((masked - plain).abs() < 0.7, "{masked} dB, and {plain} dB without a bonnet");
+    assert_eq!(score(&colmap, "--background none"), masked, "masks are not dropped");
+    assert_eq!(score(&colmap, "--masks ignore"), masked);
+    let shown = score(&colmap, "--masks none");
+    assert!(shown < masked - 1.0, "{shown} dB where the bonnet is taken for a part of the room");
+
+    let instant = driven(|folder, name, photograph| {
+        put(folder, &format!("images/{name}.jpg"), photograph);
+        put(folder, &format!("images/dynamic_mask_{name}.png"), mask(false));
+    });
+    assert_eq!(score(&instant, ""), masked, "the same masks");
+
+    // Holes in the photographs themselves, and two pixels in a corner of one.
+    let rgba = |photograph: &RgbImage, hidden: &dyn Fn(u32, u32) -> bool| {
+        RgbaImage::from_fn(320, 240, |x, y| {
+            let Rgb([r, g, b]) = *photograph.get_pixel(x, y);
+            Rgba([r, g, b, if hidden(x, y) { 0 } else { 255 }])
+        })
+    };
+    let holes = driven(|folder, name, photograph| {
+        put(folder, &format!("images/{name}.jpg"), rgba(&photograph, &|_, y| y >= BONNET));
+    });
+    let corner = sample("room");
+    let photograph = image::open(corner.path().join("room/images/003.jpg")).expect("a photograph").into_rgb8();
+    put(&corner, "images/003.jpg", rgba(&photograph, &|x, y| x < 2 && y == 0));
+    for (folder, count, expected, tolerance) in [(&holes, 10, masked, 0.3), (&corner, 1, plain, 0.05)] {
+        let (psnr, said) = rendered(folder, "");
+        assert!(said.contains(&format!("{count} photographs have an alpha channel that is opaque")), "{said}");
+        assert!((psnr - expected).abs() < tolerance, "{psnr} dB instead of {expected} dB");
+        assert_eq!(score(folder, "--masks ignore"), psnr);
+    }
+}
+
+fn what_is_unclear_is_asked() {
+    let folder = driven(|folder, name, photograph| {
+        put(folder, &format!("images/{name}.jpg"), photograph);
+        let inverted = GrayImage::from_fn(320, 240, |_, y| Luma([if y < BONNET { 0 } else { 255 }]));
+        put(folder, &format!("masks/{name}.jpg.png"), inverted);
+    });
+    let parts = ["room/masks/", "leave 8 % of the photographs", "inverted", "--masks object or --masks ignore"];
+    assert_refused(BINARY, folder.path(), "render room --targets 5 --size 32x24 --device cpu -o out", &parts);
+    let printed = done(folder.path(), "inspect room");
+    assert!(printed.contains("read as    masks: unclear whether"), "{printed}");
+    let wrong = "render room --targets 5 -o out --masks person";
+    assert_wrong_arguments(
+        BINARY,
+        folder.path(),
+        wrong,
+        &["unknown meaning of masks 'person'", "auto, object, ignore"],
+    );
+}

@@ -1,0 +1,261 @@
+//! What masks mean: those of COLMAP, nerfstudio, instant-ngp and NeuS, over the sample scenes.
+
+use image::{DynamicImage, GrayImage, ImageBuffer, Luma, RgbImage};
+use serde_json::{Value, json};
+use std::fs;
+use viewfuse::job::progress::Silent;
+use viewfuse::scene::photographs::{Album, BackgroundChoice};
+use viewfuse::scene::write::{Layout, write};
+use viewfuse::scene::{MaskChoice, MaskMeaning, Scene};
+use viewfuse_tests::command::{sample, toy};
+use viewfuse_tests::scenes::{self, Folder};
+
+/// Photographs of the sample scene `room`, 320 x 240.
+const COUNT: u32 = 11;
+
+fn mask(counts: impl Fn(u32, u32) -> bool) -> GrayImage {
+    GrayImage::from_fn(320, 240, |x, y| Luma([if counts(x, y) { 255 } else { 0 }]))
+}
+
+/// What a thing covers that is somewhere else in each photograph: 4 % of it.
+fn thing(view: u32, x: u32, y: u32) -> bool {
+    let [left, top] = [20 + 20 * (7 * view % 11), 20 + 14 * (5 * view % 11)];
+    (left..left + 64).contains(&x) && (top..top + 48).contains(&y)
+}
+
+/// The room with a mask for each photograph under the name that `name` makes of `000`.
+fn room(name: impl Fn(&str) -> String, counts: impl Fn(u32, u32, u32) -> bool) -> Folder {
+    let folder = sample("room");
+    for view in 0..COUNT {
+        let path = folder.file(&format!("room/{}", name(&format!("{view:03}"))));
+        mask(|x, y| counts(view, x, y)).save(path).expect("a mask");
+    }
+    folder
+}
+
+fn opened(folder: &Folder, masks: MaskChoice) -> Scene {
+    Scene::open_masked(folder.path().join("room"), masks).expect("a scene")
+}
+
+/// The line of `inspect` about masks.
+fn line(scene: &Scene) -> &str {
+    scene.conventions.iter().find(|line| line.starts_with("masks: ")).map_or("", String::as_str)
+}
+
+/// Photograph 5 counts where the thing is not, and is otherwise as without masks.
+#[track_caller]
+fn assert_hides_the_thing(scene: &Scene) {
+    assert_eq!(scene.masks, MaskMeaning::Ignore);
+    let photograph = scene.photograph(5).expect("a photograph");
+    let plain = Scene::open(viewfuse_tests::places::data("room")).expect("the sample").photograph(5).expect("the same");
+    assert!(!photograph.has_alpha && photograph.pixels == plain.pixels);
+    let seen = photograph.seen.expect("pixels that do not count");
+    assert!(seen.enumerate_pixels().all(|(x, y, level)| (level[0] == 0) == thing(5, x, y)));
+}
+
+#[test]
+fn masks_of_what_moves_are_ignore_masks() {
+    let names: [fn(&str) -> String; 2] = [|name| format!("masks/{name}.jpg.png"), |name| format!("masks/{name}.png")];
+    for name in names {
+        let folder = room(name, |view, x, y| !thing(view, x, y));
+        let scene = opened(&folder, MaskChoice::Auto);
+        assert_eq!(line(&scene), "masks: pixels that do not count, 11 files, 4 % of the pixels");
+        assert_hides_the_thing(&scene);
+    }
+    // nerfstudio names them.
+    let folder = room(|name| format!("elsewhere/{name}.png"), |view, x, y| !thing(view, x, y));
+    let file = folder.file("room/transforms.json");
+    let mut transforms: Value = serde_json::from_slice(&fs::read(&file).expect("a file")).expect("JSON");
+    for (view, frame) in transforms["frames"].as_array_mut().expect("frames").iter_mut().enumerate() {
+        frame["mask_path"] = json!(format!("elsewhere/{view:03}.png"));
+    }
+    fs::write(&file, transforms.to_string()).expect("a file");
+    assert_hides_the_thing(&opened(&folder, MaskChoice::Auto));
+    // A person's word counts more than what is seen.
+    let scene = opened(&folder, MaskChoice::Object);
+    assert_eq!(line(&scene), "masks: where the object is, 11 files, 96 % of the pixels");
+    assert!(scene.photograph(5).is_ok_and(|photograph| photograph.has_alpha && photograph.seen.is_none()));
+    let scene = opened(&folder, MaskChoice::None);
+    assert!(line(&scene).is_empty() && scene.views.iter().all(|view| view.mask.is_none()));
+}
+
+#[test]
+fn masks_of_instant_ngp_are_inverted() {
+    for name in ["dynamic_mask_NAME.png", "dynamic_mask_NAME.jpg.png"] {
+        let folder = room(|view| format!("images/{}", name.replace("NAME", view)), thing);
+        let scene = opened(&folder, MaskChoice::Auto);
+        let inverted = ", white where they do not count (dynamic_mask_*.png, 11 files)";
+        assert_eq!(line(&scene), format!("masks: pixels that do not count, 11 files, 4 % of the pixels{inverted}"));
+        assert_hides_the_thing(&scene);
+        // Written, they are as all others.
+        let out = Folder::new();
+        write(&scene, Layout::Transforms, &out.path().join("room"), &Silent).expect("written");
+        assert_hides_the_thing(&opened(&out, MaskChoice::Auto));
+    }
+}
+
+#[test]
+fn levels_of_0_and_1_are_whole() {
+    let shapes: [(&str, fn(GrayImage) -> DynamicImage); 5] = [
+        ("0 and 1", |mask| GrayImage::from_fn(320, 240, |x, y| Luma([mask.get_pixel(x, y)[0] / 255])).into()),
+        ("16 bits", |mask| DynamicImage::from(mask).into_luma16().into()),
+        ("16 bits, 0 and 1", |mask| {
+            let level = |x, y| Luma([u16::from(mask.get_pixel(x, y)[0] / 255)]);
+            DynamicImage::ImageLuma16(ImageBuffer::from_fn(320, 240, level))
+        }),
+        ("half the size", |mask| GrayImage::from_fn(160, 120, |x, y| *mask.get_pixel(2 * x, 2 * y)).into()),
+        ("in an alpha channel", |mask| {
+            let level = |x, y| image::Rgba([0, 0, 0, mask.get_pixel(x, y)[0]]);
+            image::RgbaImage::from_fn(320, 240, level).into()
+        }),
+    ];
+    for (shape, of) in shapes {
+        let folder = sample("room");
+        for view in 0..COUNT {
+            let picture = of(mask(|x, y| !thing(view, x, y)));
+            picture.save(folder.file(&format!("room/masks/{view:03}.png"))).expect("a mask");
+        }
+        let scene = opened(&folder, MaskChoice::Auto);
+        assert!(line(&scene).contains("11 files, 4 %"), "{shape}: {}", line(&scene));
+        assert_hides_the_thing(&scene);
+    }
+}
+
+#[test]
+fn masks_that_are_alike_are_ignore_masks() {
+    // The circle of a fisheye is one region away from the border, and the same in every photograph.
+    let circle = |_: u32, x: u32, y: u32| (f64::from(x) - 160.0).hypot(f64::from(y) - 120.0) < 112.0;
+    let scene = opened(&room(|name| format!("masks/{name}.png"), circle), MaskChoice::Auto);
+    assert_eq!(line(&scene), "masks: pixels that do not count, 11 files, 49 % of the pixels");
+}
+
+#[test]
+fn silhouettes_are_object_masks() {
+    let names: [fn(&str) -> String; 2] = [|name| format!("{name}.png"), |name| format!("{name}.png.png")];
+    for name in names {
+        let folder = toy();
+        let plain = Scene::open(folder.path().join("toy")).expect("the sample");
+        let photographs: Vec<_> = (0..plain.views.len()).map(|view| plain.photograph(view).expect("one")).collect();
+        for (view, photograph) in plain.views.iter().zip(&photographs) {
+            let (width, height) = photograph.pixels.dimensions();
+            let alpha = GrayImage::from_fn(width, height, |x, y| Luma([photograph.pixels.get_pixel(x, y)[3]]));
+            alpha.save(folder.file(&format!("toy/masks/{}", name(&view.name)))).expect("a mask");
+            let opaque: RgbImage = DynamicImage::from(photograph.pixels.clone()).into_rgb8();
+            opaque.save(folder.file(&format!("toy/rgb/{}.png", view.name))).expect("a photograph");
+        }
+        let scene = Scene::open(folder.path().join("toy")).expect("a scene");
+        assert!(line(&scene).starts_with("masks: where the object is, 24 files, "), "{}", line(&scene));
+        for (view, photograph) in photographs.iter().enumerate() {
+            assert!(scene.photograph(view).expect("the same") == *photograph, "{view}");
+        }
+        // Layouts whose masks say what does not count get the object as an alpha channel.
+        let out = Folder::new();
+        for layout in [Layout::Transforms, Layout::Colmap, Layout::Neus] {
+            let path = out.path().join(layout.to_string());
+            write(&scene, layout, &path, &Silent).expect("written");
+            let read = Scene::open(&path).expect("a scene");
+            for (view, photograph) in photographs.iter().enumerate() {
+                let same = read.view_named(&scene.views[view].name).expect("the same view");
+                assert!(read.photograph(same).expect("the same") == *photograph, "{layout}: {view}");
+            }
+        }
+    }
+}
+
+#[test]
+fn masks_that_leave_little_are_refused() {
+    // The bonnet of a car in white, and the thing that moves.
+    let kinds: [fn(u32, u32, u32) -> bool; 2] = [|_, _, y| y >= 228, thing];
+    for kind in kinds {
+        let folder = room(|name| format!("masks/{name}.jpg.png"), kind);
+        let scene = opened(&folder, MaskChoice::Auto);
+        assert!(line(&scene).contains("unclear") && line(&scene).contains(" % of the pixels"), "{}", line(&scene));
+        let error = scene.photograph(3).expect_err("unclear masks").to_string();
+        assert!(error.contains("masks/003.jpg.png: this mask and the others leave ") && error.contains("inverted"));
+        let album = Album::open(&scene, [0, 1], &Silent).map(|_| ()).expect_err("unclear masks");
+        assert!(album.to_string().contains("masks/000.jpg.png"), "{album}");
+        assert!(opened(&folder, MaskChoice::Ignore).photograph(3).is_ok_and(|photograph| photograph.seen.is_some()));
+        assert!(opened(&folder, MaskChoice::Object).photograph(3).is_ok_and(|photograph| photograph.has_alpha));
+    }
+}
+
+#[test]
+fn photographs_without_a_mask_are_told() {
+    let folder = room(|name| format!("masks/{name}.png"), |view, x, y| !thing(view, x, y));
+    folder.remove("room/masks/004.png").remove("room/masks/007.png");
+    let scene = opened(&folder, MaskChoice::Auto);
+    let warning = "2 of 11 photographs have no mask, 004.jpg the first";
+    assert!(scene.warnings.iter().any(|line| line.ends_with(warning)), "{:?}", scene.warnings);
+    assert_eq!(line(&scene), "masks: pixels that do not count, 9 files, 4 % of the pixels");
+    assert!(scene.photograph(4).is_ok_and(|photograph| photograph.seen.is_none()));
+}
+
+/// A red thing before green, through a lens.
+fn red_before_green(masks: bool) -> Folder {
+    let folder = Folder::new();
+    let is_red = |x: u32, y: u32| (60..90).contains(&x) && (30..70).contains(&y);
+    let colour = |x, y| image::Rgb(if is_red(x, y) { [255, 0, 0] } else { [0, 255, 0] });
+    RgbImage::from_fn(120, 90, colour).save(folder.file("images/1.png")).expect("a photograph");
+    if masks {
+        let mask = GrayImage::from_fn(120, 90, |x, y| Luma([if is_red(x, y) { 0 } else { 255 }]));
+        mask.save(folder.file("masks/1.png")).expect("a mask");
+    }
+    let transforms = json!({
+        "fl_x": 100, "k1": 0.2, "w": 120, "h": 90,
+        "frames": [{ "file_path": "images/1.png", "transform_matrix": scenes::opengl_matrix() }],
+    });
+    folder.write("transforms.json", transforms.to_string());
+    folder
+}
+
+#[test]
+fn a_lens_moves_a_mask_as_it_moves_the_photograph() {
+    let [masked, plain] = [true, false].map(|masks| {
+        let folder = red_before_green(masks);
+        Scene::open(folder.path()).expect("a scene").photograph(0).expect("a photograph")
+    });
+    let hidden = plain.seen.expect("corners").pixels().filter(|seen| seen[0] == 0).count();
+    let seen = masked.seen.expect("pixels that do not count");
+    let counting = || masked.pixels.pixels().zip(seen.pixels()).filter(|(_, seen)| seen[0] > 0);
+    assert!(counting().all(|(pixel, _)| pixel[0] == 0 && pixel[1] == 255), "red shows");
+    let red = masked.pixels.pixels().filter(|pixel| pixel[0] > 0).count();
+    // Some show less red than a level of 8 bits.
+    let rest = 120 * 90 - counting().count() - red - hidden;
+    assert!(rest < 40, "{rest} pixels are hidden that show no red");
+}
+
+#[test]
+fn what_an_ignore_mask_hides_is_in_no_source_and_no_truth() {
+    let folder = room(|name| format!("masks/{name}.png"), |view, x, y| !thing(view, x, y));
+    let scene = opened(&folder, MaskChoice::Auto);
+    for choice in [BackgroundChoice::Auto, BackgroundChoice::None] {
+        let album = Album::open_at(&scene, 0..11, 160, &Silent).expect("photographs");
+        let images = album.sources(&[3, 5], 160, choice, &Silent).expect("sources");
+        assert!(!images.has_silhouettes && images.warnings.is_empty(), "{:?}", images.warnings);
+        for (texel, at) in images.images[1].texels.iter().zip(0..) {
+            let (x, y) = (2 * (at % 160), 2 * (at / 160));
+            assert_eq!(texel[3] == 0.0, thing(5, x, y), "{x}, {y}");
+        }
+        let truth = album.truth(5, [160, 120], None).expect("a truth").seen.expect("pixels that do not count");
+        assert!(truth.enumerate_pixels().all(|(x, y, level)| (level[0] == 0) == thing(5, 2 * x, 2 * y)));
+    }
+}
+
+#[test]
+fn layouts_without_ignore_masks_hold_them_as_transparency_or_not_at_all() {
+    let folder = room(|name| format!("masks/{name}.png"), |view, x, y| !thing(view, x, y));
+    let scene = opened(&folder, MaskChoice::Auto);
+    let out = Folder::new();
+    let written = write(&scene, Layout::Srn, &out.path().join("srn"), &Silent).expect("written");
+    assert!(
+        written.left_out.contains(&"the ignore masks of 11 photographs: what does not count is transparent".to_owned())
+    );
+    let read = Scene::open(out.path().join("srn")).expect("a scene");
+    let photograph = read.photograph(5).expect("a photograph");
+    assert!(photograph.pixels.enumerate_pixels().all(|(x, y, pixel)| (pixel[3] == 0) == thing(5, x, y)));
+    let album = Album::open(&read, [3, 5], &Silent).expect("photographs");
+    let images = album.sources(&[3, 5], 320, BackgroundChoice::Auto, &Silent).expect("sources");
+    assert!(!images.has_silhouettes && images.warnings.len() == 1, "{:?}", images.warnings);
+    let error = write(&scene, Layout::Neus, &out.path().join("neus"), &Silent).expect_err("no place").to_string();
+    assert!(error.contains("cannot hold this scene: its masks say where the object is"), "{error}");
+}
