@@ -7,13 +7,15 @@
 //! coefficients leaves the others 0:
 //!
 //! ```text
-//! perspective   r2 = x^2 + y^2,  g = (1 + k1 r2 + k2 r2^2 + k3 r2^3) / (1 + k4 r2 + k5 r2^2 + k6 r2^3)
+//! perspective   r2 = x^2 + y^2,  g = (1 + k1 r2 + k2 r2^2 + k3 r2^3 + q4 r2^4) / (1 + k4 r2 + k5 r2^2 + k6 r2^3)
 //!               x' = g x + 2 p1 x y + p2 (r2 + 2 x^2)        SIMPLE_RADIAL (k1), RADIAL (k1 k2), OPENCV (k1 k2 p1 p2),
 //!               y' = g y + p1 (r2 + 2 y^2) + 2 p2 x y        FULL_OPENCV (k1 .. k6 p1 p2)
 //! fisheye       a = atan(r),  a' = a (1 + k1 a^2 + k2 a^4 + k3 a^6 + k4 a^8)
 //!               (x', y') = (x, y) a' / r                     SIMPLE_RADIAL_FISHEYE (k1), RADIAL_FISHEYE (k1 k2),
 //!                                                            OPENCV_FISHEYE (k1 .. k4)
 //! ```
+//!
+//! nerfstudio and Metashape call `q4` their k4: their polynomial goes on where OpenCV's has a denominator.
 //!
 //! One source serves `f32` ([`LensBlock`], for kernels and firmware) and `f64` ([`Lens`], for undistorting
 //! photographs): the functions are generic over [`Real`].
@@ -32,6 +34,8 @@ const MAX_STEPS: u32 = 24;
 const MAX_HALVINGS: u32 = 12;
 /// Greatest magnitude of a coefficient: powers of eight of them stay finite in `f32`.
 pub const MAX_COEFFICIENT: f64 = 1.0e4;
+/// Coefficients `[k1, k2, k3, k4, k5, k6, p1, p2, q4]`; a fisheye ignores all but the first four.
+pub type Coefficients<T> = [T; 9];
 /// Largest angle from the principal axis that an ideal image holds, in radians: 89.9 degrees.
 const WIDEST: f32 = 1.569_051;
 
@@ -109,7 +113,7 @@ pub enum LensError {
 impl fmt::Display for LensError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let LensError::Coefficient(index) = self;
-        let name = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"].get(*index).copied().unwrap_or("?");
+        let name = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "k4 (of r^8)"].get(*index).copied().unwrap_or("?");
         write!(f, "the lens's coefficient {name} is not a number of at most {MAX_COEFFICIENT:e}")
     }
 }
@@ -121,7 +125,7 @@ impl core::error::Error for LensError {}
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Lens {
     projection: Projection,
-    coefficients: [f64; 8],
+    coefficients: Coefficients<f64>,
 }
 
 /// An ideal point and its residual.
@@ -135,13 +139,13 @@ pub struct Undistorted<T> {
 }
 
 impl Lens {
-    /// Coefficients `[k1, k2, k3, k4, k5, k6, p1, p2]`; a fisheye ignores the last four.
+    /// From its coefficients.
     ///
     /// # Errors
     /// [`LensError`] names the first one that is not usable.
-    pub fn new(projection: Projection, coefficients: [f64; 8]) -> Result<Lens, LensError> {
+    pub fn new(projection: Projection, coefficients: Coefficients<f64>) -> Result<Lens, LensError> {
         let mut index = 0;
-        while index < 8 {
+        while index < coefficients.len() {
             let value = coefficients[index];
             if !(-MAX_COEFFICIENT..=MAX_COEFFICIENT).contains(&value) {
                 return Err(LensError::Coefficient(index));
@@ -156,14 +160,14 @@ impl Lens {
         self.projection
     }
 
-    /// `[k1, k2, k3, k4, k5, k6, p1, p2]`.
-    pub fn coefficients(&self) -> [f64; 8] {
+    /// Its coefficients.
+    pub fn coefficients(&self) -> Coefficients<f64> {
         self.coefficients
     }
 
     /// Whether the lens changes nothing: it is a pinhole.
     pub fn is_pinhole(&self) -> bool {
-        self.projection == Projection::Perspective && self.coefficients == [0.0; 8]
+        self.projection == Projection::Perspective && self.coefficients == [0.0; 9]
     }
 
     /// Where an ideal point appears in the photograph. Normalised coordinates.
@@ -198,7 +202,8 @@ impl Lens {
             first: [c[0] as f32, c[1] as f32, c[2] as f32, c[3] as f32],
             second: [c[4] as f32, c[5] as f32, c[6] as f32, c[7] as f32],
             is_fisheye: (self.projection == Projection::Fisheye) as u32,
-            padding: [0; 3],
+            fourth: c[8] as f32,
+            padding: [0; 2],
         }
     }
 }
@@ -213,16 +218,18 @@ pub struct LensBlock {
     pub second: [f32; 4],
     /// 1 for a fisheye, 0 for a perspective lens.
     pub is_fisheye: u32,
+    /// `q4`; unused by a fisheye.
+    pub fourth: f32,
     /// Zeros.
-    pub padding: [u32; 3],
+    pub padding: [u32; 2],
 }
 
 const _: () = assert!(size_of::<LensBlock>() == 48);
 
 impl LensBlock {
-    fn coefficients(&self) -> [f32; 8] {
+    fn coefficients(&self) -> Coefficients<f32> {
         let (a, b) = (self.first, self.second);
-        [a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3]]
+        [a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3], self.fourth]
     }
 
     /// Where an ideal point appears in the photograph. Normalised coordinates.
@@ -238,10 +245,10 @@ impl LensBlock {
     }
 }
 
-/// Where an ideal point appears in the photograph. `coefficients` are `[k1, k2, k3, k4, k5, k6, p1, p2]`. Total: a
-/// denominator of 0 and points that are not finite give the result of IEEE arithmetic.
+/// Where an ideal point appears in the photograph. Total: a denominator of 0 and points that are not finite give the
+/// result of IEEE arithmetic.
 #[inline]
-pub fn distort<T: Real>(is_fisheye: bool, coefficients: &[T; 8], point: [T; 2]) -> [T; 2] {
+pub fn distort<T: Real>(is_fisheye: bool, coefficients: &Coefficients<T>, point: [T; 2]) -> [T; 2] {
     let [x, y] = point;
     let squared = x * x + y * y;
     if is_fisheye {
@@ -253,10 +260,10 @@ pub fn distort<T: Real>(is_fisheye: bool, coefficients: &[T; 8], point: [T; 2]) 
         let factor = bent(coefficients, radius.arc_tangent()) / radius;
         return [x * factor, y * factor];
     }
-    let [k1, k2, k3, k4, k5, k6, p1, p2] = *coefficients;
+    let [k1, k2, k3, k4, k5, k6, p1, p2, q4] = *coefficients;
     let (one, two) = (T::of(1.0), T::of(2.0));
-    let factor =
-        (one + squared * (k1 + squared * (k2 + squared * k3))) / (one + squared * (k4 + squared * (k5 + squared * k6)));
+    let factor = (one + squared * (k1 + squared * (k2 + squared * (k3 + squared * q4))))
+        / (one + squared * (k4 + squared * (k5 + squared * k6)));
     [
         x * factor + two * p1 * x * y + p2 * (squared + two * x * x),
         y * factor + p1 * (squared + two * y * y) + two * p2 * x * y,
@@ -265,7 +272,7 @@ pub fn distort<T: Real>(is_fisheye: bool, coefficients: &[T; 8], point: [T; 2]) 
 
 /// A fisheye's radius at an angle from the principal axis.
 #[inline]
-fn bent<T: Real>(coefficients: &[T; 8], angle: T) -> T {
+fn bent<T: Real>(coefficients: &Coefficients<T>, angle: T) -> T {
     let s = angle * angle;
     let [k1, k2, k3, k4, ..] = *coefficients;
     angle * (T::of(1.0) + s * (k1 + s * (k2 + s * (k3 + s * k4))))
@@ -273,7 +280,7 @@ fn bent<T: Real>(coefficients: &[T; 8], angle: T) -> T {
 
 /// The slope of [`bent`].
 #[inline]
-fn bent_slope<T: Real>(coefficients: &[T; 8], angle: T) -> T {
+fn bent_slope<T: Real>(coefficients: &Coefficients<T>, angle: T) -> T {
     let s = angle * angle;
     let [k1, k2, k3, k4, ..] = *coefficients;
     let (three, five, seven, nine) = (T::of(3.0), T::of(5.0), T::of(7.0), T::of(9.0));
@@ -282,19 +289,19 @@ fn bent_slope<T: Real>(coefficients: &[T; 8], angle: T) -> T {
 
 /// A perspective lens's factor `g` at a squared radius, and its slope in the squared radius.
 #[inline]
-fn factor_and_slope<T: Real>(coefficients: &[T; 8], squared: T) -> (T, T) {
-    let [k1, k2, k3, k4, k5, k6, ..] = *coefficients;
-    let (one, two, three) = (T::of(1.0), T::of(2.0), T::of(3.0));
-    let above = one + squared * (k1 + squared * (k2 + squared * k3));
+fn factor_and_slope<T: Real>(coefficients: &Coefficients<T>, squared: T) -> (T, T) {
+    let [k1, k2, k3, k4, k5, k6, _, _, q4] = *coefficients;
+    let (one, two, three, four) = (T::of(1.0), T::of(2.0), T::of(3.0), T::of(4.0));
+    let above = one + squared * (k1 + squared * (k2 + squared * (k3 + squared * q4)));
     let below = one + squared * (k4 + squared * (k5 + squared * k6));
-    let above_slope = k1 + squared * (two * k2 + squared * three * k3);
+    let above_slope = k1 + squared * (two * k2 + squared * (three * k3 + squared * four * q4));
     let below_slope = k4 + squared * (two * k5 + squared * three * k6);
     (above / below, (above_slope * below - above * below_slope) / (below * below))
 }
 
 /// How fast the photograph's radius grows with the ideal one, without the tangential part; not positive where a
 /// rational factor's denominator is not.
-fn radial_slope(is_fisheye: bool, coefficients: &[f64; 8], radius: f64) -> f64 {
+fn radial_slope(is_fisheye: bool, coefficients: &Coefficients<f64>, radius: f64) -> f64 {
     if is_fisheye {
         return bent_slope(coefficients, radius.arc_tangent());
     }
@@ -314,7 +321,7 @@ fn radial_slope(is_fisheye: bool, coefficients: &[f64; 8], radius: f64) -> f64 {
 /// Inside [`Lens::reach`] the residual is a few units in the last place of the point (in `f64` below 1e-14 for points
 /// up to 10; in `f32` below 2e-6).
 #[inline]
-pub fn undistort<T: Real>(is_fisheye: bool, coefficients: &[T; 8], point: [T; 2]) -> Undistorted<T> {
+pub fn undistort<T: Real>(is_fisheye: bool, coefficients: &Coefficients<T>, point: [T; 2]) -> Undistorted<T> {
     let guess = if is_fisheye { unbent(coefficients, point) } else { straightened(coefficients, point) };
     let miss = missed(is_fisheye, coefficients, guess, point);
     Undistorted { point: guess, residual: miss.root() }
@@ -322,7 +329,7 @@ pub fn undistort<T: Real>(is_fisheye: bool, coefficients: &[T; 8], point: [T; 2]
 
 /// Squared distance between a point and where the lens maps a guess.
 #[inline]
-fn missed<T: Real>(is_fisheye: bool, coefficients: &[T; 8], guess: [T; 2], point: [T; 2]) -> T {
+fn missed<T: Real>(is_fisheye: bool, coefficients: &Coefficients<T>, guess: [T; 2], point: [T; 2]) -> T {
     let at = distort(is_fisheye, coefficients, guess);
     let (x, y) = (at[0] - point[0], at[1] - point[1]);
     x * x + y * y
@@ -330,7 +337,7 @@ fn missed<T: Real>(is_fisheye: bool, coefficients: &[T; 8], guess: [T; 2], point
 
 /// Newton's method on a fisheye's angle.
 #[inline]
-fn unbent<T: Real>(coefficients: &[T; 8], point: [T; 2]) -> [T; 2] {
+fn unbent<T: Real>(coefficients: &Coefficients<T>, point: [T; 2]) -> [T; 2] {
     let zero = T::of(0.0);
     let radius = (point[0] * point[0] + point[1] * point[1]).root();
     if !(radius > T::of(1.0e-12)) {
@@ -368,7 +375,7 @@ fn unbent<T: Real>(coefficients: &[T; 8], point: [T; 2]) -> [T; 2] {
 
 /// Newton's method in the plane of a perspective lens.
 #[inline]
-fn straightened<T: Real>(coefficients: &[T; 8], point: [T; 2]) -> [T; 2] {
+fn straightened<T: Real>(coefficients: &Coefficients<T>, point: [T; 2]) -> [T; 2] {
     let p1 = coefficients[6];
     let p2 = coefficients[7];
     let (two, six) = (T::of(2.0), T::of(6.0));

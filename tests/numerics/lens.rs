@@ -12,21 +12,21 @@ const POINTS: [[f64; 2]; 5] = [[0.0, 0.0], [0.3, -0.2], [-0.55, 0.4], [0.1, 0.7]
 struct Case {
     model: &'static str,
     projection: Projection,
-    coefficients: [f64; 8],
+    coefficients: [f64; 9],
     expected: [[f64; 2]; 5],
 }
 
-const CASES: [Case; 7] = [
+const CASES: [Case; 8] = [
     Case {
         model: "SIMPLE_RADIAL",
         projection: Projection::Perspective,
-        coefficients: [-0.12, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        coefficients: [-0.12, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
         expected: [[0.0, 0.0], [0.29532, -0.19688], [-0.519475, 0.3778], [0.094, 0.658], [-0.704, -0.528]],
     },
     Case {
         model: "RADIAL",
         projection: Projection::Perspective,
-        coefficients: [-0.21, 0.07, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        coefficients: [-0.21, 0.07, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
         expected: [
             [0.0, 0.0],
             [0.2921649, -0.1947766],
@@ -38,7 +38,7 @@ const CASES: [Case; 7] = [
     Case {
         model: "OPENCV",
         projection: Projection::Perspective,
-        coefficients: [0.0578421, -0.0805099, 0.0, 0.0, 0.0, 0.0, -0.000980296, 0.00015575],
+        coefficients: [0.0578421, -0.0805099, 0.0, 0.0, 0.0, 0.0, -0.000980296, 0.00015575, 0.0],
         expected: [
             [0.0, 0.0],
             [0.302013574727, -0.201456323298],
@@ -50,7 +50,7 @@ const CASES: [Case; 7] = [
     Case {
         model: "FULL_OPENCV",
         projection: Projection::Perspective,
-        coefficients: [0.31, -0.18, 0.021, 0.27, -0.11, 0.013, 0.0013, -0.0021],
+        coefficients: [0.31, -0.18, 0.021, 0.27, -0.11, 0.013, 0.0013, -0.0021, 0.0],
         expected: [
             [0.0, 0.0],
             [0.300364400809319, -0.200255933872879],
@@ -59,10 +59,23 @@ const CASES: [Case; 7] = [
             [-0.788535737425405, -0.588526803069054],
         ],
     },
+    // Fractions of Python's, by nerfstudio's and Metashape's formula.
+    Case {
+        model: "OPENCV with nerfstudio's k4",
+        projection: Projection::Perspective,
+        coefficients: [-0.12, 0.05, -0.02, 0.0, 0.0, 0.0, 0.0013, -0.0021, 0.03],
+        expected: [
+            [0.0, 0.0],
+            [0.29475588849, -0.19651692566],
+            [-0.5278378959106446, 0.38377699248046876],
+            [0.0942775, 0.6679425],
+            [-0.75554, -0.56378],
+        ],
+    },
     Case {
         model: "SIMPLE_RADIAL_FISHEYE",
         projection: Projection::Fisheye,
-        coefficients: [-0.04, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        coefficients: [-0.04, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
         expected: [
             [0.0, 0.0],
             [0.286549290946965, -0.19103286063131],
@@ -74,7 +87,7 @@ const CASES: [Case; 7] = [
     Case {
         model: "RADIAL_FISHEYE",
         projection: Projection::Fisheye,
-        coefficients: [0.05, -0.013, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        coefficients: [0.05, -0.013, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
         expected: [
             [0.0, 0.0],
             [0.2895987259021, -0.193065817268067],
@@ -86,7 +99,7 @@ const CASES: [Case; 7] = [
     Case {
         model: "OPENCV_FISHEYE",
         projection: Projection::Fisheye,
-        coefficients: [0.0621, -0.0187, 0.0093, -0.0021, 0.0, 0.0, 0.0, 0.0],
+        coefficients: [0.0621, -0.0187, 0.0093, -0.0021, 0.0, 0.0, 0.0, 0.0, 0.0],
         expected: [
             [0.0, 0.0],
             [0.289996861286025, -0.19333124085735],
@@ -162,14 +175,14 @@ fn the_same_in_single_precision() {
 #[test]
 fn what_no_ideal_point_maps_to_is_told() {
     // This barrel folds at a radius of sqrt(1 / 0.9), where the photograph's is 0.703.
-    let barrel = Lens::new(Projection::Perspective, [-0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).expect("a lens");
+    let barrel = Lens::new(Projection::Perspective, [-0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).expect("a lens");
     let fold = (1.0_f64 / 0.9).sqrt();
     assert!((barrel.reach(2.0) - fold).abs() < 1e-3, "{}", barrel.reach(2.0));
     let inside = barrel.undistort([0.69, 0.0]);
     assert!(inside.residual < 1e-12 && inside.point[0] < fold, "{inside:?}");
     assert!(barrel.undistort([0.8, 0.0]).residual > 0.09);
     // A fisheye's picture is wider than any ideal one.
-    let fisheye = Lens::new(Projection::Fisheye, [0.0; 8]).expect("a lens");
+    let fisheye = Lens::new(Projection::Fisheye, [0.0; 9]).expect("a lens");
     assert!(fisheye.undistort([1.5, 0.0]).residual < 1e-12);
     assert!(fisheye.undistort([1.8, 0.0]).residual > 0.2);
     for lens in [barrel, fisheye] {
@@ -182,14 +195,14 @@ fn what_no_ideal_point_maps_to_is_told() {
 
 #[test]
 fn coefficients_are_checked() {
-    for (index, value) in [(0, f64::NAN), (3, f64::INFINITY), (7, 2.0 * MAX_COEFFICIENT)] {
-        let mut coefficients = [0.0; 8];
+    for (index, value) in [(0, f64::NAN), (3, f64::INFINITY), (7, 2.0 * MAX_COEFFICIENT), (8, f64::NAN)] {
+        let mut coefficients = [0.0; 9];
         coefficients[index] = value;
         let error = Lens::new(Projection::Perspective, coefficients).expect_err("no lens");
         assert_eq!(error, LensError::Coefficient(index));
-        assert!(error.to_string().contains(["k1", "", "", "k4", "", "", "", "p2"][index]), "{error}");
+        assert!(error.to_string().contains(["k1", "", "", "k4", "", "", "", "p2", "k4 (of r^8)"][index]), "{error}");
     }
-    let pinhole = Lens::new(Projection::Perspective, [0.0; 8]).expect("a pinhole");
-    assert!(pinhole.is_pinhole() && !Lens::new(Projection::Fisheye, [0.0; 8]).expect("a lens").is_pinhole());
+    let pinhole = Lens::new(Projection::Perspective, [0.0; 9]).expect("a pinhole");
+    assert!(pinhole.is_pinhole() && !Lens::new(Projection::Fisheye, [0.0; 9]).expect("a lens").is_pinhole());
     assert_eq!((pinhole.block(), pinhole.distort([0.3, 0.4])), (LensBlock::default(), [0.3, 0.4]));
 }

@@ -78,6 +78,55 @@ fn missing_photographs_are_left_out_and_counted_once() {
 }
 
 #[test]
+fn of_several_models_the_largest_is_read() {
+    const ALL: [(u32, u32, &str); 3] = [(1, 7, "1.png"), (2, 7, "2.png"), (3, 7, "3.png")];
+    let model = |folder: &Folder, name: &str, images: &[(u32, u32, &str)], is_text: bool| {
+        let [extension, cameras, list] = match is_text {
+            true => [b"txt".to_vec(), cameras_text(&[pinhole()]).into_bytes(), images_text(images).into_bytes()],
+            false => [b"bin".to_vec(), cameras_binary(&[pinhole()]), images_binary(images)],
+        };
+        let extension = String::from_utf8(extension).expect("text");
+        folder.write(&format!("sparse/{name}/cameras.{extension}"), cameras);
+        folder.write(&format!("sparse/{name}/images.{extension}"), list);
+    };
+    for is_text in [true, false] {
+        let folder = Folder::new();
+        ALL.iter().for_each(|(_, _, name)| _ = folder.image(&format!("images/{name}"), 16, 12));
+        model(&folder, "0", &ALL[..1], is_text);
+        model(&folder, "1", &ALL[1..], is_text);
+        // Found by its number, not by its name.
+        model(&folder, "10", &ALL[..1], !is_text);
+        let scene = open(&folder);
+        assert_eq!(names(&scene), ["2", "3"]);
+        let [models, photographs] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
+        assert!(models.contains("sparse/1: this model has 2 photographs; others beside it are not read"), "{models}");
+        assert!(models.ends_with(": 0 (1 photographs), 10 (1 photographs)"), "{models}");
+        assert!(
+            photographs.ends_with("images: 1 photograph has no pose and is not used, 2 have one (without is 1.png)")
+        );
+        // By its path, another one; of equal ones the first.
+        let chosen = Scene::open(folder.path().join("sparse/0")).expect("the model");
+        assert_eq!((names(&chosen), chosen.warnings.len()), (vec!["1"], 2));
+        model(&folder, "0", &ALL, is_text);
+        model(&folder, "10", &ALL, is_text);
+        let scene = open(&folder);
+        assert_eq!(scene.views.len(), 3);
+        assert!(scene.warnings.len() == 1 && scene.warnings[0].contains("sparse/0: this model has 3"));
+    }
+}
+
+#[test]
+fn names_of_images_are_paths_of_any_system() {
+    let folder = colmap_binary();
+    folder.image("images/left/1.png", 16, 12).image("images/left/2.png", 16, 12);
+    folder.write("sparse/0/images.bin", images_binary(&[(1, 7, "left\\1.png"), (2, 7, "./left/2.png")]));
+    let scene = open(&folder);
+    assert_eq!(names(&scene), ["2", "1"]);
+    let [warning] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
+    assert!(warning.contains("2 photographs have no pose"), "{warning}");
+}
+
+#[test]
 fn text_without_the_lines_of_points_is_read() {
     let folder = colmap_text();
     let text = images_text(&IMAGES).replace("1.5 2.5 -1 3 4 1\n", "");
@@ -92,17 +141,19 @@ fn text_without_the_lines_of_points_is_read() {
 fn every_camera_model_is_read() {
     // Parameters count from 1 after focal lengths and principal point, so that each coefficient shows where it went.
     let perspective = Projection::Perspective;
-    type Case = (u32, &'static str, usize, usize, Projection, [f64; 8]);
-    let cases: [Case; 9] = [
-        (0, "SIMPLE_PINHOLE", 1, 0, perspective, [0.0; 8]),
-        (1, "PINHOLE", 2, 0, perspective, [0.0; 8]),
-        (2, "SIMPLE_RADIAL", 1, 1, perspective, [0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
-        (3, "RADIAL", 1, 2, perspective, [0.1, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
-        (4, "OPENCV", 2, 4, perspective, [0.1, 0.2, 0.0, 0.0, 0.0, 0.0, 0.3, 0.4]),
-        (5, "OPENCV_FISHEYE", 2, 4, Projection::Fisheye, [0.1, 0.2, 0.3, 0.4, 0.0, 0.0, 0.0, 0.0]),
-        (6, "FULL_OPENCV", 2, 8, perspective, [0.1, 0.2, 0.5, 0.6, 0.7, 0.8, 0.3, 0.4]),
-        (8, "SIMPLE_RADIAL_FISHEYE", 1, 1, Projection::Fisheye, [0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
-        (9, "RADIAL_FISHEYE", 1, 2, Projection::Fisheye, [0.1, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+    type Case = (u32, &'static str, usize, usize, Projection, [f64; 9]);
+    let cases: [Case; 11] = [
+        (0, "SIMPLE_PINHOLE", 1, 0, perspective, [0.0; 9]),
+        (1, "PINHOLE", 2, 0, perspective, [0.0; 9]),
+        (2, "SIMPLE_RADIAL", 1, 1, perspective, [0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        (3, "RADIAL", 1, 2, perspective, [0.1, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        (4, "OPENCV", 2, 4, perspective, [0.1, 0.2, 0.0, 0.0, 0.0, 0.0, 0.3, 0.4, 0.0]),
+        (5, "OPENCV_FISHEYE", 2, 4, Projection::Fisheye, [0.1, 0.2, 0.3, 0.4, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        (6, "FULL_OPENCV", 2, 8, perspective, [0.1, 0.2, 0.5, 0.6, 0.7, 0.8, 0.3, 0.4, 0.0]),
+        (8, "SIMPLE_RADIAL_FISHEYE", 1, 1, Projection::Fisheye, [0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        (9, "RADIAL_FISHEYE", 1, 2, Projection::Fisheye, [0.1, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        (14, "SIMPLE_FISHEYE", 1, 0, Projection::Fisheye, [0.0; 9]),
+        (15, "FISHEYE", 2, 0, Projection::Fisheye, [0.0; 9]),
     ];
     for (id, name, focal_count, coefficient_count, projection, expected) in cases {
         let mut parameters = vec![40.0, 48.0][..focal_count].to_vec();
@@ -118,7 +169,7 @@ fn every_camera_model_is_read() {
             let focal_y = if focal_count == 1 { 20.0 } else { 24.0 };
             assert_eq!((view.camera.pinhole.focal(), view.camera.pinhole.principal()), ([20.0, focal_y], [7.5, 6.5]));
             match view.lens {
-                None => assert_eq!(coefficient_count, 0, "{name}"),
+                None => assert_eq!((coefficient_count, projection), (0, perspective), "{name}"),
                 Some(lens) => {
                     assert_eq!(lens.projection(), projection, "{name}");
                     let found = lens.coefficients();
@@ -131,14 +182,23 @@ fn every_camera_model_is_read() {
 
 #[test]
 fn models_that_are_not_read_are_named() {
-    for (id, name) in [(7, "FOV"), (10, "THIN_PRISM_FISHEYE"), (4711, "NONSENSE")] {
+    for (id, name, title) in [
+        (7, "FOV", "FOV (7)"),
+        (10, "THIN_PRISM_FISHEYE", "THIN_PRISM_FISHEYE (10)"),
+        (17, "EQUIRECTANGULAR", "EQUIRECTANGULAR (17)"),
+        (4711, "NONSENSE", "4711"),
+    ] {
         let camera = Camera(7, id, name, vec![40.0, 48.0, 15.0, 13.0, 0.1]);
         let (text, binary) = (colmap_text(), colmap_binary());
         text.write("sparse/0/cameras.txt", cameras_text(std::slice::from_ref(&camera)));
         binary.write("sparse/0/cameras.bin", cameras_binary(&[camera]));
         let said = format!("camera model {name} is not supported");
         assert_refused(&text, "sparse/0/cameras.txt:2: ", &[&said, "OPENCV_FISHEYE"]);
-        assert_refused(&binary, "sparse/0/cameras.bin: byte 8: ", &[&format!("camera model {id} is not"), "PINHOLE"]);
+        assert_refused(
+            &binary,
+            "sparse/0/cameras.bin: byte 8: ",
+            &[&format!("camera model {title} is not"), "PINHOLE"],
+        );
     }
 }
 

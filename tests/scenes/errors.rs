@@ -113,13 +113,21 @@ fn numbers_that_are_none() {
 fn matrices_that_are_no_pose() {
     let scaled: Vec<f64> =
         POSE.iter().enumerate().map(|(i, v)| if i % 4 < 3 && i < 12 { 1.01 * v } else { *v }).collect();
-    assert_srn_refused("pose/2.txt", &words(&scaled), "pose/2.txt: not a camera pose", &["scaled or skewed", "0.02"]);
+    let parts = ["scaled by 1.01", "divide its 3x3 block by that, not the camera's centre"];
+    assert_srn_refused("pose/2.txt", &words(&scaled), "pose/2.txt: the rotation is scaled", &parts);
     assert_srn_refused("pose/2.txt", &with(0, 0.3), "pose/2.txt: not a camera pose", &["scaled or skewed"]);
     assert_srn_refused("pose/2.txt", &with(2, -1.0), "pose/2.txt: not a camera pose", &["mirrored"]);
     assert_srn_refused("pose/2.txt", &with(15, 2.0), "pose/2.txt: not a camera pose", &["last row"]);
     assert_srn_refused("pose/2.txt", &with(3, 1e300), "pose/2.txt: not a camera pose", &["row 1, column 4"]);
     assert_srn_refused("pose/2.txt", &with(3, 1e35), "pose/2.txt: not a camera pose", &["1e30"]);
 
+    // A camera below an object in inches.
+    let mut inches = scenes::opengl_matrix();
+    for (row, column) in (0..3).flat_map(|row| (0..3).map(move |column| (row, column))) {
+        inches[row][column] = json!(0.0254 * inches[row][column].as_f64().expect("a number"));
+    }
+    let parts = ["frames[0].transform_matrix: the rotation is scaled by 0.0254: divide"];
+    assert_transforms_refused("/frames/0", "transform_matrix", inches, &parts);
     let mut mirrored = scenes::opengl_matrix();
     mirrored[0][2] = json!(1.0);
     let parts = ["frames[0].transform_matrix: not a camera pose", "mirrored"];
@@ -213,9 +221,26 @@ fn lenses_that_are_not_read() {
         ("/frames/0", "s4", json!(-1e-4), "frames[0].s4 is -0.0001:"),
         ("", "equirectangular", json!(true), "equirectangular is true:"),
         ("", "is_fisheye", json!("yes"), "is_fisheye is \"yes\":"),
+        // Of no lens, of another model, of other programs.
+        ("", "k5", json!(0.1), "k5 is 0.1:"),
+        ("/frames/0", "k6", json!(1e-5), "frames[0].k6 is 0.00001:"),
+        ("", "p3", json!(0.1), "p3 is 0.1:"),
+        ("", "b2", json!(-0.7), "b2 is -0.7:"),
+        ("", "tau_x", json!(0.01), "tau_x is 0.01:"),
+        ("/frames/0", "ftheta_p1", json!(2), "frames[0].ftheta_p1 is 2:"),
     ] {
         assert_transforms_refused(object, key, value, &[said, advice[0], advice[1]]);
     }
+    let mut fisheye = scenes::transforms();
+    (fisheye["is_fisheye"], fisheye["p1"]) = (json!(true), json!(0.01));
+    assert_refused(
+        &scenes::transforms_folder(&fisheye),
+        "transforms.json: p1 is 0.01: this lens is not supported",
+        &[],
+    );
+    fisheye["camera_model"] = json!("OPENCV");
+    let said = ": is_fisheye true and camera_model OPENCV contradict each other";
+    assert_refused(&scenes::transforms_folder(&fisheye), &format!("transforms.json{said}"), &[]);
     let said = ["camera_model: camera model \"EQUIRECTANGULAR\" is not supported", "OPENCV_FISHEYE"];
     assert_transforms_refused("", "camera_model", json!("EQUIRECTANGULAR"), &said);
     assert_transforms_refused("/frames/0", "k2", json!(1e9), &["frames[0]: the lens's coefficient k2 is not"]);

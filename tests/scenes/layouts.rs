@@ -3,7 +3,7 @@
 //! The camera sees the point at (0.5, -0.25, 2): the pixel is `focal * (0.25, -0.125) + principal`.
 
 use serde_json::json;
-use viewfuse::scene::{Scene, SceneError};
+use viewfuse::scene::{Scene, SceneError, Split};
 use viewfuse_core::Vec3;
 use viewfuse_tests::scenes::{self, Folder, POINT_WORLD};
 
@@ -60,6 +60,32 @@ fn srn_pose_on_four_lines_and_world_to_camera() {
     folder.write("intrinsics.txt", "20. 8. 6.\n0. 0. 0.\n0.\n1.\n12 16\n1\n");
     for view in 0..3 {
         assert_pixel(&open(&folder), view, [13.0, 3.5]);
+    }
+}
+
+#[test]
+fn nsvf_intrinsics() {
+    let folder = Folder::new();
+    for name in ["0_train_0001", "1_val_0002", "2_test_0010"] {
+        folder.image(&format!("rgb/{name}.png"), 16, 12);
+        folder.write(&format!("pose/{name}.txt"), scenes::words(&scenes::WORLD_FROM_CAMERA));
+    }
+    folder.write("bbox.txt", "-1 -1 -1 1 1 1 0.1\n");
+    let rows = ["20 0 7.5", "0 24 6.5", "0 0 1"];
+    let wide = rows.map(|row| format!("{row} 0")).join("\n") + "\n0 0 0 1\n";
+    for text in [wide.clone(), wide.replace('\n', " "), rows.join("\n"), rows.join(" ")] {
+        folder.write("intrinsics.txt", &text);
+        let scene = open(&folder);
+        assert_pixel(&scene, 2, [7.5 + 5.0, 6.5 - 3.0]);
+        let splits: Vec<_> = scene.views.iter().map(|view| view.split).collect();
+        assert_eq!(splits, [Some(Split::Train), Some(Split::Validation), Some(Split::Test)]);
+        assert!(scene.conventions.len() == 2 && scene.conventions[0].contains("NSVF"), "{:?}", scene.conventions);
+        assert!(scene.unused.len() == 1 && scene.unused[0].ends_with(": bbox.txt"), "{:?}", scene.unused);
+    }
+    for (from, to, said) in [("20 0", "20 0.5", "the skew 0.5"), ("0 0 0 1", "0 0 0 2", "the form fx 0 cx")] {
+        folder.write("intrinsics.txt", wide.replace(from, to));
+        let error = Scene::open(folder.path()).expect_err("no K").to_string();
+        assert!(error.contains("intrinsics.txt:1: ") && error.contains(said), "{error}");
     }
 }
 

@@ -8,6 +8,7 @@ use viewfuse::device::cpu::Cpu;
 use viewfuse::evaluate::metrics::Metrics;
 use viewfuse::field::render::Truth;
 use viewfuse::job::progress::Silent;
+use viewfuse::scene::Scene;
 use viewfuse::scene::photographs::{Album, GroundTruth};
 use viewfuse_core::lens::{Lens, Projection};
 use viewfuse_tests::scenes::{self, Folder};
@@ -40,6 +41,11 @@ fn folder(model: &str, lens: &Lens) -> Folder {
     for (key, value) in ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"].into_iter().zip(lens.coefficients()) {
         transforms[key] = Value::from(value);
     }
+    // nerfstudio's k4.
+    let [.., fourth] = lens.coefficients();
+    if fourth != 0.0 {
+        transforms["k4"] = Value::from(fourth);
+    }
     folder.write("transforms.json", transforms.to_string());
     folder
 }
@@ -48,11 +54,12 @@ fn folder(model: &str, lens: &Lens) -> Folder {
 fn photographs_are_those_of_the_pinhole() {
     let perspective = Projection::Perspective;
     for (model, projection, coefficients) in [
-        ("SIMPLE_RADIAL", perspective, [-0.12, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
-        ("RADIAL", perspective, [0.1, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
-        ("OPENCV", perspective, [-0.1, 0.02, 0.0, 0.0, 0.0, 0.0, 0.004, -0.006]),
-        ("FULL_OPENCV", perspective, [0.31, -0.18, 0.021, 0.27, -0.11, 0.013, 0.0013, -0.0021]),
-        ("OPENCV_FISHEYE", Projection::Fisheye, [0.0621, -0.0187, 0.0093, -0.0021, 0.0, 0.0, 0.0, 0.0]),
+        ("SIMPLE_RADIAL", perspective, [-0.12, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        ("RADIAL", perspective, [0.1, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        ("OPENCV", perspective, [-0.1, 0.02, 0.0, 0.0, 0.0, 0.0, 0.004, -0.006, 0.0]),
+        ("OPENCV", perspective, [-0.12, 0.05, -0.02, 0.0, 0.0, 0.0, 0.004, -0.006, 0.03]),
+        ("FULL_OPENCV", perspective, [0.31, -0.18, 0.021, 0.27, -0.11, 0.013, 0.0013, -0.0021, 0.0]),
+        ("OPENCV_FISHEYE", Projection::Fisheye, [0.0621, -0.0187, 0.0093, -0.0021, 0.0, 0.0, 0.0, 0.0, 0.0]),
     ] {
         let lens = Lens::new(projection, coefficients).expect("a lens");
         let folder = folder(model, &lens);
@@ -84,9 +91,50 @@ fn photographs_are_those_of_the_pinhole() {
 }
 
 #[test]
+fn a_real_photograph_through_nerfstudios_polynomial() {
+    let room = Scene::open(viewfuse_tests::places::data("room")).expect("the room");
+    let truth = room.photograph(5).expect("a photograph").pixels;
+    let (camera, (width, height)) = (room.views[5].camera.pinhole, truth.dimensions());
+    let lens = Lens::new(Projection::Perspective, [-0.2, 0.06, -0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.25]).expect("a lens");
+    let ([fx, fy], [cx, cy]) = (camera.focal().map(f64::from), camera.principal().map(f64::from));
+    let taken = RgbImage::from_fn(width, height, |x, y| {
+        let [x, y] = lens.undistort([(f64::from(x) + 0.5 - cx) / fx, (f64::from(y) + 0.5 - cy) / fy]).point;
+        let place = [x * fx + cx - 0.5, y * fy + cy - 0.5].map(|at| at.max(0.0) as f32);
+        let [x, y] = [place[0].min((width - 1) as f32), place[1].min((height - 1) as f32)];
+        let pixel = image::imageops::interpolate_bilinear(&truth, x, y).expect("a pixel inside");
+        Rgb([pixel[0], pixel[1], pixel[2]])
+    });
+    let folder = Folder::new();
+    taken.save(folder.file("images/1.png")).expect("a photograph");
+    let mut file = json!({
+        "camera_model": "OPENCV", "fl_x": fx, "fl_y": fy, "cx": cx, "cy": cy, "w": width, "h": height,
+        "k1": -0.2, "k2": 0.06, "k3": -0.05, "k4": 0.25,
+        "frames": [{ "file_path": "images/1.png", "transform_matrix": scenes::opengl_matrix() }],
+    });
+    let psnr = |file: &Value| {
+        folder.write("transforms.json", file.to_string());
+        let found = open(&folder).photograph(0).expect("a photograph").pixels;
+        let inner = |x: u32, y: u32| (20..width - 20).contains(&x) && (20..height - 20).contains(&y);
+        let pixels = truth.enumerate_pixels().filter(|(x, y, _)| inner(*x, *y));
+        let errors: Vec<f64> = pixels
+            .flat_map(|(x, y, own)| {
+                [0, 1, 2].map(|c| (f64::from(own[c]) - f64::from(found.get_pixel(x, y)[c])).powi(2))
+            })
+            .collect();
+        10.0 * (255.0 * 255.0 * errors.len() as f64 / errors.iter().sum::<f64>()).log10()
+    };
+    let right = psnr(&file);
+    // The same numbers as OpenCV's rational lens are another one.
+    file["camera_model"] = json!("FULL_OPENCV");
+    let wrong = psnr(&file);
+    // Two interpolations of a textured photograph.
+    assert!(right > 28.0 && wrong < right - 10.0, "{right} {wrong}");
+}
+
+#[test]
 fn what_the_lens_did_not_see_is_marked_and_not_black() {
     // Stronger at the border than the photograph is wide: the corners of the pinhole's picture lie outside.
-    let lens = Lens::new(Projection::Perspective, [0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).expect("a lens");
+    let lens = Lens::new(Projection::Perspective, [0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).expect("a lens");
     let read = |lens: &Lens| {
         let folder = folder("RADIAL", lens);
         open(&folder).photograph(0).expect("a photograph")
@@ -96,17 +144,17 @@ fn what_the_lens_did_not_see_is_marked_and_not_black() {
     assert_eq!((seen.get_pixel(0, 0)[0], seen.get_pixel(47, 33)[0]), (0, 255));
     assert!(photograph.pixels.pixels().all(|pixel| pixel[2] == 60 && pixel[3] == 255));
     // One that sees more than the pinhole marks nothing.
-    let barrel = Lens::new(Projection::Perspective, [-0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).expect("a lens");
+    let barrel = Lens::new(Projection::Perspective, [-0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).expect("a lens");
     assert_eq!(read(&barrel).seen, None);
     // Where the polynomial folds over, the photograph shows nothing either.
-    let folded = Lens::new(Projection::Perspective, [-0.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).expect("a lens");
+    let folded = Lens::new(Projection::Perspective, [-0.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).expect("a lens");
     let seen = read(&folded).seen.expect("a fold");
     assert_eq!((seen.get_pixel(0, 0)[0], seen.get_pixel(47, 33)[0]), (0, 255));
 }
 
 #[test]
 fn what_the_lens_did_not_see_is_not_scored() {
-    let lens = Lens::new(Projection::Perspective, [0.6, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).expect("a lens");
+    let lens = Lens::new(Projection::Perspective, [0.6, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).expect("a lens");
     let folder = folder("RADIAL", &lens);
     let scene = open(&folder);
     let album = Album::open(&scene, [0], &Silent).expect("the photograph");

@@ -147,7 +147,7 @@ fn lenses_are_told_by_model_and_flag() {
         let scene = Scene::open(scenes::transforms_folder(&transforms).path()).expect("a scene");
         scene.views[0].lens.map(|lens| (lens.projection(), lens.coefficients()))
     };
-    let coefficients = [0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    let coefficients = [0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
     let (perspective, fisheye) =
         (Some((Projection::Perspective, coefficients)), Some((Projection::Fisheye, coefficients)));
     assert_eq!(lens(&[]), perspective);
@@ -156,10 +156,124 @@ fn lenses_are_told_by_model_and_flag() {
     assert_eq!(lens(&[("is_fisheye", json!(true))]), fisheye);
     assert_eq!(lens(&[("k1", json!(0))]), None);
     let all = [("k2", 0.2), ("k3", 0.3), ("k4", 0.4), ("k5", 0.5), ("k6", 0.6), ("p1", 0.7), ("p2", 0.8)];
-    let all: Vec<(&str, Value)> = all.map(|(key, value)| (key, json!(value))).into();
-    assert_eq!(lens(&all), Some((Projection::Perspective, [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8])));
+    let mut all: Vec<(&str, Value)> = all.map(|(key, value)| (key, json!(value))).into();
+    all.push(("camera_model", json!("FULL_OPENCV")));
+    assert_eq!(lens(&all), Some((Projection::Perspective, [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.0])));
     // A frame's own lens wins.
     let mut frames = json!([frame("./images/0001.png")]);
     frames[0]["k1"] = json!(-0.25);
     assert_eq!(lens(&[("frames", frames)]).map(|(_, all)| all[0]), Some(-0.25));
+}
+
+#[test]
+fn the_fourth_coefficient_goes_on_with_the_polynomial() {
+    for model in [None, Some("OPENCV"), Some("PINHOLE"), Some("RADIAL")] {
+        let mut transforms = scenes::transforms();
+        let numbers = [("k1", 0.1), ("k2", 0.2), ("k3", 0.3), ("k4", 0.4), ("p1", 0.5), ("p2", 0.6), ("k5", 0.0)];
+        numbers.into_iter().for_each(|(key, value)| transforms[key] = json!(value));
+        model.into_iter().for_each(|model| transforms["camera_model"] = json!(model));
+        let lens = open(&scenes::transforms_folder(&transforms)).views[0].lens.expect("a lens");
+        assert_eq!(lens.coefficients(), [0.1, 0.2, 0.3, 0.0, 0.0, 0.0, 0.5, 0.6, 0.4], "{model:?}");
+        let [x, y] = lens.distort([0.5, 0.0]);
+        let radius = 1.0 + 0.1 / 4.0 + 0.2 / 16.0 + 0.3 / 64.0 + 0.4 / 256.0;
+        assert!((x - (0.5 * radius + 0.6 * 0.75)).abs() < 1e-15 && (y - 0.5 * 0.25).abs() < 1e-15, "{x} {y}");
+    }
+}
+
+#[test]
+fn opening_angles_in_degrees() {
+    let mut transforms = scenes::transforms();
+    let top = transforms.as_object_mut().expect("an object");
+    top.retain(|key, _| key == "frames");
+    top.insert("x_fov".into(), json!((2.0 * (8.0f64 / 20.0).atan()).to_degrees()));
+    top.insert("y_fov".into(), json!((2.0 * (6.0f64 / 24.0).atan()).to_degrees()));
+    assert_pixel(&open(&scenes::transforms_folder(&transforms)), 0, [8.0 + 5.0, 6.0 - 3.0]);
+    transforms["x_fov"] = json!(180.5);
+    assert_refused(&scenes::transforms_folder(&transforms), "transforms.json: x_fov: opening angle", &[]);
+}
+
+/// The sample with what `change` makes of its frames and its top.
+fn changed(count: usize, change: impl Fn(&mut Value)) -> Folder {
+    let names: Vec<String> = (1..=count).map(|index| format!("images/{index}.png")).collect();
+    let mut transforms = scenes::transforms();
+    transforms["frames"] = names.iter().map(|name| frame(name)).collect();
+    change(&mut transforms);
+    let folder = Folder::new();
+    names.iter().for_each(|name| _ = folder.image(name, 16, 12));
+    folder.write("transforms.json", transforms.to_string());
+    folder
+}
+
+#[test]
+fn names_in_lists_are_compared_as_paths() {
+    let folder = changed(3, |transforms| {
+        transforms["frames"][1]["file_path"] = json!("./images/2.png");
+        transforms["frames"][2]["file_path"] = json!("images\\3.png");
+        transforms["train_filenames"] = json!(["./images/1.png", "images/2.png"]);
+        transforms["test_filenames"] = json!([".\\images\\3.png"]);
+    });
+    let scene = open(&folder);
+    let splits: Vec<_> = scene.views.iter().map(|view| view.split).collect();
+    assert_eq!(splits, [Some(Split::Train), Some(Split::Train), Some(Split::Test)]);
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    let folder = changed(1, |transforms| transforms["val_filenames"] = json!(["images/1.png", "images/7.png"]));
+    let [warning] = &open(&folder).warnings[..] else { panic!("one warning") };
+    assert!(warning.contains("no frame has 1 of the 2 names in train_filenames"), "{warning}");
+    assert!(warning.contains("images/7.png"), "{warning}");
+}
+
+#[test]
+fn what_is_not_read_is_said() {
+    // What instant-ngp's and nerfstudio's own scripts write besides changes nothing.
+    let scene = open(&changed(2, |transforms| {
+        transforms["ply_file_path"] = json!("sparse_pc.ply");
+        transforms["rolling_shutter"] = json!([0, 0, 0, 0]);
+        transforms["white_transparent"] = json!(false);
+        transforms["frames"][1]["sharpness"] = json!(20.0);
+        transforms["frames"][1]["colmap_im_id"] = json!(2);
+    }));
+    assert_eq!((&scene.warnings[..], scene.unused.len()), (&[][..], 1), "{:?}", scene.unused);
+    let keys = "transforms.json: aabb_scale, ply_file_path, rolling_shutter, white_transparent, colmap_im_id of 1 frames, \
+                sharpness of 1 frames";
+    assert!(scene.unused[0].ends_with(keys), "{}", scene.unused[0]);
+    // What changes pictures is a warning.
+    let scene = open(&changed(3, |transforms| {
+        transforms["white_transparent"] = json!(true);
+        transforms["frames"][0]["rolling_shutter"] = json!([0, 0, 0.5, 0]);
+        (0..3).for_each(|index| transforms["frames"][index]["time"] = json!(0.5 * index as f64));
+        transforms["frames"][2]["k1"] = json!(0.25);
+        transforms["frames"][2]["fl_x"] = json!(20);
+    }));
+    let [own, telling, moving] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
+    assert!(own.contains("1 of 3 frames state k1 otherwise than the top of the file: each frame's"), "{own}");
+    assert!(telling.contains("rolling_shutter, white_transparent change pictures and are not read"), "{telling}");
+    assert!(moving.contains("different times (time): the scene moves"), "{moving}");
+    // One time is a still scene.
+    let still = changed(2, |transforms| (0..2).for_each(|index| transforms["frames"][index]["time"] = json!(0.5)));
+    assert!(open(&still).warnings.is_empty());
+}
+
+#[test]
+fn photographs_that_no_frame_names_are_counted() {
+    let folder = changed(2, |_| {});
+    folder.image("images/3.png", 16, 12).image("images/10.png", 16, 12);
+    // Pictures that belong to a photograph are none.
+    for name in ["1_depth_0001", "2_normal", "1.alpha", "dynamic_mask_1"] {
+        folder.image(&format!("images/{name}.png"), 16, 12);
+    }
+    let [warning] = &open(&folder).warnings[..] else { panic!("one warning") };
+    assert!(warning.ends_with("images: 2 photographs have no pose and are not used, 2 have one (without is 3.png)"));
+    folder.remove("images/3.png").remove("images/10.png");
+    assert!(open(&folder).warnings.is_empty());
+    // In folders beside those of the photographs, too; other files beside the lists are named.
+    folder.image("images/left/7.png", 16, 12).write("notes.txt", "a note").write("sparse_pc.ply", "points");
+    let scene = open(&folder);
+    assert!(scene.warnings.is_empty(), "images itself holds photographs: {:?}", scene.warnings);
+    assert!(scene.unused.iter().any(|line| line.ends_with(": notes.txt, sparse_pc.ply")), "{:?}", scene.unused);
+    let mut transforms = scenes::transforms();
+    transforms["frames"] = json!([frame("images/left/1.png")]);
+    let folder =
+        with_frames(transforms["frames"].clone(), &["images/left/1.png", "images/right/1.png", "images/2.png"]);
+    let [warning] = &open(&folder).warnings[..] else { panic!("one warning") };
+    assert!(warning.contains("2 photographs have no pose and are not used, 1 have one"), "{warning}");
 }

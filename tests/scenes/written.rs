@@ -7,6 +7,7 @@ use std::path::Path;
 use viewfuse::job::progress::{Progress, Silent};
 use viewfuse::scene::write::{Layout, WriteSceneError, Written, write};
 use viewfuse::scene::{MaskChoice, MaskMeaning, Scene, Split, View};
+use viewfuse_core::lens::{Lens, Projection};
 use viewfuse_tests::scenes::{self, Folder};
 
 fn written(scene: &Scene, layout: Layout) -> (Folder, Scene, Written) {
@@ -169,6 +170,31 @@ fn lenses_and_masks() {
         assert_eq!(read.views[0].mask, Some(folder.path().join("out/mask/1.png")));
         assert!(written.left_out.iter().any(|line| line.contains("the lens of 1 photographs")));
     }
+}
+
+#[test]
+fn a_lens_that_a_layout_has_not_is_undone() {
+    let folder = through_a_lens("OPENCV", -0.1);
+    let text = std::fs::read_to_string(folder.file("transforms.json")).expect("a file").replace("\"k2\"", "\"k4\"");
+    folder.write("transforms.json", text);
+    let scene = open(&folder);
+    let [.., fourth] = scene.views[0].lens.expect("a lens").coefficients();
+    assert_eq!(fourth, 0.01);
+    let (_folder, read, given) = written(&scene, Layout::Transforms);
+    assert_same(Layout::Transforms, &scene, &read);
+    assert_eq!((read.views[0].lens, given.left_out.is_empty()), (scene.views[0].lens, true));
+    for layout in [Layout::Colmap, Layout::ColmapBinary] {
+        let (_folder, read, given) = written(&scene, layout);
+        let (before, after) = (scene.photograph(0).expect("one"), read.photograph(0).expect("the other"));
+        assert!(before.pixels == after.pixels && read.views[0].lens.is_none() && read.views[0].mask.is_some());
+        assert!(given.left_out.iter().any(|line| line.contains("the lens of 1 photographs")), "{:?}", given.left_out);
+    }
+    // No layout has both OpenCV's denominator and the polynomial's fourth coefficient.
+    let mut both = scene.clone();
+    let coefficients = [-0.1, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.0, 0.01];
+    both.views[0].lens = Lens::new(Projection::Perspective, coefficients).ok();
+    let (_folder, read, given) = written(&both, Layout::Transforms);
+    assert_eq!((read.views[0].lens, given.left_out.len()), (None, 1));
 }
 
 #[test]

@@ -49,7 +49,7 @@ impl Posed<'_> {
         matrix[15] = 1.0;
         matrix[..12].iter_mut().zip(rows.as_flattened()).for_each(|(own, found)| *own = *found);
         let (scale, place) = (self.scale(index), FaultLocation::File);
-        let lens = Lens::new(Projection::Perspective, [camera.k1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        let lens = Lens::new(Projection::Perspective, [camera.k1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
         let intrinsics = RawIntrinsics {
             focal: scale.map(|scale| scale * camera.focal),
             principal: [0, 1].map(|axis| scale[axis] * camera.principal[axis]),

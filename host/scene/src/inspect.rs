@@ -72,6 +72,8 @@ pub struct Inspection {
     pub far: f32,
     /// Conventions of the files that were applied, one line each.
     pub conventions: Vec<String>,
+    /// Keys and files that were not read, one line for each file or folder.
+    pub unused: Vec<String>,
     /// Warnings, one line each.
     pub warnings: Vec<String>,
 }
@@ -135,6 +137,7 @@ pub fn inspect(
         near,
         far,
         conventions: scene.conventions.clone(),
+        unused: scene.unused.clone(),
         warnings,
     })
 }

@@ -17,7 +17,7 @@ use viewfuse_core::lens::Lens;
 use viewfuse_core::pose::Pose;
 
 mod bytes;
-mod camera_models;
+pub(crate) mod camera_models;
 pub(crate) mod check;
 mod colmap;
 mod error;
@@ -38,6 +38,7 @@ mod split;
 mod srn;
 pub(crate) mod transforms;
 mod undistort;
+mod unlisted;
 
 use check::Checked;
 pub use error::SceneError;
@@ -186,6 +187,8 @@ pub struct Scene {
     pub masks: MaskMeaning,
     /// What a person says of alpha channels and masks; masks that are not used are no view's.
     pub mask_choice: MaskChoice,
+    /// Keys and files that were not read, a line each.
+    pub unused: Vec<String>,
     /// The world's place in the coordinates of the files.
     pub frame: SceneFrame,
 }
@@ -236,9 +239,11 @@ impl Scene {
                     return Err(SceneError::DuplicateName { path, name: view.name.clone() });
                 }
             }
-            let Checked { views, points, warnings, conventions, frame } = checked;
+            let Checked { views, points, mut warnings, conventions, mut unused, lists, frame } = checked;
+            warnings.extend(unlisted::photographs(&views));
+            unused.extend(unlisted::files(&found, &views, &lists));
             let (path, layout) = (path.to_path_buf(), reader.name());
-            return Ok(Scene { path, layout, views, points, warnings, conventions, masks, mask_choice, frame });
+            return Ok(Scene { path, layout, views, points, warnings, conventions, unused, masks, mask_choice, frame });
         }
         let (path, looked_for) = (path.to_path_buf(), looked_for(readers));
         Err(match files::photograph_count(&path) {

@@ -24,6 +24,7 @@ use std::str::FromStr;
 use viewfuse_job::files::WholeFolder;
 use viewfuse_job::progress::{Interrupted, Progress};
 
+use crate::scene::camera_models::KeyedLens;
 use crate::{Scene, SceneError, View};
 
 /// A layout in which scenes can be written.
@@ -261,8 +262,12 @@ fn left_out(scene: &Scene, layout: Layout) -> Vec<String> {
     if layout != Layout::Transforms && !layout.is_colmap() && masks > 0 {
         lines.push(format!("the ignore masks of {masks} photographs: what does not count is transparent"));
     }
-    let lenses = views(|view| view.lens.is_some());
-    if layout != Layout::Transforms && !layout.is_colmap() && lenses > 0 {
+    let lenses = match layout {
+        Layout::Transforms => views(|view| view.lens.is_some_and(|lens| KeyedLens::of(&lens).is_none())),
+        Layout::Colmap | Layout::ColmapBinary => views(|view| view.lens.is_some_and(|lens| !colmap::holds(&lens))),
+        _ => views(|view| view.lens.is_some()),
+    };
+    if lenses > 0 {
         lines.push(format!(
             "the lens of {lenses} photographs: they are undistorted, and what the lens did not see is not marked"
         ));

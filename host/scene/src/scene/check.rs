@@ -2,12 +2,13 @@
 //!
 //! All arithmetic is in f64; values passed to core are rounded once.
 
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use image::metadata::Orientation;
 use viewfuse_core::camera::{Camera, Pinhole};
-use viewfuse_core::pose::{MAX_COORDINATE, Pose, PoseError};
+use viewfuse_core::pose::{MAX_COORDINATE, Pose, PoseError, RIGID_TOLERANCE};
 
 use super::error::SceneError;
 use super::fault::{FaultLocation, IntrinsicsFault};
@@ -22,12 +23,15 @@ pub(super) struct Checked {
     pub(super) points: Vec<ScenePoint>,
     pub(super) warnings: Vec<String>,
     pub(super) conventions: Vec<String>,
+    pub(super) unused: Vec<String>,
+    /// The files of cameras and points that were read.
+    pub(super) lists: BTreeSet<PathBuf>,
     pub(super) frame: SceneFrame,
 }
 
 /// The scene, its views with photographs first.
 pub(super) fn scene(found: &Path, form: &'static str, raw: RawScene) -> Result<Checked, SceneError> {
-    let RawScene { views: raw_views, points, points_path, mut warnings, conventions } = raw;
+    let RawScene { views: raw_views, points, points_path, mut warnings, conventions, unused } = raw;
     let mut order: Vec<usize> = (0..raw_views.len()).collect();
     // Stable: photographs first, otherwise in their order.
     order.sort_by_key(|&view| raw_views[view].image.is_none());
@@ -70,8 +74,10 @@ pub(super) fn scene(found: &Path, form: &'static str, raw: RawScene) -> Result<C
     for (now, &before) in order.iter().enumerate() {
         place[before] = now as u32;
     }
+    let intrinsics = raw_views.iter().filter_map(|view| view.intrinsics.as_ref()).map(|own| &own.path);
+    let lists = raw_views.iter().map(|view| &view.pose.path).chain(intrinsics).chain([&points_path]).cloned().collect();
     let points = points.into_iter().map(|raw| point(&points_path, raw, &frame, &place)).collect::<Result<_, _>>()?;
-    Ok(Checked { views, points, warnings, conventions, frame })
+    Ok(Checked { views, points, warnings, conventions, unused, lists, frame })
 }
 
 /// The camera of a view without a photograph, in the world of a scene that is open; `pinhole` is that of a view without
@@ -123,7 +129,24 @@ fn pose(raw: &RawPose, frame: &SceneFrame) -> Result<Pose, SceneError> {
         (moved[3], moved[7], moved[11]) = (centre.x, centre.y, centre.z);
         Pose::from_opencv(&rows(&moved))
     };
-    checked.map_err(|reason: PoseError| SceneError::Pose { path: path.clone(), place: place.clone(), reason })
+    checked.map_err(|reason: PoseError| {
+        let (path, place) = (path.clone(), place.clone());
+        match (reason, form, scale(matrix)) {
+            (PoseError::NotRigid { .. }, PoseForm::WorldFromOpenCv | PoseForm::WorldFromOpenGl, Some(scale)) => {
+                SceneError::Scaled { path, place, scale }
+            }
+            _ => SceneError::Pose { path, place, reason },
+        }
+    })
+}
+
+/// The scale of a matrix whose 3x3 block is a rotation times a number: of a camera below a scaled object.
+fn scale(m: &[f64; 16]) -> Option<f64> {
+    let block = DMat3::from_cols_array(&[m[0], m[4], m[8], m[1], m[5], m[9], m[2], m[6], m[10]]);
+    let scale = block.determinant().cbrt();
+    let rotation = block * (1.0 / scale);
+    let is_rotation = (rotation.transpose() * rotation).abs_diff_eq(DMat3::IDENTITY, f64::from(RIGID_TOLERANCE));
+    (scale > 0.0 && is_rotation).then_some(scale)
 }
 
 fn rows(matrix: &[f64; 16]) -> [[f32; 4]; 4] {

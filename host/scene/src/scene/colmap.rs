@@ -1,7 +1,8 @@
 //! COLMAP's sparse models, binary and text: `cameras`, `images` and, if present, `points3D`.
 //!
-//! A model is searched in `sparse/0`, `sparse`, `dense/0/sparse`, `dense/sparse`, `colmap/sparse/0` and in the folder
-//! itself, which may be next to the photographs or contain them. Photographs are searched from the model's folder
+//! A model is searched in `sparse`, `dense/0/sparse`, `dense/sparse`, `colmap/sparse` (in each first among numbered
+//! models, `sparse/0`, `sparse/1`, of which the one with most images is read) and in the folder itself, which may be
+//! next to the photographs or contain them. Photographs are searched from the model's folder
 //! upwards, in `images`, `images_2`, `images_4`, `images_8`, `input`, `image`, `rgb` and in the folder itself; the
 //! first folder that has any of them is used. They may be smaller than in the model, by one scale: intrinsics scale
 //! with them. Photographs that are missing are left out, with one warning that counts them. Views are in natural order
@@ -13,6 +14,7 @@ mod binary;
 mod text;
 
 use std::collections::HashMap;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use glam::DQuat;
@@ -26,7 +28,7 @@ use super::missing::Missing;
 use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPoint, RawPose, RawScene, RawView, Reader};
 
 /// Folders of models, in the order in which they are searched.
-const MODEL_FOLDERS: [&str; 6] = ["sparse/0", "sparse", "dense/0/sparse", "dense/sparse", "colmap/sparse/0", ""];
+const MODEL_FOLDERS: [&str; 4] = ["sparse", "dense/0/sparse", "dense/sparse", "colmap/sparse"];
 /// Number of parent folders of the model in which photographs are searched.
 const HIGHEST: usize = 4;
 /// Range of a quaternion's norm that rounding in a text file can cause.
@@ -98,12 +100,54 @@ pub(super) struct Origin {
     pub(super) points_path: PathBuf,
 }
 
+/// The model in a scene's folder, if there is one.
+fn model_in(root: &Path) -> Option<PathBuf> {
+    let in_folder = |name: &str| {
+        let folder = root.join(name);
+        // Of equal ones the first.
+        let largest = numbered_models(&folder).into_iter().rev().max_by_key(|model| image_count(model));
+        largest.or_else(|| Form::of(&folder).map(|_| folder))
+    };
+    let itself = || Form::of(root).map(|_| root.to_path_buf());
+    MODEL_FOLDERS.into_iter().find_map(in_folder).or_else(itself)
+}
+
+/// COLMAP makes a model of each part of the photographs that it cannot join with another: `0`, `1` and so on, ascending.
+fn numbered_models(folder: &Path) -> Vec<PathBuf> {
+    let is_number = |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy().parse::<u32>().is_ok());
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut models: Vec<PathBuf> = entries.filter(|path| is_number(path) && Form::of(path).is_some()).collect();
+    models.sort_by_key(|path| path.file_name().and_then(|name| name.to_string_lossy().parse::<u32>().ok()));
+    models
+}
+
+/// How many images a model has; 0 if it cannot be read.
+fn image_count(model: &Path) -> u64 {
+    let path = |form: Form| form.file(model, "images");
+    match Form::of(model) {
+        Some(Form::Binary) => binary::image_count(&path(Form::Binary)).unwrap_or_default(),
+        Some(Form::Text) => text::images(&path(Form::Text)).map_or(0, |images| images.len() as u64),
+        None => 0,
+    }
+}
+
+/// A warning that names the numbered models beside this one.
+fn other_models(model: &Path) -> Option<String> {
+    let models = numbered_models(model.parent()?);
+    let others = models.iter().filter(|other| *other != model && models.contains(&model.to_path_buf()));
+    let others = others.map(|other| format!("{} ({} photographs)", files::stem(other), image_count(other)));
+    let list = others.collect::<Vec<_>>().join(", ");
+    let (count, model) = (image_count(model), model.display());
+    (!list.is_empty()).then(|| {
+        format!(
+            "{model}: this model has {count} photographs; others beside it are not read, each has coordinates of its own: {list}"
+        )
+    })
+}
+
 /// The model with points in a scene's folder, if there is one.
 pub(super) fn beside(root: &Path) -> Result<Option<Origin>, SceneError> {
-    let Some(folder) = MODEL_FOLDERS.iter().map(|name| root.join(name)).find(|folder| Form::of(folder).is_some())
-    else {
-        return Ok(None);
-    };
+    let Some(folder) = model_in(root) else { return Ok(None) };
     let Some(form) = Form::of(&folder) else { return Ok(None) };
     let [images_path, points_path] = ["images", "points3D"].map(|stem| form.file(&folder, stem));
     if !points_path.is_file() {
@@ -141,7 +185,7 @@ impl Reader for Colmap {
     }
 
     fn recognise(&self, path: &Path) -> Result<Option<PathBuf>, SceneError> {
-        Ok(MODEL_FOLDERS.iter().map(|name| path.join(name)).find(|folder| Form::of(folder).is_some()))
+        Ok(model_in(path))
     }
 
     fn read(&self, folder: &Path) -> Result<RawScene, SceneError> {
@@ -237,7 +281,7 @@ fn assemble(
         views.push(RawView::new(name, Some(ImageFile::open(&photograph)?), pose, Some(intrinsics)));
     }
     let points = raw_points(points, &view_of);
-    let warnings = missing.warning(images_path)?.into_iter().collect();
+    let warnings = missing.warning(images_path)?.into_iter().chain(other_models(folder)).collect();
     Ok(RawScene { views, points, warnings, ..RawScene::default() })
 }
 
@@ -256,9 +300,15 @@ fn photograph_folder(model: &Path, images: &[ModelImage]) -> PathBuf {
     root.unwrap_or(model).join("images")
 }
 
-/// The photograph with this name. Its extension may have changed when it was downscaled.
+/// The photograph with this name, which may be one of another system. Its extension may have changed when it was
+/// downscaled.
 fn present(folder: &Path, name: &str) -> Option<PathBuf> {
-    let path: PathBuf = folder.join(name).components().collect();
+    let joined = |name: &str| folder.join(name).components().collect::<PathBuf>();
+    let path = joined(name);
+    if path.is_file() {
+        return Some(path);
+    }
+    let path = joined(&name.replace('\\', "/"));
     if path.is_file() {
         return Some(path);
     }

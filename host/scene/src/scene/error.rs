@@ -354,6 +354,29 @@ pub enum SceneError {
         /// The names of the supported ones.
         supported: String,
     },
+    /// Two keys of a file contradict each other.
+    #[error("{path}: {first} and {second} contradict each other: keep the one that is right")]
+    Contradiction {
+        /// The file.
+        path: PathBuf,
+        /// A key and its value.
+        first: String,
+        /// Another one.
+        second: String,
+    },
+    /// A rotation with a scale.
+    #[error(
+        "{path}{place}: the rotation is scaled by {}: divide its 3x3 block by that, not the camera's centre, or export the \
+         cameras without the scale of their object", Short(*scale)
+    )]
+    Scaled {
+        /// The file.
+        path: PathBuf,
+        /// The place in it.
+        place: FaultLocation,
+        /// The scale.
+        scale: f64,
+    },
     /// The numbers are not a lens.
     #[error("{path}{place}: {reason}")]
     Lens {

@@ -51,6 +51,11 @@ impl<'a> Object<'a> {
         self.entries.get(key).filter(|value| !value.is_null())
     }
 
+    /// All keys with their values.
+    pub(super) fn entries(&self) -> impl Iterator<Item = (&'a str, &'a Value)> + use<'a> {
+        self.entries.iter().map(|(key, value)| (key.as_str(), value))
+    }
+
     /// A required value.
     pub(super) fn required(&self, key: &str) -> Result<&'a Value, SceneError> {
         self.get(key).ok_or_else(|| SceneError::MissingKey { path: self.path.to_path_buf(), key: self.full(key) })

@@ -98,7 +98,7 @@ fn read_view(list: &Path, line: usize, content: &str) -> Result<RawView, SceneEr
         path: path(),
         place: place.clone(),
     };
-    let image = list.with_file_name(file_name);
+    let image: PathBuf = list.with_file_name(file_name.replace('\\', "/")).components().collect();
     if !image.is_file() {
         return Err(SceneError::PoseWithoutImage { path: path(), place, image });
     }

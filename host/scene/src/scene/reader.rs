@@ -58,6 +58,8 @@ pub struct RawScene {
     pub warnings: Vec<String>,
     /// Conventions of the files that were applied, a line each, as `masks: pixels that do not count, 11 files`.
     pub conventions: Vec<String>,
+    /// Keys of the files that are not read, a line for each file.
+    pub unused: Vec<String>,
 }
 
 impl From<Vec<RawView>> for RawScene {

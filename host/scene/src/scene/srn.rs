@@ -5,10 +5,14 @@
 //! pose/000000.txt ...      one per photograph: 16 numbers, row-major camera-to-world, OpenCV axes
 //! target_pose/1.txt ...    poses without a photograph (may be absent)
 //! intrinsics.txt           focal cx cy 0 / origin / [near plane /] scale / height width [/ 0 or 1]
+//!                          or K alone, a matrix of 4x4 or 3x3 numbers (NSVF, BlendedMVS)
 //! ```
 //!
 //! Origin, near plane and scale place the original authors' voxel grid; no pose depends on them. An optional number
 //! after the size states whether the poses are world-to-camera (1) instead, as in the authors' own reader.
+//!
+//! NSVF's names begin with the number of their split: `0_train_0000`, `1_val_0000`, `2_test_0000`. K is for photographs
+//! of their own size.
 
 use std::collections::HashSet;
 use std::ffi::OsStr;
@@ -16,9 +20,10 @@ use std::path::{Path, PathBuf};
 
 use super::check;
 use super::error::SceneError;
-use super::fault::FaultLocation;
+use super::fault::{FaultLocation, IntrinsicsFault};
 use super::files::{self, IMAGE_EXTENSIONS};
 use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawScene, RawView, Reader};
+use super::split::Split;
 
 /// Put before the name of a view from `target_pose/`, which often counts from 1 like the photographs do. A name without
 /// a path separator can be the name of an output file.
@@ -43,12 +48,12 @@ impl Reader for Srn {
     }
 
     fn read(&self, folder: &Path) -> Result<RawScene, SceneError> {
-        Ok(RawScene::from(read(folder)?))
+        read(folder)
     }
 }
 
 /// All views of an SRN folder: photographs first, then target poses, each in natural order.
-fn read(folder: &Path) -> Result<Vec<RawView>, SceneError> {
+fn read(folder: &Path) -> Result<RawScene, SceneError> {
     let image_folder = folder.join("rgb");
     let photographs = files::list(&image_folder, |path| files::has_extension(path, &IMAGE_EXTENSIONS))?;
     let pose_folder = folder.join("pose");
@@ -79,7 +84,23 @@ fn read(folder: &Path) -> Result<Vec<RawView>, SceneError> {
             views.push(RawView::new(name, None, pose, None));
         }
     }
-    Ok(views)
+    let mut scene = RawScene::from(views);
+    if list.is_matrix {
+        scene.conventions.push("intrinsics.txt: K alone, for the photographs' size (NSVF)".to_string());
+        split_by_digit(&mut scene);
+    }
+    Ok(scene)
+}
+
+/// NSVF's splits, if all photographs' names begin with one.
+fn split_by_digit(scene: &mut RawScene) {
+    const SPLITS: [(&str, Split); 3] = [("0_", Split::Train), ("1_", Split::Validation), ("2_", Split::Test)];
+    let split_of = |view: &RawView| SPLITS.iter().find(|(digit, _)| view.name.starts_with(digit)).map(|(_, own)| *own);
+    let has_photograph = |view: &&RawView| view.image.is_some();
+    if scene.views.iter().filter(has_photograph).all(|view| split_of(view).is_some()) {
+        scene.views.iter_mut().for_each(|view| view.split = split_of(view));
+        scene.conventions.push("splits: 0_ training, 1_ validation, 2_ test in names (NSVF)".to_string());
+    }
 }
 
 fn list_poses(folder: &Path) -> Result<Vec<PathBuf>, SceneError> {
@@ -126,10 +147,15 @@ struct IntrinsicsFile {
     intrinsics: RawIntrinsics,
     /// The convention of the poses.
     form: PoseForm,
+    /// Whether it is K alone.
+    is_matrix: bool,
 }
 
 fn read_intrinsics(path: &Path) -> Result<IntrinsicsFile, SceneError> {
     let lines = files::number_lines(path, &files::read_text(path)?)?;
+    if let Some(k) = matrix(&lines) {
+        return matrix_intrinsics(path, lines[0].0, &k);
+    }
     let wrong_count = |place, of, expected, found| {
         Err(SceneError::WrongCount { path: path.to_path_buf(), place, of, expected, found })
     };
@@ -158,5 +184,32 @@ fn read_intrinsics(path: &Path) -> Result<IntrinsicsFile, SceneError> {
     Ok(IntrinsicsFile {
         intrinsics: RawIntrinsics { focal, principal, size, lens: None, path, place, size_place },
         form,
+        is_matrix: false,
     })
+}
+
+/// K, where the lines are nothing but a matrix of 3x3 or 4x4 numbers, or one in a line.
+fn matrix(lines: &[(usize, Vec<f64>)]) -> Option<[[f64; 4]; 4]> {
+    let numbers: Vec<f64> = lines.iter().flat_map(|(_, numbers)| numbers.iter().copied()).collect();
+    let side = [3, 4].into_iter().find(|side| numbers.len() == side * side)?;
+    let is_square = lines.len() == 1 || lines.iter().all(|(_, numbers)| numbers.len() == side);
+    let mut k = [[0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+    for (row, numbers) in k.iter_mut().zip(numbers.chunks(side)) {
+        row[..side].copy_from_slice(numbers);
+    }
+    is_square.then_some(k)
+}
+
+fn matrix_intrinsics(path: &Path, line: usize, k: &[[f64; 4]; 4]) -> Result<IntrinsicsFile, SceneError> {
+    let (path, place) = (path.to_path_buf(), FaultLocation::Line(line));
+    let [[focal_x, skew, x, _], [_, focal_y, y, _], ..] = *k;
+    let expected = [[focal_x, skew, x, 0.0], [0.0, focal_y, y, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+    if *k != expected || skew != 0.0 {
+        let fault = if *k == expected { IntrinsicsFault::Skew { skew } } else { IntrinsicsFault::Form };
+        return Err(SceneError::Intrinsics { path, place, fault });
+    }
+    let size_place = place.clone();
+    let (focal, principal) = ([focal_x, focal_y], [x, y]);
+    let intrinsics = RawIntrinsics { focal, principal, size: None, lens: None, path, place, size_place };
+    Ok(IntrinsicsFile { intrinsics, form: PoseForm::WorldFromOpenCv, is_matrix: true })
 }

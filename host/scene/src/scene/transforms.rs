@@ -6,7 +6,8 @@
 //! missing `fl_y` is `fl_x`, a missing `cx`, `cy` the centre of the image, missing `w`, `h` the photograph's size.
 //! Their image coordinates are COLMAP's, with pixel centres at halves, as ours.
 //!
-//! The lens is `camera_model` (or `is_fisheye`) with `k1 .. k6 p1 p2` in OpenCV's meaning; other lenses are refused.
+//! The lens is `camera_model` (or `is_fisheye`) with the coefficients that it has ([`super::camera_models`]); other
+//! lenses and coefficients are refused.
 //! `mask_path` names a frame's mask, `train_filenames` and the like the splits of the scene. Without `transforms.json`,
 //! `transforms_train.json`, `transforms_val.json` and `transforms_test.json` are one scene with splits; if there are
 //! several of them, each view's name begins with its split. A missing photograph of `images` is searched in `images_2`,
@@ -14,9 +15,10 @@
 //!
 //! `applied_transform`, `applied_scale`, `scale`, `offset` and `aabb_scale` describe transformations that were applied
 //! or settings of a particular trainer; the poses are read as they are written. `depth_file_path` is ignored, with a
-//! warning.
+//! warning, and so is what changes pictures in other programs; all keys that are not read are listed.
 
 pub(crate) mod frame;
+mod keys;
 
 use std::path::{Path, PathBuf};
 
@@ -26,7 +28,8 @@ use super::json::{self, Object};
 use super::missing::Missing;
 use super::reader::{RawScene, RawView, Reader};
 use super::split::Split;
-use frame::{Frame, Listed};
+use frame::{Frame, Listed, Lists};
+use keys::Keys;
 
 /// Name of the file of a whole scene.
 const FILE_NAME: &str = "transforms.json";
@@ -76,6 +79,8 @@ impl Reader for Transforms {
             let named = |view: RawView| RawView { name: format!("{split}_{}", view.name), ..view };
             scene.views.extend(part.views.into_iter().map(named));
             scene.warnings.extend(part.warnings);
+            scene.conventions.extend(part.conventions);
+            scene.unused.extend(part.unused);
         }
         Ok(scene)
     }
@@ -94,15 +99,17 @@ fn read(path: &Path, split: Option<Split>) -> Result<RawScene, SceneError> {
     if frames.is_empty() {
         return Err(SceneError::NoViews { path: path.to_path_buf(), looked_for: "frames[]" });
     }
-    let lists = frame::lists(&top)?;
+    let mut lists = Lists::new(path, &top)?;
+    let mut keys = Keys::new(&top);
     let mut scene = RawScene::default();
     let mut missing = Missing::default();
     let mut depth_count = 0;
     for (index, value) in frames.iter().enumerate() {
         let key = format!("frames[{index}]");
         let frame = Frame { path, scopes: [Object::new(path, &key, value)?, top.clone()], key };
+        keys.add(&frame.scopes[0]);
         depth_count += usize::from(frame.has_depth());
-        match frame.view(&lists)? {
+        match frame.view(&mut lists)? {
             Listed::View(mut view) => {
                 missing.found();
                 view.split = view.split.or(split);
@@ -112,6 +119,9 @@ fn read(path: &Path, split: Option<Split>) -> Result<RawScene, SceneError> {
         }
     }
     scene.warnings.extend(missing.warning(path)?);
+    scene.warnings.extend(lists.warning(path));
+    scene.warnings.extend(keys.warnings(path));
+    scene.unused.extend(keys.unused(path));
     if depth_count > 0 {
         scene.warnings.push(format!(
             "{}: {depth_count} of {} frames name a depth image (depth_file_path); depth images are not used",

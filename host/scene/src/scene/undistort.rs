@@ -8,7 +8,7 @@ use image::{GrayImage, RgbaImage};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use viewfuse_core::camera::Pinhole;
-use viewfuse_core::lens::{Lens, Projection, distort};
+use viewfuse_core::lens::{Coefficients, Lens, Projection, distort};
 
 use super::Photograph;
 
@@ -95,7 +95,7 @@ struct Mapping {
     focal: [f64; 2],
     principal: [f64; 2],
     size: [u32; 2],
-    coefficients: [f64; 8],
+    coefficients: Coefficients<f64>,
     /// Where the lens's polynomials fold the image over, from the centre.
     reach: f64,
 }

@@ -52,7 +52,10 @@ pub(super) fn write(out: &mut Draft, form: Form) -> Result<usize, WriteSceneErro
     let (scene, mut seen) = (out.scene, observations(out.scene));
     let mut views = Vec::with_capacity(scene.views.len());
     for (index, view) in scene.views.iter().enumerate() {
-        let (name, _) = out.stored_photograph_and_mask(index)?;
+        let name = match &view.lens {
+            Some(lens) if !holds(lens) => out.pinhole_photograph(index, "images")?,
+            _ => out.stored_photograph_and_mask(index)?.0,
+        };
         let pinhole = &view.camera.pinhole;
         let (model, parameters) = parameters(view);
         let (rotation, translation) = rigid(scene, view);
@@ -116,7 +119,7 @@ fn observations(scene: &Scene) -> Vec<Vec<([f64; 2], u64)>> {
             let projected = camera.project(point.position_world);
             let (focal, principal) = (camera.pinhole.focal().map(f64::from), camera.pinhole.principal().map(f64::from));
             let pixel = [f64::from(projected.x), f64::from(projected.y)];
-            let pixel = match lens {
+            let pixel = match lens.as_ref().filter(|lens| holds(lens)) {
                 None => pixel,
                 Some(lens) => {
                     let [x, y] = lens.distort([0, 1].map(|axis| (pixel[axis] - principal[axis]) / focal[axis]));
@@ -139,12 +142,20 @@ fn rigid(scene: &Scene, view: &View) -> (DQuat, DVec3) {
     (rotation, -(rotation * centre))
 }
 
+/// Whether a model has all of a lens's coefficients; photographs through other lenses are undistorted.
+pub(super) fn holds(lens: &Lens) -> bool {
+    let [.., fourth] = lens.coefficients();
+    lens.projection() == Projection::Fisheye || fourth == 0.0
+}
+
 /// Model and parameters of a view's camera.
 fn parameters(view: &View) -> (Model, Vec<f64>) {
     let pinhole = &view.camera.pinhole;
     let ([fx, fy], [cx, cy]) = (pinhole.focal().map(f64::from), pinhole.principal().map(f64::from));
-    let Some(lens) = &view.lens else { return (Model("PINHOLE", 1), vec![fx, fy, cx, cy]) };
-    let [k1, k2, k3, k4, k5, k6, p1, p2] = Lens::coefficients(lens);
+    let Some(lens) = view.lens.as_ref().filter(|lens| holds(lens)) else {
+        return (Model("PINHOLE", 1), vec![fx, fy, cx, cy]);
+    };
+    let [k1, k2, k3, k4, k5, k6, p1, p2, _] = lens.coefficients();
     match (lens.projection(), [k3, k4, k5, k6] == [0.0; 4]) {
         (Projection::Fisheye, _) => (Model("OPENCV_FISHEYE", 5), vec![fx, fy, cx, cy, k1, k2, k3, k4]),
         (Projection::Perspective, true) => (Model("OPENCV", 4), vec![fx, fy, cx, cy, k1, k2, p1, p2]),

@@ -1,16 +1,20 @@
 //! `transforms.json`: intrinsics and lens of each frame, masks, splits.
 
 use serde_json::{Map, Value, json};
-use viewfuse_core::lens::{Lens, Projection};
 
 use super::{Draft, WriteSceneError};
 use crate::Split;
+use crate::scene::camera_models::KeyedLens;
 
 pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
     let mut frames = Vec::new();
     let mut lists: Map<String, Value> = Map::new();
     for (index, view) in out.scene.views.iter().enumerate() {
-        let (photograph, mask) = out.stored_photograph_and_mask(index)?;
+        let keyed = view.lens.as_ref().map(|lens| KeyedLens::of(lens).map(|keyed| (keyed, lens.coefficients())));
+        let (photograph, mask) = match keyed {
+            Some(None) => (out.pinhole_photograph(index, "images")?, None),
+            _ => out.stored_photograph_and_mask(index)?,
+        };
         let file_path = format!("images/{photograph}");
         let mut matrix = out.scene.frame.file_from_camera(&view.camera.pose);
         for row in &mut matrix[..3] {
@@ -23,11 +27,10 @@ pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
             "file_path": file_path, "transform_matrix": matrix,
             "w": pinhole.width(), "h": pinhole.height(), "fl_x": fx, "fl_y": fy, "cx": cx, "cy": cy,
         });
-        if let Some(lens) = &view.lens {
-            frame["camera_model"] = model(lens).into();
-            let names = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
-            for (name, coefficient) in names.into_iter().zip(lens.coefficients()).filter(|(_, value)| *value != 0.0) {
-                frame[name] = coefficient.into();
+        if let Some(Some((keyed, coefficients))) = keyed {
+            frame["camera_model"] = keyed.models[0].into();
+            for (key, index) in keyed.keys.iter().filter(|(_, index)| coefficients[*index] != 0.0) {
+                frame[*key] = coefficients[*index].into();
             }
         }
         if let Some(mask) = mask {
@@ -49,13 +52,4 @@ pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
     lists.insert("frames".to_owned(), frames.into());
     out.put("transforms.json", format!("{:#}\n", Value::Object(lists)))?;
     Ok(count)
-}
-
-fn model(lens: &Lens) -> &'static str {
-    let [_, _, k3, k4, k5, k6, _, _] = lens.coefficients();
-    match (lens.projection(), [k3, k4, k5, k6] == [0.0; 4]) {
-        (Projection::Fisheye, _) => "OPENCV_FISHEYE",
-        (Projection::Perspective, true) => "OPENCV",
-        (Projection::Perspective, false) => "FULL_OPENCV",
-    }
 }

@@ -1,5 +1,7 @@
 //! COLMAP's binary files: little endian, a count of 64 bits first.
 
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::Path;
 
 use super::super::bytes::{self, Bytes};
@@ -17,7 +19,7 @@ pub(super) fn cameras(path: &Path) -> Result<Vec<(u32, ModelCamera)>, SceneError
         let place = bytes.place();
         let id = bytes.u32("a camera")?;
         let number = bytes.u32("a camera")?;
-        let model = known(path, &place, CameraModel::numbered(number).ok_or_else(|| number.to_string()))?;
+        let model = known(path, &place, CameraModel::numbered(number).ok_or_else(|| CameraModel::title(number)))?;
         let size = [bytes.u64("a camera")? as f64, bytes.u64("a camera")? as f64];
         let parameters = (0..model.parameter_count())
             .map(|_| bytes.f64("the parameters of a camera"))
@@ -26,6 +28,13 @@ pub(super) fn cameras(path: &Path) -> Result<Vec<(u32, ModelCamera)>, SceneError
     }
     bytes.end()?;
     Ok(all)
+}
+
+/// How many images an `images.bin` announces.
+pub(super) fn image_count(path: &Path) -> io::Result<u64> {
+    let mut count = [0; 8];
+    File::open(path)?.read_exact(&mut count)?;
+    Ok(u64::from_le_bytes(count))
 }
 
 /// `images.bin`: number, rotation, translation, camera, name, then the points found in the image, which are skipped.

@@ -1,12 +1,13 @@
 //! One entry of `frames`: its photograph, its mask, its intrinsics and its lens.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
+use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
-use viewfuse_core::lens::{Lens, Projection};
+use viewfuse_core::lens::{Coefficients, Lens, Projection};
 
-use super::super::camera_models::camera_model_names;
+use super::super::camera_models::{KEYED_LENSES, KeyedLens, LENS_KEYS, REFUSED_FLAGS, keyed_lens_names};
 use super::super::check;
 use super::super::error::SceneError;
 use super::super::fault::{FaultLocation, IntrinsicsFault};
@@ -14,22 +15,6 @@ use super::super::files::{self, IMAGE_EXTENSIONS};
 use super::super::json::Object;
 use super::super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawView};
 use super::super::split::Split;
-
-/// The supported coefficients, in the order of [`Lens::new`].
-const COEFFICIENTS: [&str; 8] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
-
-/// Coefficients that must be 0: of thin prisms.
-const REFUSED_COEFFICIENTS: [&str; 4] = ["s1", "s2", "s3", "s4"];
-
-/// Flags of unsupported projections, with any coefficients.
-const REFUSED_FLAGS: [&str; 2] = ["equirectangular", "latlong"];
-
-/// Values of `camera_model`: the perspective ones, with any coefficients.
-const PERSPECTIVE_MODELS: [&str; 7] =
-    ["PINHOLE", "SIMPLE_PINHOLE", "OPENCV", "FULL_OPENCV", "PERSPECTIVE", "SIMPLE_RADIAL", "RADIAL"];
-
-/// The fisheye ones.
-const FISHEYE_MODELS: [&str; 4] = ["OPENCV_FISHEYE", "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "FISHEYE"];
 
 /// Lists of photographs at the top of nerfstudio's files.
 const LISTS: [(&str, Split); 3] =
@@ -43,16 +28,47 @@ pub(super) enum Listed {
     Missing(FaultLocation, PathBuf),
 }
 
-/// The splits of photographs by the lists at the top level of a file.
-pub(super) fn lists(top: &Object) -> Result<HashMap<String, Split>, SceneError> {
-    let mut parts = HashMap::new();
-    for (key, split) in LISTS {
-        if top.get(key).is_some() {
-            let names = top.array(key)?.iter().filter_map(Value::as_str);
-            parts.extend(names.map(|name| (name.to_owned(), split)));
+/// The splits of photographs by the lists at the top level of a file. Names are compared as paths.
+pub(super) struct Lists {
+    parts: HashMap<PathBuf, Split>,
+    /// Those of them that a frame has.
+    found: HashSet<PathBuf>,
+}
+
+impl Lists {
+    pub(super) fn new(path: &Path, top: &Object) -> Result<Lists, SceneError> {
+        let mut parts = HashMap::new();
+        for (key, split) in LISTS {
+            if top.get(key).is_some() {
+                let names = top.array(key)?.iter().filter_map(Value::as_str);
+                parts.extend(names.map(|name| (beside(path, name), split)));
+            }
         }
+        Ok(Lists { parts, found: HashSet::new() })
     }
-    Ok(parts)
+
+    /// The split of a frame's photograph.
+    fn split(&mut self, given: &Path) -> Option<Split> {
+        let split = self.parts.get(given).copied()?;
+        self.found.insert(given.to_path_buf());
+        Some(split)
+    }
+
+    /// Counts the names in lists that no frame has.
+    pub(super) fn warning(&self, path: &Path) -> Option<String> {
+        let lacking = self.parts.keys().filter(|name| !self.found.contains(*name));
+        let (count, all, first) = (lacking.clone().count(), self.parts.len(), lacking.min()?);
+        let (path, first) = (path.display(), first.display());
+        Some(format!(
+            "{path}: no frame has {count} of the {all} names in train_filenames and the like (such as {first})"
+        ))
+    }
+}
+
+/// A path relative to a JSON file. Components without `.`, so that `./train/r_0` is named `train/r_0`; joined with `/`,
+/// for any separator of the system that wrote the file.
+fn beside(file: &Path, path: &str) -> PathBuf {
+    file.with_file_name("").join(path.replace('\\', "/")).components().collect()
 }
 
 /// One entry of `frames`.
@@ -65,11 +81,12 @@ pub(crate) struct Frame<'a> {
 }
 
 impl<'a> Frame<'a> {
-    pub(super) fn view(&self, lists: &HashMap<String, Split>) -> Result<Listed, SceneError> {
+    pub(super) fn view(&self, lists: &mut Lists) -> Result<Listed, SceneError> {
         let [frame, _] = &self.scopes;
         let pose = self.pose()?;
         let file_path = frame.text("file_path")?;
         let given = self.beside(file_path);
+        let split = lists.split(&given);
         let Some(image) = photograph(&given).or_else(|| smaller(&given)) else {
             return Ok(Listed::Missing(FaultLocation::Key(frame.full("file_path")), given));
         };
@@ -77,7 +94,7 @@ impl<'a> Frame<'a> {
         let intrinsics = Some(self.intrinsics(image.size())?);
         let mut view = RawView::new(files::stem(image.path()), Some(image), pose, intrinsics);
         view.mask = self.mask()?;
-        view.split = lists.get(file_path).copied();
+        view.split = split;
         Ok(Listed::View(Box::new(view)))
     }
 
@@ -86,7 +103,7 @@ impl<'a> Frame<'a> {
     pub(crate) fn camera_alone(&self, size: [u32; 2]) -> Result<RawView, SceneError> {
         let [frame, _] = &self.scopes;
         let pose = self.pose()?;
-        let has_focal = ["fl_x", "camera_angle_x"].iter().any(|key| self.get(key).is_some());
+        let has_focal = ["fl_x", "camera_angle_x", "x_fov"].iter().any(|key| self.get(key).is_some());
         let intrinsics = if has_focal { Some(RawIntrinsics { lens: None, ..self.intrinsics(size)? }) } else { None };
         let intrinsics = intrinsics.map(|own| RawIntrinsics { size: own.size.or(Some(size)), ..own });
         let name = frame.get("file_path").and_then(Value::as_str).map(|path| files::stem(&self.beside(path)));
@@ -122,10 +139,9 @@ impl<'a> Frame<'a> {
         Err(SceneError::NoMask { path, place, mask })
     }
 
-    /// A path relative to the JSON file. Components without `.`, so that `./train/r_0` is named `train/r_0`; joined
-    /// with `/`, for any separator of the system that wrote the file.
+    /// A path relative to the JSON file.
     fn beside(&self, path: &str) -> PathBuf {
-        self.path.with_file_name("").join(path.replace('\\', "/")).components().collect()
+        beside(self.path, path)
     }
 
     fn intrinsics(&self, image_size: [u32; 2]) -> Result<RawIntrinsics, SceneError> {
@@ -137,9 +153,8 @@ impl<'a> Frame<'a> {
             (None, Some(_)) => return Err(self.missing("w")),
         };
         let size = stated.unwrap_or(image_size);
-        let focal_x =
-            self.focal("fl_x", "camera_angle_x", size[0])?.ok_or_else(|| self.missing("fl_x (or camera_angle_x)"))?;
-        let focal_y = self.focal("fl_y", "camera_angle_y", size[1])?.unwrap_or(focal_x);
+        let focal_x = self.focal("x", size[0])?.ok_or_else(|| self.missing("fl_x (or camera_angle_x)"))?;
+        let focal_y = self.focal("y", size[1])?.unwrap_or(focal_x);
         let centre = size.map(|side| f64::from(side) / 2.0);
         let principal = [
             self.number("cx")?.map_or(centre[0], |(value, _)| value),
@@ -157,15 +172,17 @@ impl<'a> Frame<'a> {
         })
     }
 
-    /// A focal length: from the frame in either form, otherwise from the top level of the file.
-    fn focal(&self, length_key: &str, angle_key: &str, side: u32) -> Result<Option<f64>, SceneError> {
+    /// A focal length along an axis: from the frame in any form, otherwise from the top level of the file.
+    fn focal(&self, axis: &str, side: u32) -> Result<Option<f64>, SceneError> {
         for scope in &self.scopes {
-            if let Some(focal) = scope.number(length_key)? {
+            if let Some(focal) = scope.number(&format!("fl_{axis}"))? {
                 return Ok(Some(focal));
             }
-            if let Some(angle) = scope.number(angle_key)? {
-                if !(angle > 0.0 && angle < std::f64::consts::PI) {
-                    let (path, place) = (self.path.to_path_buf(), FaultLocation::Key(scope.full(angle_key)));
+            // Full opening angles, in radians and in degrees.
+            for (key, unit) in [(format!("camera_angle_{axis}"), 1.0), (format!("{axis}_fov"), PI / 180.0)] {
+                let Some(angle) = scope.number(&key)?.map(|angle| angle * unit) else { continue };
+                if !(angle > 0.0 && angle < PI) {
+                    let (path, place) = (self.path.to_path_buf(), FaultLocation::Key(scope.full(&key)));
                     let fault = IntrinsicsFault::Angle { angle };
                     return Err(SceneError::Intrinsics { path, place, fault });
                 }
@@ -179,24 +196,29 @@ impl<'a> Frame<'a> {
     fn lens(&self) -> Result<Option<Lens>, SceneError> {
         let refuse =
             |key: String, value: String| Err(SceneError::Distorted { path: self.path.to_path_buf(), key, value });
-        let mut projection = match self.get("is_fisheye") {
-            Some((Value::Bool(true), _)) => Projection::Fisheye,
-            None | Some((Value::Bool(false), _)) => Projection::Perspective,
+        let [perspective, _, fisheye] = &KEYED_LENSES;
+        let flag = match self.get("is_fisheye") {
+            Some((Value::Bool(true), key)) => Some(key),
+            None | Some((Value::Bool(false), _)) => None,
             Some((value, key)) => return refuse(key, files::excerpt(&value.to_string())),
         };
-        if let Some((value, key)) = self.get("camera_model") {
-            let model = value.as_str().unwrap_or_default();
-            let is_one_of = |models: &[&str]| models.iter().any(|known| model.eq_ignore_ascii_case(known));
-            if is_one_of(&FISHEYE_MODELS) {
-                projection = Projection::Fisheye;
-            } else if !is_one_of(&PERSPECTIVE_MODELS) {
-                return Err(SceneError::CameraModel {
-                    path: self.path.to_path_buf(),
-                    place: FaultLocation::Key(key),
-                    model: files::excerpt(&value.to_string()),
-                    supported: camera_model_names(),
-                });
+        let keyed = match self.get("camera_model") {
+            None => {
+                if flag.is_some() {
+                    fisheye
+                } else {
+                    perspective
+                }
             }
+            Some((value, key)) => KeyedLens::named(value.as_str().unwrap_or_default()).ok_or_else(|| {
+                let (path, place) = (self.path.to_path_buf(), FaultLocation::Key(key));
+                let model = files::excerpt(&value.to_string());
+                SceneError::CameraModel { path, place, model, supported: keyed_lens_names() }
+            })?,
+        };
+        if let Some(key) = flag.filter(|_| keyed.projection != Projection::Fisheye) {
+            let (path, second) = (self.path.to_path_buf(), format!("camera_model {}", keyed.models[0]));
+            return Err(SceneError::Contradiction { path, first: format!("{key} true"), second });
         }
         for flag in REFUSED_FLAGS {
             if let Some((value, key)) = self.get(flag)
@@ -205,18 +227,16 @@ impl<'a> Frame<'a> {
                 return refuse(key, files::excerpt(&value.to_string()));
             }
         }
-        for coefficient in REFUSED_COEFFICIENTS {
-            if let Some((value, key)) = self.number(coefficient)?
-                && value != 0.0
-            {
-                return refuse(key, value.to_string());
+        let mut coefficients = Coefficients::default();
+        for key in LENS_KEYS {
+            let Some((value, full)) = self.number(key)? else { continue };
+            match keyed.keys.iter().find(|(known, _)| *known == key) {
+                Some((_, index)) => coefficients[*index] = value,
+                None if value != 0.0 => return refuse(full, value.to_string()),
+                None => {}
             }
         }
-        let mut coefficients = [0.0; 8];
-        for (coefficient, key) in coefficients.iter_mut().zip(COEFFICIENTS) {
-            *coefficient = self.number(key)?.map_or(0.0, |(value, _)| value);
-        }
-        let lens = Lens::new(projection, coefficients).map_err(|reason| SceneError::Lens {
+        let lens = Lens::new(keyed.projection, coefficients).map_err(|reason| SceneError::Lens {
             path: self.path.to_path_buf(),
             place: FaultLocation::Key(self.key.clone()),
             reason,
