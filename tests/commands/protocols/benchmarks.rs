@@ -15,6 +15,7 @@ use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, done, toy}
 
 viewfuse_tests::trials![
     llff_takes_every_eighth_view,
+    views_are_counted_as_the_published_loaders_sort_them,
     dtu_takes_the_published_views,
     blender_takes_views_of_its_splits,
     blender_on_a_scene_in_its_layout,
@@ -69,6 +70,47 @@ fn llff_takes_every_eighth_view() {
     // LLFF's fern has 20 photographs: the papers' 1, 10, 19.
     let fern = scene((0..20).map(|view| (format!("image{view:03}"), None)));
     assert_eq!(names(&fern, &jobs("llff:3", &fern)[0].sources), ["image001", "image010", "image019"]);
+}
+
+/// Twenty photographs, numbered from 1 without zeros in front. `sorted` of Python makes of their names 1, 10, 11 .. 19, 2,
+/// 20, 3 .. 9, so that every eighth is 1, 17 and 6, and `linspace` takes of the others 10, 19 and 9.
+fn views_are_counted_as_the_published_loaders_sort_them() {
+    let sample = viewfuse_tests::scenes::transforms();
+    let matrix = &sample["frames"][0]["transform_matrix"];
+    let photographs = |folder: &viewfuse_tests::scenes::Folder| {
+        (1..=20).for_each(|number| _ = folder.image(&format!("images/{number}.png"), 16, 12));
+    };
+    let transforms = viewfuse_tests::scenes::Folder::new();
+    photographs(&transforms);
+    let frame = |number| json!({ "file_path": format!("images/{number}.png"), "transform_matrix": matrix });
+    let mut file = sample.clone();
+    file["frames"] = (1..=20).map(frame).collect();
+    transforms.write("transforms.json", file.to_string());
+    let colmap = viewfuse_tests::scenes::Folder::new();
+    photographs(&colmap);
+    colmap.write("sparse/0/cameras.txt", "1 PINHOLE 16 12 20 24 7.5 6.5\n");
+    let image = |number| format!("{number} 0.5 -0.5 -0.5 -0.5 -2 -3 -1 1 {number}.png\n\n");
+    colmap.write("sparse/0/images.txt", (1..=20).map(image).collect::<String>());
+    let llff = viewfuse_tests::scenes::Folder::new();
+    photographs(&llff);
+    // Axes down, right, backwards, the centre; height, width, focal length; near and far.
+    let row = [0., 0., -1., 1., 12., 0., 1., 0., 2., 16., 1., 0., 0., 3., 20., 0.5, 9.5];
+    let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (20, 17), }\n";
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes().into_iter().chain(header.bytes()));
+    bytes.extend((0..20).flat_map(|_| row).flat_map(f64::to_le_bytes));
+    llff.write("poses_bounds.npy", bytes);
+    for (folder, layout) in [(transforms, "transforms"), (colmap, "colmap"), (llff, "llff")] {
+        let scene = Scene::open(folder.path()).unwrap_or_else(|error| panic!("{error}"));
+        let [job] = &jobs("llff:3", &scene)[..] else { panic!("one job") };
+        let mut sources = names(&scene, &job.sources);
+        sources.sort_unstable();
+        assert_eq!((scene.layout, names(&scene, &job.targets)), (layout, vec!["1", "17", "6"]));
+        assert_eq!((sources, job.sources.is_sorted()), (vec!["10", "19", "9"], true), "{layout}");
+        // A person sees them by number.
+        let shown = if layout == "llff" { ["1", "10"] } else { ["1", "2"] };
+        assert_eq!(names(&scene, &[0, 1]), shown);
+    }
 }
 
 fn dtu_takes_the_published_views() {

@@ -10,10 +10,15 @@
 //! rounded half to even. `dtu` is pixelNeRF's split, whose order RegNeRF fixed, without the 15 views of wrong exposure.
 //! `blender` is that of DietNeRF and FreeNeRF.
 //!
+//! Every 8th view is counted in the order of the published loaders, which sort the photographs' paths character by
+//! character (`1, 10, 11, 2`), whatever the layout: NeRF's and RegNeRF's by `sorted(os.listdir(..))`, 3DGS's by the
+//! images' names, nerfstudio's by `file_path`. DTU's numbers are those of its camera positions, Blender's those of the
+//! frames in their file: there the order is the reader's.
+//!
 //! A benchmark's views have numbers. In a scene with all of the benchmark's views, the number is the position;
 //! otherwise it is the number at the end of the view's name.
 
-use super::photographed;
+use super::{ascending, photographed};
 use std::fmt;
 use viewfuse_scene::dataset::Split;
 use viewfuse_scene::{Scene, View};
@@ -116,7 +121,10 @@ impl Benchmark {
     /// The benchmark's views of a scene for this many sources; otherwise what the scene lacks, in words.
     pub(super) fn choose(self, scene: &Scene, source_count: usize) -> Result<Chosen, String> {
         match self {
-            Benchmark::Llff => evenly(&photographed(scene).collect::<Vec<_>>(), source_count),
+            Benchmark::Llff => {
+                let (sources, targets) = evenly(&by_character(scene), source_count)?;
+                Ok((ascending(&sources), targets))
+            }
             Benchmark::Dtu => {
                 let views: Vec<usize> = photographed(scene).collect();
                 let sources = numbered(scene, &views, DTU_VIEWS, &DTU_SOURCES[..source_count]);
@@ -146,6 +154,14 @@ impl fmt::Display for Benchmark {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
     }
+}
+
+/// The views with a photograph, sorted by its path character by character.
+fn by_character(scene: &Scene) -> Vec<usize> {
+    let path = |view: &usize| scene.views[*view].image.as_deref().map(|path| path.as_os_str().as_encoded_bytes());
+    let mut views: Vec<usize> = photographed(scene).collect();
+    views.sort_by(|a, b| path(a).cmp(&path(b)));
+    views
 }
 
 /// Every eighth view as a target, and of the others this many that are evenly spaced.
