@@ -17,6 +17,8 @@ viewfuse_tests::trials![
     what_the_cameras_cover,
     the_quality_is_what_photographs_that_are_left_out_have,
     views_are_listed_with_their_neighbours,
+    what_is_left_out_is_said_and_recorded,
+    conventions_are_said_and_recorded,
 ];
 
 fn inspection(folder: &Folder) -> Value {
@@ -223,4 +225,58 @@ fn the_quality_is_what_photographs_that_are_left_out_have() {
         "{wrong}"
     );
     assert!(done(scene.path(), "inspect toy --quality").contains("\nexpected   not measured: toy: the silhouettes"));
+}
+
+fn run_record(folder: &Folder, output: &str) -> Value {
+    let bytes = std::fs::read(folder.path().join(output).join("run.json")).expect("a run record");
+    serde_json::from_slice(&bytes).expect("JSON")
+}
+
+fn what_is_left_out_is_said_and_recorded() {
+    let (folder, room) = (Folder::new(), viewfuse_tests::places::data("room"));
+    for name in names_in(&room.join("images")) {
+        std::fs::copy(room.join("images").join(&name), folder.file(&format!("room/images/{name}"))).expect("a copy");
+    }
+    let text = std::fs::read(room.join("transforms.json")).expect("a file");
+    let mut transforms: Value = serde_json::from_slice(&text).expect("JSON");
+    let frames = transforms["frames"].as_array_mut().expect("frames");
+    let count = frames.len();
+    frames[2]["file_path"] = "images/999.jpg".into();
+    transforms["aabb_scale"] = 4.into();
+    folder.write("room/transforms.json", transforms.to_string());
+    let warnings = [
+        format!("transforms.json: 1 of {count} photographs are not there and left out"),
+        format!("images: 1 photograph has no pose and is not used, {} have one (without is 002.jpg)", count - 1),
+    ];
+    let (printed, verbose) = (done(folder.path(), "inspect room"), done(folder.path(), "inspect room --verbose"));
+    for warning in &warnings {
+        let is_said = |line: &str| line.starts_with("warning    ") && line.contains(warning);
+        assert!(printed.lines().any(is_said) && verbose.lines().any(is_said), "{printed}");
+    }
+    assert!(!printed.contains("not read   "), "{printed}");
+    assert!(verbose.lines().any(|line| line.starts_with("not read   ") && line.ends_with(": aabb_scale")), "{verbose}");
+    let render = "render room --targets 005 --size 32x24 --device cpu --weights mean --no-sheets -o out";
+    let outcome = run(env!("CARGO_BIN_EXE_viewfuse"), folder.path(), render);
+    let record = run_record(&folder, "out");
+    for warning in &warnings {
+        assert!(texts(&record["warnings"]).iter().any(|line| line.contains(warning)), "{}", record["warnings"]);
+        let said = outcome.stderr.lines().filter(|line| line.contains("warning: ") && line.contains(warning));
+        assert_eq!(said.count(), 1, "{}", outcome.stderr);
+    }
+}
+
+fn conventions_are_said_and_recorded() {
+    let scene = toy();
+    let render = |output: &str| {
+        let options = "--targets 20 --size 32x32 --device cpu --weights mean --no-sheets";
+        done(scene.path(), &format!("render toy {options} -o {output}"));
+        std::fs::read(scene.path().join(output).join("000020.png")).expect("a picture")
+    };
+    let plain = render("plain");
+    assert_eq!(texts(&run_record(&scene, "plain")["conventions"]), Vec::<&str>::new());
+    scene.write("toy/intrinsics.txt", "131.25 0 64 0\n0 131.25 64 0\n0 0 1 0\n0 0 0 1\n");
+    assert!(render("matrix") == plain, "the same camera gives another picture");
+    let convention = "intrinsics.txt: K alone, for the photographs' size (NSVF)";
+    assert_eq!(texts(&run_record(&scene, "matrix")["conventions"]), [convention]);
+    assert!(done(scene.path(), "inspect toy").contains(&format!("\nread as    {convention}\n")));
 }

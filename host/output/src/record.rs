@@ -52,8 +52,10 @@ pub struct RunRecord {
     pub leave_out: f32,
     /// Transmittance of early termination: no channel changes by more than this times its range.
     pub early_termination: f32,
-    /// Warnings about the photographs.
+    /// Warnings about the scene and its photographs.
     pub warnings: Vec<String>,
+    /// Conventions of the scene's files that were applied.
+    pub conventions: Vec<String>,
     /// Names of the source views.
     pub sources: Vec<String>,
     /// Estimated memory beside photographs and pictures, in bytes; null for fields without an estimate.

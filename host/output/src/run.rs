@@ -72,8 +72,9 @@ pub struct RunWriter {
     frames: Vec<FrameRecord>,
     size: [u32; 2],
     background: [f32; 3],
-    /// Before those about the photographs.
+    /// About the scene and the whole run, before those about the photographs.
     given: Vec<String>,
+    conventions: Vec<String>,
     warnings: Vec<String>,
     chosen: Option<Chosen>,
 }
@@ -117,7 +118,8 @@ impl RunWriter {
             frames: Vec::new(),
             size: [0, 0],
             background: [0.0; 3],
-            given: Vec::new(),
+            given: scene.warnings.clone(),
+            conventions: scene.conventions.clone(),
             warnings: Vec::new(),
             chosen: None,
         }
@@ -300,6 +302,7 @@ impl RunWriter {
             leave_out: options.leave_out,
             early_termination: options.early_termination,
             warnings: self.given.into_iter().chain(self.warnings).collect(),
+            conventions: self.conventions,
             sources: self.source_names,
             memory_estimate: record.memory_estimate,
             near_far: record.near_far.map(|bounds| bounds.map(|depth| self.space.file_length(depth))),

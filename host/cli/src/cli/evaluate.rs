@@ -16,7 +16,7 @@ use super::metrics_options::MetricOptions;
 use super::model::ModelOptions;
 use super::options::{BoundOptions, DeviceOptions, PictureOptions, SourceOptions};
 use super::outputs::keep_file_apart;
-use super::printing::say;
+use super::printing::{say, warn_of};
 use super::terminal::Terminal;
 use super::threads::on_threads;
 use super::weighting::{many_choices_help, or_every_scheme};
@@ -123,6 +123,7 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
     // All are opened before the first is computed: a wrong path shows at once.
     let paths = arguments.paths()?;
     let scenes: Vec<Scene> = paths.iter().map(|path| arguments.picture.masks.open(path)).collect::<Result<_, _>>()?;
+    scenes.iter().for_each(warn_of);
     arguments.output.as_deref().map_or(Ok(()), |path| keep_file_apart(&scenes, path))?;
     let (mut all, mut json_tables): (Vec<Vec<Score>>, Vec<serde_json::Value>) = (Vec::new(), Vec::new());
     let mut tell = |name: &str, results: &Table| -> anyhow::Result<()> {

@@ -43,6 +43,9 @@ pub(crate) struct Arguments {
     /// long as `render` takes before its first picture, seconds for a dozen photographs
     #[arg(long, conflicts_with = "views")]
     quality: bool,
+    /// List the keys and files of the scene that are not read, too
+    #[arg(short, long)]
+    verbose: bool,
     /// Print JSON instead of text
     #[arg(long)]
     json: bool,
@@ -68,6 +71,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         say(format_args!("{}", serde_json::to_string_pretty(&document)?))?;
     } else {
         print_text(&inspection)?;
+        if arguments.verbose {
+            inspection.unused.iter().try_for_each(|unused| say(format_args!("not read   {unused}")))?;
+        }
         match &quality {
             Some(quality) => quality.print()?,
             None => say("expected   --quality leaves photographs out and says which PSNR to expect")?,

@@ -3,7 +3,7 @@
 use super::ending::INTERRUPTED;
 use super::options::{DeviceOptions, PictureOptions, SourceOptions};
 use super::outputs::keep_file_apart;
-use super::printing::say;
+use super::printing::{say, warn_of};
 use super::terminal::Terminal;
 use super::threads::on_threads;
 use anyhow::bail;
@@ -115,6 +115,7 @@ struct Ended {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let weighting = arguments.weights.open()?;
     let scene = arguments.picture.masks.open(&arguments.scene)?;
+    warn_of(&scene);
     let field = AnyField::default();
     let about = field.about();
     let views = |list: &Option<String>| -> anyhow::Result<Vec<Target>> {

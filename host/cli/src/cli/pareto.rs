@@ -5,7 +5,7 @@ use super::model::NetworkOptions;
 use super::options::{PictureOptions, SourceOptions};
 use super::outputs::keep_folder_apart;
 use super::parse::parse_seconds;
-use super::printing::say;
+use super::printing::{say, warn_of};
 use super::table::table;
 use super::terminal::Terminal;
 use super::threads::on_threads;
@@ -88,6 +88,7 @@ fn parse_beside(text: &str) -> Result<Beside, String> {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let weighting = arguments.weights.open()?;
     let scene = arguments.picture.masks.open(&arguments.scene)?;
+    warn_of(&scene);
     let field = arguments.network.open(arguments.seed)?;
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);
     let job = selection.resolve(&scene, field.about().least_sources)?;

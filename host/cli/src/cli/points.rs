@@ -2,7 +2,7 @@
 
 use super::options::{DeviceOptions, PictureOptions, SourceOptions};
 use super::outputs::keep_file_apart;
-use super::printing::say;
+use super::printing::{say, warn_of};
 use super::terminal::Terminal;
 use super::threads::on_threads;
 use anyhow::bail;
@@ -59,6 +59,7 @@ fn ply_file(path: PathBuf) -> Result<PathBuf, &'static str> {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let weighting = arguments.weights.open()?;
     let scene = arguments.picture.masks.open(&arguments.scene)?;
+    warn_of(&scene);
     let field = AnyField::default();
     let about = field.about();
     let sources = arguments.sources.to_selection(None, None).sources_without(&scene, &[], about.least_sources)?;

@@ -4,6 +4,7 @@
 use super::shown::{shown, shown_in_line};
 use std::fmt::Display;
 use std::io::{self, Write};
+use viewfuse_scene::Scene;
 
 /// Prints a line on standard output. A closed pipe (`| head`) is ignored, because the files are still to be written.
 ///
@@ -20,6 +21,11 @@ pub fn say(text: impl Display) -> io::Result<()> {
 /// too.
 pub(crate) fn complain(message: impl Display) {
     let _ = writeln!(io::stderr().lock(), "viewfuse: {}", shown_in_line(message));
+}
+
+/// Says what was left out of a scene.
+pub(crate) fn warn_of(scene: &Scene) {
+    scene.warnings.iter().for_each(|warning| complain(format_args!("warning: {warning}")));
 }
 
 /// Prints what is wrong with the arguments, which takes several lines.

@@ -4,7 +4,7 @@ use super::options::SourceOptions;
 use super::outputs::keep_file_apart;
 use super::parse::parse_count;
 use super::path::PathOptions;
-use super::printing::say;
+use super::printing::{say, warn_of};
 use super::table::table;
 use super::wrong::wrong;
 use anyhow::Context;
@@ -61,6 +61,7 @@ fn scheme_help() -> String {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let weighting = arguments.weights.open()?;
     let scene = Scene::open(&arguments.scene)?;
+    warn_of(&scene);
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), arguments.path.choice());
     let job = selection.resolve(&scene, 1)?;
     let selected = SelectedSources::of(&scene, &job, &weighting, arguments.count)?;

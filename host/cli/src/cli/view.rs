@@ -3,7 +3,7 @@
 use super::model::ModelOptions;
 use super::options::{BoundOptions, DeviceOptions, PictureOptions, SourceOptions};
 use super::posed::PoseOption;
-use super::printing::say;
+use super::printing::{say, warn_of};
 use super::terminal::Terminal;
 use super::threads::on_threads;
 use super::weighting::choice_help;
@@ -74,6 +74,7 @@ pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> 
         None => (Weighting::default_scheme(), arguments.model.label().is_none() && arguments.gaussians.is_none()),
     };
     let (folder, scene) = arguments.pose.open(&arguments.scene, &arguments.picture.masks)?;
+    warn_of(&scene);
     let field = match &arguments.gaussians {
         Some(path) => AnyField::new(GivenGaussians { scene: GaussianScene::read(path, &scene.frame)? }),
         None => arguments.model.open(arguments.seed, None)?,

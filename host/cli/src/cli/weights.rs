@@ -3,8 +3,7 @@
 use super::options::SourceOptions;
 use super::outputs::keep_file_apart;
 use super::path::PathOptions;
-use super::printing::complain;
-use super::printing::say;
+use super::printing::{complain, say, warn_of};
 use super::table::table;
 use super::weighting::{many_help, open_all, or_every_scheme};
 use clap::Args;
@@ -50,6 +49,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let weightings = open_all(&or_every_scheme(&arguments.weights)?)?;
     let scene = Scene::open(&arguments.scene)?;
+    warn_of(&scene);
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), arguments.path.choice());
     let job = selection.resolve(&scene, 1)?;
     if let Some(warning) = away_warning(&scene, &job) {

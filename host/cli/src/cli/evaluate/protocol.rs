@@ -6,7 +6,7 @@ use super::files::{csv_of, json_of};
 use super::jobs::{Jobs, names};
 use super::tables::{counted, print_published, print_table};
 use crate::cli::outputs::keep_folder_apart;
-use crate::cli::printing::say;
+use crate::cli::printing::{say, warn_of};
 use crate::cli::threads::on_threads;
 use crate::cli::wrong::wrong;
 use anyhow::Context;
@@ -82,6 +82,7 @@ pub(super) fn run(
     let render_options = arguments.bound.bounded(arguments.picture.to_render_options(arguments.model.exact, &about)?);
     let scenes: Vec<Scene> =
         arguments.paths()?.iter().map(|path| arguments.picture.masks.open(path)).collect::<Result<_, _>>()?;
+    scenes.iter().for_each(warn_of);
     folder.map_or(Ok(()), |folder| keep_folder_apart(&scenes, folder))?;
     let draws = Draws {
         seed: arguments.seed,

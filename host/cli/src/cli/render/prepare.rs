@@ -2,6 +2,7 @@
 
 use super::Arguments;
 use crate::cli::outputs::keep_folder_apart;
+use crate::cli::printing::warn_of;
 use crate::cli::terminal::Terminal;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -42,6 +43,7 @@ impl Prepared {
         let start = Instant::now();
         let weighting = arguments.weighting()?;
         let (folder, scene) = arguments.pose.open(&arguments.scene, &arguments.picture.masks)?;
+        warn_of(&scene);
         if !arguments.is_stream() {
             keep_folder_apart([&scene], &arguments.output)?;
         }
