@@ -1,4 +1,4 @@
-//! Fusing views and compositing samples against `f64`.
+//! Fusing views against `f64`, and compositing thin, opaque and useless samples.
 
 use viewfuse::check::compare::Comparator;
 use viewfuse::check::poses::Random;
@@ -66,37 +66,14 @@ fn composite(samples: &[Sample], background: [f32; 3]) -> (Composite<3>, Vec<f32
     (ray.finish(&background, -1.0), weights)
 }
 
-/// Channels, opacity, depth in `f64`.
-fn oracle(samples: &[Sample], background: [f32; 3]) -> ([f64; 3], f64, f64) {
-    let (mut channels, mut depth, mut total) = ([0.0; 3], 0.0, 0.0_f64);
-    for (values, optical_depth, at) in samples {
-        let weight = (-total).exp() * -(-f64::from(*optical_depth)).exp_m1();
-        total += f64::from(*optical_depth);
-        depth += weight * f64::from(*at);
-        (0..3).for_each(|channel| channels[channel] += weight * f64::from(values[channel]));
-    }
-    (0..3).for_each(|channel| channels[channel] += (-total).exp() * f64::from(background[channel]));
-    let opacity = -(-total).exp_m1();
-    (channels, opacity, depth / opacity)
-}
-
-fn random_samples(random: &mut Random, count: usize, low: f64, high: f64) -> Vec<Sample> {
-    (0..count)
-        .map(|i| {
-            let channels = std::array::from_fn(|_| random.unit() as f32);
-            (channels, random.log_range(low, high) as f32, 1.0 + i as f32 / count as f32)
-        })
-        .collect()
-}
-
 #[test]
 fn two_thousand_thin_samples_are_not_lost() {
     let samples = vec![([1.0, 0.5, 0.0], 1.0e-7, 2.0); 2000];
     let (actual, _) = composite(&samples, [0.0; 3]);
-    let (channels, opacity, _) = oracle(&samples, [0.0; 3]);
+    let opacity = -(-2000.0 * f64::from(1.0e-7_f32)).exp_m1();
     // One by one each would round to 0 or 2^-24; kept as a sum they are right to half a step of the transmittance.
     let tolerance = Comparator { absolute: 1.5e-7, relative: 0.0 };
-    tolerance.compare_varying(&actual.channels, &channels).unwrap_or_else(|e| panic!("{e}"));
+    tolerance.compare_varying(&actual.channels, &[opacity, 0.5 * opacity, 0.0]).unwrap_or_else(|e| panic!("{e}"));
     tolerance.compare(&[actual.opacity], &[opacity]).unwrap_or_else(|e| panic!("{e}"));
     assert!((actual.depth - 2.0).abs() < 2.0e-6, "{}", actual.depth);
 }
@@ -115,34 +92,4 @@ fn empty_opaque_and_useless_samples() {
         assert_eq!(actual, Composite { channels: [0.5, 0.6, 0.7], depth: 3.0, opacity: 1.0 });
         assert_eq!(weights, [1.0, 0.0]);
     }
-}
-
-#[test]
-fn a_ray_that_ends_early_changes_by_less_than_its_threshold() {
-    let mut random = Random::new(33);
-    let mut reached = 0.0_f32;
-    for case in 0..3_000 {
-        let threshold = [0.5, 0.1, 1.0e-2, 1.0e-3][case % 4];
-        let samples = random_samples(&mut random, 64, 1.0e-3, 3.0);
-        let mut ray = Compositor::<3>::START;
-        let mut ended = None;
-        for (channels, optical_depth, at) in &samples {
-            if ended.is_none() && ray.is_terminated(threshold) {
-                ended = Some(ray);
-            }
-            ray.add(channels, *optical_depth, *at);
-        }
-        let Some(ended) = ended else { continue };
-        // Whatever is behind: the rest of the samples, black or white.
-        let full = ray.finish(&[0.0, 1.0, 0.5], 0.0).channels;
-        for background in [[0.0; 3], [1.0; 3]] {
-            let short = ended.finish(&background, 0.0).channels;
-            for channel in 0..3 {
-                let change = (full[channel] - short[channel]).abs();
-                assert!(change <= threshold + 4.0e-6, "{change} > {threshold}");
-                reached = reached.max(change / threshold);
-            }
-        }
-    }
-    assert!(reached > 0.5, "the bound is not idle: {reached}");
 }

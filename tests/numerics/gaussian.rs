@@ -2,7 +2,6 @@
 
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock, Pinhole};
-use viewfuse_core::composite::Compositor;
 use viewfuse_core::gaussian::{DILATION, GaussianBlock, ProjectedGaussian, axes, colour_along, opacity, project};
 use viewfuse_core::pose::Pose;
 
@@ -111,21 +110,6 @@ fn what_can_not_be_drawn_covers_nothing() {
     let aside = GaussianBlock { position: [-40.0, 0.0, 2.0], ..good };
     let [left, right, _, _] = project(&aside, &camera, NEAR).pixels(160, 90);
     assert_eq!((left, right), (0, 0));
-}
-
-#[test]
-fn surfaces_are_composited_front_to_back() {
-    let surfaces = [([1.0, 0.0, 0.0], 0.5_f32, 1.0), ([0.0, 1.0, 0.0], 0.25, 2.0), ([0.0, 0.0, 1.0], 0.8, 4.0)];
-    let mut ray = Compositor::<3>::START;
-    let weights = surfaces.map(|(colour, alpha, depth)| ray.add_alpha(&colour, alpha, depth));
-    assert_eq!([ray.add_alpha(&[9.0; 3], f32::NAN, 1.0), ray.add_alpha(&[9.0; 3], -1.0, 1.0)], [0.0; 2]);
-    let expected = [0.5, 0.5 * 0.25, 0.5 * 0.75 * 0.8];
-    weights.iter().zip(expected).for_each(|(own, expected)| assert!((own - expected).abs() < 1.0e-7));
-    let pixel = ray.finish(&[1.0; 3], 0.0);
-    assert!((pixel.opacity - (1.0 - 0.5 * 0.75 * 0.2)).abs() < 1.0e-7);
-    assert!((pixel.channels[1] - (0.125 + 0.075)).abs() < 1.0e-7, "{pixel:?}");
-    ray.add_alpha(&[0.0; 3], 2.0, 1.0);
-    assert_eq!(ray.transmittance(), 0.0);
 }
 
 /// The harmonics are orthonormal on the sphere: by a product rule that is exact for polynomials of the degree.

@@ -18,6 +18,7 @@ use viewfuse::evaluate::metrics::trunk::{Convolution, InceptionKind, Pooling, St
 use viewfuse::evaluate::metrics::{MetricError, Metrics, Scored};
 use viewfuse::nn::checkpoint::{Checkpoint, TensorShape};
 use viewfuse::nn::initialisation;
+use viewfuse_core::metrics::{mean_squared_error, psnr, ssim};
 
 /// What networks in `f32` may differ by, of the score.
 const TOLERANCE: f64 = 1.0e-4;
@@ -31,7 +32,7 @@ fn picture(name: &str) -> RgbImage {
 }
 
 fn pair(name: &str) -> [RgbImage; 2] {
-    ["pred", "truth"].map(|of| picture(&format!("{name}_{of}")))
+    ["pred", "truth"].map(|side| picture(&format!("{name}_{side}")))
 }
 
 fn expected(name: &str) -> Vec<f64> {
@@ -227,8 +228,21 @@ fn conventions_decide_what_is_scored() {
     // The published evaluation stretches the prediction; the network sees the photograph as it is.
     let published = scores(Convention::ViewAttention);
     let shown = |picture| Convention::ViewAttention.shown(picture).into_owned();
-    let stretched = viewfuse_core::metrics::psnr(&shown(&prediction), &shown(&truth));
+    let stretched = psnr(&shown(&prediction), &shown(&truth));
     assert_eq!(published[0].value, stretched);
     let seen = lpips(LpipsTrunk::Alex).distance(&Cpu, &shown(&prediction), &truth).expect("a distance");
     assert_eq!(published[2].value, seen);
+}
+
+#[test]
+fn metrics_of_degenerate_pictures() {
+    assert_eq!(mean_squared_error(&[], &[]), 0.0);
+    assert_eq!(mean_squared_error(&[0, 255], &[255, 0]), 65025.0);
+    assert_eq!((psnr(&[0], &[255]), psnr(&[7], &[7])), (0.0, f64::INFINITY));
+    assert_eq!(ssim(&[0; 42], &[0; 42], 6, 7, 1), None);
+    assert_eq!(ssim(&[0; 42], &[0; 42], 7, 6, 1), None);
+    assert_eq!(ssim(&[], &[], 7, 7, 0), None);
+    assert_eq!(ssim(&[9; 49], &[9; 49], 7, 7, 1), Some(1.0));
+    let flat = ssim(&[0; 49], &[255; 49], 7, 7, 1).expect("one window");
+    assert!((flat - 6.5025 / (65025.0 + 6.5025)).abs() < 1.0e-12);
 }

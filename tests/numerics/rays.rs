@@ -1,65 +1,10 @@
-//! Rays and where to look along them, at extremes: random numbers, depths of both passes, what is seen and what is
-//! wanted.
+//! Where to look along rays, at extremes: depths of the second pass, and which samples are wanted.
 
 use viewfuse::check::poses::Random;
 use viewfuse::check::ray_inputs;
-use viewfuse_core::composite::Compositor;
 use viewfuse_core::depths::{FineBlock, fine_depth, random_draw, stratified_depth};
-use viewfuse_core::math;
-use viewfuse_core::random::{normal, uniform_pair};
 use viewfuse_core::rays::{TargetRay, place_point};
 use viewfuse_kernels::sample_mask::{SampleMaskBlock, is_sampled, weigh_sample};
-
-/// As [`normal`], in `f64`.
-fn normal_oracle(seed: [u32; 2], pixel: u32, sample: u32) -> f64 {
-    let [u, v] = uniform_pair(seed, pixel, sample).map(f64::from);
-    (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
-}
-
-#[test]
-fn normal_numbers_are_normal() {
-    const COUNT: u32 = 1 << 20;
-    for seed in [[0, 0], [1, 0], [u32::MAX, 7]] {
-        let (mut sum, mut squares, mut fourths, mut largest, mut lag, mut previous) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-        for i in 0..COUNT {
-            let value = normal(seed, i / 64, i % 64);
-            let expected = normal_oracle(seed, i / 64, i % 64);
-            // The root's and the cosine's, whose argument of up to a turn is rounded twice.
-            assert!((f64::from(value) - expected).abs() <= 6.0e-6, "{value} instead of {expected}");
-            let value = f64::from(value);
-            sum += value;
-            squares += value * value;
-            fourths += value.powi(4);
-            lag += value * previous;
-            previous = value;
-            largest = value.abs().max(largest);
-        }
-        let count = f64::from(COUNT);
-        let five = 5.0 / count.sqrt();
-        assert!((sum / count).abs() < five, "mean {}", sum / count);
-        assert!((squares / count - 1.0).abs() < five * 2.0_f64.sqrt(), "variance {}", squares / count);
-        assert!((fourths / count - 3.0).abs() < five * 96.0_f64.sqrt(), "fourth moment {}", fourths / count);
-        assert!((lag / count).abs() < five, "neighbours {}", lag / count);
-        assert!((4.5..5.8).contains(&largest), "largest {largest}");
-    }
-    let furthest = math::sqrt(-2.0 * math::ln(1.0 / 16_777_216.0));
-    assert!((5.7..5.8).contains(&furthest), "no number is larger than {furthest}");
-}
-
-#[test]
-fn chances_are_one_in_each_part() {
-    for importance_count in [1, 2, 16, 128] {
-        let block = FineBlock { seed: [9, 0], coarse_count: 64, importance_count, ..FineBlock::default() };
-        for pixel in 0..2_000 {
-            for index in 0..importance_count {
-                let [place, inside] = random_draw(pixel, index, &block);
-                let part = f64::from(place) * f64::from(importance_count) - f64::from(index);
-                assert!((0.0..=1.0).contains(&place) && (-1.0e-5..=1.0 + 1.0e-5).contains(&part), "{place}");
-                assert!((0.0..1.0).contains(&inside));
-            }
-        }
-    }
-}
 
 /// A sample at or behind the end of its ray stands for nothing.
 #[test]
@@ -105,44 +50,6 @@ fn fine_depths_stay_within_the_ray() {
                 assert!((ray.near..=ray.far).contains(&depth), "{depth} not in {ray:?}");
             }
         }
-    }
-}
-
-#[test]
-fn depth_samples_lie_around_the_depth() {
-    let ray = TargetRay { near: 1.0, far: 3.0, ..TargetRay::default() };
-    let block = FineBlock { coarse_count: 1, depth_count: 4, depth_deviation: 0.01, ..FineBlock::default() };
-    let at = |depth, opacity, draw, block: &FineBlock| fine_depth(&[[0.0; 2]], &ray, depth, opacity, draw, 0, block);
-    assert_eq!(at(2.0, 0.5, [1.0, 0.0], &block), 2.0 + 0.01);
-    let published = FineBlock { depth_times_opacity: 1, ..block };
-    // Too near, as published: the sum of weights times depths.
-    assert_eq!(at(2.4, 0.5, [-2.0, 0.0], &published), 1.2 - 2.0 * 0.01);
-    // A ray that met nothing looks at its beginning, or wherever nothing was said to be.
-    for draw in [[0.0, 0.0], [-5.0, 0.0]] {
-        assert_eq!(at(0.0, 0.0, draw, &block), 1.0);
-        assert_eq!(at(9.0, 0.0, draw, &published), 1.0);
-    }
-    assert_eq!(at(9.0, 0.0, [0.0, 0.0], &block), 3.0);
-}
-
-#[test]
-fn weights_are_the_compositors() {
-    let mut random = Random::new(65);
-    for case in 0..5_000 {
-        let (mut ray, mut sum, mut total) = (Compositor::<1>::START, 0.0, 0.0_f64);
-        let (low, high) = [(1.0e-6, 1.0e-3), (1.0e-3, 1.0), (0.1, 1.0e3)][case % 3];
-        for _ in 0..1 + random.below(128) {
-            let odd = [0.0, -1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY][random.below(5)];
-            let optical_depth = if random.below(20) == 0 { odd } else { random.log_range(low, high) as f32 };
-            let before = ray.transmittance();
-            let ([weight, transmittance], after) = weigh_sample(sum, optical_depth);
-            assert_eq!(transmittance.to_bits(), before.to_bits());
-            assert_eq!(weight.to_bits(), ray.add(&[0.0], optical_depth, 0.0).to_bits(), "{optical_depth}");
-            sum = after;
-            total += f64::from(weight);
-        }
-        // Each weight is a difference of neighbours, rounded once.
-        assert!((total - (1.0 - f64::from(ray.transmittance()))).abs() <= 64.0 / 16_777_216.0, "{total}");
     }
 }
 

@@ -45,40 +45,10 @@ fn uniform_is_uniform() {
 }
 
 #[test]
-fn stratified_depths_stay_in_their_parts() {
-    let mut random = Random::new(21);
-    for _ in 0..20_000 {
-        let near = random.range(0.0, 3.0) as f32;
-        let far = near + random.log_range(1.0e-6, 1.0e3) as f32;
-        let count = 1 + random.below(256) as u32;
-        let part = random.below(count as usize) as u32;
-        let jitter = random.unit() as f32;
-        let depth = stratified_depth(near, far, part, count, jitter);
-        assert!((near..=far).contains(&depth));
-        let (n, f) = (f64::from(near), f64::from(far));
-        let expected = n + (f - n) * (f64::from(part) + f64::from(jitter)) / f64::from(count);
-        // Difference, sum, quotient and product are rounded once each in units of the interval, the result in its own.
-        assert!((f64::from(depth) - expected).abs() <= (4.0 * (f - n) + f) / 16_777_216.0);
-        assert!(stratified_depth(near, far, part, count, 1.0) >= depth);
-    }
+fn stratified_depths_at_their_ends() {
     assert_eq!(stratified_depth(1.0, 3.0, 0, 0, 0.5), 2.0);
     assert_eq!(stratified_depth(1.0, 3.0, 9, 4, 0.5), 3.0);
     assert_eq!(stratified_depth(1.0, 3.0, 0, 4, f32::NAN), 1.0);
-}
-
-#[test]
-fn samples_hit_parts_as_often_as_their_weights_say() {
-    let weights = [0.1_f32, 0.0, 0.4, 0.2, 0.0, 0.0, 0.25, 0.05];
-    let mut hits = [0.0_f64; 8];
-    for i in 0..200_000 {
-        let depth = inverse_cdf(2.0, 6.0, &weights, uniform(5, i, 0));
-        hits[(((depth - 2.0) * 2.0) as usize).min(7)] += 1.0;
-    }
-    for part in 0..8 {
-        let p = f64::from(weights[part]);
-        let deviation = (200_000.0 * p * (1.0 - p)).sqrt();
-        assert!((hits[part] - 200_000.0 * p).abs() <= 5.0 * deviation + 10.0, "{part}: {hits:?}");
-    }
 }
 
 #[test]

@@ -1,6 +1,5 @@
-//! From volumes to a feature image at the ends: nodes, borders and what lies outside; densities of all sizes.
+//! From volumes to a feature image at the ends: what lies outside, and densities that are none.
 
-use viewfuse::check::poses::Random;
 use viewfuse_core::camera::{Camera, CameraBlock, Pinhole};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::rays::RayPoint;
@@ -26,39 +25,8 @@ fn point_at(column: f64, row: f64, node: f64) -> RayPoint {
     RayPoint { position: [x, y, depth].map(|coordinate| coordinate as f32), ..RayPoint::default() }
 }
 
-fn volume() -> Vec<f32> {
-    let mut random = Random::new(71);
-    (0..4 * 5 * 6 * 2).map(|_| random.normal() as f32).collect()
-}
-
-fn node(volume: &[f32], column: usize, row: usize, depth: usize, feature: usize) -> f64 {
-    f64::from(volume[((row * 5 + column) * 6 + depth) * 2 + feature])
-}
-
 fn looked_up(volume: &[f32], point: RayPoint) -> [f64; 2] {
     [0, 1].map(|feature| f64::from(volume_value(&[camera()], &[point], volume, &BLOCK, feature)))
-}
-
-#[test]
-fn nodes_have_their_values_and_half_of_them_at_the_border() {
-    let volume = volume();
-    for (column, row, depth) in [(0, 0, 0), (4, 3, 5), (2, 1, 3), (4, 0, 2), (0, 3, 5)] {
-        let at = |x: f64, y: f64, z: f64| looked_up(&volume, point_at(x, y, z))[1];
-        let (x, y, z) = (column as f64, row as f64, depth as f64);
-        let own = node(&volume, column, row, depth, 1);
-        assert!((at(x, y, z) - own).abs() <= 1.0e-5);
-        let (beside, above) = (if column == 0 { -0.5 } else { 4.5 }, if row == 0 { -0.5 } else { 3.5 });
-        if column == 0 || column == 4 {
-            assert!((at(beside, y, z) - own / 2.0).abs() <= 1.0e-5);
-        }
-        if row == 0 || row == 3 {
-            assert!((at(x, above, z) - own / 2.0).abs() <= 1.0e-5);
-        }
-    }
-    // Node 0 is the farthest.
-    let far = RayPoint { position: [0.0, 0.0, 3.75], ..point_at(2.0, 1.5, 0.0) };
-    let expected = (node(&volume, 2, 1, 0, 0) + node(&volume, 2, 2, 0, 0)) / 2.0;
-    assert!((looked_up(&volume, far)[0] - expected).abs() <= 1.0e-5);
 }
 
 #[test]
@@ -105,41 +73,6 @@ fn weights(densities: &[f32], lengths: &[f32], block: &FeatureBlock) -> Vec<f32>
     });
     assert_eq!(weights.len(), count);
     weights
-}
-
-#[test]
-fn weights_telescope() {
-    let mut random = Random::new(73);
-    for case in 0..2000 {
-        let count = 1 + random.below(16);
-        let depth = random.log_range(1.0e-6, 1.0e6);
-        let lengths: Vec<f32> = (0..count).map(|_| random.log_range(1.0e-3, 1.0) as f32).collect();
-        let mut density = |index: usize| (depth * random.unit() / f64::from(lengths[index])) as f32;
-        let densities: Vec<f32> = (0..count).map(&mut density).collect();
-        let last_length = [1.0e10, 0.25][case % 2];
-        let own = |index: usize| {
-            let is_last = index + 1 == count;
-            let length = if is_last { f64::from(last_length) } else { 0.5 * f64::from(lengths[index]) };
-            f64::from(densities[index]) * length
-        };
-        let [exclusive, inclusive] =
-            [0, 1].map(|inclusive| weights(&densities, &lengths, &features(count as u32, inclusive, last_length)));
-        let mut passed = 0.0_f64;
-        for index in 0..count {
-            let stopped = (-passed).exp() * -(-own(index)).exp_m1();
-            passed += own(index);
-            // Each transmittance is rounded at 1, and as often as optical depths were added.
-            let tolerance = (3.0 + count as f64) / 16_777_216.0;
-            let off = f64::from(exclusive[index]) - stopped;
-            assert!(off.abs() <= tolerance, "{densities:?} {index}: {off}");
-            let off = f64::from(inclusive[index]) - stopped * (-own(index)).exp();
-            assert!(off.abs() <= tolerance, "{densities:?} {index}: {off}");
-        }
-        // Neighbouring transmittances cancel.
-        let sum: f64 = exclusive.iter().map(|weight| f64::from(*weight)).sum();
-        let off = sum + (-passed).exp_m1();
-        assert!(off.abs() <= (3.0 + count as f64) / 16_777_216.0, "{densities:?}: {off}");
-    }
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Every formula weighting against `f64` on the same poses, with the derived bound, and what must not change it.
 
 use viewfuse::check::compare::relative_units;
-use viewfuse::check::oracle::{Arithmetic, Matrix, WidePose, evaluate, minus, norm, normalised, schemes};
+use viewfuse::check::oracle::{Matrix, WidePose, evaluate, normalised, schemes};
 use viewfuse::check::poses::{Random, looking_at_origin, pose_of, ring, rotation_about};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::sources::Sources;
@@ -21,7 +21,7 @@ fn weights(scheme: Scheme, sources: &[Pose], target: &Pose) -> Vec<f32> {
 #[track_caller]
 fn check(scheme: Scheme, sources: &[Pose], target: &Pose) -> f64 {
     let actual = weights(scheme, sources, target);
-    let (expected, bounds) = evaluate(scheme, sources, target, Arithmetic::EXACT);
+    let (expected, bounds) = evaluate(scheme, sources, target);
     let sum: f64 = actual.iter().map(|w| f64::from(*w)).sum();
     assert!((sum - 1.0).abs() <= sources.len() as f64 / 16_777_216.0, "{scheme}: sum {sum}");
     let mut worst = 0.0_f64;
@@ -174,58 +174,6 @@ fn opposite_axes_are_pi_apart() {
 }
 
 #[test]
-fn a_rigid_motion_of_the_world_changes_nothing() {
-    let mut random = Random::new(15);
-    let mut changed_by_rotation = 0;
-    for i in 0..400 {
-        let sources: Vec<Pose> = (0..COUNTS[i % 7]).map(|_| random.pose(1.0)).collect();
-        let target = random.pose(1.0);
-        let motion = (random.rotation(), random.vector());
-        let moved: Vec<Pose> = sources.iter().map(|pose| moved(pose, &motion, 1.0)).collect();
-        let moved_target = self::moved(&target, &motion, 1.0);
-        for scheme in schemes() {
-            let (before, after) = (weights(scheme, &sources, &target), weights(scheme, &moved, &moved_target));
-            let bounds = evaluate(scheme, &sources, &target, Arithmetic::EXACT).1;
-            // Rounding the moved poses moves centres by 2e-7 and axes by 1e-7 or so; all distances here exceed 0.01.
-            let nearest = sources.iter().map(|s| f64::from(s.distance(&target))).fold(1.0, f64::min);
-            let steepness = 3.0 * 6.0e-7 / nearest.max(1.0e-2) + 40.0e-7;
-            for view in 0..sources.len() {
-                let difference = f64::from((before[view] - after[view]).abs());
-                let same =
-                    difference <= f64::from(before[view]) * (2.0 * bounds[view] / 16_777_216.0 + 4.0 * steepness);
-                match scheme.formula() {
-                    Formula::L1 | Formula::RelativeFrobenius => changed_by_rotation += i32::from(!same),
-                    Formula::Gaussian => assert!(difference <= 2.0e-4, "{scheme} {before:?} {after:?}"),
-                    _ => assert!(same, "{scheme} {before:?} {after:?}"),
-                }
-            }
-        }
-    }
-    assert!(changed_by_rotation > 400, "L1 and the relative pose depend on the world's axes and origin");
-}
-
-#[test]
-fn error_weighting_ignores_the_unit_of_length() {
-    let mut random = Random::new(16);
-    for i in 0..200 {
-        let sources: Vec<Pose> = (0..COUNTS[i % 7]).map(|_| random.pose(1.0)).collect();
-        let target = random.pose(1.0);
-        for factor in [1.0 / 1_048_576.0, 0.125, 4096.0, (60.0_f64).exp2()] {
-            let still = ([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], [0.0; 3]);
-            let scaled: Vec<Pose> = sources.iter().map(|pose| moved(pose, &still, factor)).collect();
-            let scaled_target = moved(&target, &still, factor);
-            for alpha in [0.0, 0.5, 1.0] {
-                let scheme = Scheme::error(alpha, AngleKind::PrincipalAxis).expect("a scheme");
-                let (a, b) = (weights(scheme, &sources, &target), weights(scheme, &scaled, &scaled_target));
-                // Powers of two are exact until the norm starts to scale its components.
-                let same = a.iter().zip(&b).all(|(a, b)| (a - b).abs() <= 30.0 * a / 16_777_216.0);
-                assert!(same && (factor > 1.0e15 || a == b), "{factor}: {a:?} {b:?}");
-            }
-        }
-    }
-}
-
-#[test]
 fn parameters_out_of_range_are_refused() {
     for alpha in [-0.1, 1.1, f32::NAN, f32::INFINITY] {
         assert_eq!(Scheme::error(alpha, AngleKind::FullRotation), Err(SchemeError::Parameter(Formula::Error)));
@@ -238,24 +186,6 @@ fn parameters_out_of_range_are_refused() {
     }
 }
 
-#[test]
-fn permuting_the_sources_permutes_the_weights() {
-    let mut random = Random::new(17);
-    for i in 0..200 {
-        let count = COUNTS[i % 7];
-        let sources: Vec<Pose> = (0..count).map(|_| random.pose(1.5)).collect();
-        let target = random.pose(1.5);
-        let shift = random.below(count);
-        let rotated: Vec<Pose> = (0..count).map(|view| sources[(view + shift) % count]).collect();
-        for scheme in schemes().into_iter().filter(|scheme| *scheme != Scheme::MEAN) {
-            let (a, b) = (weights(scheme, &sources, &target), weights(scheme, &rotated, &target));
-            // Only the order of the sum differs: S - 1 additions and the division, twice.
-            let bound = 2.0 * count as f32 / 16_777_216.0;
-            assert!((0..count).all(|view| (a[(view + shift) % count] - b[view]).abs() <= bound * b[view]), "{scheme}");
-        }
-    }
-}
-
 fn multiply(a: &Matrix, b: &Matrix) -> Matrix {
     let mut product = [[0.0; 3]; 3];
     for row in 0..3 {
@@ -264,15 +194,4 @@ fn multiply(a: &Matrix, b: &Matrix) -> Matrix {
         }
     }
     product
-}
-
-/// The pose after scaling the world and then a rigid motion of it.
-fn moved(pose: &Pose, (rotation, translation): &(Matrix, [f64; 3]), scale: f64) -> Pose {
-    let wide = WidePose::new(pose);
-    let columns = [0, 1, 2].map(|row: usize| [wide.axes[0][row], wide.axes[1][row], wide.axes[2][row]]);
-    let turned = |v: [f64; 3]| [0, 1, 2].map(|row: usize| (0..3).map(|k| rotation[row][k] * v[k]).sum::<f64>());
-    let centre = turned(wide.centre.map(|c| c * scale));
-    let result = pose_of(&multiply(rotation, &columns), [0, 1, 2].map(|axis: usize| centre[axis] + translation[axis]));
-    debug_assert!(norm(minus(WidePose::new(&result).axes[2], turned(wide.axes[2]))) < 1.0e-6);
-    result
 }

@@ -6,28 +6,10 @@
 //! and each error is rounded (1 in the numerator, 1 in the sum), the sum has `S - 1` additions, and the last division
 //! 1.
 //!
-//! This holds for correctly rounded divisions and square roots. [`Arithmetic`] has their errors on other devices; their
-//! number in a weight is counted for each formula.
+//! This holds for correctly rounded divisions and square roots, as CPUs have them.
 
 use viewfuse_core::pose::Pose;
 use viewfuse_core::weighting::{AngleKind, ERROR_OFFSET, Formula, Scheme};
-
-/// Errors of divisions and square roots beyond a correct rounding, in units of `2^-24`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Arithmetic {
-    /// A division.
-    pub division: f64,
-    /// A square root.
-    pub square_root: f64,
-}
-
-impl Arithmetic {
-    /// Everything is correctly rounded: CPUs.
-    pub const EXACT: Arithmetic = Arithmetic { division: 0.0, square_root: 0.0 };
-    /// The errors that Vulkan allows: a division 2.5 ULP, which are 5 units; a square root is 1 over a reciprocal root
-    /// of 2 ULP, which are 9 together.
-    pub const VULKAN: Arithmetic = Arithmetic { division: 4.0, square_root: 8.0 };
-}
 
 /// `[row][column]`.
 pub type Matrix = [[f64; 3]; 3];
@@ -153,23 +135,18 @@ pub fn schemes() -> Vec<Scheme> {
 }
 
 /// The weights in `f64` and the bound on each one's relative error, in units of `2^-24`.
-pub fn evaluate(scheme: Scheme, sources: &[Pose], target: &Pose, arithmetic: Arithmetic) -> (Vec<f64>, Vec<f64>) {
-    let Arithmetic { division, square_root } = arithmetic;
+pub fn evaluate(scheme: Scheme, sources: &[Pose], target: &Pose) -> (Vec<f64>, Vec<f64>) {
     let target = WidePose::new(target);
     let sources: Vec<WidePose> = sources.iter().map(WidePose::new).collect();
     let distances: Vec<f64> = sources.iter().map(|s| s.distance(&target)).collect();
     let largest = distances.iter().copied().fold(0.0, f64::max);
     if scheme.formula() == Formula::Gaussian {
-        return gaussian(&distances, f64::from(scheme.parameter()), arithmetic);
+        return gaussian(&distances, f64::from(scheme.parameter()));
     }
     // Roundings of a distance: 1 a component, squares, two additions, halved by the root, the root; with the
-    // scaling of very small or large components one division a component and one product more.
+    // scaling of very small or large components one product more.
     let unscaled = |d: f64| d == 0.0 || (1.0e-14..1.0e14).contains(&d);
-    let is_scaled = !distances.iter().all(|d| unscaled(*d));
-    let scaling = if is_scaled { division } else { 0.0 };
-    let distance_units = (if is_scaled { 5.5 } else { 3.5 }) + square_root + scaling;
-    // A norm of two norms: the inner roots are in `distance_units` or as many, the outer one comes on top.
-    let norm_units = square_root + scaling;
+    let distance_units = if distances.iter().all(|d| unscaled(*d)) { 3.5 } else { 5.5 };
     let (errors, units): (Vec<f64>, Vec<f64>) = sources
         .iter()
         .zip(&distances)
@@ -177,26 +154,20 @@ pub fn evaluate(scheme: Scheme, sources: &[Pose], target: &Pose, arithmetic: Ari
             Formula::Mean | Formula::Gaussian => (1.0, 0.0),
             Formula::L1 => (l1(source, &target), 12.0),
             Formula::Frobenius => {
-                (source.rotation_difference_squared(&target).sqrt().hypot(distance), distance_units + 4.0 + norm_units)
+                (source.rotation_difference_squared(&target).sqrt().hypot(distance), distance_units + 4.0)
             }
-            Formula::RelativeFrobenius => {
-                let (error, units) = relative_frobenius(source, &target);
-                (error, units + 2.0 * norm_units)
-            }
+            Formula::RelativeFrobenius => relative_frobenius(source, &target),
             Formula::Distance => {
                 let power = scheme.choice();
-                (distance.powi(power as i32), f64::from(power) * (distance_units + 2.0 + division))
+                (distance.powi(power as i32), f64::from(power) * (distance_units + 2.0))
             }
             Formula::Error => {
                 let is_of_axes = scheme.choice() == AngleKind::PrincipalAxis as u32;
                 let angle = if is_of_axes { source.axis_angle(&target) } else { source.rotation_angle(&target) };
                 let alpha = f64::from(scheme.parameter());
                 let translation = if largest > 0.0 { distance / largest } else { 0.0 };
-                // Angle 16.5, division by pi 1.5, factor 1, two additions; the distance term has less. With
-                // costly roots and divisions it has more: two distances and their quotient; an angle has a root and
-                // up to two divisions.
-                let costly = 2.0 * (square_root + scaling) + 2.0 * division;
-                (alpha * angle / std::f64::consts::PI + (1.0 - alpha) * translation, 21.0 + costly)
+                // Angle 16.5, division by pi 1.5, factor 1, two additions; the distance term has less.
+                (alpha * angle / std::f64::consts::PI + (1.0 - alpha) * translation, 21.0)
             }
         })
         .unzip();
@@ -205,9 +176,7 @@ pub fn evaluate(scheme: Scheme, sources: &[Pose], target: &Pose, arithmetic: Ari
     let sum: f64 = scores.iter().sum();
     let weights: Vec<f64> = scores.iter().map(|s| s / sum).collect();
     let mean_units: f64 = weights.iter().zip(&units).map(|(w, u)| w * (u + 1.0)).sum();
-    // The quotients of the smallest and each error, in the numerator and in the sum, and the sum's reciprocal.
-    let quotients = 3.0 * division;
-    let bounds = units.iter().map(|u| u + 1.0 + mean_units + sources.len() as f64 + 3.0 + quotients).collect();
+    let bounds = units.iter().map(|u| u + 1.0 + mean_units + sources.len() as f64 + 3.0).collect();
     (weights, bounds)
 }
 
@@ -238,25 +207,22 @@ fn relative_frobenius(source: &WidePose, target: &WidePose) -> (f64, f64) {
 /// kept with its rounding error: `exp` has 4 units, the correction 3, and 1 is left for what is of second order.
 /// Beyond, each square inherits 7 units of its distance (11 if scaled), the difference, sum and products are rounded 4
 /// times, and `exp` adds its own 4 units.
-fn gaussian(distances: &[f64], beta: f64, arithmetic: Arithmetic) -> (Vec<f64>, Vec<f64>) {
-    // Within 1e6 there is no root on the way and only the quotients behind the exponential; beyond, squares inherit
-    // twice a distance's root and scaling.
-    let Arithmetic { division, square_root } = arithmetic;
-    let square_units = 11.0 + 2.0 * (square_root + division);
+fn gaussian(distances: &[f64], beta: f64) -> (Vec<f64>, Vec<f64>) {
     let nearest = distances.iter().copied().fold(f64::INFINITY, f64::min);
     let logits: Vec<f64> = distances.iter().map(|d| -beta * (d - nearest) * (d + nearest)).collect();
     let sum: f64 = logits.iter().map(|l| l.exp()).sum();
     let weights: Vec<f64> = logits.iter().map(|l| l.exp() / sum).collect();
     let is_exact = beta <= 1.0e6 && distances.iter().all(|d| *d <= 1.0e6);
-    let units: Vec<f64> =
-        distances
-            .iter()
-            .zip(&logits)
-            .map(|(d, logit)| {
-                if is_exact { 8.0 } else { square_units * beta * (d * d + nearest * nearest) + 4.0 * logit.abs() + 4.0 }
-            })
-            .collect();
+    let units: Vec<f64> = distances
+        .iter()
+        .zip(&logits)
+        .map(
+            |(d, logit)| {
+                if is_exact { 8.0 } else { 11.0 * beta * (d * d + nearest * nearest) + 4.0 * logit.abs() + 4.0 }
+            },
+        )
+        .collect();
     let mean_units: f64 = weights.iter().zip(&units).map(|(w, u)| if *w > 0.0 { w * u } else { 0.0 }).sum();
-    let bounds = units.iter().map(|u| u + mean_units + distances.len() as f64 + 3.0 + 3.0 * division).collect();
+    let bounds = units.iter().map(|u| u + mean_units + distances.len() as f64 + 3.0).collect();
     (weights, bounds)
 }
