@@ -1,6 +1,6 @@
 //! A device that runs the body of every kernel as it stands, one element after the other: the definition of what the
 //! CPU has a faster form of. Arrays that may lie in pages lie in four. What a GPU's workgroup computes together runs so
-//! as well, with a thread for each invocation.
+//! as well, with a thread for each invocation. One kernel can be wrong.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -17,12 +17,70 @@ use viewfuse_kernels::store::Store;
 use viewfuse_kernels::workgroup::Workgroup;
 use viewfuse_kernels::{bodies, for_each_kernel};
 
+#[derive(Clone, Copy)]
 pub(crate) struct Bodies {
     /// Whether what a workgroup computes together is computed so.
     pub(crate) in_workgroups: bool,
+    /// The kernel whose results are off by about a thousandth.
+    pub(crate) faulty: Option<Kernel>,
 }
 
-memory_of_the_cpu!(Bodies, |_device| "bodies".to_owned());
+impl Bodies {
+    /// Each element by itself, and nothing wrong.
+    pub(crate) const PLAIN: Bodies = Bodies { in_workgroups: false, faulty: None };
+}
+
+impl Memory for Bodies {
+    type Buffer<T: Element> = Vec<T>;
+
+    fn name(&self) -> String {
+        "bodies".to_owned()
+    }
+
+    fn upload<T: Element>(&self, values: &[T]) -> Result<Vec<T>, DeviceError> {
+        Cpu.upload(values)
+    }
+
+    fn zeros<T: Element>(&self, count: usize) -> Result<Vec<T>, DeviceError> {
+        Cpu.zeros(count)
+    }
+
+    fn most_elements<T: Element>(&self) -> usize {
+        Cpu.most_elements::<T>()
+    }
+
+    fn busy_elements(&self) -> usize {
+        Cpu.busy_elements()
+    }
+
+    fn finish(&self) -> Result<(), DeviceError> {
+        Cpu.finish()
+    }
+
+    fn kernel_times(&self) -> Vec<KernelTime> {
+        Cpu.kernel_times()
+    }
+
+    fn download<T: Element>(&self, buffer: &Vec<T>) -> Result<Vec<T>, DeviceError> {
+        Cpu.download(buffer)
+    }
+}
+
+/// Flips a bit of every word: of the fraction of a number of 32 bits, it is worth a thousandth.
+fn spoil<T: Element>(values: &mut [T]) {
+    bytemuck::cast_slice_mut::<T, u32>(values).iter_mut().for_each(|word| *word ^= 1 << 13);
+}
+
+/// Spoils what is written.
+macro_rules! spoil {
+    (write $array:ident) => {
+        spoil(&mut $array[..])
+    };
+    (write_paged $array:ident) => {
+        spoil(&mut $array[..])
+    };
+    ($kind:ident $array:ident) => {};
+}
 
 /// A matrix product in one piece.
 struct Whole;
@@ -235,6 +293,9 @@ macro_rules! methods {
                         together!($marks $method $($block)? $elements [$({ $kind $array })+]);
                     }
                     run!($method $($block)? $elements [$({ $kind $array: $Host, as $entry })+]);
+                    if self.faulty == Some(Kernel::$Kernel) {
+                        $(spoil!($kind $array);)+
+                    }
                     Ok(())
                 }
             )+
