@@ -89,7 +89,7 @@ fn thinned() -> Optimised {
     let all = cpus_scene();
     let every =
         |step: usize| Optimised { gaussians: all.gaussians.iter().copied().step_by(step).collect(), ..all.clone() };
-    (1..all.gaussians.len()).map(every).find(|own| longest_list(own) <= MAX_LISTED).expect("a step")
+    (1..all.gaussians.len()).map(every).find(|cloud| longest_list(cloud) <= MAX_LISTED).expect("a step")
 }
 
 /// Derivatives by the Gaussians of a loss whose derivatives by the first source's pixels have all signs.
@@ -111,11 +111,11 @@ fn derivatives_are_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
     let own = thinned();
     let (cpu, ours) = (derivatives(&Cpu, &own), derivatives(&device, &own));
     let groups: [(&str, Part); 5] = [
-        ("position", |own| own.position.to_vec()),
-        ("opacity", |own| vec![own.opacity]),
-        ("scales", |own| own.log_scales.to_vec()),
-        ("rotation", |own| own.rotation.to_vec()),
-        ("colour", |own| own.colour.to_vec()),
+        ("position", |gaussian| gaussian.position.to_vec()),
+        ("opacity", |gaussian| vec![gaussian.opacity]),
+        ("scales", |gaussian| gaussian.log_scales.to_vec()),
+        ("rotation", |gaussian| gaussian.rotation.to_vec()),
+        ("colour", |gaussian| gaussian.colour.to_vec()),
     ];
     let norm = |values: &[f32]| values.iter().map(|value| f64::from(*value).powi(2)).sum::<f64>().sqrt();
     for (name, of) in groups {

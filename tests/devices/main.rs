@@ -14,10 +14,8 @@ mod genvs;
 mod limits;
 mod loader;
 mod memory;
-mod metrics;
 mod picture;
 mod pixelnerf;
-mod sampling;
 mod time;
 mod transfers;
 mod validation;
@@ -57,8 +55,6 @@ fn main() -> ExitCode {
         picture::TESTS,
         pixelnerf::TESTS,
         genvs::TESTS,
-        metrics::TESTS,
-        sampling::TESTS,
         limits::TESTS,
         expectations::TESTS,
         forms::TESTS,

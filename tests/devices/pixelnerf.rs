@@ -14,6 +14,7 @@ use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::Selection;
 use viewfuse::weighting::Weighting;
 use viewfuse_core::camera::CameraBlock;
+use viewfuse_tests::fields::largest_difference;
 use viewfuse_tests::places::data;
 use viewfuse_vulkan::{GpuOptions, Limits};
 
@@ -72,10 +73,7 @@ fn pixelnerfs_pictures_are_the_cpus(candidate: &Candidate) -> Result<(), Failed>
         for options in if omissions == Omissions::NONE { vec![own] } else { vec![own, short] } {
             let device = candidate.vulkan(&options)?;
             let ours = picture(&device, omissions, "20").map_err(|error| format!("{error:?}"))?;
-            assert_eq!(ours.len(), reference.len());
-            let differences = ours.iter().flatten().zip(reference.iter().flatten()).map(|(a, e)| (a - e).abs());
-            let worst =
-                differences.fold(0.0, |worst: f32, difference| if difference <= worst { worst } else { difference });
+            let worst = largest_difference(&ours, &reference);
             if !(worst <= MAX_DIFFERENCE) {
                 return Err(format!("{omissions:?}: a channel differs by {worst}").into());
             }

@@ -2,6 +2,7 @@
 
 mod auto;
 mod budget;
+mod every;
 mod gaussians;
 mod genvs;
 mod pixelnerf;

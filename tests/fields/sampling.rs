@@ -1,6 +1,5 @@
 //! The driver of the samplers, on the CPU: which calls it makes, what it starts from, when it ends, and what it does
-//! with NaN and infinity. That it gives what the samplers' formulas give is in `numerics/sampler.rs`, that other
-//! devices give the same in `devices/sampling.rs`.
+//! with NaN and infinity. That it gives what the samplers' formulas give is in `numerics/sampler.rs`.
 
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::FieldError;

@@ -1,7 +1,9 @@
-//! Checkpoints made by hand, byte by byte: right ones, and all that PyTorch would never write.
+//! Checkpoints made by hand, byte by byte: right ones, and all that PyTorch would never write; and changed ones.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use tempfile::TempDir;
+use viewfuse::nn::checkpoint::{Checkpoint, TensorShape};
 
 /// A tensor as a `state_dict` describes it. Every field can lie.
 #[derive(Clone, Debug)]
@@ -228,6 +230,16 @@ pub fn snapshot(claims: &[Claim]) -> Vec<u8> {
 /// A safetensors file with this header.
 pub fn safetensors(header: &str, content: &[u8]) -> Vec<u8> {
     [&(header.len() as u64).to_le_bytes(), header.as_bytes(), content].concat()
+}
+
+/// A checkpoint with its tensors changed.
+pub fn changed(made: &Checkpoint, change: impl FnOnce(&mut Vec<(TensorShape, Vec<f32>)>)) -> Checkpoint {
+    let tensor = |(name, shape): (&String, &Vec<usize>)| {
+        (TensorShape { name: name.clone(), shape: shape.clone() }, made.tensor(name).expect("values"))
+    };
+    let mut tensors = made.shapes().iter().map(tensor).collect();
+    change(&mut tensors);
+    Checkpoint::in_memory("changed", tensors, BTreeMap::new())
 }
 
 /// A file with these bytes, in a folder that goes away.

@@ -204,11 +204,8 @@ pub fn safetensors(tensors: &[(&str, &str, &[usize], Vec<u8>)]) -> Vec<u8> {
         header.insert((*name).to_owned(), serde_json::json!({"dtype": dtype, "shape": shape, "data_offsets": offsets}));
         data.extend(bytes);
     }
-    let mut header = serde_json::Value::Object(header).to_string().into_bytes();
+    let header = serde_json::Value::Object(header).to_string();
     // The data starts at a multiple of 8.
-    header.resize(header.len().next_multiple_of(8), b' ');
-    let mut file = (header.len() as u64).to_le_bytes().to_vec();
-    file.extend(header);
-    file.extend(data);
-    file
+    let length = header.len().next_multiple_of(8);
+    crate::checkpoints::safetensors(&format!("{header:length$}"), &data)
 }

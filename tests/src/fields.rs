@@ -1,13 +1,17 @@
-//! A field from sources to a picture, and what it left out on the way.
+//! A field from sources to a picture, what it omitted on the way, and comparing pictures.
 
 use std::sync::Arc;
 use viewfuse::device::Device;
+use viewfuse::device::choice::AnyDevice;
+use viewfuse::device::cpu::Cpu;
 use viewfuse::field::render::{RenderOptions, Stage};
-use viewfuse::field::{Field, FieldError, LeftOut, On, Record, Rendered};
-use viewfuse::job::progress::Progress;
+use viewfuse::field::{AnyField, Field, FieldError, LeftOut, On, Record, Rendered};
+use viewfuse::job::progress::{Progress, Silent};
 use viewfuse::scene::photographs::SourceImages;
-use viewfuse::weighting::sources::SourceWeights;
+use viewfuse::weighting::Weighting;
+use viewfuse::weighting::sources::{MAX_SOURCES, SourcePoses, SourceWeights};
 use viewfuse_core::camera::Camera;
+use viewfuse_core::weights::Weights;
 
 /// One target on a device, from sources that nothing is known of, and the field's record of it.
 ///
@@ -37,4 +41,72 @@ pub fn picture<D: Device + Sync, F: Field + Sync>(
 #[track_caller]
 pub fn line(record: &Record, what: &str) -> LeftOut {
     *record.left_out.iter().find(|line| line.what == what).unwrap_or_else(|| panic!("no line '{what}'"))
+}
+
+/// One target on the CPU, from sources that a scheme weighs.
+///
+/// # Errors
+/// The field's.
+pub fn weighted_picture(
+    field: &AnyField,
+    scheme: &str,
+    sources: &SourceImages,
+    target: &Camera,
+    early_termination: f32,
+) -> Result<Rendered, FieldError> {
+    let (device, options) = (AnyDevice::Cpu(Cpu), RenderOptions::default());
+    let renderer = field.on(&device);
+    let weighting = Weighting::open(scheme).expect("a scheme");
+    let mut stage = Stage::of_sources(Arc::new(sources.clone()), renderer.as_ref(), &options, &Silent)?;
+    stage.weigh_by(&relevance(sources, &weighting), &Silent)?;
+    let poses: Vec<_> = sources.images.iter().map(|image| image.camera.pose).collect();
+    let weights = weighting.weigh(&SourcePoses::new(&poses).expect("sources"), &target.pose);
+    stage.picture(target, &weights, early_termination, &Silent)
+}
+
+/// The weights of all sources for each as a target, whose own is 0; none for a single source.
+fn relevance(sources: &SourceImages, weighting: &Weighting) -> Vec<SourceWeights> {
+    let poses: Vec<_> = sources.images.iter().map(|image| image.camera.pose).collect();
+    let for_target = |target: usize| {
+        let mut others = poses.clone();
+        others.remove(target);
+        let others = SourcePoses::new(&others).expect("two sources or more");
+        let mut scores = weighting.weigh(&others, &poses[target]).values().to_vec();
+        scores.insert(target, 0.0);
+        let scores: [f32; MAX_SOURCES] = std::array::from_fn(|view| scores[view]);
+        Weights::from_scores(&scores, poses.len() as u32)
+    };
+    if poses.len() < 2 { Vec::new() } else { (0..poses.len()).map(for_target).collect() }
+}
+
+/// The largest difference of a channel of each pixel; NaN if there is one.
+fn differences<'a>(a: &'a [[f32; 4]], b: &'a [[f32; 4]]) -> impl Iterator<Item = f32> + 'a {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).map(|(a, b)| largest(a.iter().zip(b).map(|(a, b)| (a - b).abs())))
+}
+
+/// The largest number; NaN if there is one.
+fn largest(numbers: impl Iterator<Item = f32>) -> f32 {
+    numbers.fold(0.0, |largest, number| if number <= largest || largest.is_nan() { largest } else { number })
+}
+
+/// Largest difference of any channel of any pixel; NaN if there is one.
+#[track_caller]
+pub fn largest_difference(a: &[[f32; 4]], b: &[[f32; 4]]) -> f32 {
+    largest(differences(a, b))
+}
+
+/// Share of pixels no channel of which differs by more than `bound`.
+#[track_caller]
+pub fn share_within(a: &[[f32; 4]], b: &[[f32; 4]], bound: f32) -> f64 {
+    differences(a, b).filter(|difference| *difference <= bound).count() as f64 / a.len() as f64
+}
+
+/// Nothing is NaN or infinite, colours lie in their range.
+#[track_caller]
+pub fn assert_sound(picture: &Rendered) {
+    let in_range = |value: &f32| (-1.0e-5..=1.0 + 1.0e-5).contains(value);
+    assert!(picture.colours.iter().flatten().all(in_range), "a colour out of range or not finite");
+    assert!(picture.depths.iter().all(|depth| depth.is_finite() && *depth >= 0.0), "a depth that is not finite");
+    assert_eq!(picture.colours.len(), (picture.width * picture.height) as usize);
 }

@@ -1,8 +1,8 @@
 //! Photographs of the lorry in memory, as fields are given them, and cameras around it.
 
-use viewfuse::scene::photographs::{SourceImage, SourceImages};
+use viewfuse::scene::photographs::SourceImages;
 use viewfuse_core::camera::{Camera, Pinhole};
-use viewfuse_lab::scenes::{Orbit, render, toy};
+use viewfuse_lab::scenes::{Orbit, sources, toy};
 
 /// Cameras at distance 1.3 whose pictures have this side; the focal length is that of SRN's cars.
 ///
@@ -18,24 +18,8 @@ pub fn orbit(side: u32) -> Orbit {
 /// # Panics
 /// If the side is 0.
 pub fn photographs(count: u32, side: u32) -> SourceImages {
-    let lorry = toy::lorry().expect("the lorry");
-    let image = |camera: Camera| {
-        let level = |value: u8| f32::from(value) / 255.0;
-        let texel = |pixel: &image::Rgba<u8>| {
-            let alpha = level(pixel[3]);
-            [level(pixel[0]) * alpha, level(pixel[1]) * alpha, level(pixel[2]) * alpha, alpha]
-        };
-        SourceImage { camera, texels: render(&lorry, &camera).pixels().map(texel).collect() }
-    };
     let cameras = orbit(side).spiral(count, [-0.4, 0.8]).expect("cameras off the pole");
-    SourceImages {
-        images: cameras.into_iter().map(image).collect(),
-        background: [1.0; 3],
-        has_silhouettes: true,
-        points: Vec::new(),
-        near_far: None,
-        warnings: Vec::new(),
-    }
+    sources(&toy::lorry().expect("the lorry"), &cameras)
 }
 
 /// A camera that is none of the sources.

@@ -17,7 +17,7 @@
 //! object        parts together                                 Object
 //! trace         first point of an object on a ray              trace, is_blocked
 //! shade         light on that point                            shade
-//! render        a camera's picture of an object                render
+//! render        a camera's picture of an object                render, sources
 //! orbit         cameras around an object                       Orbit
 //! folder        pictures and poses on disk, SRN layout         write_scene
 //! toy           the sample: a toy lorry with its load          lorry, training_cameras, test_cameras
@@ -74,7 +74,7 @@ pub use orbit::Orbit;
 pub use part::Part;
 pub use placement::Placement;
 pub use prism::Prism;
-pub use render::{render, render_with};
+pub use render::{render, render_with, sources};
 pub use scenery::Scenery;
 pub use shape::Shape;
 pub use shoot::{Shoot, generate};

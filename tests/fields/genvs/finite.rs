@@ -1,13 +1,12 @@
 //! NaN and infinity are reported at the stage that produced them, which the error names.
 
 use super::{exact, sources, target, try_picture};
-use std::collections::BTreeMap;
 use viewfuse::field::FieldError;
 use viewfuse::field::finite::NotFinite;
 use viewfuse::field::genvs::{Architecture, Genvs, test_networks};
-use viewfuse::nn::checkpoint::{Checkpoint, TensorShape};
 use viewfuse::scene::photographs::SourceImages;
 use viewfuse_core::weights::Weights;
+use viewfuse_tests::checkpoints::changed;
 
 /// Times this, every weight is finite still; what becomes of numbers that meet several of them is not.
 const LARGE: f32 = 1.9e38;
@@ -15,20 +14,12 @@ const LARGE: f32 = 1.9e38;
 /// The small network with all weights of a module, or of a layer, multiplied.
 fn multiplied(module: &str, factor: f32) -> Genvs {
     let made = test_networks::deterministic(&Architecture::small());
-    let belongs = move |name: &str, module: &str| {
-        name.strip_prefix(module).is_some_and(|rest| rest.starts_with('.') && rest.ends_with(".weight"))
-    };
-    assert!(made.shapes().keys().any(|name| belongs(name, module)), "{module}");
-    let shapes = made.shapes().iter();
-    let shapes: Vec<TensorShape> =
-        shapes.map(|(name, shape)| TensorShape { name: name.clone(), shape: shape.clone() }).collect();
-    let module = module.to_owned();
-    let checkpoint = Checkpoint::computed("changed", shapes, BTreeMap::new(), move |tensor| {
-        let mut values = made.tensor(&tensor.name).expect("values");
-        if belongs(&tensor.name, &module) {
-            values.iter_mut().for_each(|value| *value *= factor);
-        }
-        values
+    let belongs =
+        |name: &str| name.strip_prefix(module).is_some_and(|rest| rest.starts_with('.') && rest.ends_with(".weight"));
+    let checkpoint = changed(&made, |tensors| {
+        let own: Vec<_> = tensors.iter_mut().filter(|(tensor, _)| belongs(&tensor.name)).collect();
+        assert!(!own.is_empty(), "{module}");
+        own.into_iter().flat_map(|(_, values)| values).for_each(|value| *value *= factor);
     });
     Genvs::new(checkpoint, exact()).expect("a made network")
 }

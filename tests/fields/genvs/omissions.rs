@@ -124,7 +124,7 @@ fn a_picture_that_no_longer_changes_ends_early() {
         (picture, line(&record, "denoiser calls"))
     };
     let ((whole, _), (early, calls)) = (with(None), with(Plan::fast(0).early_termination));
-    let difference = largest_difference(&whole, &early);
+    let difference = largest_difference(&whole.colours, &early.colours);
     println!("{} of {} calls left out, largest difference {difference:.1e}", calls.left_out, calls.of);
     assert!(calls.left_out > 0 && calls.of == 18);
     assert!(difference <= 0.5 / 255.0 + 1.0e-6, "half a level: {difference}");

@@ -1,4 +1,4 @@
-//! The reference values of the small member, as they are and damaged.
+//! The reference values of the small member, damaged; as they are, a command of the main README compares them.
 
 use safetensors::{Dtype, SafeTensors, tensor::TensorView};
 use std::collections::HashMap;
@@ -12,15 +12,6 @@ type Tensor = (Dtype, Vec<usize>, Vec<u8>);
 
 fn file() -> PathBuf {
     viewfuse_tests::places::data("genvs_small.safetensors")
-}
-
-#[test]
-fn the_small_network_has_them() {
-    let report = verify(&file(), &Cpu, &Silent).expect("a report");
-    assert_eq!(report.quantities.len(), 10);
-    for quantity in &report.quantities {
-        assert!(quantity.passes(), "{quantity:?}");
-    }
 }
 
 /// The file with a change, and what is said about it.

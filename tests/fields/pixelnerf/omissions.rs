@@ -17,7 +17,7 @@ fn cost_and_gain(omissions: Omissions, what: &str) -> (f32, f64) {
     let reference = picture(&body(exact()), &sources, &target);
     let field = body(leaving_out(omissions));
     let (picture, record) = recorded(&field, &sources, &Weights::mean(3), &target, EARLY_TERMINATION);
-    let difference = largest_difference(&picture, &reference);
+    let difference = largest_difference(&picture.colours, &reference.colours);
     let LeftOut { left_out, of, switch, .. } = line(&record, what);
     assert!(switch && of > 0);
     let share = left_out as f64 / of as f64;
@@ -55,7 +55,7 @@ fn latent_layers_on_the_grid_are_only_rounding() {
     let reference = picture(&mist(exact()), &sources, &target);
     let field = mist(leaving_out(Omissions { latent_layers: true, ..Omissions::NONE }));
     let (picture, record) = recorded(&field, &sources, &Weights::mean(3), &target, EARLY_TERMINATION);
-    let difference = largest_difference(&picture, &reference);
+    let difference = largest_difference(&picture.colours, &reference.colours);
     println!("latent layers on the grid: {difference:.1e}");
     assert!(difference > 0.0, "the same bits: the layers were not moved");
     // A fine sample may fall into the next part where two sums round apart.
@@ -164,7 +164,7 @@ fn a_higher_limit_of_early_termination_saves_more_and_costs_more() {
     let with = |early_termination| {
         let field = body(leaving_out(Omissions { hidden_samples: true, ..Omissions::NONE }));
         let (picture, record) = recorded(&field, &sources, &weights, &target, early_termination);
-        (largest_difference(&picture, &reference), line(&record, "second-pass samples").left_out)
+        (largest_difference(&picture.colours, &reference.colours), line(&record, "second-pass samples").left_out)
     };
     let (strict, loose) = (with(1.0e-4), with(0.5));
     println!(

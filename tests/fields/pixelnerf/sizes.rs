@@ -4,18 +4,10 @@ use super::{assert_sound, exact, picture, sources, target};
 use std::collections::BTreeMap;
 use viewfuse::field::pixelnerf::{Architecture, Level, PixelNerf, test_networks};
 use viewfuse::nn::checkpoint::{Checkpoint, TensorShape};
+use viewfuse_tests::checkpoints::changed;
 
 fn with_changes(change: impl FnOnce(&mut Vec<(TensorShape, Vec<f32>)>)) -> Checkpoint {
-    let made = test_networks::deterministic(&Architecture::small(16));
-    let mut tensors: Vec<(TensorShape, Vec<f32>)> = made
-        .shapes()
-        .iter()
-        .map(|(name, shape)| {
-            (TensorShape { name: name.clone(), shape: shape.clone() }, made.tensor(name).expect("values"))
-        })
-        .collect();
-    change(&mut tensors);
-    Checkpoint::in_memory("changed", tensors, BTreeMap::new())
+    changed(&test_networks::deterministic(&Architecture::small(16)), change)
 }
 
 fn refusal(checkpoint: &Checkpoint) -> String {

@@ -1,11 +1,10 @@
 //! Views that nobody would take on purpose: results stay finite and in range.
 
-use super::worlds::{Run, assert_shows_an_object, assert_sound, ball, ball_views, orbit, source, target, views};
-use image::{Rgba, RgbaImage};
+use super::worlds::{Run, assert_shows_an_object, ball, ball_views};
 use viewfuse::field::training_free::NoObject;
-use viewfuse::scene::photographs::SourceImages;
-use viewfuse_core::camera::Camera;
-use viewfuse_lab::scenes::render;
+use viewfuse_lab::scenes::sources;
+use viewfuse_tests::fields::assert_sound;
+use viewfuse_tests::lorry::{orbit, target};
 
 #[test]
 fn identical_sources() {
@@ -40,7 +39,7 @@ fn sources_of_unequal_sizes() {
     for (index, camera) in cameras.iter_mut().enumerate() {
         camera.pinhole = camera.pinhole.resized(24 + 7 * index as u32, 40 - 2 * index as u32).expect("a size");
     }
-    let picture = Run::default().picture(&views(&ball(), &cameras), &target(40)).expect("a picture");
+    let picture = Run::default().picture(&sources(&ball(), &cameras), &target(40)).expect("a picture");
     assert_sound(&picture);
     assert_shows_an_object(&picture);
 }
@@ -60,16 +59,9 @@ fn a_white_object_on_white() {
 
 #[test]
 fn photographs_without_any_background() {
-    let cameras = orbit(24).spiral(6, [-0.5, 0.8]).expect("cameras");
-    let full = |camera: &Camera| source(*camera, &RgbaImage::from_pixel(24, 24, Rgba([90, 120, 30, 255])));
-    let sources = SourceImages {
-        images: cameras.iter().map(full).collect(),
-        background: [0.0; 3],
-        has_silhouettes: true,
-        points: Vec::new(),
-        near_far: None,
-        warnings: Vec::new(),
-    };
+    let mut sources = sources(&ball(), &orbit(24).spiral(6, [-0.5, 0.8]).expect("cameras"));
+    sources.background = [0.0; 3];
+    sources.images.iter_mut().for_each(|image| image.texels.fill([0.35, 0.47, 0.12, 1.0]));
     assert_sound(&Run::default().picture(&sources, &target(24)).expect("a picture"));
 }
 
@@ -77,15 +69,7 @@ fn photographs_without_any_background() {
 fn pictures_of_hardly_any_pixels() {
     for side in [1, 2, 3] {
         let cameras = orbit(side).spiral(6, [-0.5, 0.8]).expect("cameras");
-        let images = cameras.iter().map(|camera| source(*camera, &render(&ball(), camera))).collect();
-        let sources = SourceImages {
-            images,
-            background: [1.0; 3],
-            has_silhouettes: true,
-            points: Vec::new(),
-            near_far: None,
-            warnings: Vec::new(),
-        };
+        let sources = sources(&ball(), &cameras);
         for target_side in [1, 5] {
             match Run::default().picture(&sources, &target(target_side)) {
                 Ok(picture) => assert_sound(&picture),

@@ -1,9 +1,6 @@
 //! Depths against the closed form, and what moves with the world.
 
-use super::worlds::{
-    RADIUS, Run, assert_shows_an_object, assert_sound, ball_views, largest_difference, lorry_views, share_within,
-    target, views,
-};
+use super::worlds::{RADIUS, Run, assert_shows_an_object, ball_views, lorry_views};
 use viewfuse::field::Rendered;
 use viewfuse::field::training_free::NoObject;
 use viewfuse::scene::photographs::{SourceImage, SourceImages};
@@ -11,7 +8,9 @@ use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::math::sin_cos;
 use viewfuse_core::pose::Pose;
-use viewfuse_lab::scenes::toy::lorry;
+use viewfuse_lab::scenes::{self, toy::lorry};
+use viewfuse_tests::fields::{assert_sound, largest_difference, share_within};
+use viewfuse_tests::lorry::target;
 
 /// Depth along the principal axis at which a pixel's ray meets the ball; `None` if it misses it.
 fn closed_form(camera: &Camera, column: u32, row: u32) -> Option<f64> {
@@ -92,7 +91,10 @@ fn moving_and_scaling_the_world_changes_next_to_nothing() {
     for (what, angle, shift, scale, least) in cases {
         let there = moved_views(&sources, angle, shift, scale);
         let picture = Run::default().picture(&there, &moved(&camera, angle, shift, scale)).expect("a picture");
-        let (same, largest) = (share_within(&still, &picture, 1.0 / 255.0), largest_difference(&still, &picture));
+        let (same, largest) = (
+            share_within(&still.colours, &picture.colours, 1.0 / 255.0),
+            largest_difference(&still.colours, &picture.colours),
+        );
         println!("{what}: {same:.4} of the pixels within 1/255, largest difference {largest:.4}");
         if !(same >= least) {
             failures.push(format!("{what}: only {same}"));
@@ -102,7 +104,7 @@ fn moving_and_scaling_the_world_changes_next_to_nothing() {
 
     // A turn that is no multiple of a quarter gives the object another box, hence other planes and steps: another
     // picture of the same quality.
-    let truth = views(&lorry().expect("the lorry"), &[camera]);
+    let truth = scenes::sources(&lorry().expect("the lorry"), &[camera]);
     let psnr = |picture: &Rendered| {
         let over_white = truth.images[0].texels.iter().map(|t| [0, 1, 2].map(|c| t[c] + 1.0 - t[3]));
         let squares =
@@ -113,13 +115,16 @@ fn moving_and_scaling_the_world_changes_next_to_nothing() {
     for angle in [0.2, 0.4, 0.8] {
         let there = moved_views(&sources, Some(angle), shift, 1.0);
         let picture = Run::default().picture(&there, &moved(&camera, Some(angle), shift, 1.0)).expect("a picture");
-        let (turned, same) = (psnr(&picture), share_within(&still, &picture, 1.0 / 255.0));
+        let (turned, same) = (psnr(&picture), share_within(&still.colours, &picture.colours, 1.0 / 255.0));
         println!("turned by {angle}: {same:.4} of the pixels within 1/255; {turned:.2} dB, {quality:.2} dB still");
         assert!((turned - quality).abs() < 1.0, "turned by {angle}: {turned} dB, {quality} dB still");
     }
     let elsewhere = moved_views(&sources, Some(0.4), shift, 1.0);
     let wrong = Run::default().picture(&elsewhere, &camera);
-    assert!(wrong.map_or(0.0, |wrong| share_within(&still, &wrong, 1.0 / 255.0)) < 0.95, "a still target passes");
+    assert!(
+        wrong.map_or(0.0, |wrong| share_within(&still.colours, &wrong.colours, 1.0 / 255.0)) < 0.95,
+        "a still target passes"
+    );
 }
 
 #[test]

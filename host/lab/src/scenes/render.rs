@@ -12,6 +12,7 @@ use image::RgbaImage;
 use rayon::prelude::*;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
+use viewfuse_scene::photographs::{SourceImage, SourceImages};
 
 /// Rays per pixel along each axis, if not told otherwise.
 pub const RAYS_PER_SIDE: u32 = 4;
@@ -36,6 +37,24 @@ pub fn render_with(object: &Object, camera: &Camera, rays_per_side: u32) -> Rgba
         }
     });
     pixels
+}
+
+/// The object from cameras as a field is given its sources: photographs with silhouettes, on white.
+pub fn sources(object: &Object, cameras: &[Camera]) -> SourceImages {
+    let texel = |pixel: &image::Rgba<u8>| {
+        let [red, green, blue, alpha] = pixel.0.map(|value| f32::from(value) / 255.0);
+        [red * alpha, green * alpha, blue * alpha, alpha]
+    };
+    let image =
+        |camera: &Camera| SourceImage { camera: *camera, texels: render(object, camera).pixels().map(texel).collect() };
+    SourceImages {
+        images: cameras.iter().map(image).collect(),
+        background: [1.0; 3],
+        has_silhouettes: true,
+        points: Vec::new(),
+        near_far: None,
+        warnings: Vec::new(),
+    }
 }
 
 fn pixel(object: &Object, camera: &Camera, rays_per_side: u32, [column, row]: [u32; 2]) -> [u8; 4] {

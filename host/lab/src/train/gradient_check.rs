@@ -2,13 +2,13 @@
 //! quotients.
 
 use super::scenes::TrainingScene;
-use crate::scenes::{Orbit, render, toy};
+use crate::scenes::{Orbit, sources, toy};
 use candle_core::{DType, Device, Result, Tensor, Var};
 use std::path::PathBuf;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::random::normal;
 use viewfuse_field::learned::default_near_far;
-use viewfuse_scene::photographs::{SourceImage, SourceImages};
+use viewfuse_scene::photographs::SourceImages;
 use viewfuse_scene::unit::RigUnit;
 
 pub(super) fn orbit(side: u32) -> Orbit {
@@ -17,21 +17,8 @@ pub(super) fn orbit(side: u32) -> Orbit {
 }
 
 pub(super) fn photographs(count: u32, side: u32) -> SourceImages {
-    let lorry = toy::lorry().expect("the lorry");
-    let texel = |pixel: &image::Rgba<u8>| {
-        let [red, green, blue, alpha] = pixel.0.map(|value| f32::from(value) / 255.0);
-        [red * alpha, green * alpha, blue * alpha, alpha]
-    };
-    let image = |camera: Camera| SourceImage { camera, texels: render(&lorry, &camera).pixels().map(texel).collect() };
     let cameras = orbit(side).spiral(count, [-0.4, 0.8]).expect("cameras off the pole");
-    SourceImages {
-        images: cameras.into_iter().map(image).collect(),
-        background: [1.0; 3],
-        has_silhouettes: true,
-        points: Vec::new(),
-        near_far: None,
-        warnings: Vec::new(),
-    }
+    sources(&toy::lorry().expect("the lorry"), &cameras)
 }
 
 /// A training scene of toy photographs.
