@@ -55,7 +55,7 @@ pub(crate) fn short(target: &str, executions: u64) {
 
 /// The targets of these names, or all.
 fn named(names: &[String]) -> Vec<&'static str> {
-    let is_chosen = |name: &&str| names.is_empty() || names.iter().any(|own| own == name);
+    let is_chosen = |name: &&str| names.is_empty() || names.iter().any(|chosen| chosen == name);
     ALL.iter().map(|(name, _)| *name).filter(is_chosen).collect()
 }
 

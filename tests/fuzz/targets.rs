@@ -3,6 +3,7 @@
 mod capi;
 mod checkpoints;
 mod fall;
+mod files;
 mod gaussians;
 mod guarded;
 mod images;
@@ -68,9 +69,9 @@ pub(crate) const ALL: [Row; 26] = [
     ("pickles", || Box::new(checkpoints::Checkpoints::pickles())),
     ("pytorch", || Box::new(checkpoints::Checkpoints::files())),
     ("attention", || Box::new(checkpoints::Attention::new())),
-    ("evaluation", || Box::new(records::Run::new())),
-    ("pareto", || Box::new(records::Sweeps::new())),
-    ("training", || Box::new(records::Trainings::new())),
+    ("evaluation", || Box::new(records::evaluation())),
+    ("pareto", || Box::new(records::sweep())),
+    ("training", || Box::new(records::training())),
     ("state", || Box::new(state::State::new())),
     ("requests", || Box::new(requests::Requests)),
     ("journals", || Box::new(journals::Journals::new())),

@@ -5,6 +5,7 @@ use crate::memory;
 use viewfuse::nn::checkpoint::Checkpoint;
 use viewfuse::weighting::attention::AttentionModel;
 use viewfuse_tests::checkpoints::{Claim, Pickle, archive, legacy, safetensors, snapshot, state_dict};
+use viewfuse_tests::command;
 use viewfuse_tests::places::data;
 
 /// Tensors of files that ask for more are not read here.
@@ -138,21 +139,16 @@ impl Attention {
 
 impl Target for Attention {
     fn seeds(&self) -> Vec<Vec<u8>> {
-        let of = |tensors: &[(&str, &[usize])]| {
-            let (mut header, mut at) = (serde_json::Map::new(), 0);
-            for (name, shape) in tensors {
-                let end = at + 4 * shape.iter().product::<usize>();
-                let row = serde_json::json!({"dtype": "F32", "shape": shape, "data_offsets": [at, end]});
-                header.insert((*name).to_owned(), row);
-                at = end;
-            }
-            safetensors(&serde_json::Value::Object(header).to_string(), &vec![0; at])
+        let zeros = |tensors: &[(&str, &[usize])]| {
+            let bytes = |shape: &[usize]| vec![0; 4 * shape.iter().product::<usize>()];
+            let all = tensors.iter().map(|(name, shape)| (*name, "F32", *shape, bytes(shape)));
+            command::safetensors(&all.collect::<Vec<_>>())
         };
         let n = viewfuse_core::attention::POSE_FEATURES;
         vec![
-            of(&[("query_layer.weight", &[n, n]), ("key_layer.weight", &[n, n])]),
-            of(&[("paper.0.weight", &[4, 4]), ("paper.0.bias", &[4])]),
-            of(&[("multihead_attention.in_proj_weight", &[36, 12])]),
+            zeros(&[("query_layer.weight", &[n, n]), ("key_layer.weight", &[n, n])]),
+            zeros(&[("paper.0.weight", &[4, 4]), ("paper.0.bias", &[4])]),
+            zeros(&[("multihead_attention.in_proj_weight", &[36, 12])]),
         ]
     }
 

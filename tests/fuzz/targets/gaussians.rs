@@ -57,13 +57,19 @@ impl Target for Gaussians {
                     f_rest.len()
                 ));
             }
-            let is_whole = |own: &Gaussian| {
-                let limited = own.log_scales.iter().chain([&own.opacity]).all(|value| value.abs() <= MAX_LOGARITHM);
-                let finite = own.position.iter().chain(&own.rotation).chain(&own.f_dc).all(|value| value.is_finite());
+            let is_whole = |gaussian: &Gaussian| {
+                let limited =
+                    gaussian.log_scales.iter().chain([&gaussian.opacity]).all(|value| value.abs() <= MAX_LOGARITHM);
+                let finite = gaussian
+                    .position
+                    .iter()
+                    .chain(&gaussian.rotation)
+                    .chain(&gaussian.f_dc)
+                    .all(|value| value.is_finite());
                 limited && finite
             };
-            if let Some(own) = gaussians.iter().find(|own| !is_whole(own)) {
-                return Err(format!("{own:?} was read"));
+            if let Some(wrong) = gaussians.iter().find(|gaussian| !is_whole(gaussian)) {
+                return Err(format!("{wrong:?} was read"));
             }
         }
         verdict(outcome, path)

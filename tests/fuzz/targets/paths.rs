@@ -64,7 +64,7 @@ impl Target for Paths {
             if frames_per_second.is_some_and(|rate| !(rate > 0.0 && rate.is_finite())) {
                 return Err(format!("{frames_per_second:?} frames per second"));
             }
-            if let Some(camera) = cameras.iter().find(|own| !own.camera.pose.centre_world().is_finite()) {
+            if let Some(camera) = cameras.iter().find(|camera| !camera.camera.pose.centre_world().is_finite()) {
                 return Err(format!("the camera {} is nowhere", camera.name));
             }
         }

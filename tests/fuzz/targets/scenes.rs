@@ -1,42 +1,33 @@
 //! Scenes: of every layout, each file that is not a photograph.
 
-use super::{Target, Verdict, folder, verdict};
+use super::files::Files;
+use super::{Target, Verdict, verdict};
 use image::{Rgb, RgbImage};
 use std::fs;
 use std::io::{Cursor, Write};
 use std::path::PathBuf;
-use tempfile::TempDir;
 use viewfuse::scene::Scene;
 use viewfuse_tests::command::files_below;
 use viewfuse_tests::scenes::{self as made, Folder};
 use zip::write::SimpleFileOptions;
 
-/// A scene one of whose files is broken at a time. The first byte of an input says which.
-pub(crate) struct Broken {
-    folder: TempDir,
-    files: Vec<(PathBuf, Vec<u8>)>,
-    /// The one that differs.
-    last: Option<usize>,
-    /// Puts the bytes into what the file is made of.
-    wrap: fn(&[u8]) -> Vec<u8>,
-}
+/// A scene one of whose files is broken at a time.
+pub(crate) struct Broken(Files);
 
 impl Broken {
     /// A scene of these files, and photographs of 16 x 12.
     fn new(files: &[(&str, Vec<u8>)], photographs: &[&str]) -> Broken {
-        let folder = folder();
-        let file = |name: &str| {
-            let path = folder.path().join(name);
-            fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
-            path
-        };
+        Broken::with(Files::new(files), photographs)
+    }
+
+    fn with(files: Files, photographs: &[&str]) -> Broken {
         for name in photographs {
-            RgbImage::from_pixel(16, 12, Rgb([10, 20, 30])).save(file(name)).expect("a photograph");
+            let path = files.path().join(name);
+            fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+            RgbImage::from_pixel(16, 12, Rgb([10, 20, 30])).save(path).expect("a photograph");
         }
-        let files: Vec<(PathBuf, Vec<u8>)> = files.iter().map(|(name, bytes)| (file(name), bytes.clone())).collect();
-        files.iter().for_each(|(path, bytes)| fs::write(path, bytes).expect("a file"));
-        Scene::open(folder.path()).unwrap_or_else(|error| panic!("it is right as it is: {error}"));
-        Broken { folder, files, last: None, wrap: <[u8]>::to_vec }
+        Scene::open(files.path()).unwrap_or_else(|error| panic!("it is right as it is: {error}"));
+        Broken(files)
     }
 
     /// A copy of a scene that a test made: of its files, those that are no photographs are broken.
@@ -83,11 +74,8 @@ pub(crate) fn neus() -> Broken {
 
 /// An array in an archive that is right.
 pub(crate) fn neus_array() -> Broken {
-    let array = include_bytes!("../../data/fuzz/seeds/world_mat.npy");
-    let mut broken = Broken::new(&[("cameras_sphere.npz", archive(array))], &NEUS[..2]);
-    broken.files[0].1 = array.to_vec();
-    broken.wrap = archive;
-    broken
+    let array = include_bytes!("../../data/fuzz/seeds/world_mat.npy").to_vec();
+    Broken::with(Files::wrapped(&[("cameras_sphere.npz", array)], archive), &NEUS[..2])
 }
 
 fn archive(array: &[u8]) -> Vec<u8> {
@@ -124,8 +112,7 @@ pub(crate) fn colmap_text() -> Broken {
 
 impl Target for Broken {
     fn seeds(&self) -> Vec<Vec<u8>> {
-        let seed = |(index, (_, bytes)): (usize, &(PathBuf, Vec<u8>))| [&[index as u8], bytes.as_slice()].concat();
-        self.files.iter().enumerate().map(seed).collect()
+        self.0.seeds()
     }
 
     fn words(&self) -> &'static [&'static str] {
@@ -155,15 +142,8 @@ impl Target for Broken {
     }
 
     fn run(&mut self, bytes: &[u8]) -> Result<Verdict, String> {
-        let (first, rest) = bytes.split_first().unwrap_or((&0, &[]));
-        let index = usize::from(*first) % self.files.len();
-        if let Some(last) = self.last.filter(|last| *last != index) {
-            let (path, whole) = &self.files[last];
-            fs::write(path, (self.wrap)(whole)).expect("a file");
-        }
-        self.last = Some(index);
-        fs::write(&self.files[index].0, (self.wrap)(rest)).expect("a file");
-        let opened = Scene::open(self.folder.path());
+        self.0.write(bytes);
+        let opened = Scene::open(self.0.path());
         if let Ok(scene) = &opened {
             let is_sound = |view: &viewfuse::scene::View| {
                 view.camera.pose.to_opencv().iter().flatten().all(|number| number.is_finite())
@@ -172,8 +152,8 @@ impl Target for Broken {
                 return Err("a scene without views, or with a pose that is not finite".to_owned());
             }
             // With its lens and mask; a refusal is as good as a picture.
-            return verdict(scene.photograph(0), self.folder.path());
+            return verdict(scene.photograph(0), self.0.path());
         }
-        verdict(opened, self.folder.path())
+        verdict(opened, self.0.path())
     }
 }

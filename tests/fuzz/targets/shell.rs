@@ -91,7 +91,7 @@ impl Target for Shell {
         Ok(if is_plain {
             Verdict::Read
         } else {
-            Verdict::Refused(word.chars().take(2).filter(|own| !own.is_alphanumeric()).collect())
+            Verdict::Refused(word.chars().take(2).filter(|letter| !letter.is_alphanumeric()).collect())
         })
     }
 }
