@@ -183,7 +183,7 @@ pub fn table(observations: &[Observation<'_>]) -> Table {
             }
         }
     }
-    let scene_count = observations.iter().map(|own| own.scene).collect::<BTreeSet<_>>().len();
+    let scene_count = observations.iter().map(|observation| observation.scene).collect::<BTreeSet<_>>().len();
     let unit = if scene_count > 1 { Unit::Scenes } else { Unit::Views };
     // By scheme and metric: every scene's, or view's, values.
     let mut values: BTreeMap<(&str, &str), BTreeMap<Counted<'_>, Vec<f64>>> = BTreeMap::new();
@@ -226,7 +226,7 @@ pub fn table(observations: &[Observation<'_>]) -> Table {
     Table {
         source_counts: observations
             .iter()
-            .map(|own| own.score.source_count)
+            .map(|observation| observation.score.source_count)
             .collect::<BTreeSet<_>>()
             .into_iter()
             .collect(),
@@ -290,9 +290,10 @@ fn lead(rows: &mut [Row], column: usize, metric: &Metric, means: &Means<'_>) {
         .map(|row| {
             let Some(cell) = &row.cells[column] else { return false };
             let own = means.get(&(row.scheme.as_str(), metric.name.as_str()));
-            let difference = own.and_then(|own| Interval::of_differences(best, own));
+            let difference = own.and_then(|means| Interval::of_differences(best, means));
             // Where the interval is unknown, as for infinite scores, the printed values decide.
-            let is_close = difference.is_some_and(|own| own.half_width.is_some() && !own.excludes_zero());
+            let is_close =
+                difference.is_some_and(|interval| interval.half_width.is_some() && !interval.excludes_zero());
             cell.place == 1 || is_close
         })
         .collect();

@@ -54,26 +54,3 @@ impl<D: Device> Linear<D> {
         device.linear(&block, inputs, weights, bias, residual, outputs)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::weights::LinearWeights;
-    use viewfuse_device::cpu::Cpu;
-
-    #[test]
-    fn the_device_agrees_with_the_host() -> Result<(), DeviceError> {
-        let weights = LinearWeights::new(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0], vec![10.0, -20.0]);
-        let layer = weights.load(&Cpu)?;
-        assert_eq!((layer.in_count, layer.out_count), (3, 2));
-        let inputs = vec![1.0, 0.5, -1.0, 0.0, 2.0, 0.25];
-        let mut outputs = vec![0.0; 4];
-        layer.run(&Cpu, 2, LinearOptions::PLAIN, &inputs, None, &mut outputs)?;
-        let expected: Vec<f32> = inputs.chunks(3).flat_map(|row| weights.run(row)).collect();
-        assert_eq!(outputs, expected);
-        let options = LinearOptions { relu_inputs: true, relu_outputs: true };
-        layer.run(&Cpu, 2, options, &inputs, Some(&vec![0.0, 0.0, 1.0, 2.0]), &mut outputs)?;
-        assert_eq!(outputs, [12.0, 0.0, 15.75, 0.0]);
-        Ok(())
-    }
-}

@@ -43,25 +43,3 @@ impl<D: Device> GroupNorm<D> {
         Ok(output)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::image::Size;
-    use viewfuse_device::cpu::Cpu;
-
-    #[test]
-    fn groups_are_normalised_on_their_own() -> Result<(), DeviceError> {
-        let norm =
-            GroupNorm::<Cpu> { weights: vec![2.0; 4], bias: vec![0.5; 4], channels: 4, group_count: 2, epsilon: 0.0 };
-        let mut scratch = Scratch::new(&Cpu);
-        // The first group is 1 and 3, the second 100 and 500, half of them in each pixel.
-        let values = [1.0, 1.0, 100.0, 500.0, 3.0, 3.0, 500.0, 100.0];
-        let image = Image::upload(&Cpu, Size { height: 1, width: 2, channels: 4 }, &values)?;
-        let output = norm.run(&mut scratch, &image, false)?;
-        assert_eq!(output.values, [-1.5, -1.5, -1.5, 2.5, 2.5, 2.5, 2.5, -1.5]);
-        let silu = norm.run(&mut scratch, &image, true)?;
-        assert!((silu.values[0] + 1.5 / (1.0 + 1.5_f32.exp())).abs() < 1.0e-6, "{}", silu.values[0]);
-        Ok(())
-    }
-}

@@ -46,23 +46,3 @@ pub fn concatenate<D: Device>(scratch: &mut Scratch<'_, D>, images: &[&Image<D>]
     }
     Ok(wide)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::image::Size;
-    use viewfuse_device::cpu::Cpu;
-
-    #[test]
-    fn channels_follow_one_another() -> Result<(), DeviceError> {
-        let mut scratch = Scratch::new(&Cpu);
-        let size = Size { height: 1, width: 3, channels: 1 };
-        let first = Image::upload(&Cpu, size, &[1.0, 2.0, 3.0])?;
-        let second = Image::upload(&Cpu, Size { width: 2, channels: 2, ..size }, &[0.0, 10.0, 1.0, 30.0])?;
-        let wide = concatenate(&mut scratch, &[&first, &second])?;
-        assert_eq!(wide.size, Size { channels: 3, ..size });
-        // The second's middle column lies between its two.
-        assert_eq!(wide.values, [1.0, 0.0, 10.0, 2.0, 0.5, 20.0, 3.0, 1.0, 30.0]);
-        Ok(())
-    }
-}

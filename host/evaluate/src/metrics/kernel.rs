@@ -109,8 +109,6 @@ mod tests {
             let (a, b) = (set(count_a, 0.0), set(count_b, shift));
             let (ours, expected) = (kernel_distance(&a, &b, 0).expect("a distance"), plainly(&a, &b));
             assert!((ours - expected).abs() <= 1.0e-12 * expected.abs().max(1.0), "{ours} is not {expected}");
-            let other = kernel_distance(&a, &b, 0).expect("a distance");
-            assert_eq!(ours, other);
         }
     }
 

@@ -109,7 +109,9 @@ impl<D: Device> Lpips<D> {
         };
         let expected: Vec<TensorShape> = kind.channels().iter().enumerate().map(shape).collect();
         // A saved LPIPS module contains the trunk, and the heads twice.
-        heads.check(&expected, |name| ["lins.", "net.", "scaling_layer."].iter().any(|own| name.starts_with(own)))?;
+        heads.check(&expected, |name| {
+            ["lins.", "net.", "scaling_layer."].iter().any(|prefix| name.starts_with(prefix))
+        })?;
         let heads = expected.iter().map(|tensor| heads.tensor(&tensor.name)).collect::<Result<_, _>>()?;
         let trunk = Trunk::load(device, trunk, &kind.steps(), |name| name.starts_with("classifier."))?;
         Ok(Lpips { kind, trunk, heads })

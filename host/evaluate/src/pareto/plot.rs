@@ -131,11 +131,13 @@ fn draw(picture: &mut String, title: &str, devices: &[DeviceRecord]) -> Result<(
     Ok(())
 }
 
-/// How a device's points look.
-#[derive(Clone, Copy)]
-struct Style {
-    colour: RGBColor,
-    shape: usize,
+/// How the points of a line look.
+#[derive(Clone, Copy, Debug)]
+pub struct Style {
+    /// Their colour.
+    pub colour: RGBColor,
+    /// Circles (0), squares (1) or triangles.
+    pub shape: usize,
 }
 
 impl Style {
@@ -143,7 +145,11 @@ impl Style {
         Style { colour: COLOURS[device % COLOURS.len()], shape: device % 3 }
     }
 
-    fn mark(self, area: &Area<'_>, [x, y]: [i32; 2]) -> Result<(), Failure> {
+    /// Draws a point.
+    ///
+    /// # Errors
+    /// None is known to happen.
+    pub fn mark(self, area: &DrawingArea<SVGBackend<'_>, Shift>, [x, y]: [i32; 2]) -> Result<(), Box<dyn Error>> {
         let style = self.colour.filled();
         match self.shape {
             0 => area.draw(&Circle::new((x, y), MARKER, style))?,

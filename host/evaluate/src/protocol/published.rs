@@ -138,7 +138,7 @@ mod tests {
         assert!(same.figures.is_sorted_by(|a, b| a.psnr <= b.psnr));
         assert!(same.of.starts_with("LLFF, 3 sources, 504x378, PSNR: means over the benchmark's 8 scenes (fern, "));
         assert!(same.of.ends_with(", 1 of the 2 here among them"), "{}", same.of);
-        assert_eq!(published("llff:6", [504, 378], false).map(|own| own.figures.len()), Some(4));
+        assert_eq!(published("llff:6", [504, 378], false).map(|row| row.figures.len()), Some(4));
         let small = published("llff:3", [252, 189], false).expect("withheld");
         assert_eq!(
             (small.figures.len(), small.withheld.as_deref()),
@@ -150,10 +150,10 @@ mod tests {
 
     #[test]
     fn masked_figures_need_the_masked_metric() {
-        let withheld = |protocol, masked| published(protocol, [400, 300], masked).and_then(|own| own.withheld);
+        let withheld = |protocol, masked| published(protocol, [400, 300], masked).and_then(|row| row.withheld);
         assert_eq!(withheld("dtu:3", true), None);
         assert!(withheld("dtu:3", false).is_some_and(|why| why.contains("no masks")));
         assert!(withheld("dtu:3,masks=given", true).is_some_and(|why| why.contains("given no masks")));
-        assert_eq!(published("blender:8", [400, 400], false).map(|own| own.figures.len()), Some(2));
+        assert_eq!(published("blender:8", [400, 400], false).map(|row| row.figures.len()), Some(2));
     }
 }

@@ -80,7 +80,7 @@ impl Table {
     pub fn details(&self) -> Vec<String> {
         let Some(metric) = self.metrics.get(self.headline) else { return Vec::new() };
         let of_row = |row: &Row| {
-            let own = self.comparisons_of(&row.scheme).filter(|own| own.standing != Standing::Above);
+            let own = self.comparisons_of(&row.scheme).filter(|comparison| comparison.standing != Standing::Above);
             let parts: Vec<String> = own.map(|comparison| words(comparison, metric)).collect();
             format!("{}: {}", row.scheme, parts.join("; "))
         };
@@ -88,20 +88,21 @@ impl Table {
     }
 
     fn comparisons_of<'a>(&'a self, scheme: &'a str) -> impl Iterator<Item = &'a Comparison> {
-        self.comparisons.iter().filter(move |own| own.scheme == scheme)
+        self.comparisons.iter().filter(move |comparison| comparison.scheme == scheme)
     }
 
     /// The schemes that are not above every baseline.
     fn schemes_in_doubt(&self) -> impl Iterator<Item = &Row> {
-        let is_in_doubt = |row: &&Row| self.comparisons_of(&row.scheme).any(|own| own.standing != Standing::Above);
+        let is_in_doubt =
+            |row: &&Row| self.comparisons_of(&row.scheme).any(|comparison| comparison.standing != Standing::Above);
         self.rows.iter().filter(move |row| !row.is_baseline && is_in_doubt(row))
     }
 
     /// How a scheme stands to the baselines, as short as it has to be.
     fn line(&self, scheme: &str) -> String {
         let of = |standings: &[Standing]| -> Vec<&str> {
-            let own = self.comparisons_of(scheme).filter(|own| standings.contains(&own.standing));
-            own.map(|own| own.baseline.as_str()).collect()
+            let own = self.comparisons_of(scheme).filter(|comparison| standings.contains(&comparison.standing));
+            own.map(|comparison| comparison.baseline.as_str()).collect()
         };
         let groups = [
             ("below", of(&[Standing::Below])),

@@ -2,21 +2,19 @@
 
 use super::ReportError;
 use maud::{Markup, html};
-use plotters::coord::Shift;
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
 use plotters::prelude::*;
 use std::error::Error;
 use std::ops::Range;
 use viewfuse_evaluate::baseline::Baseline;
 use viewfuse_evaluate::metrics::interval::Interval;
-use viewfuse_evaluate::pareto::plot::COLOURS;
+use viewfuse_evaluate::pareto::plot::{COLOURS, Style};
 use viewfuse_evaluate::summary::{REFERENCE, Table};
 
 const SIZE: (u32, u32) = (520, 360);
 /// The style of baselines, which are not schemes.
 const COPY: RGBColor = RGBColor(138, 143, 152);
 const FONT: &str = "sans-serif";
-const MARKER: i32 = 4;
 /// Horizontal distance of the first and the last scheme's intervals at one number of sources, in doublings.
 const SPREAD: f64 = 0.3;
 
@@ -25,31 +23,13 @@ fn baseline_shape(name: &str) -> usize {
     Baseline::ALL.iter().position(|baseline| baseline.name() == name).unwrap_or(0)
 }
 
-/// The style of a scheme's points.
-#[derive(Clone, Copy)]
-struct Style {
-    colour: RGBColor,
-    shape: usize,
-}
-
-impl Style {
-    /// The reference is black, baselines are grey, the others, counted from 0, cycle through colours and then shapes.
-    fn of(scheme: &str, other: usize) -> Style {
-        match scheme {
-            REFERENCE => Style { colour: BLACK, shape: 0 },
-            baseline if Baseline::is_named(baseline) => Style { colour: COPY, shape: baseline_shape(baseline) },
-            _ => Style { colour: COLOURS[other % COLOURS.len()], shape: other / COLOURS.len() % 3 },
-        }
-    }
-
-    fn mark(self, area: &DrawingArea<SVGBackend<'_>, Shift>, at: (i32, i32)) -> Result<(), Box<dyn Error>> {
-        let style = self.colour.filled();
-        match self.shape {
-            0 => area.draw(&Circle::new(at, MARKER, style))?,
-            1 => area.draw(&Rectangle::new([(at.0 - MARKER, at.1 - MARKER), (at.0 + MARKER, at.1 + MARKER)], style))?,
-            _ => area.draw(&TriangleMarker::new(at, MARKER + 2, style))?,
-        }
-        Ok(())
+/// The style of a scheme's points: the reference is black, baselines are grey, the others, counted from 0, cycle through
+/// colours and then shapes.
+fn style(scheme: &str, other: usize) -> Style {
+    match scheme {
+        REFERENCE => Style { colour: BLACK, shape: 0 },
+        baseline if Baseline::is_named(baseline) => Style { colour: COPY, shape: baseline_shape(baseline) },
+        _ => Style { colour: COLOURS[other % COLOURS.len()], shape: other / COLOURS.len() % 3 },
     }
 }
 
@@ -99,12 +79,12 @@ pub(super) fn key(tables: &[Table]) -> Markup {
 fn styles(tables: &[Table]) -> Vec<(&str, Style)> {
     let schemes = tables.first().into_iter().flat_map(|table| &table.rows).map(|row| row.scheme.as_str());
     let mut others = 0;
-    let style = |scheme| {
-        let style = Style::of(scheme, others);
+    let styled = |scheme| {
+        let style = style(scheme, others);
         others += usize::from(scheme != REFERENCE && !Baseline::is_named(scheme));
         (scheme, style)
     };
-    schemes.map(style).collect()
+    schemes.map(styled).collect()
 }
 
 /// The lines of a metric. Baselines are not in figures of differences: their range would hide the differences between
@@ -166,7 +146,7 @@ fn draw(picture: &mut String, label: &str, lines: &[Line]) -> Result<(), Box<dyn
         chart.draw_series([PathElement::new(points.clone(), style.colour.mix(0.8).stroke_width(2))])?;
         for point in points {
             let (x, y) = chart.backend_coord(&point);
-            style.mark(&area, (x - left, y - top))?;
+            style.mark(&area, [x - left, y - top])?;
         }
     }
     root.present()?;

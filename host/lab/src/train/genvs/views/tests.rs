@@ -1,12 +1,8 @@
-//! Sources of a GeNVS show what their cameras say, and are weighted for their target.
+//! Sources of a GeNVS show what their cameras say.
 
 use super::super::super::gradient_check::scene;
 use super::{Draw, SourceDraw, ViewCounts, Views};
 use candle_core::{DType, Tensor};
-use viewfuse_core::pose::Pose;
-use viewfuse_core::weighting::Scheme;
-use viewfuse_weighting::Weighting;
-use viewfuse_weighting::sources::SourcePoses;
 
 /// Three sources and a target of each of two objects of 32 pixels.
 fn views(least_crop: f32) -> Views {
@@ -32,18 +28,4 @@ fn cropped_sources_keep_their_side_and_change_their_cameras_only() {
     let blocks = |views: &Views| views.sources.iter().flatten().map(|camera| camera.block(0)).collect::<Vec<_>>();
     assert_eq!(cropped.cameras.concat(), blocks(&cropped));
     assert_ne!(blocks(&cropped), blocks(&whole));
-}
-
-#[test]
-fn weights_are_those_of_the_scheme_for_the_first_target() {
-    let views = views(1.0);
-    let rows = |scheme| views.weights(scheme).and_then(|weights| weights.to_vec2::<f32>()).expect("weights");
-    assert_eq!(rows(Scheme::MEAN), vec![vec![1.0 / 3.0; 3]; 2]);
-    let scheme = Weighting::from(Scheme::ERROR);
-    for ((own, sources), targets) in rows(Scheme::ERROR).iter().zip(&views.sources).zip(&views.target_cameras) {
-        let poses: Vec<Pose> = sources.iter().map(|camera| camera.pose).collect();
-        let poses = SourcePoses::new(&poses).expect("sources");
-        assert_eq!(own, &scheme.weigh(&poses, &targets[0].pose).values()[..3]);
-        assert!(own.iter().any(|weight| (weight - 1.0 / 3.0).abs() > 0.01), "{own:?}");
-    }
 }
