@@ -71,7 +71,7 @@ fn the_nearer_surface_wins() {
     let block = FrontBlock { width: SIDE, height: SIDE, group_count: 1, front_share: 0.1 };
     let filled = |planes: Planes| vec![planes; (SIDE * SIDE) as usize];
     assert_eq!(chosen(&block, &filled(opacity(&[3.0; 5]))), 3);
-    let hull = |plane: usize, opacity: f32| (0..PLANES).map(move |own| if own == plane { opacity } else { 0.0 });
+    let hull = |plane: usize, opacity: f32| (0..PLANES).map(move |index| if index == plane { opacity } else { 0.0 });
     let two = |near: f32| -> Planes {
         let planes: Vec<f32> = hull(3, 0.9).zip(hull(11, near)).map(|(far, near)| far.max(near)).collect();
         planes.try_into().expect("planes")

@@ -33,16 +33,16 @@ fn covariance(gaussian: &GaussianBlock, camera: &CameraBlock) -> [f64; 3] {
     let mut sum = [f64::from(DILATION), 0.0, f64::from(DILATION)];
     for axis in 0..3 {
         // The rotation of a unit vector e by a quaternion: e + 2 v x (v x e + w e).
-        let unit: [f64; 3] = std::array::from_fn(|own| f64::from(u8::from(own == axis)));
+        let unit: [f64; 3] = std::array::from_fn(|index| f64::from(u8::from(index == axis)));
         let inner = cross(v, unit);
-        let turned = cross(v, std::array::from_fn(|own| inner[own] + w * unit[own]));
+        let turned = cross(v, std::array::from_fn(|index| inner[index] + w * unit[index]));
         let deviation = f64::from(gaussian.log_scales[axis]).exp();
         let step = 1.0e-5;
         let at = |sign: f64| {
-            seen(camera, std::array::from_fn(|own| mean[own] + sign * step * (unit[own] + 2.0 * turned[own])))
+            seen(camera, std::array::from_fn(|index| mean[index] + sign * step * (unit[index] + 2.0 * turned[index])))
         };
         let (ahead, behind) = (at(1.0), at(-1.0));
-        let [u, v] = [0, 1].map(|own| (ahead[own] - behind[own]) / (2.0 * step) * deviation);
+        let [u, v] = [0, 1].map(|index| (ahead[index] - behind[index]) / (2.0 * step) * deviation);
         sum = [sum[0] + u * u, sum[1] + u * v, sum[2] + v * v];
     }
     sum
@@ -119,7 +119,7 @@ fn spherical_harmonics_are_orthonormal() {
         if index == 0 {
             return 0.282_094_79;
         }
-        let rest: Vec<f32> = (0..45).map(|own| f32::from(u8::from(own == index - 1))).collect();
+        let rest: Vec<f32> = (0..45).map(|other| f32::from(u8::from(other == index - 1))).collect();
         // Around a level that keeps the colour above 0.
         f64::from(colour_along([16.0 / 0.282_094_8, 0.0, 0.0], &rest[..], 3, direction)[0]) - 16.5
     };

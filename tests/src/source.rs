@@ -48,7 +48,7 @@ impl Source {
         let rest = if gap.trim().is_empty() {
             gap
         } else {
-            gap.rsplit('\n').next().filter(|own| own.trim().is_empty()).unwrap_or(" ")
+            gap.rsplit('\n').next().filter(|line| line.trim().is_empty()).unwrap_or(" ")
         };
         let lines = gap.matches('\n').count() - rest.matches('\n').count();
         self.code.extend(std::iter::repeat_n('\n', lines));
@@ -88,7 +88,7 @@ pub fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
     for path in entries {
         if path.is_dir() && path.file_name().is_some_and(|name| name != "target") {
             found.extend(files(&path, extension));
-        } else if path.extension().is_some_and(|own| own == extension) {
+        } else if path.extension().is_some_and(|ending| ending == extension) {
             found.push(path);
         }
     }

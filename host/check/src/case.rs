@@ -20,10 +20,10 @@ pub trait Case: Dispatch {
     /// The derivation of the tolerance.
     const REASON: &'static str;
     /// Seeds of a parity test: as many as cover every shape and variant of the inputs.
-    const SEED_COUNT: u64;
+    const SEED_COUNT: u64 = 4;
     /// Whether the parameters hold numbers whose change by 1 % must change the outputs; otherwise they are counts,
     /// shapes and choices, or there are none.
-    const HAS_REAL_PARAMETERS: bool;
+    const HAS_REAL_PARAMETERS: bool = true;
     /// Arrays of which the kernel reads only shapes: a change of 1 % changes no output.
     const SHAPES_ONLY: &'static [&'static str] = &[];
     /// One entry for each input whose change by 1 % in all dispatches must change the outputs.

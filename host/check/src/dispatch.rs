@@ -259,7 +259,7 @@ macro_rules! dispatches {
             }
 
             fn upload<D: Device>(device: &D, dispatches: &[Self]) -> Result<Self::Loaded<D>, DeviceError> {
-                Ok(($(dispatches.iter().map(|own| own.$array.upload(device)).collect::<Result<_, _>>()?,)+))
+                Ok(($(dispatches.iter().map(|dispatch| dispatch.$array.upload(device)).collect::<Result<_, _>>()?,)+))
             }
 
             fn dispatch<D: Device>(

@@ -263,7 +263,7 @@ pub fn sums_of(parts: &[SplatGradient]) -> [Bounded; 9] {
         let ([x, y], [xx, xy, yy], [red, green, blue]) = (own.along, own.squares, own.colour);
         [own.opacity, x, y, xx, xy, yy, red, green, blue]
     };
-    [0, 1, 2, 3, 4, 5, 6, 7, 8].map(|index| Bounded::sum(parts.iter().map(|own| f64::from(numbers(own)[index]))))
+    [0, 1, 2, 3, 4, 5, 6, 7, 8].map(|index| Bounded::sum(parts.iter().map(|part| f64::from(numbers(part)[index]))))
 }
 
 /// The derivative by a Gaussian's parameters, in the order of its fields; `None` where it depends on rounding.

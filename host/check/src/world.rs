@@ -108,7 +108,7 @@ impl World {
             world.paint(numbers, &block);
         }
         world.weights = simplex(numbers, view_count, None);
-        world.pair_weights = (0..view_count).flat_map(|own| simplex(numbers, view_count, Some(own))).collect();
+        world.pair_weights = (0..view_count).flat_map(|view| simplex(numbers, view_count, Some(view))).collect();
         world
     }
 

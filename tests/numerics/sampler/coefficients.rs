@@ -30,7 +30,7 @@ fn expected(levels: &[f64], next: f64, reached: bool) -> Vec<f64> {
     let h = (from / next).ln();
     let place = |level: &f64| (from / level).ln() / h;
     let places: Vec<f64> = reached.then_some(1.0).into_iter().chain(levels.iter().map(place)).collect();
-    (0..places.len()).map(|own| integral(&places, own, |t| h * (-h * (1.0 - t)).exp())).collect()
+    (0..places.len()).map(|index| integral(&places, index, |t| h * (-h * (1.0 - t)).exp())).collect()
 }
 
 /// How far coefficients are off, in units of 2^-24 of the sum of their magnitudes: that is what rounding of the results
@@ -83,7 +83,7 @@ fn coefficients_of_directions_agree_with_f64_on_even_steps() {
         history.push(level);
         let next = level - 1.0;
         let places: Vec<f64> = (0..=known.min(3)).map(|back| -(back as f64)).collect();
-        let expected: Vec<f64> = (0..places.len()).map(|own| integral(&places, own, |_| -1.0)).collect();
+        let expected: Vec<f64> = (0..places.len()).map(|index| integral(&places, index, |_| -1.0)).collect();
         let mix = Sampler::Ipndm.step(&history, next);
         if next > 0.0 {
             assert!(mix.state == 1.0 && units_off(&mix, &expected) <= 2.0, "{mix:?}, not {expected:?}");

@@ -6,17 +6,15 @@ use crate::swept::{Swept, costs};
 use crate::world::{Numbers, change_texels};
 
 impl Case for BlendPlanes {
-    const SEED_COUNT: u64 = 4;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 4.0e-3, least: 1.0e-2 };
     const REASON: &'static str = "running error analysis from the image coordinates to the sum over planes; numbers whose bound \
         is larger than a step of 8 bits are undecided";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("views", |own| own.views[1].camera.intrinsics[0] *= 1.01),
-        ("texels", |own| change_texels(&mut own.texels[own.views[1].camera.first_texel as usize..])),
-        ("disparities", |own| increase(own.disparities.iter_mut().map(|[disparity, _]| disparity))),
-        ("costs", |own| increase(own.costs.as_flattened_mut().iter_mut().step_by(2))),
-        ("parameters", |own| own.block.target.intrinsics[0] *= 1.01),
+        ("views", |case| case.views[1].camera.intrinsics[0] *= 1.01),
+        ("texels", |case| change_texels(&mut case.texels[case.views[1].camera.first_texel as usize..])),
+        ("disparities", |case| increase(case.disparities.iter_mut().map(|[disparity, _]| disparity))),
+        ("costs", |case| increase(case.costs.as_flattened_mut().iter_mut().step_by(2))),
+        ("parameters", |case| case.block.target.intrinsics[0] *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<BlendPlanes> {

@@ -7,16 +7,14 @@ use crate::world::Numbers;
 use viewfuse_kernels::plane_sweep::PLANES;
 
 impl Case for CensusCost {
-    const SEED_COUNT: u64 = 4;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 2.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "differences of grey in units of 0.04, each rounded; sums over twelve neighbours of all pairs; \
         three quotients";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("pairs", |own| own.pairs[0].weight *= 1.01),
-        ("grey", |own| increase(own.grey.iter_mut().step_by(2).map(|grey| &mut grey[0]))),
-        ("evidence", |own| increase(own.evidence.as_flattened_mut())),
-        ("parameters", |own| own.block.dissent_share *= 1.01),
+        ("pairs", |case| case.pairs[0].weight *= 1.01),
+        ("grey", |case| increase(case.grey.iter_mut().step_by(2).map(|grey| &mut grey[0]))),
+        ("evidence", |case| increase(case.evidence.as_flattened_mut())),
+        ("parameters", |case| case.block.dissent_share *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<CensusCost> {

@@ -6,17 +6,15 @@ use crate::swept::Swept;
 use crate::world::change_texels;
 
 impl Case for CompareViews {
-    const SEED_COUNT: u64 = 4;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 4.0e-4, least: 1.0e-2 };
     const REASON: &'static str = "colours as a look-up (fifteen roundings of an image coordinate, times the image's slope) \
         over an alpha of at least 0.3; a disparity's error over two steps, times the bell's slope";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("views", |own| own.views[1].camera.intrinsics[0] *= 1.01),
-        ("pairs", |own| own.pairs[0].weight *= 1.01),
-        ("texels", |own| change_texels(&mut own.texels[own.views[1].camera.first_texel as usize..])),
-        ("disparities", |own| increase(own.disparities.iter_mut().map(|[disparity, _]| disparity))),
-        ("parameters", |own| own.block.disparity_step *= 1.01),
+        ("views", |case| case.views[1].camera.intrinsics[0] *= 1.01),
+        ("pairs", |case| case.pairs[0].weight *= 1.01),
+        ("texels", |case| change_texels(&mut case.texels[case.views[1].camera.first_texel as usize..])),
+        ("disparities", |case| increase(case.disparities.iter_mut().map(|[disparity, _]| disparity))),
+        ("parameters", |case| case.block.disparity_step *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<CompareViews> {

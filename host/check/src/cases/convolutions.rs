@@ -66,16 +66,15 @@ fn place(index: usize, first: u32, pitch: u32, channels: u32) -> Option<[usize; 
 impl Case for Convolve {
     // As many as give every shape every combination of residual and rectification.
     const SEED_COUNT: u64 = 8;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 1.0e-2, least: 1.0e-2 };
     const REASON: &'static str = "n units (2^-24) of the sum of magnitudes of n summands, in whatever order; of layers for \
         large images channels + 14 units of the magnitudes in Winograd's transforms, whose factors come to about 10^2";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("inputs", |own| increase(&mut own.inputs)),
-        ("weights", |own| increase(&mut own.weights.values)),
-        ("bias", |own| increase(&mut own.bias)),
-        ("residual", |own| increase(own.residual.iter_mut().flatten())),
-        ("parameters", |own| own.block.scale *= 1.01),
+        ("inputs", |case| increase(&mut case.inputs)),
+        ("weights", |case| increase(&mut case.weights.values)),
+        ("bias", |case| increase(&mut case.bias)),
+        ("residual", |case| increase(case.residual.iter_mut().flatten())),
+        ("parameters", |case| case.block.scale *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<Convolve> {
@@ -155,9 +154,9 @@ impl Case for ConvolveTransposed {
     const LIMITS: Limits = Limits { tolerance: 5.0e-4, least: 1.0e-2 };
     const REASON: &'static str = Linear::REASON;
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("inputs", |own| increase(&mut own.inputs)),
-        ("weights", |own| increase(&mut own.weights.values)),
-        ("bias", |own| increase(&mut own.bias)),
+        ("inputs", |case| increase(&mut case.inputs)),
+        ("weights", |case| increase(&mut case.weights.values)),
+        ("bias", |case| increase(&mut case.bias)),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<ConvolveTransposed> {

@@ -9,14 +9,12 @@ fn change_pixels(pixels: &mut [u32]) {
 }
 
 impl Case for CoarseDepths {
-    const SEED_COUNT: u64 = 4;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 2.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "a share of the interval: five roundings and a division, then its product and sum";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("rays", |own| own.rays.iter_mut().for_each(|ray| ray.far *= 1.01)),
-        ("pixels", |own| change_pixels(&mut own.pixels)),
-        ("parameters", |own| own.block.jitter *= 1.01),
+        ("rays", |case| case.rays.iter_mut().for_each(|ray| ray.far *= 1.01)),
+        ("pixels", |case| change_pixels(&mut case.pixels)),
+        ("parameters", |case| case.block.jitter *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<CoarseDepths> {
@@ -47,12 +45,11 @@ impl Case for CoarseDepths {
 }
 
 impl Case for RandomDraws {
-    const SEED_COUNT: u64 = 4;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 1.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "an addition and a division; for normal numbers 2 ULP of the logarithm, 4.5 ULP of the root, \
         9e-8 of the cosine, two roundings of its argument of up to a turn";
-    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("pixels", |own| change_pixels(&mut own.pixels))];
+    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("pixels", |case| change_pixels(&mut case.pixels))];
 
     fn inputs(seed: u64, size: u32) -> Vec<RandomDraws> {
         let random = &mut random(8, seed, size);

@@ -17,13 +17,12 @@ const WINDOWS: [[u32; 7]; 7] = [
 ];
 
 impl Case for ConvolveDepthwise {
-    const SEED_COUNT: u64 = 4;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 5.0e-5, least: 1.0e-2 };
     const REASON: &'static str =
         "n units (2^-24) of the sum of magnitudes of n summands, as many as places of the window";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] =
-        &[("inputs", |own| increase(&mut own.inputs)), ("weights", |own| increase(&mut own.weights))];
+        &[("inputs", |case| increase(&mut case.inputs)), ("weights", |case| increase(&mut case.weights))];
 
     fn inputs(seed: u64, count: u32) -> Vec<ConvolveDepthwise> {
         let random = &mut random(22, seed, count);

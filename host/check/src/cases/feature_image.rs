@@ -28,14 +28,13 @@ fn block(random: &mut Random, (sample_count, feature_count, last_length, ..): Ki
 
 impl Case for WeighFeatures {
     const SEED_COUNT: u64 = 8;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 2.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "roundings of the optical depth times the transmittance, 2 ULP of two exponentials, a \
         difference";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("raw", |own| increase(&mut own.raw)),
-        ("points", |own| own.points.iter_mut().for_each(|point| point.length *= 1.01)),
-        ("parameters", |own| own.block.length_scale *= 1.01),
+        ("raw", |case| increase(&mut case.raw)),
+        ("points", |case| case.points.iter_mut().for_each(|point| point.length *= 1.01)),
+        ("parameters", |case| case.block.length_scale *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<WeighFeatures> {
@@ -81,9 +80,9 @@ impl Case for SumFeatures {
     const REASON: &'static str =
         "n + 2 units (2^-24) of the sum of magnitudes of n summands, each a product with a sum of two";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("weights", |own| increase(&mut own.weights)),
-        ("fused", |own| increase(&mut own.fused)),
-        ("raw", |own| increase(&mut own.raw)),
+        ("weights", |case| increase(&mut case.weights)),
+        ("fused", |case| increase(&mut case.fused)),
+        ("raw", |case| increase(&mut case.raw)),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<SumFeatures> {
@@ -122,14 +121,12 @@ impl Case for SumFeatures {
 }
 
 impl Case for DenoiserInput {
-    const SEED_COUNT: u64 = 4;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 1.0e-4, least: 1.0e-2 };
     const REASON: &'static str = "one product";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("noisy", |own| increase(&mut own.noisy)),
-        ("condition", |own| increase(&mut own.condition)),
-        ("parameters", |own| own.block.scale *= 1.01),
+        ("noisy", |case| increase(&mut case.noisy)),
+        ("condition", |case| increase(&mut case.condition)),
+        ("parameters", |case| case.block.scale *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<DenoiserInput> {

@@ -68,17 +68,16 @@ fn fine(random: &mut Random, size: u32, index: usize, counts: [u32; 3]) -> FineD
 
 impl Case for FineDepths {
     const SEED_COUNT: u64 = 8;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 2.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "a place in a part: a division, a product, two sums; undecided where the random number \
         hits the border of a part to within the sums of weights";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("seen", |own| increase(own.seen.iter_mut().step_by(2).map(|[weight, _]| weight))),
-        ("rays", |own| own.rays.iter_mut().for_each(|ray| ray.far *= 1.01)),
-        ("colours", |own| increase(own.colours.iter_mut().map(|[.., opacity]| opacity))),
-        ("pixel_depths", |own| increase(&mut own.pixel_depths)),
-        ("draws", |own| increase(own.draws.iter_mut().map(|[first, _]| first))),
-        ("parameters", |own| own.block.depth_deviation *= 1.01),
+        ("seen", |case| increase(case.seen.iter_mut().step_by(2).map(|[weight, _]| weight))),
+        ("rays", |case| case.rays.iter_mut().for_each(|ray| ray.far *= 1.01)),
+        ("colours", |case| increase(case.colours.iter_mut().map(|[.., opacity]| opacity))),
+        ("pixel_depths", |case| increase(&mut case.pixel_depths)),
+        ("draws", |case| increase(case.draws.iter_mut().map(|[first, _]| first))),
+        ("parameters", |case| case.block.depth_deviation *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<FineDepths> {
@@ -100,12 +99,11 @@ impl Case for FineDepths {
 }
 
 impl Case for MergeDepths {
-    const SEED_COUNT: u64 = 4;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 0.0, least: 1.0e-2 };
     const REASON: &'static str = "the same numbers in order: exact";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] =
-        &[("coarse", |own| own.coarse[0] *= 1.01), ("fine", |own| own.fine[0] *= 1.01)];
+        &[("coarse", |case| case.coarse[0] *= 1.01), ("fine", |case| case.fine[0] *= 1.01)];
 
     fn inputs(seed: u64, size: u32) -> Vec<MergeDepths> {
         let random = &mut random(10, seed, size);

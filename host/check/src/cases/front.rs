@@ -6,15 +6,13 @@ use crate::swept::{Swept, costs, opacities};
 use crate::world::Numbers;
 
 impl Case for PlaneOpacity {
-    const SEED_COUNT: u64 = 4;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 2.0e-3, least: 1.0e-2 };
     const REASON: &'static str = "running error analysis from the image coordinates to a difference of disparities in steps of a \
         plane, under an exponential; undecided where a coordinate rounds to either of two pixels";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("views", |own| own.views[1].camera.intrinsics[0] *= 1.01),
-        ("disparities", |own| increase(own.disparities.iter_mut().map(|[disparity, _]| disparity))),
-        ("parameters", |own| own.block.disparity_step *= 1.01),
+        ("views", |case| case.views[1].camera.intrinsics[0] *= 1.01),
+        ("disparities", |case| increase(case.disparities.iter_mut().map(|[disparity, _]| disparity))),
+        ("parameters", |case| case.block.disparity_step *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<PlaneOpacity> {
@@ -36,15 +34,13 @@ impl Case for PlaneOpacity {
 }
 
 impl Case for FrontCost {
-    const SEED_COUNT: u64 = 4;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 1.0e-5, least: 1.0e-2 };
     const REASON: &'static str =
         "a mean of at most nine opacities, a slope of 2.5 on it, a product, and a sum of costs below 1";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("opacities", |own| increase(own.opacities.iter_mut().step_by(2).flatten())),
-        ("means", |own| increase(own.means.iter_mut().step_by(2).flatten())),
-        ("parameters", |own| own.block.front_share *= 1.01),
+        ("opacities", |case| increase(case.opacities.iter_mut().step_by(2).flatten())),
+        ("means", |case| increase(case.means.iter_mut().step_by(2).flatten())),
+        ("parameters", |case| case.block.front_share *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<FrontCost> {

@@ -10,7 +10,7 @@ impl Case for FuseViews {
     const LIMITS: Limits = Limits { tolerance: 1.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "a product and an addition a view, two roundings each";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] =
-        &[("weights", |own| own.weights[0] *= 1.01), ("latents", |own| own.latents[0] *= 1.01)];
+        &[("weights", |case| case.weights[0] *= 1.01), ("latents", |case| case.latents[0] *= 1.01)];
 
     fn inputs(seed: u64, size: u32) -> Vec<FuseViews> {
         let random = &mut random(3, seed, size);

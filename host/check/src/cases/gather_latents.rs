@@ -38,17 +38,16 @@ fn jobs(random: &mut Random, size: u32) -> Vec<GatherLatents> {
 
 impl Case for GatherLatents {
     const SEED_COUNT: u64 = 8;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 5.0e-3, least: 1.0e-2 };
     const REASON: &'static str = "errors of a projection, in pixels, times the change of the grid over a node; two mixtures; \
         undecided where a point is on the view's plane to within rounding";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("views", |own| own.views.iter_mut().for_each(|view| view.intrinsics[0] *= 1.01)),
-        ("points", |own| own.points.iter_mut().for_each(|point| point.position[1] *= 1.01)),
+        ("views", |case| case.views.iter_mut().for_each(|view| view.intrinsics[0] *= 1.01)),
+        ("points", |case| case.points.iter_mut().for_each(|point| point.position[1] *= 1.01)),
         // Of the first view.
-        ("grid", |own| increase(own.grid.iter_mut().filter(|_| own.block.view == 0))),
-        ("residual", |own| increase(own.residual.iter_mut().flatten())),
-        ("parameters", |own| own.block.pixel_centre *= 1.01),
+        ("grid", |case| increase(case.grid.iter_mut().filter(|_| case.block.view == 0))),
+        ("residual", |case| increase(case.residual.iter_mut().flatten())),
+        ("parameters", |case| case.block.pixel_centre *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<GatherLatents> {
@@ -76,20 +75,19 @@ impl Case for GatherLatents {
 
 impl Case for GatherLatentsF16 {
     const SEED_COUNT: u64 = 8;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = GatherLatents::LIMITS;
     const REASON: &'static str = "as gather_latents: numbers in half precision are read exactly";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("views", |own| own.views.iter_mut().for_each(|view| view.intrinsics[0] *= 1.01)),
-        ("points", |own| own.points.iter_mut().for_each(|point| point.position[1] *= 1.01)),
+        ("views", |case| case.views.iter_mut().for_each(|view| view.intrinsics[0] *= 1.01)),
+        ("points", |case| case.points.iter_mut().for_each(|point| point.position[1] *= 1.01)),
         // Of the first view.
-        ("grid", |own| {
-            if own.block.view == 0 {
-                half_precision::increase_packed(&mut own.grid)
+        ("grid", |case| {
+            if case.block.view == 0 {
+                half_precision::increase_packed(&mut case.grid)
             }
         }),
-        ("residual", |own| increase(own.residual.iter_mut().flatten())),
-        ("parameters", |own| own.block.pixel_centre *= 1.01),
+        ("residual", |case| increase(case.residual.iter_mut().flatten())),
+        ("parameters", |case| case.block.pixel_centre *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<GatherLatentsF16> {

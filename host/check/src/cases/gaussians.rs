@@ -100,14 +100,12 @@ impl Picture {
 }
 
 impl Case for ProjectGaussians {
-    const SEED_COUNT: u64 = 4;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 5.0e-2, least: 1.0e-3 };
     const REASON: &'static str = "running error analysis from the camera's axes through the covariance to its inverse and to the \
         pixels where the opacity counts";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("gaussians", |own| increase(own.gaussians.iter_mut().flat_map(|gaussian| &mut gaussian.log_scales))),
-        ("parameters", |own| own.block.camera.intrinsics[0] *= 1.01),
+        ("gaussians", |case| increase(case.gaussians.iter_mut().flat_map(|gaussian| &mut gaussian.log_scales))),
+        ("parameters", |case| case.block.camera.intrinsics[0] *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<ProjectGaussians> {
@@ -126,16 +124,14 @@ impl Case for ProjectGaussians {
 }
 
 impl Case for BlendSplats {
-    const SEED_COUNT: u64 = 4;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 1.0e-3, least: 1.0e-2 };
     const REASON: &'static str = "running error analysis from a pixel's distance to its sums of colours and depths; undecided where it \
         depends on rounding whether a splat counts";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("starts", |own| own.starts.iter_mut().skip(1).for_each(|start| *start = start.saturating_sub(1))),
-        ("entries", |own| own.entries.reverse()),
-        ("splats", |own| increase(own.splats.iter_mut().map(|splat| &mut splat.opacity))),
-        ("parameters", |own| increase(&mut own.block.background[..3])),
+        ("starts", |case| case.starts.iter_mut().skip(1).for_each(|start| *start = start.saturating_sub(1))),
+        ("entries", |case| case.entries.reverse()),
+        ("splats", |case| increase(case.splats.iter_mut().map(|splat| &mut splat.opacity))),
+        ("parameters", |case| increase(&mut case.block.background[..3])),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<BlendSplats> {
@@ -158,17 +154,16 @@ impl Case for BlendSplats {
 }
 
 impl Case for BlendGradient {
-    const SEED_COUNT: u64 = 4;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 2.0e-2, least: 1.0e-1 };
     const REASON: &'static str = "running error analysis of what lies behind a splat, divided by its transmittance, and of sums over the \
         pixels of a tile; a tile with a pixel where it depends on rounding whether a splat counts is undecided";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("starts", |own| own.starts.iter_mut().skip(1).for_each(|start| *start = start.saturating_sub(1))),
-        ("entries", |own| own.entries.reverse()),
-        ("splats", |own| increase(own.splats.iter_mut().map(|splat| &mut splat.opacity))),
-        ("colours", |own| increase(own.colours.as_flattened_mut())),
-        ("gradients", |own| increase(own.gradients.as_flattened_mut())),
+        ("starts", |case| case.starts.iter_mut().skip(1).for_each(|start| *start = start.saturating_sub(1))),
+        ("entries", |case| case.entries.reverse()),
+        ("splats", |case| increase(case.splats.iter_mut().map(|splat| &mut splat.opacity))),
+        ("colours", |case| increase(case.colours.as_flattened_mut())),
+        ("gradients", |case| increase(case.gradients.as_flattened_mut())),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<BlendGradient> {
@@ -206,18 +201,16 @@ impl Case for BlendGradient {
 }
 
 impl Case for ProjectGradients {
-    const SEED_COUNT: u64 = 4;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 1.0, least: 1.0 };
     const REASON: &'static str = "running error analysis of the chain rule, from sums over tiles through the inverse of the covariance to \
         scales, rotation and position; undecided where the projection's slope is limited or not by rounding";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("gaussians", |own| increase(own.gaussians.iter_mut().flat_map(|gaussian| &mut gaussian.log_scales))),
-        ("splats", |own| increase(own.splats.iter_mut().flat_map(|splat| &mut splat.conic))),
-        ("use_starts", |own| own.use_starts.iter_mut().skip(1).for_each(|start| *start = start.saturating_sub(1))),
-        ("uses", |own| own.uses.reverse()),
-        ("sums", |own| increase(own.sums.iter_mut().map(|sums| &mut sums.opacity))),
-        ("parameters", |own| own.block.camera.intrinsics[0] *= 1.01),
+        ("gaussians", |case| increase(case.gaussians.iter_mut().flat_map(|gaussian| &mut gaussian.log_scales))),
+        ("splats", |case| increase(case.splats.iter_mut().flat_map(|splat| &mut splat.conic))),
+        ("use_starts", |case| case.use_starts.iter_mut().skip(1).for_each(|start| *start = start.saturating_sub(1))),
+        ("uses", |case| case.uses.reverse()),
+        ("sums", |case| increase(case.sums.iter_mut().map(|sums| &mut sums.opacity))),
+        ("parameters", |case| case.block.camera.intrinsics[0] *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<ProjectGradients> {

@@ -47,13 +47,12 @@ fn image(random: &mut Random, block: &GroupNormBlock, distance: f64) -> Vec<f32>
 }
 
 impl Case for ChannelMeans {
-    const SEED_COUNT: u64 = 4;
     // A floor of variances and a length are there for another kernel.
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 5.0e-4, least: 1.0e-2 };
     const REASON: &'static str =
         "n units (2^-24) of the sum of magnitudes of n pixels, in whatever order, and a division";
-    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("inputs", |own| increase(&mut own.inputs))];
+    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("inputs", |case| increase(&mut case.inputs))];
 
     fn inputs(seed: u64, size: u32) -> Vec<ChannelMeans> {
         let random = &mut random(23, seed, size);
@@ -79,7 +78,7 @@ impl Case for GroupNormPartials {
     const LIMITS: Limits = Limits { tolerance: 2.0, least: 1.0e-2 };
     const REASON: &'static str = "n units (2^-24) of the sum of n differences from one of the values, a rounding of the \
         mean; n + 3 units of the sum of squares, which is up to 10^4";
-    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("inputs", |own| increase(&mut own.inputs))];
+    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("inputs", |case| increase(&mut case.inputs))];
 
     fn inputs(seed: u64, size: u32) -> Vec<GroupNormPartials> {
         let random = &mut random(24, seed, size);
@@ -103,13 +102,12 @@ impl Case for GroupNormPartials {
 impl Case for GroupNormStatistics {
     // As many as give every shape floors, offsets and distances of all kinds.
     const SEED_COUNT: u64 = 8;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 5.0e-2, least: 1.0e-2 };
     const REASON: &'static str = "running error analysis of one part after the other: a rounding of the mean each, which is \
         up to 10^3 deviations, and what that makes of the squares between the partials; the reciprocal of a square root";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("partials", |own| own.partials.iter_mut().for_each(|statistics| statistics[1] *= 1.01)),
-        ("parameters", |own| own.block.variance_floor = 1.01 * (own.block.variance_floor + 1.0e-3)),
+        ("partials", |case| case.partials.iter_mut().for_each(|statistics| statistics[1] *= 1.01)),
+        ("parameters", |case| case.block.variance_floor = 1.01 * (case.block.variance_floor + 1.0e-3)),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<GroupNormStatistics> {
@@ -162,10 +160,10 @@ impl Case for GroupNorm {
     const REASON: &'static str = "a difference from the mean, up to 10^3 deviations, two products and a sum; of SiLU an \
         exponential, a sum and a division";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("inputs", |own| increase(&mut own.inputs)),
-        ("statistics", |own| own.statistics.iter_mut().for_each(|own| own[1] *= 1.01)),
-        ("weights", |own| increase(&mut own.weights)),
-        ("bias", |own| increase(&mut own.bias)),
+        ("inputs", |case| increase(&mut case.inputs)),
+        ("statistics", |case| case.statistics.iter_mut().for_each(|statistics| statistics[1] *= 1.01)),
+        ("weights", |case| increase(&mut case.weights)),
+        ("bias", |case| increase(&mut case.bias)),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<GroupNorm> {

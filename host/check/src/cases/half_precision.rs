@@ -31,7 +31,7 @@ impl Case for PackF16 {
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 0.0, least: 1.0e-4 };
     const REASON: &'static str = "the nearest number in half precision, of two the even one: exact";
-    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("numbers", |own| increase(&mut own.numbers))];
+    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("numbers", |case| increase(&mut case.numbers))];
 
     fn inputs(seed: u64, size: u32) -> Vec<PackF16> {
         let random = &mut random(41, seed, size);

@@ -5,14 +5,13 @@ use crate::hull_oracle::{Scene, hull_entry};
 use crate::world::{World, change_texels};
 
 impl Case for HullEntry {
-    const SEED_COUNT: u64 = 4;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 1.0e-4, least: 1.0e-2 };
     const REASON: &'static str = "up to 60 additions of a step to a depth of 3";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("object", |own| own.object[0].high[0] *= 1.01),
-        ("views", |own| own.views[1].intrinsics[0] *= 1.01),
-        ("texels", |own| change_texels(&mut own.texels[own.views[1].first_texel as usize..])),
+        ("object", |case| case.object[0].high[0] *= 1.01),
+        ("views", |case| case.views[1].intrinsics[0] *= 1.01),
+        ("texels", |case| change_texels(&mut case.texels[case.views[1].first_texel as usize..])),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<HullEntry> {

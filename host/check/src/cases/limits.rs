@@ -12,7 +12,7 @@ impl Case for CopyNumbers {
     const LIMITS: Limits = Limits { tolerance: 1.0e-30, least: 1.0e-30 };
     const REASON: &'static str = "a copy is exact";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] =
-        &[("numbers", |own| increase(own.numbers.as_flattened_mut()))];
+        &[("numbers", |case| increase(case.numbers.as_flattened_mut()))];
 
     fn inputs(seed: u64, size: u32) -> Vec<CopyNumbers> {
         let random = &mut random(60, seed, size);
@@ -28,11 +28,10 @@ impl Case for CopyNumbers {
 
 impl Case for MultiplyAdd {
     const SEED_COUNT: u64 = 2;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 1.0e-3, least: 1.0e-3 };
     const REASON: &'static str = "running errors of products and sums, which a device may fuse, along the chains";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] =
-        &[("starts", |own| increase(&mut own.starts)), ("parameters", |own| own.block.factor *= 1.01)];
+        &[("starts", |case| increase(&mut case.starts)), ("parameters", |case| case.block.factor *= 1.01)];
 
     fn inputs(seed: u64, size: u32) -> Vec<MultiplyAdd> {
         let random = &mut random(61, seed, size);
@@ -64,7 +63,7 @@ impl Case for LookUpTexels {
     const LIMITS: Limits = Limits { tolerance: 1.0e-3, least: 1.0e-3 };
     const REASON: &'static str = "rounding of the places, times the image's changes, and of the sums";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] =
-        &[("texels", |own| increase(own.texels.as_flattened_mut()))];
+        &[("texels", |case| increase(case.texels.as_flattened_mut()))];
 
     fn inputs(seed: u64, size: u32) -> Vec<LookUpTexels> {
         let random = &mut random(62, seed, size);

@@ -83,10 +83,10 @@ impl Case for Linear {
     const REASON: &'static str =
         "n units (2^-24) of the sum of magnitudes of n summands, in whatever order they are summed";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("inputs", |own| increase(&mut own.inputs)),
-        ("weights", |own| increase(&mut own.weights.values)),
-        ("bias", |own| increase(&mut own.bias)),
-        ("residual", |own| increase(own.residual.iter_mut().flatten())),
+        ("inputs", |case| increase(&mut case.inputs)),
+        ("weights", |case| increase(&mut case.weights.values)),
+        ("bias", |case| increase(&mut case.bias)),
+        ("residual", |case| increase(case.residual.iter_mut().flatten())),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<Linear> {

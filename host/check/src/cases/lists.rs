@@ -48,11 +48,10 @@ fn exact(values: impl IntoIterator<Item = u32>, count: usize) -> Vec<Option<Boun
 }
 
 impl Case for CountMarked {
-    const SEED_COUNT: u64 = 4;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = EXACT;
     const REASON: &'static str = REASON;
-    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("mask", |own| unmark(&mut own.mask))];
+    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("mask", |case| unmark(&mut case.mask))];
 
     fn inputs(seed: u64, size: u32) -> Vec<CountMarked> {
         let dispatch = |mask: Vec<u32>| CountMarked {
@@ -69,12 +68,11 @@ impl Case for CountMarked {
 }
 
 impl Case for SumCounts {
-    const SEED_COUNT: u64 = 4;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = EXACT;
     const REASON: &'static str = REASON;
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] =
-        &[("counts", |own| own.counts.iter_mut().for_each(|count| *count = *count * 101 / 100))];
+        &[("counts", |case| case.counts.iter_mut().for_each(|count| *count = *count * 101 / 100))];
 
     fn inputs(seed: u64, size: u32) -> Vec<SumCounts> {
         let random = &mut random(62, seed, size);
@@ -96,13 +94,12 @@ impl Case for SumCounts {
 }
 
 impl Case for ListMarked {
-    const SEED_COUNT: u64 = 4;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = EXACT;
     const REASON: &'static str = REASON;
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("mask", |own| unmark(&mut own.mask)),
-        ("offsets", |own| own.offsets.iter_mut().for_each(|offset| *offset = *offset * 99 / 100)),
+        ("mask", |case| unmark(&mut case.mask)),
+        ("offsets", |case| case.offsets.iter_mut().for_each(|offset| *offset = *offset * 99 / 100)),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<ListMarked> {
@@ -127,7 +124,7 @@ impl Case for FindNonFinite {
     const LIMITS: Limits = EXACT;
     const REASON: &'static str = REASON;
     // The largest numbers become infinite.
-    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("values", |own| increase(&mut own.values))];
+    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("values", |case| increase(&mut case.values))];
 
     fn inputs(seed: u64, size: u32) -> Vec<FindNonFinite> {
         let random = &mut random(64, seed, size);

@@ -6,18 +6,17 @@ use crate::world::{World, change_depths, change_texels};
 
 impl Case for MarchRays {
     const SEED_COUNT: u64 = 3;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 4.0e-3, least: 1.0e-2 };
     const REASON: &'static str = "running error analysis from the image coordinates to the sum along the ray; numbers whose \
         bound is larger than a step of 8 bits are undecided";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("object", |own| own.object[0].high[0] *= 1.01),
-        ("views", |own| own.views[1].intrinsics[0] *= 1.01),
-        ("footprints", |own| increase(&mut own.footprints)),
-        ("texels", |own| change_texels(&mut own.texels[own.views[1].first_texel as usize..])),
-        ("depths", |own| change_depths(&mut own.depths)),
-        ("weights", |own| own.weights[1] *= 1.01),
-        ("parameters", |own| own.block.target.intrinsics[0] *= 1.01),
+        ("object", |case| case.object[0].high[0] *= 1.01),
+        ("views", |case| case.views[1].intrinsics[0] *= 1.01),
+        ("footprints", |case| increase(&mut case.footprints)),
+        ("texels", |case| change_texels(&mut case.texels[case.views[1].first_texel as usize..])),
+        ("depths", |case| change_depths(&mut case.depths)),
+        ("weights", |case| case.weights[1] *= 1.01),
+        ("parameters", |case| case.block.target.intrinsics[0] *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<MarchRays> {

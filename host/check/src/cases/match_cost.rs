@@ -5,18 +5,16 @@ use crate::hull_oracle::{self, Scene};
 use crate::world::{World, change_depths, change_texels};
 
 impl Case for MatchCost {
-    const SEED_COUNT: u64 = 4;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 2.0e-4, least: 1.0e-2 };
     const REASON: &'static str = "colours as a look-up (ten roundings of an image coordinate, times the image's slope) over \
         an alpha of at least 0.3, times shares of at most 1 / NO_WITNESS";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("object", |own| own.object[0].radius *= 1.01),
-        ("views", |own| own.views[1].intrinsics[0] *= 1.01),
-        ("texels", |own| change_texels(&mut own.texels[own.views[1].first_texel as usize..])),
-        ("entries", |own| change_depths(&mut own.entries)),
-        ("pair_weights", |own| increase(own.pair_weights.iter_mut().step_by(2))),
-        ("parameters", |own| own.block.near *= 1.01),
+        ("object", |case| case.object[0].radius *= 1.01),
+        ("views", |case| case.views[1].intrinsics[0] *= 1.01),
+        ("texels", |case| change_texels(&mut case.texels[case.views[1].first_texel as usize..])),
+        ("entries", |case| change_depths(&mut case.entries)),
+        ("pair_weights", |case| increase(case.pair_weights.iter_mut().step_by(2))),
+        ("parameters", |case| case.block.near *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<MatchCost> {

@@ -6,14 +6,13 @@ use crate::matrix_oracle;
 
 impl Case for MatrixProduct {
     const SEED_COUNT: u64 = 8;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 5.0e-3, least: 1.0e-2 };
     const REASON: &'static str = "n units (2^-24) of the sum of magnitudes of n products, in whatever order they are summed, \
         and one more product";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("left", |own| increase(&mut own.left)),
-        ("right", |own| increase(&mut own.right)),
-        ("parameters", |own| own.block.scale *= 1.01),
+        ("left", |case| increase(&mut case.left)),
+        ("right", |case| increase(&mut case.right)),
+        ("parameters", |case| case.block.scale *= 1.01),
     ];
 
     /// Of some the right matrix is empty: it is in the left one's buffer.
@@ -88,12 +87,11 @@ impl Case for MatrixProduct {
 }
 
 impl Case for SoftmaxRows {
-    const SEED_COUNT: u64 = 4;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 5.0e-5, least: 1.0e-30 };
     const REASON: &'static str = "a difference from the largest score, of up to some 10^2, is an error of the exponent; two \
         exponentials, n units (2^-24) of their sum, a division and a product";
-    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("scores", |own| increase(&mut own.scores))];
+    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("scores", |case| increase(&mut case.scores))];
 
     fn inputs(seed: u64, size: u32) -> Vec<SoftmaxRows> {
         let random = &mut random(28, seed, size);

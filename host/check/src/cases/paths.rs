@@ -18,12 +18,11 @@ fn increase_some(costs: &mut [Planes]) {
 }
 
 impl Case for FollowPaths {
-    const SEED_COUNT: u64 = 4;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 4.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "three roundings of costs below 0.5 a step; their differences among planes add up along a \
         line";
-    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("means", |own| increase_some(&mut own.means))];
+    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("means", |case| increase_some(&mut case.means))];
 
     fn inputs(seed: u64, size: u32) -> Vec<FollowPaths> {
         let (block, means) = volumes(seed, size, 1);
@@ -41,11 +40,10 @@ impl Case for FollowPaths {
 }
 
 impl Case for JoinPaths {
-    const SEED_COUNT: u64 = 4;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 1.0e-6, least: 1.0e-2 };
     const REASON: &'static str = "three additions of costs below 0.5, a quarter of their sum";
-    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("paths", |own| increase_some(&mut own.paths))];
+    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("paths", |case| increase_some(&mut case.paths))];
 
     fn inputs(seed: u64, size: u32) -> Vec<JoinPaths> {
         let (block, paths) = volumes(seed, size, 4);

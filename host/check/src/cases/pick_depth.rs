@@ -7,19 +7,17 @@ use crate::world::{Numbers, World, change_depths, costs};
 use viewfuse_kernels::visual_hull::NO_SURFACE;
 
 impl Case for PickDepth {
-    const SEED_COUNT: u64 = 4;
-    const HAS_REAL_PARAMETERS: bool = true;
     // Of the cameras it takes only where their pixels are.
     const SHAPES_ONLY: &'static [&'static str] = &["views"];
     const LIMITS: Limits = Limits { tolerance: 2.0e-4, least: 1.0e-2 };
     const REASON: &'static str = "running error analysis of costs, of the parabola through the least three and its quotient; \
         undecided where two planes cost the same to within it";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("object", |own| own.object[0].radius *= 1.01),
-        ("means", |own| increase(own.means.iter_mut().step_by(2).filter(|cost| **cost > 0.0))),
-        ("entries", |own| change_depths(&mut own.entries)),
-        ("guess", |own| change_depths(&mut own.guess)),
-        ("parameters", |own| own.block.near *= 1.01),
+        ("object", |case| case.object[0].radius *= 1.01),
+        ("means", |case| increase(case.means.iter_mut().step_by(2).filter(|cost| **cost > 0.0))),
+        ("entries", |case| change_depths(&mut case.entries)),
+        ("guess", |case| change_depths(&mut case.guess)),
+        ("parameters", |case| case.block.near *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<PickDepth> {

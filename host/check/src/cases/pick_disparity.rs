@@ -6,14 +6,12 @@ use crate::swept::{Swept, costs};
 use crate::world::Numbers;
 
 impl Case for PickDisparity {
-    const SEED_COUNT: u64 = 4;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 5.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "a difference of costs in units of the temperature, under an exponential; the quotient of two \
         sums of these; the vertex of a parabola in steps of a plane; undecided where all three costs are nearly equal";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("costs", |own| increase(own.costs.as_flattened_mut().iter_mut().step_by(2))),
-        ("parameters", |own| own.block.disparity_step *= 1.01),
+        ("costs", |case| increase(case.costs.as_flattened_mut().iter_mut().step_by(2))),
+        ("parameters", |case| case.block.disparity_step *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<PickDisparity> {

@@ -6,17 +6,16 @@ use crate::ray_oracle;
 
 impl Case for MixPictures {
     const SEED_COUNT: u64 = 8;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 1.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "a product and an addition an array, two roundings each";
     // Each array has a coefficient in some dispatch.
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("parameters", |own| own.block.state *= 1.01),
-        ("state", |own| increase(&mut own.state)),
-        ("newest", |own| increase(&mut own.newest)),
-        ("second", |own| increase(&mut own.second)),
-        ("third", |own| increase(&mut own.third)),
-        ("fourth", |own| increase(&mut own.fourth)),
+        ("parameters", |case| case.block.state *= 1.01),
+        ("state", |case| increase(&mut case.state)),
+        ("newest", |case| increase(&mut case.newest)),
+        ("second", |case| increase(&mut case.second)),
+        ("third", |case| increase(&mut case.third)),
+        ("fourth", |case| increase(&mut case.fourth)),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<MixPictures> {
@@ -61,12 +60,11 @@ impl Case for MixPictures {
 
 impl Case for AddNoise {
     const SEED_COUNT: u64 = 8;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 1.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "a product and an addition; for normal numbers 2 ULP of the logarithm, 4.5 ULP of the root, \
         9e-8 of the cosine, two roundings of its argument of up to a turn";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] =
-        &[("parameters", |own| own.block.scale *= 1.01), ("picture", |own| increase(&mut own.picture))];
+        &[("parameters", |case| case.block.scale *= 1.01), ("picture", |case| increase(&mut case.picture))];
 
     fn inputs(seed: u64, size: u32) -> Vec<AddNoise> {
         let random = &mut random(30, seed, size);

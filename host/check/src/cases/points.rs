@@ -17,15 +17,13 @@ fn move_points(points: &mut [RayPoint]) {
 }
 
 impl Case for EmbedPoints {
-    const SEED_COUNT: u64 = 4;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 1.0e-3, least: 1.0e-2 };
     const REASON: &'static str = "a rotation: three products and their sum; an angle is its product with up to 48, a sine \
         adds 9e-8";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("views", |own| own.views[0].pose.right[0] *= 1.01),
-        ("points", |own| move_points(&mut own.points)),
-        ("parameters", |own| own.block.frequency *= 1.01),
+        ("views", |case| case.views[0].pose.right[0] *= 1.01),
+        ("points", |case| move_points(&mut case.points)),
+        ("parameters", |case| case.block.frequency *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<EmbedPoints> {
@@ -58,9 +56,9 @@ impl Case for VisibleWeights {
     const REASON: &'static str = "a sum over views and a division by it; undecided where a point is on a view's plane to \
         within a rotation's rounding";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("views", |own| own.views.iter_mut().for_each(|view| view.pose.right[3] *= 1.01)),
-        ("weights", |own| own.weights[0] *= 1.01),
-        ("points", |own| move_points(&mut own.points)),
+        ("views", |case| case.views.iter_mut().for_each(|view| view.pose.right[3] *= 1.01)),
+        ("weights", |case| case.weights[0] *= 1.01),
+        ("points", |case| move_points(&mut case.points)),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<VisibleWeights> {
@@ -95,8 +93,8 @@ impl Case for Radiance {
     const LIMITS: Limits = Limits { tolerance: 1.0e-4, least: 1.0e-2 };
     const REASON: &'static str = "2 ULP of the exponential, an addition and a division; a product";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("raw", |own| increase(&mut own.raw)),
-        ("points", |own| own.points.iter_mut().for_each(|point| point.length *= 1.01)),
+        ("raw", |case| increase(&mut case.raw)),
+        ("points", |case| case.points.iter_mut().for_each(|point| point.length *= 1.01)),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<Radiance> {

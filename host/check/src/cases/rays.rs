@@ -6,14 +6,12 @@ use crate::ray_inputs::{camera, ray};
 use crate::ray_oracle;
 
 impl Case for CastRays {
-    const SEED_COUNT: u64 = 4;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 1.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "quotients of image coordinates by the focal length, three products with the axes, a norm \
         (1 where depths are along the axis) and a division by it";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("pixels", |own| own.pixels.iter_mut().for_each(|pixel| *pixel = *pixel * 101 / 100)),
-        ("parameters", |own| own.block.camera.intrinsics[0] *= 1.01),
+        ("pixels", |case| case.pixels.iter_mut().for_each(|pixel| *pixel = *pixel * 101 / 100)),
+        ("parameters", |case| case.block.camera.intrinsics[0] *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<CastRays> {
@@ -41,14 +39,13 @@ impl Case for CastRays {
 }
 
 impl Case for PlacePoints {
-    const SEED_COUNT: u64 = 4;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 1.0e-4, least: 1.0e-2 };
     const REASON: &'static str = "a product and an addition a coordinate, a difference of depths";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("samples", |own| own.samples.iter_mut().flatten().for_each(|sample| *sample = *sample * 99 / 100)),
-        ("rays", |own| own.rays.iter_mut().for_each(|ray| ray.direction[0] *= 1.01)),
-        ("depths", |own| increase(own.depths.iter_mut().step_by(2))),
+        ("samples", |case| case.samples.iter_mut().flatten().for_each(|sample| *sample = *sample * 99 / 100)),
+        ("rays", |case| case.rays.iter_mut().for_each(|ray| ray.direction[0] *= 1.01)),
+        ("depths", |case| increase(case.depths.iter_mut().step_by(2))),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<PlacePoints> {

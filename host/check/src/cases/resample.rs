@@ -5,11 +5,10 @@ use super::*;
 use crate::network_oracle;
 
 impl Case for MaxPool {
-    const SEED_COUNT: u64 = 4;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 0.0, least: 1.0e-2 };
     const REASON: &'static str = "one of the inputs: exact";
-    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("inputs", |own| increase(&mut own.inputs))];
+    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("inputs", |case| increase(&mut case.inputs))];
 
     fn inputs(seed: u64, size: u32) -> Vec<MaxPool> {
         let random = &mut random(19, seed, size);
@@ -46,12 +45,11 @@ const SHAPES: [[u32; 7]; 6] = [
 ];
 
 impl Case for Upsample {
-    const SEED_COUNT: u64 = 4;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 5.0e-4, least: 1.0e-2 };
     const REASON: &'static str = "a place among the inputs: a division, a product and a sum, times the change between \
         neighbours; two mixtures";
-    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("inputs", |own| increase(&mut own.inputs))];
+    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("inputs", |case| increase(&mut case.inputs))];
 
     fn inputs(seed: u64, size: u32) -> Vec<Upsample> {
         let random = &mut random(20, seed, size);

@@ -11,13 +11,12 @@ use crate::ray_oracle;
 const FIRST_RAY: u32 = 2;
 
 impl Case for WeighSamples {
-    const SEED_COUNT: u64 = 4;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 1.0e-4, least: 1.0e-2 };
     const REASON: &'static str = "roundings of the optical depth times the transmittance, 2 ULP of the exponential, on both \
         sides of a sample";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] =
-        &[("samples", |own| increase(own.samples.iter_mut().map(|sample| &mut sample[3])))];
+        &[("samples", |case| increase(case.samples.iter_mut().map(|sample| &mut sample[3])))];
 
     fn inputs(seed: u64, size: u32) -> Vec<WeighSamples> {
         let random = &mut random(11, seed, size);
@@ -83,16 +82,15 @@ fn mask(random: &mut Random, size: u32, (step, sample_count, part_count): (u32, 
 
 impl Case for SampleMask {
     const SEED_COUNT: u64 = 8;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 0.0, least: 0.5 };
     const REASON: &'static str = "yes or no, undecided where a sample lies on the border of a part or a share on its \
         threshold to within rounding";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("seen", |own| increase(own.seen.iter_mut().map(|[weight, _]| weight))),
-        ("rays", |own| own.rays.iter_mut().for_each(|ray| ray.far *= 1.01)),
-        ("pixels", |own| own.pixels.iter_mut().for_each(|pixel| *pixel = *pixel * 99 / 100)),
-        ("depths", |own| increase(&mut own.depths)),
-        ("parameters", |own| own.block.least_share *= 1.01),
+        ("seen", |case| increase(case.seen.iter_mut().map(|[weight, _]| weight))),
+        ("rays", |case| case.rays.iter_mut().for_each(|ray| ray.far *= 1.01)),
+        ("pixels", |case| case.pixels.iter_mut().for_each(|pixel| *pixel = *pixel * 99 / 100)),
+        ("depths", |case| increase(&mut case.depths)),
+        ("parameters", |case| case.block.least_share *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<SampleMask> {

@@ -37,16 +37,15 @@ fn jobs(random: &mut Random, size: u32) -> Vec<GatherVolume> {
 
 impl Case for GatherVolume {
     const SEED_COUNT: u64 = 8;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 5.0e-3, least: 1.0e-2 };
     const REASON: &'static str = "errors of a projection and of the depth, in nodes, times the change of the volume over a \
         node; eight products; undecided where a point is on the view's plane to within rounding";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("views", |own| own.views.iter_mut().for_each(|view| view.intrinsics[0] *= 1.01)),
-        ("points", |own| own.points.iter_mut().for_each(|point| point.position[1] *= 1.01)),
+        ("views", |case| case.views.iter_mut().for_each(|view| view.intrinsics[0] *= 1.01)),
+        ("points", |case| case.points.iter_mut().for_each(|point| point.position[1] *= 1.01)),
         // Of the first view.
-        ("volume", |own| increase(own.volume.iter_mut().filter(|_| own.block.view == 0))),
-        ("parameters", |own| own.block.near *= 1.01),
+        ("volume", |case| increase(case.volume.iter_mut().filter(|_| case.block.view == 0))),
+        ("parameters", |case| case.block.near *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<GatherVolume> {
@@ -68,19 +67,18 @@ impl Case for GatherVolume {
 
 impl Case for GatherVolumeF16 {
     const SEED_COUNT: u64 = 8;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = GatherVolume::LIMITS;
     const REASON: &'static str = "as gather_volume: numbers in half precision are read exactly";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("views", |own| own.views.iter_mut().for_each(|view| view.intrinsics[0] *= 1.01)),
-        ("points", |own| own.points.iter_mut().for_each(|point| point.position[1] *= 1.01)),
+        ("views", |case| case.views.iter_mut().for_each(|view| view.intrinsics[0] *= 1.01)),
+        ("points", |case| case.points.iter_mut().for_each(|point| point.position[1] *= 1.01)),
         // Of the first view.
-        ("volume", |own| {
-            if own.block.view == 0 {
-                half_precision::increase_packed(&mut own.volume)
+        ("volume", |case| {
+            if case.block.view == 0 {
+                half_precision::increase_packed(&mut case.volume)
             }
         }),
-        ("parameters", |own| own.block.near *= 1.01),
+        ("parameters", |case| case.block.near *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<GatherVolumeF16> {

@@ -18,13 +18,12 @@ fn place(sweep: &SweepBlock, element: usize) -> (u32, u32) {
 }
 
 impl Case for SumRow {
-    const SEED_COUNT: u64 = 4;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 1.0e-6, least: 1.0e-2 };
     const REASON: &'static str = "at most five additions of costs of at most 0.2";
     // All but those outside.
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] =
-        &[("costs", |own| increase(own.costs.iter_mut().filter(|cost| **cost > 0.0)))];
+        &[("costs", |case| increase(case.costs.iter_mut().filter(|cost| **cost > 0.0)))];
 
     fn inputs(seed: u64, size: u32) -> Vec<SumRow> {
         let (block, costs) = band(seed, size);
@@ -42,14 +41,13 @@ impl Case for SumRow {
 }
 
 impl Case for MeanColumn {
-    const SEED_COUNT: u64 = 4;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 1.0e-6, least: 1.0e-2 };
     const REASON: &'static str = "at most 25 additions of costs of at most 0.2, a division of 2.5 ULP";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         // What is outside the hull and what is not: the values themselves come in through the sums.
-        ("costs", |own| own.costs.iter_mut().step_by(100).for_each(|cost| *cost = -*cost)),
-        ("row_sums", |own| increase(own.row_sums.iter_mut().map(|[sum, _]| sum))),
+        ("costs", |case| case.costs.iter_mut().step_by(100).for_each(|cost| *cost = -*cost)),
+        ("row_sums", |case| increase(case.row_sums.iter_mut().map(|[sum, _]| sum))),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<MeanColumn> {

@@ -31,12 +31,11 @@ fn place(block: &WindowBlock, element: usize) -> (u32, u32) {
 }
 
 impl Case for RowSums {
-    const SEED_COUNT: u64 = 4;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 2.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "at most thirteen additions of weights of at most 1";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] =
-        &[("costs", |own| increase(own.costs.iter_mut().step_by(2).flatten()))];
+        &[("costs", |case| increase(case.costs.iter_mut().step_by(2).flatten()))];
 
     fn inputs(seed: u64, size: u32) -> Vec<RowSums> {
         let (block, costs) = weighted(seed, size);
@@ -53,13 +52,11 @@ impl Case for RowSums {
 }
 
 impl Case for WindowCost {
-    const SEED_COUNT: u64 = 4;
-    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 2.0e-6, least: 1.0e-2 };
     const REASON: &'static str = "for each window at most thirteen additions of sums, and a quotient below 0.4";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("sums", |own| increase(own.sums.iter_mut().step_by(2).flatten())),
-        ("parameters", |own| own.block.near_cost *= 1.01),
+        ("sums", |case| increase(case.sums.iter_mut().step_by(2).flatten())),
+        ("parameters", |case| case.block.near_cost *= 1.01),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<WindowCost> {

@@ -59,9 +59,9 @@ impl Augmentation {
             let name = if self.sources.is_empty() { "sources" } else { "schemes" };
             return refuse(name, 0.0, "at least one is needed");
         }
-        let fits = |own: &u32| (16..=side).contains(own) && own.is_multiple_of(16);
-        if let Some(own) = self.sides.iter().find(|own| !fits(own)) {
-            return refuse("sides", f64::from(*own), "it must be a multiple of 16 from 16 to the side");
+        let fits = |size: &u32| (16..=side).contains(size) && size.is_multiple_of(16);
+        if let Some(wrong) = self.sides.iter().find(|size| !fits(size)) {
+            return refuse("sides", f64::from(*wrong), "it must be a multiple of 16 from 16 to the side");
         }
         if !(self.least_crop > 0.0 && self.least_crop <= 1.0) {
             return refuse("least_crop", f64::from(self.least_crop), "it must be above 0 and at most 1");

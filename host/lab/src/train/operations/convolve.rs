@@ -142,12 +142,12 @@ impl Operation<3> for Convolution {
             for strip in self.strips() {
                 let rows = self.unfold(image, &strip, &mut scratch);
                 let own = &mut output[strip.start * out_width * outs..strip.end * out_width * outs];
-                own.chunks_exact_mut(outs).for_each(|own| own.copy_from_slice(biases));
+                own.chunks_exact_mut(outs).for_each(|pixel| pixel.copy_from_slice(biases));
                 let count = strip.len() * out_width;
                 add_product(matrix(rows, count, row_len), weights.t(), matrix_mut(own, count, outs));
                 if self.rectifies {
                     // NaN stays NaN, so that the loss shows it.
-                    own.iter_mut().for_each(|own| *own = if *own < T::zero() { T::zero() } else { *own });
+                    own.iter_mut().for_each(|value| *value = if *value < T::zero() { T::zero() } else { *value });
                 }
             }
         });

@@ -144,7 +144,10 @@ fn the_point_network_has_its_gradient() {
         let (grids, parameters) = (grids.as_detached_tensor(), parameters.as_detached_tensor());
         let raw = grids.apply_op3(&weights, &parameters, Apply(point_network(true))).expect("samples");
         let gradients = mixed(&raw).and_then(|sum| sum.backward()).expect("gradients");
-        gradients.get(&weights).and_then(|own| own.flatten_all().ok()?.to_vec1::<f64>().ok()).expect("a gradient")
+        gradients
+            .get(&weights)
+            .and_then(|gradient| gradient.flatten_all().ok()?.to_vec1::<f64>().ok())
+            .expect("a gradient")
     };
     assert_eq!(frozen, of_weights(false).expect("gradients"));
 }
