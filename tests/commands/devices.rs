@@ -71,11 +71,16 @@ fn devices_that_are_not_there_are_refused() {
         &["from 0.001 to 86400"],
     );
     let (adapters, problem) = adapters();
-    for (device, wanted) in [("vulkan:99", "99"), ("vulkan:nonsense", "nonsense")] {
+    // A number is an index, also where it stands in a device's name.
+    let in_names = adapters.iter().flat_map(|adapter| adapter.name.split(|own: char| !own.is_ascii_digit()));
+    let is_none = |number: &&str| number.parse().is_ok_and(|number: usize| number >= adapters.len());
+    for wanted in in_names.filter(is_none).chain(["99", "'nonsense'", "'v'"]) {
         // Without any, that is what is said.
-        let mut parts = vec![problem.as_deref().unwrap_or(wanted)];
-        parts.extend(adapters.iter().map(|adapter| adapter.name.as_str()));
-        assert_refused(BINARY, scene.path(), &render(device), &parts);
+        let counted: Vec<String> = adapters.iter().map(|own| format!("{} {}", own.index, own.name)).collect();
+        let are = if counted.len() == 1 { "is" } else { "are" };
+        let said = format!("no Vulkan device {wanted}; there {are}: {}", counted.join(", "));
+        let device = format!("vulkan:{}", wanted.trim_matches('\''));
+        assert_refused(BINARY, scene.path(), &render(&device), &[problem.as_deref().unwrap_or(&said)]);
     }
 }
 

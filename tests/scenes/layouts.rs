@@ -175,6 +175,12 @@ fn a_view_is_found_by_name_or_by_its_number() {
     folder.image("rgb/car2.png", 16, 12).write("pose/car2.txt", scenes::words(&scenes::WORLD_FROM_CAMERA));
     let scene = open(&folder);
     assert_eq!((scene.view_named("2"), scene.view_named("02"), scene.view_named("car2")), (Some(0), None, Some(2)));
+    // Without numbers in the names, a number is an index.
+    let mut scene = scene;
+    for (view, name) in scene.views.iter_mut().zip(["front", "left", "5 right", "back", "top"]) {
+        view.name = name.to_owned();
+    }
+    assert_eq!(["0", "2", "5", "9"].map(|number| scene.view_named(number)), [Some(0), Some(2), None, None]);
 }
 
 #[test]

@@ -209,26 +209,37 @@ impl Adapter {
         format!("{vendor:x}-{device:x}-{cache}")
     }
 
-    /// Chooses among [`Instance::adapters`]: by number, by a part of the name (in any case), or, for an empty text,
-    /// any. Of several, the first usable one. A number that no device has may still be part of a name ("4090").
+    /// Chooses among [`Instance::adapters`]: by number, by whole words of the name (in any case), or, for an empty
+    /// text, any. Of several, the first usable one. A number is always the device's: a name may hold numbers, too.
     ///
     /// # Errors
-    /// [`VulkanError::NoDevice`] if none matches, [`VulkanError::Missing`] if the matching one cannot be used.
+    /// [`VulkanError::NoSuchDevice`] if none matches, [`VulkanError::Missing`] if the matching one cannot be used.
     pub fn choose<'a>(adapters: &'a [Adapter], wanted: &str) -> Result<&'a Adapter, VulkanError> {
+        let is_number = !wanted.is_empty() && wanted.bytes().all(|byte| byte.is_ascii_digit());
         let lower = wanted.to_lowercase();
-        let numbered = wanted.parse::<usize>().ok().and_then(|index| adapters.get(index));
-        let named = || adapters.iter().filter(|adapter| adapter.name.to_lowercase().contains(&lower));
-        let found = numbered.or_else(|| named().find(|adapter| adapter.missing.is_empty()).or(named().next()));
-        let Some(adapter) = found else {
-            let there: Vec<String> = adapters.iter().map(|a| format!("{}: {}", a.index, a.name)).collect();
-            let detail = format!("none is called '{wanted}'; there are {}", there.join(", "));
-            return Err(VulkanError::NoDevice { detail });
+        let fits = |adapter: &&Adapter| match is_number {
+            true => wanted.parse() == Ok(adapter.index),
+            false => has_words(&adapter.name.to_lowercase(), &lower),
+        };
+        let fitting = || adapters.iter().filter(fits);
+        let Some(adapter) = fitting().find(|adapter| adapter.missing.is_empty()).or(fitting().next()) else {
+            let wanted = if is_number { wanted.to_owned() } else { format!("'{wanted}'") };
+            let there = adapters.iter().map(|adapter| format!("{} {}", adapter.index, adapter.name)).collect();
+            return Err(VulkanError::NoSuchDevice { wanted, there });
         };
         match adapter.missing.is_empty() {
             true => Ok(adapter),
             false => Err(VulkanError::Missing { device: adapter.name.clone(), missing: adapter.missing.clone() }),
         }
     }
+}
+
+/// Whether a name holds a text that neither begins nor ends within a word of it.
+fn has_words(name: &str, text: &str) -> bool {
+    let is_word = |character: Option<char>| character.is_some_and(char::is_alphanumeric);
+    let begins_within = |at: usize| is_word(name[..at].chars().next_back()) && is_word(text.chars().next());
+    let ends_within = |end: usize| is_word(name[end..].chars().next()) && is_word(text.chars().next_back());
+    name.match_indices(text).any(|(at, _)| !begins_within(at) && !ends_within(at + text.len()))
 }
 
 fn text(name: Result<&CStr, FromBytesUntilNulError>) -> String {

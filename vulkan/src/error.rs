@@ -25,6 +25,14 @@ pub enum VulkanError {
         /// The request, and the devices that exist.
         detail: String,
     },
+    /// No device has this number, or these words in its name.
+    #[error("no Vulkan device {wanted}; {}", counted(.there))]
+    NoSuchDevice {
+        /// The number, or the name between quotes.
+        wanted: String,
+        /// Number and name of each device.
+        there: Vec<String>,
+    },
     /// The device lacks a requirement.
     #[error("{device} lacks what viewfuse needs: {}", list(.missing))]
     Missing {
@@ -154,6 +162,15 @@ impl fmt::Display for Missing {
             Missing::Limit { name, needed, found } => write!(f, "{name} of {needed} (it has {found})"),
             Missing::ComputeQueue => write!(f, "a compute queue"),
         }
+    }
+}
+
+/// Devices in words.
+fn counted(there: &[String]) -> String {
+    match there {
+        [] => "there is none".to_owned(),
+        [one] => format!("there is: {one}"),
+        several => format!("there are: {}", several.join(", ")),
     }
 }
 

@@ -16,7 +16,7 @@ pub enum DeviceChoice {
     Auto,
     /// All cores of this machine.
     Cpu,
-    /// A Vulkan device: its number or a part of its name; empty for the best.
+    /// A Vulkan device: its number or whole words of its name; empty for the best.
     Vulkan(String),
 }
 

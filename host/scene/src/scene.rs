@@ -346,10 +346,11 @@ impl Scene {
     /// The index of the view that `text` refers to: the view of exactly this name; otherwise, if `text` is a
     /// whole number, the one view whose name ends in that number, leading zeros aside.
     ///
-    /// `1` finds `dinoSR0001`, `3` finds `000003`, also where the count starts at 0. A number alone is never an index
-    /// into [`Scene::views`]: some data sets count from 1 and some from 0. Of a photograph and a target pose of the
-    /// same number the photograph is meant. `#3` is the index 3, in any scene without a view of just this name. `None`
-    /// if no view fits or, by number, several do.
+    /// `1` finds `dinoSR0001`, `3` finds `000003`, also where the count starts at 0. Where names end in numbers, a
+    /// number alone is never an index into [`Scene::views`]: some data sets count from 1 and some from 0. Where none
+    /// does (`left`, `right`), it is. Of a photograph and a target pose of the same number the photograph is meant.
+    /// `#3` is the index 3, in any scene without a view of just this name. `None` if no view fits or, by number,
+    /// several do.
     pub fn view_named(&self, text: &str) -> Option<usize> {
         if let Some(view) = self.views.iter().position(|view| view.name == text) {
             return Some(view);
@@ -359,6 +360,9 @@ impl Scene {
             return index.parse().ok().filter(|index| is_number && *index < self.views.len());
         }
         let wanted = trailing_number(text).filter(|_| text.bytes().all(|byte| byte.is_ascii_digit()))?;
+        if self.views.iter().all(|view| trailing_number(&view.name).is_none()) {
+            return text.parse().ok().filter(|index| *index < self.views.len());
+        }
         let fitting = |has_image: bool| {
             let fits =
                 move |view: &View| view.image.is_some() == has_image && trailing_number(&view.name) == Some(wanted);
