@@ -282,3 +282,21 @@ fn selections_along_paths() {
     let error = selection.resolve(&scene, 2).expect_err("two of a name").to_string();
     assert!(error.ends_with("two targets are called '000005'"), "{error}");
 }
+
+/// Names are given back as they stand in a table, but for the extension of a picture; results are files of the name.
+#[test]
+fn names_of_a_table_are_kept_or_refused() {
+    let table = |names: &[&str]| {
+        let line = |name: &&str| format!("\"{}\",0,0,0,1,0,0,0\n", name.replace('"', "\"\""));
+        let text = format!("name,x,y,z,qw,qx,qy,qz\n{}", names.iter().map(line).collect::<String>());
+        let path = path_of("path.csv", text)?;
+        Ok::<_, String>(path.cameras.into_iter().map(|camera| camera.name).collect::<Vec<String>>())
+    };
+    let kept = ["v1.5", "v1.6", "a,b", "\"q\"", "two\nlines", "\u{1b}[2J", "\u{e9}", ".hidden", &"x".repeat(240)];
+    assert_eq!(table(&kept), Ok(kept.map(str::to_owned).to_vec()));
+    assert_eq!(table(&["out/a.png", "b.JPG"]), Ok(["a", "b"].map(str::to_owned).to_vec()));
+    for (name, reason) in [("nul\0", "it holds a NUL"), (&*"x".repeat(241), "it is too long")] {
+        let error = table(&["a", name]).expect_err("no name of a file");
+        assert!(error.contains("cannot be the name of a view") && error.contains(reason), "{error}");
+    }
+}

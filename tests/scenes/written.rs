@@ -319,3 +319,108 @@ fn a_scene_far_from_the_origin_is_written_in_its_own_coordinates() {
         assert!((radius * distance(&read) - distance(&scene)).abs() < 1e-6, "{layout}");
     }
 }
+
+/// Names that file systems hold, and the layouts that do not.
+fn hostile_names() -> Vec<(String, Vec<Layout>)> {
+    let lists = || vec![Layout::Srn, Layout::Llff, Layout::Neus];
+    let lines = || vec![Layout::Colmap, Layout::Middlebury];
+    let held = [
+        "plain",
+        "a.b",
+        "a.png",
+        "dot.",
+        "quote\"'",
+        "#comment",
+        "1",
+        "-3",
+        "007",
+        "target_1",
+        "x_par.txt",
+        "\u{e9}",
+        "e\u{301}",
+        "\u{feff}bom",
+        "a,b;c",
+        "%E9",
+        "{json}",
+        "\u{1b}[2J",
+        "\u{7f}",
+        "*?$(rm)",
+        "CON",
+        "images",
+        "nan",
+    ];
+    let mut all: Vec<(String, Vec<Layout>)> = held.iter().map(|name| ((*name).to_owned(), Vec::new())).collect();
+    all.push(("x".repeat(240), Vec::new()));
+    all.push(("x".repeat(241), Layout::ALL.to_vec()));
+    all.extend([".hidden", "..", "..."].map(|name| (name.to_owned(), lists())));
+    all.extend(["line\nbreak", "a\rb", "\ta", " leading", "\u{2003}em"].map(|name| (name.to_owned(), lines())));
+    all.extend(["a b", "trailing ", "\u{2028}", "a\tb"].map(|name| (name.to_owned(), vec![Layout::Middlebury])));
+    if cfg!(unix) {
+        all.push(("back\\slash".to_owned(), vec![Layout::Transforms]));
+    }
+    // A separator at the beginning of a line is a blank to a reader of words.
+    all.iter_mut().filter(|(name, _)| name == "\u{2028}").for_each(|(_, layouts)| layouts.push(Layout::Colmap));
+    all
+}
+
+/// Every layout gives a scene of hostile names back, or refuses it and leaves nothing.
+#[test]
+fn hostile_names_are_given_back_or_refused() {
+    let folder = llff();
+    let mut second = llff_row();
+    (second[3], second[8]) = (1.25, 2.5);
+    folder.write("poses_bounds.npy", npy(&[2, 17], &[llff_row(), second].concat()));
+    let plain = open(&folder);
+    for (index, view) in plain.views.iter().enumerate() {
+        let level = 90 * index as u8;
+        let path = view.image.as_ref().expect("a photograph");
+        image::RgbImage::from_pixel(16, 12, image::Rgb([level; 3])).save(path).expect("a picture of its own");
+    }
+    for (name, refused_by) in hostile_names() {
+        let mut scene = plain.clone();
+        // In the order of their files, which LLFF's layout keeps.
+        let mut names = [name.clone(), "m".to_owned()];
+        names.sort_by_key(|name| format!("{name}.png"));
+        scene.views.iter_mut().zip(names).for_each(|(view, name)| view.name = name);
+        for layout in Layout::ALL {
+            let out = Folder::new();
+            let path = out.path().join("out");
+            match write(&scene, layout, &path, &Silent) {
+                Ok(_) => {
+                    assert!(!refused_by.contains(&layout), "{layout}: {name:?} was to be refused");
+                    let read = Scene::open(&path).unwrap_or_else(|error| panic!("{layout}: {error}"));
+                    assert_eq!(read.views.len(), 2, "{layout}: {name:?}");
+                    for (index, view) in scene.views.iter().enumerate() {
+                        let back = read.views.iter().position(|own| own.name == view.name);
+                        let back = back.unwrap_or_else(|| panic!("{layout}: {name:?}: {:?}", self::names(&read)));
+                        assert_eq!(scene.photograph(index).ok(), read.photograph(back).ok(), "{layout}: {name:?}");
+                        let centre = |scene: &Scene, view: usize| scene.views[view].camera.pose.centre_world();
+                        let moved = centre(&scene, index).distance(centre(&read, back));
+                        assert!(layout == Layout::Neus || moved < 1e-5, "{layout}: {name:?} by {moved}");
+                    }
+                }
+                Err(error) => {
+                    assert!(refused_by.contains(&layout), "{layout}: {error}");
+                    assert!(error.to_string().contains(&format!("the name {name:?}")), "{error}");
+                    assert_eq!(std::fs::read_dir(out.path()).expect("a folder").count(), 0, "{layout}: {name:?}");
+                }
+            }
+        }
+    }
+}
+
+/// What no rule of names foresees is found when the files are read back: LLFF's rows are in the order of the files.
+#[test]
+fn poses_of_other_photographs_are_not_written() {
+    let folder = llff();
+    let mut second = llff_row();
+    (second[3], second[8]) = (1.25, 2.5);
+    folder.write("poses_bounds.npy", npy(&[2, 17], &[llff_row(), second].concat()));
+    let mut scene = open(&folder);
+    // `a-b.png` comes before `a.png`, `a` before `a-b`.
+    scene.views.iter_mut().zip(["a", "a-b"]).for_each(|(view, name)| view.name = name.to_owned());
+    let out = Folder::new();
+    let error = write(&scene, Layout::Llff, &out.path().join("out"), &Silent).expect_err("another order");
+    assert!(error.to_string().contains("is read back with the pose of another"), "{error}");
+    assert_eq!(std::fs::read_dir(out.path()).expect("a folder").count(), 0);
+}

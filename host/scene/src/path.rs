@@ -24,7 +24,7 @@ use serde_json::Value;
 use viewfuse_core::camera::{Camera, Pinhole};
 
 use crate::Scene;
-use crate::scene::check::camera_in;
+use crate::scene::check::{camera_in, is_name};
 use crate::scene::files::{has_extension, read_text};
 use crate::scene::json::{self, Object};
 use crate::scene::reader::RawView;
@@ -101,7 +101,7 @@ impl CameraPath {
 
 /// The names of a path's cameras, made up where they are missing or equal.
 fn names(path: &Path, views: Vec<RawView>) -> Result<Vec<String>, SceneError> {
-    if let Some(view) = views.iter().find(|view| view.name.contains(std::path::is_separator)) {
+    if let Some(view) = views.iter().find(|view| !view.name.is_empty() && !is_name(&view.name)) {
         return Err(SceneError::Name { path: path.to_path_buf(), name: view.name.clone() });
     }
     let differ = views.iter().map(|view| view.name.as_str()).collect::<HashSet<_>>().len() == views.len();
@@ -116,7 +116,7 @@ pub(crate) fn numbered(what: &str, index: usize) -> String {
     format!("{what}-{index:03}")
 }
 
-/// A name from the file that a view would have: its stem.
+/// A name from the file that a view would have: without its folder, and without the extension of a picture.
 fn stem_of(file: &str) -> String {
-    files::stem(Path::new(&file.replace('\\', "/")))
+    files::picture_stem(Path::new(&file.replace('\\', "/")))
 }

@@ -3,16 +3,19 @@
 //! Poses are written in the coordinates of the scene's own files ([`crate::SceneFrame`]). Photographs are copied
 //! unchanged if the layout can hold their lens and their mask; otherwise they are written undistorted, with the mask as
 //! the alpha channel. In NeRF's and COLMAP's layouts masks say which pixels do not count: those of an object become the
-//! alpha channel, of photographs that are not undistorted. A layout that cannot hold a scene refuses it with the reason; data that is lost without changing
-//! what the cameras see (points, near and far bounds, splits) is listed in [`Written::left_out`].
+//! alpha channel, of photographs that are not undistorted. A layout that cannot hold a scene refuses it with the
+//! reason; data that is lost without changing what the cameras see (points, near and far bounds, splits) is listed in [`Written::left_out`].
 //!
-//! The folder appears whole or not at all: it is filled under a temporary name in the same folder, and renamed.
+//! The folder appears whole or not at all: it is filled under a temporary name in the same folder, opened as any scene
+//! (`readback`), and renamed.
 
 mod colmap;
 mod llff;
 mod middlebury;
+mod names;
 mod neus;
 mod photographs;
+mod readback;
 mod srn;
 mod transforms;
 
@@ -26,6 +29,7 @@ use viewfuse_job::progress::{Interrupted, Progress};
 
 use crate::scene::camera_models::KeyedLens;
 use crate::{Scene, SceneError, View};
+pub use names::check_name;
 
 /// A layout in which scenes can be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -179,16 +183,16 @@ pub fn write_with(
 ) -> Result<Written, WriteSceneError> {
     let failed = |cause| WriteSceneError::Io { path: folder.to_path_buf(), cause };
     let is_empty = || fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none());
-    if folder.exists() && !is_empty() {
+    if folder.is_symlink() || folder.exists() && !is_empty() {
         return Err(WriteSceneError::Occupied { folder: folder.to_path_buf() });
     }
     let unfit = |reason| WriteSceneError::Unfit { scene: scene.path.clone(), layout, reason };
+    scene.views.iter().try_for_each(|view| check_name(layout, &view.name)).map_err(unfit)?;
     match layout {
         Layout::Transforms => all_photographed(scene),
-        Layout::Colmap | Layout::ColmapBinary => all_photographed(scene),
+        Layout::Colmap | Layout::ColmapBinary | Layout::Middlebury => all_photographed(scene),
         Layout::Neus => all_photographed(scene).and_then(|()| neus::fits(scene)),
         Layout::Srn => srn::fits(scene),
-        Layout::Middlebury => all_photographed(scene).and_then(|()| middlebury::fits(scene)),
         Layout::Llff => all_photographed(scene).and_then(|()| llff::fits(scene)),
     }
     .map_err(unfit)?;
@@ -206,6 +210,7 @@ pub fn write_with(
         Layout::Llff => llff::write(&mut out)?,
         Layout::Neus => neus::write(&mut out)?,
     };
+    readback::check(scene, layout, &draft).map_err(unfit)?;
     beside.iter().try_for_each(|(name, bytes)| out.put(name, bytes))?;
     unfinished.finish().map_err(failed)?;
     Ok(Written { folder: folder.to_path_buf(), photograph_count, left_out: left_out(scene, layout) })

@@ -68,6 +68,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let text = if arguments.json {
         format!("{}\n", serde_json::to_string_pretty(&selected)?)
     } else if arguments.lines {
+        if let Some(own) = job.targets.iter().find(|own| own.name.contains(['\n', '\r'])) {
+            return Err(wrong(format_args!(
+                "--lines: the name {:?} has a line break in it; --json holds it",
+                own.name
+            )));
+        }
         selected.lines()
     } else if arguments.index {
         let no_index =

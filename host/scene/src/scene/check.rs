@@ -17,6 +17,15 @@ use super::images;
 use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPoint, RawPose, RawScene, RawView};
 use super::{SceneFrame, ScenePoint, View};
 
+/// Most bytes of a view's name: file systems take 255, and results have endings such as `_confidence.png`.
+const MAX_NAME: usize = 240;
+
+/// Whether a view may be called so: results are files of its name.
+pub(crate) fn is_name(name: &str) -> bool {
+    let is_no_part = |own: char| std::path::is_separator(own) || own == '\0';
+    !name.is_empty() && name.len() <= MAX_NAME && !name.contains(is_no_part)
+}
+
 /// A scene whose numbers were checked.
 pub(super) struct Checked {
     pub(super) views: Vec<View>,
@@ -39,7 +48,7 @@ pub(super) fn scene(found: &Path, form: &'static str, raw: RawScene) -> Result<C
 
     let mut views: Vec<View> = Vec::with_capacity(raw_views.len());
     for raw in order.iter().map(|&view| &raw_views[view]) {
-        if raw.name.is_empty() || raw.name.contains(std::path::is_separator) {
+        if !is_name(&raw.name) {
             return Err(SceneError::Name { path: found.to_path_buf(), name: raw.name.clone() });
         }
         let pinhole = match (&raw.intrinsics, views.first()) {

@@ -149,7 +149,7 @@ pub enum SceneError {
         pose: PathBuf,
     },
     /// A view's name cannot be that of a file.
-    #[error("{path}: {name:?} cannot be the name of a view: it is empty or holds a separator of folders")]
+    #[error("{path}: {name:?} cannot be the name of a view, of which files are called: {}", not_a_name(.name))]
     Name {
         /// The scene.
         path: PathBuf,
@@ -503,5 +503,15 @@ fn in_one_line(cause: &image::ImageError) -> String {
     match line.char_indices().nth(LONGEST_CAUSE) {
         Some((end, _)) => format!("{}...", &line[..end]),
         None => line,
+    }
+}
+
+/// Why a text is no name of a view.
+fn not_a_name(name: &str) -> &'static str {
+    match name {
+        "" => "it is empty",
+        _ if name.contains('\0') => "it holds a NUL",
+        _ if name.contains(std::path::is_separator) => "it holds a separator of folders",
+        _ => "it is too long",
     }
 }

@@ -140,6 +140,11 @@ pub fn stem(path: &Path) -> String {
     exact(path.file_stem().unwrap_or_default())
 }
 
+/// The same of a picture that need not be there: what follows the last dot stays if pictures have no such extension.
+pub(crate) fn picture_stem(path: &Path) -> String {
+    if has_extension(path, &IMAGE_EXTENSIONS) { stem(path) } else { exact(path.file_name().unwrap_or_default()) }
+}
+
 /// A name of the file system as text; bytes that are not UTF-8 are written as `%E9`.
 pub(super) fn exact(name: &OsStr) -> String {
     let mut text = String::new();

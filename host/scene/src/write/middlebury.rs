@@ -1,14 +1,6 @@
 //! Middlebury's list: `K R t` of each photograph, pixel centres at whole numbers.
 
 use super::{Draft, WriteSceneError, camera_from_world, words};
-use crate::Scene;
-
-pub(super) fn fits(scene: &Scene) -> Result<(), String> {
-    match scene.views.iter().find(|view| view.name.contains(char::is_whitespace)) {
-        Some(view) => Err(format!("the name {:?} has a blank in it", view.name)),
-        None => Ok(()),
-    }
-}
 
 pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
     let mut list = format!("{}\n", out.scene.views.len());

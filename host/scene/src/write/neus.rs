@@ -93,7 +93,7 @@ fn numbers(views: &[View], files: &[String]) -> Vec<u64> {
 }
 
 /// Centre and radius of the sphere in the coordinates of the scene's files.
-fn sphere(scene: &Scene) -> (DVec3, f64) {
+pub(super) fn sphere(scene: &Scene) -> (DVec3, f64) {
     if is_own(scene) {
         return (DVec3::ZERO, 1.0);
     }

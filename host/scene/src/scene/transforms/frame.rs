@@ -106,7 +106,7 @@ impl<'a> Frame<'a> {
         let has_focal = ["fl_x", "camera_angle_x", "x_fov"].iter().any(|key| self.get(key).is_some());
         let intrinsics = if has_focal { Some(RawIntrinsics { lens: None, ..self.intrinsics(size)? }) } else { None };
         let intrinsics = intrinsics.map(|own| RawIntrinsics { size: own.size.or(Some(size)), ..own });
-        let name = frame.get("file_path").and_then(Value::as_str).map(|path| files::stem(&self.beside(path)));
+        let name = frame.get("file_path").and_then(Value::as_str).map(|path| files::picture_stem(&self.beside(path)));
         Ok(RawView::new(name.unwrap_or_default(), None, pose, intrinsics))
     }
 
