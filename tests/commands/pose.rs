@@ -55,6 +55,7 @@ pub(crate) fn trials() -> Vec<Trial> {
         trial("commands::pose::formats_that_are_not_read", formats_that_are_not_read),
         trial("commands::pose::too_many_and_too_few", too_many_and_too_few),
         trial("commands::pose::without_the_program", without_the_program),
+        trial("commands::pose::what_lies_beside_the_output_stays", what_lies_beside_the_output_stays),
         trial("commands::pose::bare_photographs_say_how", bare_photographs_say_how),
     ];
     own.into_iter().chain(colmap::trials()).chain(on_the_way::trials()).chain(stopped::trials()).collect()
@@ -324,6 +325,29 @@ fn without_the_program() {
     named.env("VIEWFUSE_OPENMVG", "/bin/echo");
     if Path::new("/bin/echo").exists() {
         assert_command_refused(named, folder.path(), &["/bin/echo: its answer cannot be read"]);
+    }
+}
+
+/// The hidden folder of attempts may be a person's, or of a run that was stopped.
+fn what_lies_beside_the_output_stays() {
+    let folder = bare(0..3);
+    folder.write(".posed.attempts/notes.txt", "mine").write(".posed.attempts/inner/more.txt", "mine");
+    // Without an input nothing has begun.
+    assert_refused(BINARY, folder.path(), "pose nowhere -o posed", &["nowhere"]);
+    // A solver that was asked, and failed.
+    if Path::new("/bin/echo").exists() {
+        let mut named: Command = command(BINARY, folder.path(), "pose bare -o posed");
+        named.env("VIEWFUSE_OPENMVG", "/bin/echo");
+        assert_command_refused(named, folder.path(), &["/bin/echo"]);
+    }
+    #[cfg(unix)]
+    {
+        fs::create_dir(folder.path().join("elsewhere")).expect("a folder");
+        let link = folder.path().join(".linked.attempts");
+        std::os::unix::fs::symlink(folder.path().join("elsewhere"), &link).expect("a link");
+        assert_refused(BINARY, folder.path(), "pose bare -o linked", &[".linked.attempts: it is a link"]);
+        std::os::unix::fs::symlink("elsewhere", folder.path().join("posed")).expect("a link");
+        assert_refused(BINARY, folder.path(), "pose bare -o posed", &["posed: exists already"]);
     }
 }
 

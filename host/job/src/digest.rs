@@ -26,7 +26,52 @@ pub fn sha256(bytes: &[u8]) -> String {
     hexadecimal(&Sha256::digest(bytes))
 }
 
+/// Length of the seal before bytes that are kept.
+pub const SEAL: usize = 64;
+
+/// Bytes as they are kept in a file of this name: before them stands the digest of the name, of their number and of
+/// themselves.
+pub fn sealed(name: &str, bytes: &[u8]) -> Vec<u8> {
+    [seal(name, bytes).as_bytes(), bytes].concat()
+}
+
+/// The bytes that [`sealed`] was given with this name; `None` if these are not what it made of them, or were kept under
+/// another name.
+pub fn unsealed<'a>(name: &str, kept: &'a [u8]) -> Option<&'a [u8]> {
+    let (own, bytes) = kept.split_at_checked(SEAL)?;
+    (seal(name, bytes).as_bytes() == own).then_some(bytes)
+}
+
+fn seal(name: &str, bytes: &[u8]) -> String {
+    let mut digest = Sha256::new();
+    for part in [name.as_bytes(), bytes] {
+        digest.update((part.len() as u64).to_le_bytes());
+        digest.update(part);
+    }
+    hexadecimal(&digest.finalize())
+}
+
 /// Two digits a byte.
 pub fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{SEAL, sealed, unsealed};
+
+    #[test]
+    fn a_seal_covers_name_and_bytes() {
+        let kept = sealed("a", b"bc");
+        assert_eq!(
+            (unsealed("a", &kept), unsealed("a", &sealed("a", b""))),
+            (Some(b"bc".as_slice()), Some([].as_slice()))
+        );
+        assert_eq!((unsealed("b", &kept), unsealed("ab", &[&kept[..SEAL], b"c"].concat())), (None, None));
+        for at in 0..kept.len() {
+            let mut changed = kept.clone();
+            changed[at] ^= 1;
+            assert_eq!((unsealed("a", &changed), unsealed("a", &kept[..at])), (None, None), "byte {at}");
+        }
+    }
 }

@@ -12,7 +12,7 @@ pub use folder::WholeFolder;
 pub use journal::{Journal, JournalLines};
 pub use lock::FolderLock;
 pub use ordinary::{is_ordinary, open_ordinary};
-pub use unfinished::remove_all;
+pub use unfinished::{remove_all, remove_unfinished};
 
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -84,6 +84,11 @@ impl WholeFile {
         };
         let (file, unfinished) = Own::make(folder, make, |file| file.path().to_path_buf()).map_err(failed)?;
         Ok(WholeFile { path: path.to_path_buf(), writer: BufWriter::new(file), unfinished })
+    }
+
+    /// The temporary file, for a program that writes the content.
+    pub fn path(&self) -> &Path {
+        self.writer.get_ref().path()
     }
 
     /// Appends bytes.

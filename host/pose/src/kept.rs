@@ -7,18 +7,25 @@
 use crate::solution::{Features, Job, Solution, Solver, SolverError};
 use serde::{Deserialize, Serialize};
 use std::fs;
-use std::io::ErrorKind;
+use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
-use viewfuse_job::digest::{sha256, sha256_of};
-use viewfuse_job::files::write_whole;
+use std::sync::atomic::{AtomicBool, Ordering};
+use viewfuse_job::digest::{SEAL, sealed, sha256, sha256_of, unsealed};
+use viewfuse_job::files::{is_ordinary, read_at_most, remove_unfinished, write_whole};
 use viewfuse_job::progress::Progress;
+
+/// What the name of an answer's file ends in, behind its digest.
+const SUFFIX: &str = ".json";
+/// Most bytes of an answer: larger files are none.
+const MAX_ANSWER: u64 = 1 << 30;
 
 /// A solver whose answers are kept in a folder.
 pub struct Kept<'a> {
     solver: &'a dyn Solver,
     folder: &'a Path,
     identity: OnceLock<Option<String>>,
+    was_asked: AtomicBool,
 }
 
 /// An answer in its file.
@@ -42,7 +49,12 @@ impl Answer {
 impl<'a> Kept<'a> {
     /// Of a solver, in a folder that need not be there; the one that it is in must be, otherwise nothing is kept.
     pub fn new(solver: &'a dyn Solver, folder: &'a Path) -> Kept<'a> {
-        Kept { solver, folder, identity: OnceLock::new() }
+        Kept { solver, folder, identity: OnceLock::new(), was_asked: AtomicBool::new(false) }
+    }
+
+    /// Whether it was asked for a solution: work has begun.
+    pub fn was_asked(&self) -> bool {
+        self.was_asked.load(Ordering::Relaxed)
     }
 
     /// The folder for the answers while a scene is made: hidden, beside it. `None` for a path that ends in no name.
@@ -51,13 +63,39 @@ impl<'a> Kept<'a> {
         Some(scene.with_file_name(format!(".{name}.attempts")))
     }
 
-    /// Removes the folder: its scene is written, or will not be.
+    /// That answers can be kept in a folder: it is none yet, or a folder, and no link to a place elsewhere.
     ///
     /// # Errors
-    /// What the system says; that it is not there is none.
-    pub fn remove(folder: &Path) -> std::io::Result<()> {
-        match fs::remove_dir_all(folder) {
-            Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
+    /// If it is anything else, or what the system says.
+    pub fn check(folder: &Path) -> io::Result<()> {
+        match fs::symlink_metadata(folder) {
+            Err(cause) if cause.kind() == ErrorKind::NotFound => Ok(()),
+            Err(cause) => Err(cause),
+            Ok(about) if about.is_dir() => Ok(()),
+            Ok(_) => {
+                Err(io::Error::other("it is a link or a file, and is left alone; move it, or give another output"))
+            }
+        }
+    }
+
+    /// Removes the answers in a folder, and the folder if nothing else is in it: its scene is written, or will not be.
+    /// What is no answer by its name and its content stays.
+    ///
+    /// # Errors
+    /// What the system says; that the folder is not there is none.
+    pub fn remove(folder: &Path) -> io::Result<()> {
+        if !fs::symlink_metadata(folder).is_ok_and(|about| about.is_dir()) {
+            return Ok(());
+        }
+        remove_unfinished(folder);
+        for entry in fs::read_dir(folder)? {
+            let file = entry?.path();
+            if answer_in(&file).is_some() {
+                fs::remove_file(&file)?;
+            }
+        }
+        match fs::remove_dir(folder) {
+            Err(error) if error.kind() != ErrorKind::DirectoryNotEmpty => Err(error),
             _ => Ok(()),
         }
     }
@@ -71,15 +109,44 @@ impl<'a> Kept<'a> {
         }
         let own = (env!("CARGO_PKG_VERSION"), self.solver.name(), identity, job);
         let digest = sha256(&serde_json::to_vec(&own).ok()?);
-        Some(self.folder.join(format!("{digest}.json")))
+        Some(self.folder.join(digest + SUFFIX))
     }
 
     /// Keeps a text. A disk that cannot be written to costs no more than that: the scene's own files will tell.
     fn keep(&self, file: &Path, text: &[u8]) {
-        if fs::create_dir(self.folder).is_ok() || self.folder.is_dir() {
-            let _ = write_whole(file, text);
+        if Kept::check(self.folder).is_ok() && (fs::create_dir(self.folder).is_ok() || self.folder.is_dir()) {
+            let _ = write_whole(file, &sealed(&name_of(file), text));
         }
     }
+
+    /// The answer that is kept in a file, if it may be one to this job.
+    fn earlier(&self, file: &Path, job: &Job, progress: &dyn Progress) -> Option<Answer> {
+        if Kept::check(self.folder).is_err() || fs::symlink_metadata(file).is_err() {
+            return None;
+        }
+        let answer = answer_in(file).filter(|answer| answer.fits(job));
+        if answer.is_none() {
+            let folder = self.folder.display();
+            progress.warn(&format!("{folder}: holds answers that are not as they were kept; they are found anew"));
+        }
+        answer
+    }
+}
+
+/// The answer in a file of this program.
+fn answer_in(file: &Path) -> Option<Answer> {
+    let name = name_of(file);
+    let digest = name.strip_suffix(SUFFIX)?;
+    let is_digest = digest.len() == SEAL && digest.bytes().all(|byte| byte.is_ascii_hexdigit());
+    if !is_digest || !is_ordinary(file).ok()? {
+        return None;
+    }
+    let kept = read_at_most(file, MAX_ANSWER).ok()?;
+    serde_json::from_slice(unsealed(&name, &kept)?).ok()
+}
+
+fn name_of(file: &Path) -> String {
+    file.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 impl Solver for Kept<'_> {
@@ -96,9 +163,9 @@ impl Solver for Kept<'_> {
     }
 
     fn solve(&self, job: &Job, progress: &dyn Progress) -> Result<Solution, SolverError> {
+        self.was_asked.store(true, Ordering::Relaxed);
         let Some(file) = self.file(job, progress) else { return self.solver.solve(job, progress) };
-        let earlier = fs::read(&file).ok().and_then(|text| serde_json::from_slice::<Answer>(&text).ok());
-        if let Some(answer) = earlier.filter(|answer| answer.fits(job)) {
+        if let Some(answer) = self.earlier(&file, job, progress) {
             return answer.into();
         }
         let answer = match self.solver.solve(job, progress) {
@@ -193,14 +260,63 @@ mod tests {
         assert_eq!(solver.0.load(Ordering::Relaxed), 4, "nothing was found, once");
         assert!(focal(&moved, 8).is_err() && focal(&moved, 8).is_err());
         assert_eq!(solver.0.load(Ordering::Relaxed), 6, "what broke is tried again");
+        // An answer to another question, whole, under this one's name.
+        let answers = || fs::read_dir(&folder).expect("the folder").map(|own| own.expect("an entry").path());
+        let file = answers().find(|path| fs::read_to_string(path).expect("text").contains("\"focal\":1.0"));
+        let other = answers().find(|path| fs::read_to_string(path).expect("text").contains("\"focal\":2.0"));
+        let (file, other) = (file.expect("the first answer"), other.expect("the second one"));
+        fs::copy(&other, &file).expect("a copy");
+        assert_eq!(focal(&moved, 0), Ok(7.0), "found anew");
+        assert_eq!(focal(&moved, 0), Ok(7.0), "and kept");
         // Files that were cut or changed.
-        for entry in fs::read_dir(&folder).expect("the folder").flatten() {
-            fs::write(entry.path(), "{\"solution\"").expect("a file");
+        for path in answers() {
+            let text = fs::read_to_string(&path).expect("text");
+            fs::write(path, text.replace("7.0", "9.5")).expect("a file");
         }
-        assert_eq!(focal(&moved, 0), Ok(7.0));
+        assert_eq!(focal(&moved, 0), Ok(8.0));
         Kept::remove(&folder).expect("removed");
         Kept::remove(&folder).expect("nothing to remove");
-        assert_eq!(focal(&moved, 0), Ok(8.0));
+        assert!(!folder.exists());
+        assert_eq!(focal(&moved, 0), Ok(9.0));
+    }
+
+    /// A folder of the right name, with answers and with what is no answer by its name, its content or its kind.
+    #[test]
+    fn only_answers_are_removed() {
+        let scratch = tempfile::tempdir().expect("a folder");
+        let photograph = scratch.path().join("a.png");
+        fs::write(&photograph, "pixels").expect("a file");
+        let folder = scratch.path().join(".posed.attempts");
+        let solver = Counting::default();
+        let kept = Kept::new(&solver, &folder);
+        assert!(!kept.was_asked() && kept.solve(&job(&photograph, 0), &Silent).is_ok() && kept.was_asked());
+        let answer = fs::read_dir(&folder).expect("a folder").next().expect("an answer").expect("an entry").path();
+        let mine = ["notes.txt".to_owned(), format!("{}.json", "0".repeat(64)), "inner/a.json".to_owned()];
+        fs::create_dir(folder.join("inner")).expect("a folder");
+        mine.iter().for_each(|name| fs::write(folder.join(name), "{}").expect("a file"));
+        // An answer under another name is a person's copy.
+        fs::copy(&answer, folder.join(format!("{}.json", "1".repeat(64)))).expect("a copy");
+        Kept::remove(&folder).expect("removed");
+        let left = fs::read_dir(&folder).expect("a person's folder").count();
+        assert_eq!((answer.exists(), left, mine.map(|name| folder.join(name).exists())), (false, 4, [true; 3]));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn nothing_is_kept_or_removed_through_a_link() {
+        let scratch = tempfile::tempdir().expect("a folder");
+        let photograph = scratch.path().join("a.png");
+        fs::write(&photograph, "pixels").expect("a file");
+        let [folder, target] = [".posed.attempts", "elsewhere"].map(|name| scratch.path().join(name));
+        fs::create_dir(&target).expect("a folder");
+        let solver = Counting::default();
+        assert!(Kept::new(&solver, &target).solve(&job(&photograph, 0), &Silent).is_ok());
+        std::os::unix::fs::symlink(&target, &folder).expect("a link");
+        assert!(Kept::check(&folder).is_err() && Kept::check(&target).is_ok());
+        let focal = || Kept::new(&solver, &folder).solve(&job(&photograph, 0), &Silent).map(|own| own.cameras[0].focal);
+        assert_eq!((focal().ok(), focal().ok()), (Some(2.0), Some(3.0)), "asked each time");
+        Kept::remove(&folder).expect("left alone");
+        assert_eq!((fs::read_dir(&target).expect("a folder").count(), folder.is_symlink()), (1, true));
     }
 
     #[test]

@@ -73,7 +73,8 @@ fn parse_layout(text: &str) -> Result<Layout, String> {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let Arguments { photographs, output, .. } = arguments;
-    if output.exists() && !std::fs::read_dir(output).is_ok_and(|mut entries| entries.next().is_none()) {
+    let is_empty = || std::fs::read_dir(output).is_ok_and(|mut entries| entries.next().is_none());
+    if output.is_symlink() || output.exists() && !is_empty() {
         bail!("{}: exists already and is not an empty folder; give another name", output.display());
     }
     let options = Options { focal: arguments.focal, seed: arguments.seed, every: arguments.every.into() };
@@ -106,11 +107,13 @@ fn found(
 ) -> anyhow::Result<Found> {
     let from: Vec<&dyn Solver> = from.iter().map(AsRef::as_ref).collect();
     let Some(folder) = Kept::folder_beside(to.1) else { return written(photographs, &from, options, to) };
+    Kept::check(&folder).with_context(|| folder.display().to_string())?;
     let kept: Vec<Kept<'_>> = from.iter().map(|solver| Kept::new(*solver, &folder)).collect();
     let from: Vec<&dyn Solver> = kept.iter().map(|own| own as &dyn Solver).collect();
     let found = written(photographs, &from, options, to);
     let is_stopped = |error: &anyhow::Error| error.chain().any(|cause| cause.is::<Interrupted>());
-    if !found.as_ref().is_err_and(is_stopped) {
+    // Before the first question there is nothing of this run; what is there is of one that was stopped.
+    if kept.iter().any(Kept::was_asked) && !found.as_ref().is_err_and(is_stopped) {
         Kept::remove(&folder).with_context(|| folder.display().to_string())?;
     }
     found

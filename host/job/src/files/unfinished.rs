@@ -91,14 +91,20 @@ impl Drop for Own {
 }
 
 /// Removes what killed processes left in a folder; once for each process and folder.
-pub(super) fn clean(folder: &Path) {
+fn clean(folder: &Path) {
     let whole = fs::canonicalize(folder).unwrap_or_else(|_| folder.to_path_buf());
-    if !lock(&CLEANED).insert(whole) {
-        return;
+    if lock(&CLEANED).insert(whole) {
+        remove_unfinished(folder);
     }
+}
+
+/// Removes the temporary files and folders that killed processes left in a folder.
+pub fn remove_unfinished(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let path = entry.path();
-        if is_temporary(&entry.file_name().to_string_lossy()) && !lock(&OWN).contains(&path) {
+        // No links, and nothing that waits for a writer when it is opened.
+        let is_of_kind = entry.file_type().is_ok_and(|kind| kind.is_file() || kind.is_dir());
+        if is_of_kind && is_temporary(&entry.file_name().to_string_lossy()) && !lock(&OWN).contains(&path) {
             // Only of what nobody has locked.
             let Ok(file) = File::open(&path) else { continue };
             if file.try_lock().is_ok() && fs::remove_file(&path).is_err() {
