@@ -11,6 +11,7 @@ use viewfuse_tests::command::{Outcome, assert_refused, command, run, toy};
 viewfuse_tests::trials![
     a_decoder_that_panics_is_an_error,
     nothing_controls_the_terminal,
+    names_control_the_terminal_in_no_command,
     lists_that_are_no_lists_are_wrong_arguments,
     standard_error_may_be_full_or_closed,
     devices_without_an_end,
@@ -50,6 +51,71 @@ fn nothing_controls_the_terminal() {
     fs::rename(rgb.join("000003.png"), rgb.join("\u{1b}]0;3.png")).expect("a file of that name");
     assert_harmless(&inspect(scene));
     assert_harmless(&inspect("no\u{1b}[2Jsuch\nscene"));
+}
+
+/// Commands that print names of scenes, views, targets, files or schemes, for the scene `SCENE`, whose view `VIEW`
+/// and camera path have names of their own.
+const NAMING: [&str; 24] = [
+    "inspect SCENE --views",
+    "inspect SCENE --json",
+    "inspect SCENE -o NAME.png",
+    "weights SCENE --targets VIEW",
+    "weights SCENE --targets VIEW --json",
+    "weights SCENE --targets VIEW --csv",
+    "weights SCENE --targets VIEW --npy NAME.npy",
+    "weights SCENE --camera-path PATH --csv",
+    "weights SCENE --targets 3",
+    "select SCENE --targets VIEW --count 3",
+    "select SCENE --targets VIEW --count 3 -o NAME.txt",
+    "points SCENE --sources 0,1,2 --size 16x16 --device cpu -o NAME.ply",
+    "optimise SCENE --sources 0,1,2 --left-out VIEW --size 16x16 --iterations 2 --device cpu -o NAME.ply",
+    "render SCENE --targets VIEW --sources 0,1,2 --size 16x16 --device cpu -o NAME",
+    "render SCENE --camera-path PATH --sources 0,1,2 --size 16x16 --device cpu -o path",
+    "evaluate SCENE SCENE --targets VIEW --sources 0,1,2 --size 16x16 --weights mean --device cpu",
+    "evaluate SCENE --targets VIEW --sources 0,1,2 --size 16x16 --weights mean --device cpu -o NAME.csv",
+    "evaluate SCENE --protocol nearest:2 --targets-per-trial 1 --size 16x16 --weights mean --device cpu -o NAME-p",
+    "pareto SCENE --targets VIEW --sources 0,1,2 --size 16x16 --repeat 1 --only exact --device cpu -o NAME-q",
+    "export SCENE --layout srn -o NAME-srn",
+    "pose SCENE -o NAME-posed",
+    "compare NAME.png NAME.png",
+    "convert NAME out.safetensors",
+    "verify NAME --device cpu",
+];
+
+/// No name reaches the terminal as it is: neither in what a command says nor in its progress, each change of which is
+/// a line here.
+fn names_control_the_terminal_in_no_command() {
+    let folder = toy();
+    let (scene, name) = ("sc\u{1b}[2Jene", "v\u{1b}]0;owned\u{7}\u{9b}31m\u{202e}w");
+    let toy = folder.path().join("toy");
+    for (file, extension) in [("rgb", "png"), ("pose", "txt")] {
+        let to = toy.join(file).join(format!("{name}.{extension}"));
+        fs::rename(toy.join(file).join(format!("000020.{extension}")), to).expect("a file of that name");
+    }
+    fs::rename(toy, folder.path().join(scene)).expect("a folder of that name");
+    let path = format!("name,x,y,z,look_x,look_y,look_z\na{name},0.1,0.2,1.3,0,0,0\nb{name},0.2,0.1,1.3,0,0,0\n");
+    folder.write(&format!("{name}.csv"), path);
+    let (mut shown, mut failed) = (0, Vec::new());
+    for arguments in NAMING {
+        let mut command = command(BINARY, folder.path(), "");
+        let words = arguments.split_whitespace().map(|word| match word {
+            "PATH" => format!("{name}.csv"),
+            _ => word.replace("SCENE", scene).replace("NAME", name).replace("VIEW", name),
+        });
+        let outcome = command.args(words).env("VIEWFUSE_PROGRESS", "0").output().expect("it starts");
+        let said = String::from_utf8([outcome.stdout, outcome.stderr].concat()).expect("text");
+        let controls = |own: char| !"\n\t".contains(own) && (own.is_control() || own == '\u{202e}');
+        assert!(!said.contains(controls), "{arguments}: {said:?}");
+        shown += said.matches("\\u001b").count();
+        if !outcome.status.success() {
+            failed.push((arguments, said));
+        }
+    }
+    // Those that have nothing to do: a message is a message.
+    let refused = ["pose", "convert", "verify"];
+    let is_refused = |arguments: &str| refused.iter().any(|own| arguments.contains(own));
+    assert!(failed.iter().all(|(arguments, _)| is_refused(arguments)), "{failed:#?}");
+    assert!(shown > 60, "names are shown: {shown}");
 }
 
 #[track_caller]

@@ -82,3 +82,25 @@ fn libraries_leave_the_terminal_to_the_command() {
     assert_eq!(faulty.map(count), [1; 3]);
     assert_eq!(count("// println!() and --size\nfn a() { sprintln!(); my_env::x(\"a -- b, --- and --\") }"), 0);
 }
+
+/// The only file of the command that names standard output or standard error: it escapes what it prints.
+const WAY_OUT: &str = "host/cli/src/cli/printing.rs";
+/// What reaches the terminal past it.
+const PAST_IT: [&str; 7] = ["stdout(", "stderr(", "println!", "eprintln!", "print!", "eprint!", "dbg!"];
+
+#[test]
+fn the_command_has_one_way_out_to_the_terminal() {
+    let root = repository();
+    let folders = ["host/cli/src", "host/lab/src"].map(|folder| files(&root.join(folder), "rs"));
+    let mut found = Vec::new();
+    for path in folders.iter().flatten() {
+        let source = Source::read(path);
+        // Pipes of other programs are no way to the terminal.
+        let is_other = |code: &str| code.contains("Stdio::");
+        let mut lines = source.lines().filter(|(_, code)| !is_other(code));
+        if lines.any(|(_, code)| PAST_IT.into_iter().any(|word| has_word(code, word))) {
+            found.push(path.strip_prefix(&root).expect("inside").to_string_lossy().into_owned());
+        }
+    }
+    assert_eq!(found, [WAY_OUT]);
+}

@@ -138,7 +138,14 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
     let mut command = help::shortened(Arguments::command());
     let matches = match command.try_get_matches_from_mut(args_os()) {
         Ok(matches) => matches,
-        Err(error) => help::explained(error, args_os(), &mut command).exit(),
+        Err(error) => {
+            let error = help::explained(error, args_os(), &mut command);
+            // In colours if nothing on the command line, which may be made of files' names, controls the terminal.
+            if !printing::is_harmless(&error) {
+                return Err(error.into());
+            }
+            error.exit()
+        }
     };
     let arguments = Arguments::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
     listen()?;

@@ -1,6 +1,6 @@
 //! `viewfuse completions`: what a shell completes, and manual pages, from the command line itself.
 
-use super::printing::say;
+use super::printing::{data_out, say};
 use clap::{Args, Command, ValueEnum};
 use clap_complete::{Shell, generate};
 use clap_mangen::Man;
@@ -89,7 +89,7 @@ fn write_pages(mut command: Command, folder: Option<&Path>) -> anyhow::Result<()
 
 /// Bytes on standard output. A closed pipe (`| head`) is no error.
 fn put(bytes: &[u8]) -> io::Result<()> {
-    match io::stdout().lock().write_all(bytes) {
+    match data_out().write_all(bytes) {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         written => written,
     }

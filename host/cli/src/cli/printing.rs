@@ -1,10 +1,16 @@
-//! What the command prints: results on standard output, errors on standard error. Nothing from a file controls the
-//! terminal.
+//! What the command prints: results on standard output, errors and progress on standard error. This is the one way out:
+//! nothing from a file controls the terminal.
 
 use super::shown::{shown, shown_in_line};
 use std::fmt::Display;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, StdoutLock, Write};
+use terminal_size::{Width, terminal_size_of};
 use viewfuse_scene::Scene;
+
+/// Goes to the beginning of the line and clears it.
+const CLEAR: &str = "\r\u{1b}[2K";
+/// Columns of a terminal that does not tell.
+const WIDTH: u16 = 80;
 
 /// Prints a line on standard output. A closed pipe (`| head`) is ignored, because the files are still to be written.
 ///
@@ -15,6 +21,11 @@ pub fn say(text: impl Display) -> io::Result<()> {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         outcome => outcome,
     }
+}
+
+/// Standard output for what is no message: a script, a video.
+pub(crate) fn data_out() -> StdoutLock<'static> {
+    io::stdout().lock()
 }
 
 /// Prints an error in one line on standard error, which may be full or closed: what went wrong is in the exit code,
@@ -31,4 +42,30 @@ pub(crate) fn warn_of(scene: &Scene) {
 /// Prints what is wrong with the arguments, which takes several lines.
 pub(crate) fn complain_of_arguments(message: impl Display) {
     let _ = write!(io::stderr().lock(), "{}", shown(message));
+}
+
+/// Whether a message is shown as it is.
+pub(crate) fn is_harmless(message: impl Display) -> bool {
+    let message = message.to_string();
+    shown(&message) == message
+}
+
+/// Whether standard error, where progress goes, is a terminal.
+pub(crate) fn has_terminal() -> bool {
+    io::stderr().is_terminal()
+}
+
+/// Columns of the terminal.
+pub(crate) fn width() -> u16 {
+    terminal_size_of(io::stderr()).map_or(WIDTH, |(Width(width), _)| width)
+}
+
+/// Prints a line of progress. A closed pipe is ignored.
+pub(crate) fn progress_line(line: impl Display) {
+    let _ = writeln!(io::stderr().lock(), "{}", shown_in_line(line));
+}
+
+/// Replaces the terminal's last line, without going to the next one; by nothing it is cleared.
+pub(crate) fn draw(line: impl Display) {
+    let _ = write!(io::stderr().lock(), "{CLEAR}{}", shown_in_line(line));
 }

@@ -12,12 +12,10 @@ mod progress_bar;
 
 use super::ending;
 use super::environment::time_between_lines;
-use super::printing::complain;
-use super::shown::shown;
+use super::printing::{complain, has_terminal, say};
 use clock::Clock;
 use course::Course;
 use progress_bar::ProgressDisplay;
-use std::io::{self, IsTerminal, Write};
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -64,7 +62,7 @@ pub struct Terminal {
 impl Terminal {
     /// Without progress; `label` is the stage until the work names one.
     pub fn new(label: &str) -> Terminal {
-        let display = Arc::new(ProgressDisplay::new(label, io::stderr().is_terminal(), time_between_lines()));
+        let display = Arc::new(ProgressDisplay::new(label, has_terminal(), time_between_lines()));
         let own = Arc::clone(&display);
         let clock = Clock::start(move || own.show());
         Terminal { display, clock: Some(clock), told: Mutex::default() }
@@ -103,9 +101,9 @@ impl Progress for Terminal {
         }
     }
 
-    /// A closed pipe is ignored.
+    /// Work goes on where it cannot be shown.
     fn note(&self, news: &str) {
-        self.aside(|| writeln!(io::stdout().lock(), "{}", shown(news)).ok());
+        self.aside(|| say(news).ok());
     }
 
     fn is_cancelled(&self) -> bool {

@@ -2,10 +2,11 @@
 
 use super::Arguments;
 use super::prepare::Prepared;
+use crate::cli::printing::data_out;
 use crate::cli::threads::on_threads;
 use anyhow::Context;
 use image::RgbImage;
-use std::io::{self, BufWriter, StdoutLock, Write};
+use std::io::{BufWriter, StdoutLock, Write};
 use viewfuse_field::auto;
 use viewfuse_field::render::Frame;
 use viewfuse_job::progress::Progress;
@@ -27,7 +28,7 @@ impl Stream {
         let (video, first) = match &mut self.video {
             Some(video) => video,
             None => {
-                let video = Y4m::begin(BufWriter::new(io::stdout().lock()), size.into(), self.rate)?;
+                let video = Y4m::begin(BufWriter::new(data_out()), size.into(), self.rate)?;
                 self.video.insert((video, size))
             }
         };

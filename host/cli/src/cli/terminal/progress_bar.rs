@@ -1,16 +1,11 @@
 //! The course of the work as a bar on a terminal, and elsewhere as a line every few seconds.
 
 use super::course::Course;
-use std::io::{self, Write};
+use crate::cli::printing::{draw, progress_line, width};
+use crate::cli::shown::shown_in_line;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
-use terminal_size::{Width, terminal_size_of};
 use unicode_width::UnicodeWidthChar;
-
-/// Goes to the beginning of the line and clears it.
-const CLEAR: &str = "\r\u{1b}[2K";
-/// Columns of a terminal that does not tell.
-const WIDTH: u16 = 80;
 
 /// Shows a course.
 pub(super) struct ProgressDisplay {
@@ -86,17 +81,15 @@ impl ProgressDisplay {
         match &mut *style {
             ProgressStyle::Hidden => {}
             ProgressStyle::Bar(shown) => {
-                let width = terminal_size_of(io::stderr()).map_or(WIDTH, |(Width(width), _)| width);
-                let bar = bar(&words, share, width.into());
+                let bar = bar(&words, share, width().into());
                 if bar != *shown {
-                    write!(io::stderr().lock(), "{CLEAR}{bar}").ok();
+                    draw(&bar);
                     *shown = bar;
                 }
             }
             ProgressStyle::Lines(lines) => {
                 if let Some(line) = lines.due(now, share, &words) {
-                    // A closed pipe is ignored.
-                    writeln!(io::stderr().lock(), "{line}").ok();
+                    progress_line(line);
                 }
             }
         }
@@ -108,7 +101,7 @@ impl ProgressStyle {
         if let ProgressStyle::Bar(shown) = self
             && !shown.is_empty()
         {
-            write!(io::stderr().lock(), "{CLEAR}").ok();
+            draw("");
             shown.clear();
         }
     }
@@ -133,7 +126,8 @@ fn bar(words: &str, share: f64, width: usize) -> String {
     let end = format!(" {:>3} %", (100.0 * share) as u64);
     let room = width.saturating_sub(end.len() + 1);
     let (mut line, mut used) = (String::new(), 0);
-    for character in words.chars() {
+    // As it is shown, so that its width is known.
+    for character in shown_in_line(words).chars() {
         used += character.width().unwrap_or(0);
         if used > room {
             break;
@@ -169,6 +163,7 @@ mod tests {
     #[test]
     fn a_bar_is_shorter_than_the_terminal() {
         assert_eq!(bar("view 2", 0.5, 24), "view 2 [####----]  50 %");
+        assert_eq!(bar("a\u{1b}[2J", 0.0, 24), "a\\u001b[2J [------]   0 %", "no names that control it");
         assert_eq!(bar("\u{6f22}", 1.0, 24), "\u{6f22} [############] 100 %");
         assert_eq!(bar("a long name of a stage", 0.999, 20), "a long name o  99 %");
         for width in 0..40 {
