@@ -12,6 +12,8 @@ viewfuse_tests::trials![
     an_evaluation_keeps_its_record,
     names_that_meet_in_a_file,
     inputs_are_not_replaced,
+    no_option_names_both_an_input_and_an_output,
+    files_of_a_person_are_no_pictures_of_a_run,
     links_to_nothing_are_noticed_first,
     what_a_kill_left_is_removed,
 ];
@@ -120,6 +122,58 @@ fn inputs_are_not_replaced() {
     assert_kept(&folder, "report out -o out/scores-0-of-1.jsonl", &["belongs to out"]);
     for _ in 0..2 {
         done(folder.path(), "report out -o out/page.html");
+    }
+}
+
+/// Whichever options they are, and however the path is written.
+fn no_option_names_both_an_input_and_an_output() {
+    let folder = toy();
+    folder.write("p.csv", "x,y,z,look_x,look_y,look_z\n0.1,0.2,1.3,0,0,0\n");
+    let checkpoint = viewfuse_tests::places::data("pixelnerf_small.safetensors");
+    fs::copy(checkpoint, folder.file("m.safetensors")).expect("a copy");
+    fs::copy(viewfuse_tests::places::data("attention.json"), folder.file("a.ply")).expect("a copy");
+    for (arguments, input) in [
+        ("weights toy --camera-path p.csv --npy p.csv", "p.csv"),
+        ("weights toy --camera-path p.csv --npy ./toy/../p.csv", "p.csv"),
+        ("select toy --count 3 --camera-path p.csv -o p.csv", "p.csv"),
+        ("evaluate toy --targets 20 --model m.safetensors -o m.safetensors", "m.safetensors"),
+        ("evaluate toy --targets 20 --lpips alex=x.pth,heads=p.csv -o p.csv", "p.csv"),
+        ("select toy --count 3 --targets 20 --weights attention:m.safetensors -o m.safetensors", "m.safetensors"),
+        ("evaluate toy --targets 20 --weights mine=attention:p.csv -o p.csv", "p.csv"),
+        ("optimise toy --weights attention:a.ply --size 16x16 -o a.ply", "a.ply"),
+        ("optimise toy --resume a.ply --size 16x16 -o toy/../a.ply", "a.ply"),
+        ("points toy --weights attention:a.ply --size 16x16 -o a.ply", "a.ply"),
+    ] {
+        assert_kept(&folder, arguments, &[input, "is the input", "another name"]);
+    }
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("p.csv", folder.path().join("link.csv")).expect("a link");
+        assert_kept(&folder, "weights toy --camera-path p.csv --npy link.csv", &["link.csv: is the input p.csv"]);
+    }
+    // The same name elsewhere is another file.
+    done(folder.path(), "weights toy --camera-path p.csv --npy toy/p.csv");
+}
+
+/// A folder without a record, and one whose record names other targets.
+fn files_of_a_person_are_no_pictures_of_a_run() {
+    let folder = toy();
+    for mine in ["000020.png", "000020_depth.npy", "000020_sheet.png", "video.gif"] {
+        let file = format!("out-{mine}/{mine}");
+        folder.write(&file, "mine");
+        let out = format!("out-{mine}");
+        let parts = [&*file, "no earlier run wrote this file", "another folder"];
+        assert_refused(BINARY, folder.path(), &format!("{RENDER} --video gif -o {out}"), &parts);
+        assert_refused(BINARY, folder.path(), &format!("{RENDER} --video gif --replace -o {out}"), &parts);
+        done(folder.path(), &format!("{} --video gif -o {out}-b", RENDER.replace("20", "21")));
+        folder.write(&format!("{out}-b/000020.png"), "mine");
+        let parts = ["000020.png", "no earlier run wrote this file"];
+        assert_refused(BINARY, folder.path(), &format!("{RENDER} -o {out}-b"), &parts);
+        assert_eq!(fs::read(folder.path().join(file)).expect("it stays"), b"mine");
+    }
+    // What a run wrote is replaced by the next one.
+    for _ in 0..2 {
+        done(folder.path(), &format!("{RENDER} --video gif -o again"));
     }
 }
 

@@ -11,7 +11,7 @@
 //! table            tables
 //! ending           the end of a process that was told to end
 //! terminal         progress and warnings
-//! outputs          outputs that would replace inputs
+//! outputs          outputs that would replace inputs, of all commands
 //! options, path, weighting, model, metrics_options
 //!                  options that several commands share
 //! pose, posed      poses of photographs that have none, by themselves or on the way
@@ -148,6 +148,7 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
         }
     };
     let arguments = Arguments::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
+    outputs::keep_inputs(&command, &matches)?;
     listen()?;
     match arguments.command {
         Command::Pose(arguments) => pose::run(&arguments),

@@ -66,6 +66,12 @@ fn bytes_of_record(folder: &Path) -> Option<Vec<u8>> {
     if path.is_file() { read_at_most(&path, MAX_RECORD).ok() } else { None }
 }
 
+/// Whether a run in a folder began and did not end: there is a journal, or the empty record of a machine that lost its
+/// power.
+pub(crate) fn was_interrupted(folder: &Path) -> bool {
+    FrameJournal::is_in(folder) || bytes_of_record(folder).is_some_and(|bytes| bytes.is_empty())
+}
+
 /// The files that earlier runs wrote to a folder and that are there; the record and the journal themselves are not
 /// among them. Nothing outside the folder, and no link.
 pub(crate) fn earlier_files(folder: &Path) -> BTreeSet<String> {

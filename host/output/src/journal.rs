@@ -111,6 +111,11 @@ impl FrameJournal {
         Ok((journal, frames))
     }
 
+    /// Whether a folder has one, of whichever run.
+    pub(crate) fn is_in(folder: &Path) -> bool {
+        matches!(Reading::open(folder), Ok(Some(_)))
+    }
+
     /// The files that the journal of a folder lists, whichever run it is of.
     pub(crate) fn files_of_any_run(folder: &Path) -> Vec<String> {
         let mut files = Vec::new();

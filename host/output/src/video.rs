@@ -6,7 +6,6 @@ use crate::webp::Animation;
 use crate::y4m::Y4m;
 use image::{DynamicImage, ImageError, Rgb, RgbImage};
 use std::fmt;
-use std::fs;
 use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -222,14 +221,14 @@ fn io_error(path: &Path, cause: io::Error) -> VideoError {
 
 /// Frames as y4m to the standard input of `ffmpeg`, which writes the file. It is named otherwise until it is whole.
 fn compress(path: &Path, frames: &Frames<'_>, rate: FrameRate) -> Result<(), VideoError> {
-    let draft = path.with_file_name(format!(".viewfuse-{}", path.file_name().unwrap_or_default().to_string_lossy()));
+    let draft = WholeFile::create(path)?;
     let mut command = Command::new(FFMPEG);
     command.args(["-hide_banner", "-loglevel", "error", "-y", "-f", "yuv4mpegpipe", "-i", "-"]);
     // Half the resolution of colours, as every player expects, needs even sides.
     command.args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]);
     // Players would guess by the size which matrix the colours were made with.
     command.args(["-colorspace", "smpte170m", "-color_primaries", "bt709", "-color_trc", "iec61966-2-1"]);
-    command.args(["-color_range", "tv"]).arg(&draft);
+    command.args(["-color_range", "tv", "-f", "mp4"]).arg(draft.path());
     let started = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn();
     let mut child = started.map_err(|cause| match cause.kind() {
         io::ErrorKind::NotFound => VideoError::NoProgram,
@@ -257,9 +256,5 @@ fn compress(path: &Path, frames: &Frames<'_>, rate: FrameRate) -> Result<(), Vid
             Err(VideoError::Program { path: path.to_path_buf(), said })
         }
     };
-    let outcome = outcome.and_then(|()| fs::rename(&draft, path).map_err(|cause| io_error(path, cause)));
-    if outcome.is_err() {
-        fs::remove_file(&draft).ok();
-    }
-    outcome
+    outcome.and_then(|()| Ok(draft.finish()?))
 }

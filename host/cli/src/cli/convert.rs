@@ -1,6 +1,5 @@
 //! `viewfuse convert`.
 
-use super::outputs::keep_input;
 use super::printing::say;
 use super::table::table;
 use super::terminal::Terminal;
@@ -60,7 +59,6 @@ fn for_firmware(arguments: &Arguments, is_rust: bool) -> anyhow::Result<ExitCode
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let output = &arguments.output;
-    keep_input(&arguments.input, output)?;
     let ends_in = |name: &str| output.extension().is_some_and(|extension| extension == name);
     if (ends_in("h") || ends_in("rs")) && !arguments.half {
         return for_firmware(arguments, ends_in("rs"));

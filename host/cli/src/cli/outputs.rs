@@ -1,9 +1,45 @@
-//! Outputs that would replace inputs are refused before work begins.
+//! Outputs that would replace inputs are refused before work begins: files that options name by [`keep_inputs`], for all
+//! commands at once, what scenes are read from by the commands that open them.
 
 use super::wrong::wrong;
+use clap::{Arg, ArgMatches, Command};
+use std::ffi::{OsStr, OsString};
 use std::fs::canonicalize;
 use std::path::Path;
 use viewfuse_scene::Scene;
+
+/// The options that name what a command writes, by identifier. All others may name what it reads.
+const WRITTEN: [&str; 2] = ["output", "npy"];
+
+/// Refuses a command whose output is a file that another of its options names, whichever that is: alone, or within a
+/// value such as `attention:FILE` or `alex=FILE,heads=FILE`.
+pub(super) fn keep_inputs(command: &Command, matches: &ArgMatches) -> anyhow::Result<()> {
+    let Some((name, matches)) = matches.subcommand() else { return Ok(()) };
+    let arguments = command.find_subcommand(name).into_iter().flat_map(Command::get_arguments);
+    let values = |argument: &Arg| -> Vec<OsString> {
+        let values = matches.try_get_raw(argument.get_id().as_str()).ok().flatten();
+        values.into_iter().flatten().map(OsStr::to_os_string).collect()
+    };
+    let (written, read): (Vec<&Arg>, Vec<&Arg>) =
+        arguments.partition(|argument| WRITTEN.contains(&argument.get_id().as_str()));
+    let inputs: Vec<OsString> = read.into_iter().flat_map(values).flat_map(|value| parts(&value)).collect();
+    for output in written.into_iter().flat_map(values).filter(|output| Path::new(output).is_file()) {
+        inputs.iter().try_for_each(|input| keep_input(Path::new(input), Path::new(&output)))?;
+    }
+    Ok(())
+}
+
+/// What may be a path in a value: all of it, and what stands between the separators of lists and of keys.
+fn parts(value: &OsStr) -> Vec<OsString> {
+    let Some(text) = value.to_str() else { return vec![value.to_os_string()] };
+    let behind = |(place, _): (usize, &str)| &text[place + 1..];
+    let beginnings = [text].into_iter().chain(text.match_indices(['=', ':', ',']).map(behind));
+    let up_to_commas = |from: &str| -> Vec<OsString> {
+        let commas = from.match_indices(',').map(|(place, _)| place).chain([from.len()]);
+        commas.map(|end| OsString::from(&from[..end])).collect()
+    };
+    beginnings.flat_map(up_to_commas).collect()
+}
 
 /// Refuses a folder for pictures that one of the scenes is read from.
 pub(super) fn keep_folder_apart<'a>(scenes: impl IntoIterator<Item = &'a Scene>, folder: &Path) -> anyhow::Result<()> {
@@ -37,5 +73,59 @@ pub fn keep_input(input: &Path, output: &Path) -> anyhow::Result<()> {
             Err(wrong(format_args!("{output}: is the input {input} itself, which is not replaced; give another name")))
         }
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{WRITTEN, parts};
+    use clap::CommandFactory;
+    use std::any::TypeId;
+    use std::path::PathBuf;
+
+    /// What the others name: files and folders that are read.
+    const READ: [&str; 13] = [
+        "photographs",
+        "scene",
+        "scenes",
+        "gaussians",
+        "camera_path",
+        "files",
+        "resume",
+        "fid",
+        "prediction",
+        "truth",
+        "input",
+        "help",
+        "version",
+    ];
+
+    /// Whoever adds an option for a path says here whether it is read or written.
+    #[test]
+    fn every_path_is_read_or_written() {
+        let command = crate::cli::Arguments::command();
+        let arguments = command.get_subcommands().flat_map(|own| own.get_arguments().map(move |one| (own, one)));
+        let is_path = |argument: &clap::Arg| argument.get_value_parser().type_id() == TypeId::of::<PathBuf>();
+        let mut count = 0;
+        for (command, argument) in arguments.filter(|(_, argument)| is_path(argument)) {
+            let id = argument.get_id().as_str();
+            assert!(WRITTEN.contains(&id) != READ.contains(&id), "{}: {id}", command.get_name());
+            count += 1;
+        }
+        assert!(count > 25, "{count} paths");
+    }
+
+    #[test]
+    fn paths_are_found_within_values() {
+        let of = |value: &str, part: &str| parts(value.as_ref()).iter().any(|own| own == part);
+        for (value, part) in [
+            ("p.csv", "p.csv"),
+            ("attention:a.safetensors", "a.safetensors"),
+            ("cars=attention:a=b/c:d", "a=b/c:d"),
+            ("alex=a,b.pth,heads=c.pt", "a,b.pth"),
+            ("alex=a.pth,heads=c.pt", "c.pt"),
+        ] {
+            assert!(of(value, part), "{value}: {:?}", parts(value.as_ref()));
+        }
     }
 }

@@ -56,7 +56,7 @@ impl Prepared {
         let rate = arguments.outputs.rate(job.frames_per_second);
         if !arguments.is_stream() {
             check_writable(&arguments.output.join(RECORD))?;
-            check_folder(&arguments.output, &job.targets, arguments.outputs.replace)?;
+            check_folder(&arguments.output, &job.targets, &arguments.outputs.video, arguments.outputs.replace)?;
         }
         let device = arguments.device.open()?;
         Ok(Prepared { start, weighting, folder, scene, open_time, job, field, options, rate, device })
