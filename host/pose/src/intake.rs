@@ -15,7 +15,8 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_job::progress::{Interrupted, Progress};
-use viewfuse_scene::reader::{ImageFile, list};
+use viewfuse_scene::reader::{ImageFile, folders, list};
+use viewfuse_scene::write::{Layout, check_name};
 use viewfuse_scene::{SceneError, encode_png, read_picture};
 
 /// Most photographs of a folder: every pair of them is matched.
@@ -30,6 +31,9 @@ const COPY_SIDE: u32 = 512;
 /// Photographs decoded at the same time: each takes some 20 bytes a pixel.
 const AT_ONCE: usize = 4;
 
+/// Folders within folders in which photographs are looked for: `flight/DCIM/100MEDIA`.
+const MAX_DEPTH: usize = 4;
+
 /// A photograph with less than this share of the others' median sharpness is blurred.
 const MIN_SHARPNESS: f64 = 0.1;
 
@@ -39,10 +43,12 @@ const READ: [&str; 6] = ["jpg", "jpeg", "png", "webp", "tif", "tiff"];
 /// A photograph, read.
 #[derive(Clone, Debug)]
 pub struct Photo {
-    /// Its name: the file's, without the extension.
+    /// Its name: the file's in the folder of photographs, without the extension; `card1_001` for `card1/001.jpg`.
     pub name: String,
-    /// The file in the folder.
+    /// The file.
     pub path: PathBuf,
+    /// The file's place in the folder of photographs, with `/`.
+    pub file: String,
     /// The file whose pixels are upright as they are stored: `path`, or a copy.
     pub(crate) upright: PathBuf,
     /// Width and height upright, in pixels.
@@ -78,6 +84,8 @@ pub struct Intake {
     pub photos: Vec<Photo>,
     /// Those that cannot.
     pub unusable: Vec<Unusable>,
+    /// Files that were not taken for photographs of this folder, a line for each reason.
+    pub passed_over: Vec<Unusable>,
     /// Copies at working size, which go with it.
     _scratch: TempDir,
 }
@@ -113,6 +121,14 @@ pub enum IntakeError {
         count: usize,
         /// A step that leaves few enough.
         step: usize,
+    },
+    /// A name that the layouts of scenes do not hold.
+    #[error("{}: {reason}; rename it", path.display())]
+    Name {
+        /// The photograph.
+        path: PathBuf,
+        /// What they do not hold of it.
+        reason: String,
     },
     /// Two files of one name.
     #[error("{}: two photographs have the name {name}; rename one", folder.display())]
@@ -160,14 +176,14 @@ impl Intake {
     /// # Errors
     /// [`IntakeError`].
     pub fn read(folder: &Path, every: usize, progress: &dyn Progress) -> Result<Intake, IntakeError> {
-        let files = files(folder, every)?;
+        let Listed { root, files, passed_over } = files(folder, every)?;
         let scratch = tempfile::tempdir().map_err(|cause| IntakeError::Io { path: folder.to_path_buf(), cause })?;
         progress.expect(files.len());
         let mut read = Vec::with_capacity(files.len());
         for some in files.chunks(AT_ONCE) {
             let one = |path: &PathBuf| {
                 progress.check()?;
-                let photo = photo(path, scratch.path());
+                let photo = photo(path, &root, scratch.path());
                 progress.step();
                 Ok(photo)
             };
@@ -175,10 +191,10 @@ impl Intake {
         }
         let (mut photos, mut unusable) = (Vec::new(), Vec::new());
         for (path, photo) in files.iter().zip(read) {
-            let mut refuse = |reason| unusable.push(Unusable { name: file_name(path), reason });
+            let mut refuse = |reason| unusable.push(Unusable { name: place_in(&root, path), reason });
             match photo {
                 Ok(photo) => match photos.iter().find(|other| is_same(&photo, other)) {
-                    Some(Photo { path, .. }) => refuse(format!("the same picture as {}", file_name(path))),
+                    Some(Photo { file, .. }) => refuse(format!("the same picture as {file}")),
                     None => photos.push(photo),
                 },
                 Err(Refused::Photograph(reason)) => refuse(reason),
@@ -186,19 +202,20 @@ impl Intake {
             }
         }
         unusable.extend(blurred(&mut photos));
-        let files = lengths(&files)?;
-        Ok(Intake { folder: folder.to_path_buf(), files, photos, unusable, _scratch: scratch })
+        let files = lengths(&root, &files)?;
+        Ok(Intake { folder: folder.to_path_buf(), files, photos, unusable, passed_over, _scratch: scratch })
     }
 }
 
 /// Names and lengths of the photographs of a folder, of every one, as [`Intake::files`].
 pub(crate) fn listed(folder: &Path) -> Result<Vec<(String, u64)>, IntakeError> {
-    lengths(&files(folder, 1)?)
+    let Listed { root, files, .. } = files(folder, 1)?;
+    lengths(&root, &files)
 }
 
-fn lengths(files: &[PathBuf]) -> Result<Vec<(String, u64)>, IntakeError> {
+fn lengths(root: &Path, files: &[PathBuf]) -> Result<Vec<(String, u64)>, IntakeError> {
     let of = |path: &PathBuf| match fs::metadata(path) {
-        Ok(about) => Ok((file_name(path), about.len())),
+        Ok(about) => Ok((place_in(root, path), about.len())),
         Err(cause) => Err(IntakeError::Io { path: path.clone(), cause }),
     };
     files.iter().map(of).collect()
@@ -211,7 +228,7 @@ fn blurred(photos: &mut Vec<Photo>) -> Vec<Unusable> {
     let Some(&median) = all.get(all.len() / 2).filter(|_| all.len() > 2) else { return Vec::new() };
     let is_sharp = |photo: &Photo| photo.sharpness >= MIN_SHARPNESS * median;
     let of = |photo: &Photo| Unusable {
-        name: file_name(&photo.path),
+        name: photo.file.clone(),
         reason: format!("blurred: {:.0} times less detail than the others", median / photo.sharpness.max(1.0e-9)),
     };
     let found = photos.iter().filter(|photo| !is_sharp(photo)).map(of).collect();
@@ -219,40 +236,110 @@ fn blurred(photos: &mut Vec<Photo>) -> Vec<Unusable> {
     found
 }
 
-/// The photographs of a folder in natural order.
-fn files(folder: &Path, every: usize) -> Result<Vec<PathBuf>, IntakeError> {
-    let of = |folder: &Path| -> Result<Vec<PathBuf>, SceneError> { list(folder, is_photograph) };
-    let mut all = of(folder)?;
+/// The photographs of a folder, and what else is there.
+struct Listed {
+    /// The folder that their places are in.
+    root: PathBuf,
+    /// In natural order.
+    files: Vec<PathBuf>,
+    passed_over: Vec<Unusable>,
+}
+
+/// The photographs of a folder, or of `images` in it: those that lie in it, and where none does, those in its folders
+/// (cards, flights, cameras) and in theirs.
+fn files(folder: &Path, every: usize) -> Result<Listed, IntakeError> {
     let inner = folder.join("images");
-    if all.is_empty() && inner.is_dir() {
-        all = of(&inner)?;
+    let inner = inner.as_path();
+    let (mut root, mut all) = (folder, Vec::new());
+    for (own, is_deep) in [(folder, false), (inner, false), (inner, true), (folder, true)] {
+        if all.is_empty() && (own == folder || own.is_dir()) {
+            (root, all) = (own, if is_deep { below(own, MAX_DEPTH)? } else { list(own, is_photograph)? });
+        }
     }
     if all.is_empty() {
         return Err(IntakeError::None { folder: folder.to_path_buf() });
     }
+    let root = root.to_path_buf();
     for path in &all {
         if let Some((format, way)) = unread(&extension(path)) {
-            let way = way.replace("FILE", &file_name(path));
+            let way = way.replace("FILE", &place_in(&root, path));
             return Err(IntakeError::Format { path: path.clone(), format, way });
         }
     }
-    let all: Vec<PathBuf> = all.into_iter().step_by(every.max(1)).collect();
-    if all.len() > MAX_PHOTOGRAPHS {
-        let (count, step) = (all.len(), every.max(1) * all.len().div_ceil(MAX_PHOTOGRAPHS));
+    let is_flat = all.iter().any(|path| path.parent() == Some(&root));
+    let deeper = if is_flat { below(&root, MAX_DEPTH)? } else { Vec::new() };
+    let passed_over = passed_over(&root, &deeper)?;
+    let files: Vec<PathBuf> = all.into_iter().step_by(every.max(1)).collect();
+    if files.len() > MAX_PHOTOGRAPHS {
+        let (count, step) = (files.len(), every.max(1) * files.len().div_ceil(MAX_PHOTOGRAPHS));
         return Err(IntakeError::Many { folder: folder.to_path_buf(), count, step });
     }
     let mut names = HashSet::new();
-    match all.iter().map(|path| stem(path)).find(|name| !names.insert(name.clone())) {
-        Some(name) => Err(IntakeError::Names { folder: folder.to_path_buf(), name }),
-        None => Ok(all),
+    for path in &files {
+        let name = name_in(&root, path);
+        // Those of every layout that a scene is written in.
+        for layout in [Layout::Colmap, Layout::Transforms] {
+            check_name(layout, &name).map_err(|reason| IntakeError::Name { path: path.clone(), reason })?;
+        }
+        if !names.insert(name.clone()) {
+            return Err(IntakeError::Names { folder: folder.to_path_buf(), name });
+        }
     }
+    Ok(Listed { root, files, passed_over })
 }
 
-fn stem(path: &Path) -> String {
-    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+/// The photographs in the folders of a folder, and in theirs down to a depth.
+fn below(folder: &Path, depth: usize) -> Result<Vec<PathBuf>, SceneError> {
+    let mut all = Vec::new();
+    for inner in folders(folder)?.iter().filter(|inner| !is_of_masks(inner)) {
+        all.extend(list(inner, is_photograph)?);
+        if depth > 0 {
+            all.extend(below(inner, depth - 1)?);
+        }
+    }
+    Ok(all)
 }
 
-pub(crate) fn file_name(path: &Path) -> String {
+/// Whether a folder is, by its name, one of masks.
+fn is_of_masks(folder: &Path) -> bool {
+    ["mask", "masks"].iter().any(|name| folder.file_name().is_some_and(|own| own.eq_ignore_ascii_case(name)))
+}
+
+/// What lies beside the photographs and is not taken, by its name: a line a reason.
+fn passed_over(root: &Path, deeper: &[PathBuf]) -> Result<Vec<Unusable>, IntakeError> {
+    let other = list(root, |path| !is_photograph(path))?;
+    let failed = |cause| IntakeError::Io { path: root.to_path_buf(), cause };
+    let entries = fs::read_dir(root).and_then(Iterator::collect::<Result<Vec<_>, _>>).map_err(failed)?;
+    let mut hidden: Vec<PathBuf> = entries.iter().map(fs::DirEntry::path).collect();
+    hidden.retain(|path| file_name(path).starts_with('.') && is_photograph(path) && path.is_file());
+    hidden.sort();
+    let line = |files: &[PathBuf], reason: &str| {
+        let (first, more) = files.split_first()?;
+        let more = if more.is_empty() { String::new() } else { format!(" and {} more", more.len()) };
+        Some(Unusable { name: place_in(root, first) + &more, reason: reason.to_owned() })
+    };
+    let lines = [
+        line(&hidden, "hidden, by a name that begins with a dot"),
+        line(&other, "no photograph by its name"),
+        line(deeper, "in a folder beside photographs: pose it by itself, or put all into folders"),
+    ];
+    Ok(lines.into_iter().flatten().collect())
+}
+
+/// The name of a photograph: its place in the folder without the extension, its folders before it as in `card1_001`.
+fn name_in(root: &Path, path: &Path) -> String {
+    let folders = path.strip_prefix(root).ok().and_then(Path::parent).into_iter().flat_map(Path::components);
+    let folders: String = folders.map(|own| own.as_os_str().to_string_lossy().into_owned() + "_").collect();
+    folders + &path.file_stem().unwrap_or_default().to_string_lossy()
+}
+
+/// Where a file lies in a folder, with `/`.
+fn place_in(root: &Path, path: &Path) -> String {
+    let inside = path.strip_prefix(root).unwrap_or(path).components();
+    inside.map(|own| own.as_os_str().to_string_lossy()).collect::<Vec<_>>().join("/")
+}
+
+fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
@@ -263,7 +350,7 @@ enum Refused {
 }
 
 /// Reads one, and writes its copies.
-fn photo(path: &Path, scratch: &Path) -> Result<Photo, Refused> {
+fn photo(path: &Path, root: &Path, scratch: &Path) -> Result<Photo, Refused> {
     let unreadable = |error: SceneError| Refused::Photograph(in_words(path, &error));
     let failed = |path: &Path| {
         let path = path.to_path_buf();
@@ -275,7 +362,7 @@ fn photo(path: &Path, scratch: &Path) -> Result<Photo, Refused> {
     }
     let exif = Exif::read(path, header.size());
     let picture = read_picture(path).map_err(unreadable)?;
-    let name = stem(path);
+    let (name, file) = (name_in(root, path), place_in(root, path));
     let mut upright = path.to_path_buf();
     if header.orientation() != Orientation::NoTransforms {
         upright = scratch.join(format!("{name}.png"));
@@ -295,7 +382,7 @@ fn photo(path: &Path, scratch: &Path) -> Result<Photo, Refused> {
     fs::create_dir_all(&folder).map_err(failed(&folder))?;
     let working = folder.join(format!("{name}.png"));
     put(&working, &DynamicImage::ImageLuma8(grey)).map_err(failed(&working))?;
-    Ok(Photo { name, path: path.to_path_buf(), upright, size, exif, working, working_size, copy, sharpness })
+    Ok(Photo { name, path: path.to_path_buf(), file, upright, size, exif, working, working_size, copy, sharpness })
 }
 
 fn put(path: &Path, picture: &DynamicImage) -> std::io::Result<()> {
@@ -312,4 +399,69 @@ fn in_words(path: &Path, error: &SceneError) -> String {
 fn reduced([width, height]: [u32; 2], side: u32) -> [u32; 2] {
     let scale = (f64::from(side) / f64::from(width.max(height))).min(1.0);
     [width, height].map(|own| ((f64::from(own) * scale).round() as u32).max(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use viewfuse_job::progress::Silent;
+
+    /// A picture of its own for each name.
+    fn put_all(folder: &Path, names: &[&str]) {
+        for (index, name) in names.iter().enumerate() {
+            let path = folder.join(name);
+            fs::create_dir_all(path.parent().expect("a folder")).expect("folders");
+            let level = |x: u32, y: u32| image::Rgb([((x * 7 + y * 13 + 40 * index as u32) % 256) as u8; 3]);
+            put(&path, &DynamicImage::ImageRgb8(RgbImage::from_fn(24, 16, level))).expect("a picture");
+        }
+    }
+
+    fn names(folder: &Path) -> Vec<(String, String)> {
+        let intake = Intake::read(folder, 1, &Silent).expect("photographs");
+        assert_eq!(intake.files.iter().map(|(file, _)| file).collect::<Vec<_>>().len(), intake.photos.len());
+        intake.photos.into_iter().map(|photo| (photo.name, photo.file)).collect()
+    }
+
+    fn expected(all: &[(&str, &str)]) -> Vec<(String, String)> {
+        all.iter().map(|(name, file)| ((*name).to_owned(), (*file).to_owned())).collect()
+    }
+
+    #[test]
+    fn photographs_in_folders_have_names_of_their_places() {
+        let scratch = tempfile::tempdir().expect("a folder");
+        let cards = ["card1/001.png", "card1/002.png", "card2/DCIM/001.png", "masks/001.png", ".trash/001.png"];
+        put_all(scratch.path(), &cards);
+        let taken = [("card1_001", cards[0]), ("card1_002", cards[1]), ("card2_DCIM_001", cards[2])];
+        assert_eq!(names(scratch.path()), expected(&taken));
+        // A folder `images` is taken alone, with the folders in it.
+        put_all(scratch.path(), &["images/left/1.png", "images/right/1.png"]);
+        assert_eq!(names(scratch.path()), expected(&[("left_1", "left/1.png"), ("right_1", "right/1.png")]));
+        // Two places of one name.
+        put_all(scratch.path(), &["images/a_b/c.png", "images/a/b_c.png"]);
+        assert!(matches!(Intake::read(scratch.path(), 1, &Silent), Err(IntakeError::Names { .. })));
+    }
+
+    #[test]
+    fn what_is_left_out_by_its_name_is_said() {
+        let scratch = tempfile::tempdir().expect("a folder");
+        put_all(scratch.path(), &["1.png", "2.png", "._1.png", "._2.png", "edited/1.png"]);
+        fs::write(scratch.path().join("clip.mp4"), "a video").expect("a file");
+        assert_eq!(names(scratch.path()), expected(&[("1", "1.png"), ("2", "2.png")]));
+        let passed = Intake::read(scratch.path(), 1, &Silent).expect("photographs").passed_over;
+        let told: Vec<String> = passed.into_iter().map(|own| format!("{}: {}", own.name, own.reason)).collect();
+        let parts = ["._1.png and 1 more: hidden", "clip.mp4: no photograph by its name", "edited/1.png: in a folder"];
+        assert_eq!(told.len(), 3, "{told:?}");
+        assert!(told.iter().zip(parts).all(|(line, part)| line.starts_with(part)), "{told:?}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn names_that_no_scene_holds_are_refused_before_the_work() {
+        for name in ["line\nbreak.png", " leading.png", "back\\slash.png"] {
+            let scratch = tempfile::tempdir().expect("a folder");
+            put_all(scratch.path(), &["1.png", name]);
+            let error = Intake::read(scratch.path(), 1, &Silent).expect_err("no name");
+            assert!(matches!(error, IntakeError::Name { .. }) && error.to_string().contains("rename it"), "{error}");
+        }
+    }
 }

@@ -4,7 +4,7 @@ use crate::advice::Neighbours;
 use crate::attempt::Tried;
 use crate::find::{Found, Options};
 use crate::focal::FocalSource;
-use crate::intake::{IntakeError, file_name, listed};
+use crate::intake::{IntakeError, listed};
 use crate::verdict::{Verdict, Verified};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -63,16 +63,18 @@ impl Found {
     pub fn left_out(&self, verdict: Option<&Verdict>) -> Vec<(String, String)> {
         let mut all: Vec<(String, String)> =
             self.intake.unusable.iter().map(|own| (own.name.clone(), own.reason.clone())).collect();
-        let Some(verdict) = verdict else { return all };
+        let passed_over = self.intake.passed_over.iter().map(|own| (own.name.clone(), own.reason.clone()));
+        let Some(verdict) = verdict else { return all.into_iter().chain(passed_over).collect() };
         for (index, photo) in self.intake.photos.iter().enumerate() {
             if verdict.photos.contains(&index) {
                 continue;
             }
             let taken_out = verdict.taken_out.iter().find(|(own, _)| *own == index).map(|(_, reason)| reason.clone());
             let reason = taken_out.unwrap_or_else(|| "matches too little of the other photographs".to_owned());
-            all.push((file_name(&photo.path), reason));
+            all.push((photo.file.clone(), reason));
         }
         all.sort();
+        all.extend(passed_over);
         all
     }
 

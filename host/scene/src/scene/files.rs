@@ -83,14 +83,30 @@ pub fn list(folder: &Path, wanted: impl Fn(&Path) -> bool) -> Result<Vec<PathBuf
     Ok(paths)
 }
 
-/// How many photographs lie in a folder, or in `images` in it; 0 for what cannot be listed.
+/// The folders in a folder, in natural order. Hidden ones and links are left out.
+///
+/// # Errors
+/// As [`list`].
+pub fn folders(folder: &Path) -> Result<Vec<PathBuf>, SceneError> {
+    let failed = |cause| unreadable(folder, cause);
+    let mut paths = Vec::new();
+    for entry in fs::read_dir(folder).map_err(failed)? {
+        let entry = entry.map_err(failed)?;
+        let is_hidden = entry.file_name().to_string_lossy().starts_with('.');
+        if !is_hidden && entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+            paths.push(entry.path());
+        }
+    }
+    paths.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()).then_with(|| a.cmp(b)));
+    Ok(paths)
+}
+
+/// How many photographs lie in a folder, or in `images` in it, or in all folders in it; 0 for what cannot be listed.
 pub(super) fn photograph_count(folder: &Path) -> usize {
     let count =
         |folder: &Path| list(folder, |path| has_extension(path, &IMAGE_EXTENSIONS)).map_or(0, |paths| paths.len());
-    match count(folder) {
-        0 => count(&folder.join("images")),
-        count => count,
-    }
+    let below = || folders(folder).unwrap_or_default().iter().map(|inner| count(inner)).sum();
+    [count(folder), count(&folder.join("images"))].into_iter().find(|count| *count > 0).unwrap_or_else(below)
 }
 
 /// The existing ones of `images` and, by increasing N, `images_N`: photographs at full size and N times smaller.

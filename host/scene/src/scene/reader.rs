@@ -15,7 +15,7 @@ use super::images;
 use super::masks::meaning::MaskMeaning;
 use super::split::Split;
 
-pub use super::files::{has_extension, list, number_lines, read_text, stem};
+pub use super::files::{folders, has_extension, list, number_lines, read_text, stem};
 
 /// A layout of scenes on disk.
 pub trait Reader {
