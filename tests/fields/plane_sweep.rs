@@ -1,13 +1,14 @@
 //! The training-free field on whole photographs, on the CPU: the sample scene with a background, and a painted wall.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::render::{RenderOptions, Stage, render_all};
 use viewfuse::field::training_free::{Cache, Sweep, TrainingFree};
 use viewfuse::field::{DepthMap, On, Rendered};
-use viewfuse::job::digest::sha256;
-use viewfuse::job::progress::Silent;
+use viewfuse::job::digest::{SEAL, sealed, sha256};
+use viewfuse::job::progress::{Progress, Silent};
 use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::Selection;
 use viewfuse::scene::photographs::{SourceImage, SourceImages};
@@ -83,8 +84,26 @@ fn picture(sources: &SourceImages, target: &Camera) -> Rendered {
 }
 
 fn picture_of(field: &TrainingFree, sources: &SourceImages, target: &Camera) -> Rendered {
+    picture_saying(field, sources, target, &Silent)
+}
+
+fn picture_saying(field: &TrainingFree, sources: &SourceImages, target: &Camera, progress: &dyn Progress) -> Rendered {
     let weights = Weights::mean(sources.images.len() as u32);
-    on_stage(field, sources, |stage| stage.picture(target, &weights, 0.0, &Silent).expect("a picture"))
+    let renderer = On { device: &Cpu, field };
+    let options = RenderOptions::default();
+    let mut stage = Stage::of_sources(Arc::new(sources.clone()), &renderer, &options, progress).expect("a stage");
+    stage.weigh_by(&relevance(sources.images.len()), progress).expect("a weighting");
+    stage.picture(target, &weights, 0.0, progress).expect("a picture")
+}
+
+/// Warnings that differ.
+#[derive(Default)]
+struct Warnings(Mutex<BTreeSet<String>>);
+
+impl Progress for Warnings {
+    fn warn(&self, warning: &str) {
+        self.0.lock().expect("no panic").insert(warning.to_owned());
+    }
 }
 
 /// The depths of the sources, before any picture.
@@ -333,19 +352,43 @@ fn what_is_kept_of_the_sources_is_used_and_gives_the_same_picture() {
     assert_eq!(kept_files(&kept), files, "and nothing is new");
     assert_eq!(depths_of(&field, &sources), depths_of(&TrainingFree::default(), &sources), "before a picture, too");
     // Other surfaces in a file that is whole: another picture, so it is used.
-    let (path, bytes) = files.iter().find(|(_, bytes)| bytes.len() == 64 + 8 * 72 * 54).expect("disparities");
-    let other = vec![0x3f; bytes.len() - 64];
-    std::fs::write(path, [sha256(&other).as_bytes(), &other].concat()).expect("written");
+    let maps: Vec<_> = files.iter().filter(|(_, bytes)| bytes.len() == SEAL + 8 * 72 * 54).collect();
+    let [(path, bytes), (_, of_another), ..] = maps[..] else { panic!("disparities of each source") };
+    let name = path.file_stem().expect("a name").to_string_lossy();
+    let other = vec![0x3f; bytes.len() - SEAL];
+    std::fs::write(path, sealed(&name, &other)).expect("written");
     assert_ne!(picture_of(&field, &sources, &target), expected);
-    // A damaged file is not used, and is made again; neither is a file of another length.
-    for damaged in [[&bytes[..], b"more"].concat(), bytes[..bytes.len() - 8].to_vec(), b"short".to_vec(), {
-        let mut one_bit = bytes.clone();
-        one_bit[100] ^= 1;
-        one_bit
-    }] {
+    // What is damaged, has another length or another name, and numbers that are none, are not used but made again.
+    let mut one_bit = bytes.clone();
+    one_bit[100] ^= 1;
+    let with = |number: f32| sealed(&name, &[&bytes[SEAL..bytes.len() - 4], &number.to_le_bytes()].concat());
+    for damaged in [
+        [&bytes[..], b"more"].concat(),
+        bytes[..bytes.len() - 8].to_vec(),
+        b"short".to_vec(),
+        one_bit,
+        of_another.clone(),
+        [sha256(&other).as_bytes(), &other].concat(),
+        with(f32::NAN),
+        with(f32::INFINITY),
+        sealed(&name, &bytes[SEAL..bytes.len() - 8]),
+        sealed(&name, &[]),
+    ] {
         std::fs::write(path, damaged).expect("written");
         assert_eq!(picture_of(&field, &sources, &target), expected);
         assert_eq!(kept_files(&kept), files);
+    }
+    // So are points that are none.
+    let (points, bytes) = files.iter().find(|(_, bytes)| bytes.len() != SEAL + 8 * 72 * 54).expect("points");
+    let name = points.file_stem().expect("a name").to_string_lossy();
+    for body in [Vec::new(), [f32::NAN; 3].map(f32::to_le_bytes).concat()] {
+        std::fs::write(points, sealed(&name, &body)).expect("written");
+        let said = Warnings::default();
+        assert_eq!(picture_saying(&field, &sources, &target, &said), expected);
+        let said = said.0.into_inner().expect("no panic");
+        let told = said.iter().filter(|own| own.contains("are not as they were kept")).count();
+        assert_eq!(told, 1, "{said:?}");
+        assert_eq!(&std::fs::read(points).expect("made again"), bytes);
     }
     // Another photograph has files of its own: its own disparities, those of the two that it is compared with, and the
     // points.

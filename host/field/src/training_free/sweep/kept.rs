@@ -4,27 +4,29 @@
 //! A file's name is the SHA-256 of all that its content depends on: photographs at the size of the comparison, cameras,
 //! weights, settings, and what this program finds on this device in three small fixed images. Another version, driver
 //! or photograph whose results could differ so finds nothing, and makes a file of its own. A person may delete any
-//! file, or the folder. A file that is damaged, or not of this program, is not used.
+//! file, or the folder. A file that is damaged, was kept under another name, or is not of this program, is not used:
+//! what it should hold is found anew, and a warning says so.
 
 use super::Sweep;
 use super::matching::{Images, Matching, Range, swept};
 use super::scratch::Scratch;
 use crate::FieldError;
 use bytemuck::{AnyBitPattern, NoUninit, bytes_of, cast_slice, pod_collect_to_vec};
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock, Pinhole};
 use viewfuse_core::pose::Pose;
 use viewfuse_device::Device;
-use viewfuse_job::digest::sha256;
+use viewfuse_job::digest::{SEAL, sealed, sha256, unsealed};
 use viewfuse_job::files::{WriteError, check_writable, is_ordinary, read_at_most, write_whole};
 use viewfuse_job::progress::Progress;
 use viewfuse_kernels::plane_sweep::PLANES;
 use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
 use viewfuse_scene::photographs::SourceImage;
 
-/// Digits of a digest.
-const DIGITS: usize = 64;
+/// Of the form of the files.
+const FORM: u32 = 2;
 /// Columns and rows of the fixed images.
 const PROBE: [u32; 2] = [24, 16];
 
@@ -98,27 +100,48 @@ impl Kept {
 
     fn key(&self, what: &str, bytes: &[u8]) -> Key {
         let version = env!("CARGO_PKG_VERSION");
-        Key(sha256(format!("{version} {what} {} {}", self.probe, sha256(bytes)).as_bytes()))
+        Key(sha256(format!("{version} {FORM} {what} {} {}", self.probe, sha256(bytes)).as_bytes()))
     }
 
     fn path(&self, key: &Key) -> PathBuf {
         self.cache.folder.join(format!("{}.kept", key.0))
     }
 
-    /// What is kept under a name, `None` if there is nothing, or not as it was written: at most `most` values.
-    pub(super) fn read<T: NoUninit + AnyBitPattern>(&self, key: &Key, most: usize) -> Option<Vec<T>> {
+    /// So many values that are kept under a name, all of finite numbers; `None` if there are none, or not as they were
+    /// written.
+    pub(super) fn read<T: NoUninit + AnyBitPattern>(
+        &self,
+        key: &Key,
+        counts: RangeInclusive<usize>,
+        progress: &dyn Progress,
+    ) -> Option<Vec<T>> {
         let path = self.path(key);
-        let is_there = is_ordinary(&path).is_ok_and(|is_there| is_there);
-        let bytes = is_there.then(|| read_at_most(&path, (DIGITS + most * size_of::<T>()) as u64).ok())??;
-        let (digest, values) = bytes.split_at_checked(DIGITS)?;
-        (sha256(values).as_bytes() == digest && values.len() % size_of::<T>() == 0).then(|| pod_collect_to_vec(values))
+        if is_ordinary(&path).is_ok_and(|is_there| !is_there) {
+            return None;
+        }
+        let values = || {
+            is_ordinary(&path).ok()?;
+            let bytes = read_at_most(&path, (SEAL + counts.end() * size_of::<T>()) as u64).ok()?;
+            let bytes = unsealed(&key.0, &bytes).filter(|bytes| bytes.len().is_multiple_of(size_of::<T>()))?;
+            let values: Vec<T> = pod_collect_to_vec(bytes);
+            let is_whole = counts.contains(&values.len());
+            (is_whole && cast_slice::<T, f32>(&values).iter().all(|number| number.is_finite())).then_some(values)
+        };
+        let values = values();
+        if values.is_none() {
+            let folder = self.cache.folder.display();
+            progress
+                .warn(&format!("{folder}: holds files that are not as they were kept; what they are of is found anew"));
+        }
+        values
     }
 
-    /// Keeps values. That they cannot be kept costs the next run its time, and is a warning.
+    /// Keeps values, if there are any. That they cannot be kept costs the next run its time, and is a warning.
     pub(super) fn write<T: NoUninit>(&self, key: &Key, values: &[T], progress: &dyn Progress) {
-        let values: &[u8] = cast_slice(values);
-        let bytes = [sha256(values).as_bytes(), values].concat();
-        if let Err(error) = write_whole(&self.path(key), &bytes) {
+        if values.is_empty() {
+            return;
+        }
+        if let Err(error) = write_whole(&self.path(key), &sealed(&key.0, cast_slice(values))) {
             progress.warn(&format!("what was found of the sources is not kept: {error}"));
         }
     }

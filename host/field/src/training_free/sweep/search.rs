@@ -37,7 +37,8 @@ impl<D: Device> Matching<'_, D> {
     ) -> Result<Space, FieldError> {
         let cameras: Vec<Camera> = images.iter().map(|image| image.camera).collect();
         let key = kept.map(|kept| kept.of_scene(images));
-        if let Some(points) = kept.zip(key.as_ref()).and_then(|(kept, key)| kept.read::<[f32; 3]>(key, MAX_POINTS)) {
+        let points = |(kept, key): (&Kept, &_)| kept.read::<[f32; 3]>(key, 1..=MAX_POINTS, progress);
+        if let Some(points) = kept.zip(key.as_ref()).and_then(points) {
             return Ok(Space::of_points(points.into_iter().map(Vec3::from).collect(), &cameras));
         }
         let space = self.find_space(images, progress)?;

@@ -216,8 +216,8 @@ impl<D: Device> Views<'_, D> {
         let kept = self.scene.kept.as_ref();
         let key = kept.map(|kept| kept.of_source(&settings, &frustum, &swept, &self.matched.texels));
         let len = (frustum.camera.width * frustum.camera.height) as usize;
-        let found = kept.zip(key.as_ref()).and_then(|(kept, key)| kept.read(key, len));
-        if let Some(found) = found.filter(|found| found.len() == len) {
+        let found = kept.zip(key.as_ref()).and_then(|(kept, key)| kept.read(key, len..=len, progress));
+        if let Some(found) = found {
             self.maps.found.push((view, found));
             return Ok(());
         }
