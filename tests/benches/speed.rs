@@ -192,7 +192,8 @@ fn gaussian_files(criterion: &mut Criterion) {
             f_dc: [0.25, 0.5, 0.75],
         };
         let f_rest = vec![0.125; COUNT * 3 * REST_COUNTS[degree] as usize];
-        let scene = GaussianScene { gaussians: vec![gaussian; COUNT], degree: degree as u32, f_rest };
+        let scene =
+            GaussianScene { gaussians: vec![gaussian; COUNT], degree: degree as u32, f_rest, is_antialiased: false };
         let path = folder.path().join(format!("{degree}.ply"));
         scene.write(&path, &SceneFrame::FILE).expect("a file");
         let open = || GaussianScene::read(&path, &SceneFrame::FILE).expect("the file");

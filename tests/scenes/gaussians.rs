@@ -25,7 +25,7 @@ pub(super) fn drawn(count: usize, degree: u32, seed: u32) -> GaussianScene {
     };
     let gaussians: Vec<Gaussian> = (0..count).map(gaussian).collect();
     let f_rest = (0..count * 3 * REST_COUNTS[degree as usize] as usize).map(|_| number()).collect();
-    GaussianScene { gaussians, degree, f_rest }
+    GaussianScene { gaussians, degree, f_rest, is_antialiased: false }
 }
 
 fn written(scene: &GaussianScene, frame: &SceneFrame) -> (TempDir, PathBuf) {

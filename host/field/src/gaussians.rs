@@ -11,6 +11,7 @@
 //! start      the Gaussians to begin with: the sources' surfaces, and faint ones at random
 //! particles  Gaussians with the state of their optimisation: steps, pruning, splitting
 //! optimise   the loop
+//! covers     whether given Gaussians show what the sources show
 //! given      a scene of Gaussians that is there already, as a field
 //! ```
 //!
@@ -22,6 +23,7 @@
 //! Source: "3D Gaussian Splatting for Real-Time Radiance Field Rendering" (Kerbl et al. 2023); the pyramid, the faint
 //! Gaussians at random and the penalty on opacity are for few views.
 
+mod covers;
 mod given;
 mod level;
 mod loss;

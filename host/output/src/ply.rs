@@ -19,7 +19,7 @@ pub fn write_ply(path: &Path, points: &[CloudPoint], frame: &SceneFrame) -> Resu
         .into_iter()
         .chain(["nx", "ny", "nz"].map(|name| ("float", name.to_owned())))
         .chain(["red", "green", "blue"].map(|name| ("uchar", name.to_owned())));
-    let mut bytes = header("vertex", points.len(), properties);
+    let mut bytes = header("vertex", points.len(), properties, &["viewfuse".to_owned()]);
     for CloudPoint { position, normal, colour, .. } in points {
         for value in frame.file(position.as_dvec3()).to_array() {
             match is_double {

@@ -1,11 +1,31 @@
-//! Scenes of Gaussians, and their files in the layout of "3D Gaussian Splatting" (Kerbl et al. 2023).
+//! Scenes of Gaussians, and their files.
 //!
-//! A file is a binary little-endian PLY file with an element `vertex` and the properties `x y z` (mean), `f_dc_0..2`
-//! and `f_rest_*` (spherical harmonics of the colour), `opacity` (logit), `scale_0..2` (natural logarithms of the
-//! standard deviations) and `rot_0..3` (quaternion `w, x, y, z`), in any order and with others between them, which are
-//! ignored. Its coordinates are those of the photographs' cameras, that is of the scene's files ([`SceneFrame`]).
+//! A file in the layout of "3D Gaussian Splatting" (Kerbl et al. 2023) is a binary little-endian PLY file with an element
+//! `vertex` and the properties `x y z` (mean), `f_dc_0..2` and `f_rest_*` (spherical harmonics of the colour), `opacity`
+//! (logit), `scale_0..2` (natural logarithms of the standard deviations) and `rot_0..3` (quaternion `w, x, y, z`), in
+//! any order. Its coordinates are those of the photographs' cameras, that is of the scene's files ([`SceneFrame`]),
+//! unless it lies beside nerfstudio's record of another world.
+//!
+//! ```text
+//! harmonics   spherical harmonics in other worlds and of other degrees
+//! place       where a file's Gaussians are in the scene's world
+//! comments    what the comments of a PLY file say
+//! splat       .splat
+//! spz         .spz
+//! compressed  the compressed .ply of PlayCanvas
+//! ply         the .ply of the published code
+//! file        which of them a file is: GaussianFile
+//! write       writing
+//! ```
 
-mod read;
+mod comments;
+mod compressed;
+mod file;
+mod harmonics;
+mod place;
+mod ply;
+mod splat;
+mod spz;
 mod write;
 
 use std::path::Path;
@@ -14,7 +34,10 @@ use viewfuse_core::Vec3;
 use viewfuse_core::gaussian::{GaussianBlock, REST_COUNTS, colour_along};
 use viewfuse_job::files::WriteError;
 
+use crate::scene::FaultLocation;
 use crate::{SceneError, SceneFrame};
+
+pub use file::GaussianFile;
 
 /// Greatest degree of spherical harmonics.
 pub const MAX_DEGREE: u32 = 3;
@@ -47,26 +70,30 @@ pub struct GaussianScene {
     /// Coefficients of the degrees above 0: `[gaussian][channel][coefficient]`, with
     /// [`REST_COUNTS`]`[degree]` coefficients a channel.
     pub f_rest: Vec<f32>,
+    /// Whether they were trained for splats that keep their integral when they are dilated to a pixel: each is fainter
+    /// by as much as its dilation widens it (mip-splatting's 2D filter).
+    pub is_antialiased: bool,
 }
 
 impl GaussianScene {
-    /// Reads a file in the coordinates of the scene's files: `frame` is the scene's.
+    /// Reads a file in the coordinates of the scene's files, of any format that is read: `frame` is the scene's.
     ///
     /// # Errors
     /// [`SceneError`] with the path and the line of the header or the property: no such file, another format, a
-    /// property that is missing, twice or no `float` or `double`, rows that the file has no room for, NaN, coordinates
-    /// beyond [`viewfuse_core::pose::MAX_COORDINATE`]. Infinite opacities, and scales of zero, are limited to
-    /// [`MAX_LOGARITHM`].
+    /// property that is missing, twice or no `float` or `double`, a comment that changes the picture in an unknown way,
+    /// rows that the file has no room for, NaN, coordinates beyond [`viewfuse_core::pose::MAX_COORDINATE`]. Infinite
+    /// opacities, and scales of zero, are limited to [`MAX_LOGARITHM`].
     pub fn read(path: &Path, frame: &SceneFrame) -> Result<GaussianScene, SceneError> {
-        read::read(path, frame)
+        Ok(GaussianFile::read(path, frame)?.scene)
     }
 
-    /// Writes a file in the coordinates of the scene's files, completely or not at all. Coordinates are `float`, or
-    /// `double` where the scene was moved or scaled when it was opened: `float` would not hold them. Normals are 0, as
-    /// in the published code.
+    /// Writes a file in the coordinates of the scene's files, completely or not at all: a `.splat` or a `.spz` if it is
+    /// called so, otherwise a PLY file as the strictest readers want it, of `float`, with normals (0) and all
+    /// coefficients of degree 3. Where the scene was moved when it was opened, `float` would not hold the coordinates:
+    /// they are about the origin that a comment states, and are read back with it.
     ///
     /// # Errors
-    /// [`WriteError`].
+    /// [`WriteError`]; also where a `.splat` or a `.spz` cannot hold the coordinates.
     pub fn write(&self, path: &Path, frame: &SceneFrame) -> Result<(), WriteError> {
         write::write(self, path, frame)
     }
@@ -89,4 +116,9 @@ impl GaussianScene {
         };
         self.gaussians.iter().enumerate().map(block).collect()
     }
+}
+
+/// The error of a file that is none of Gaussians, or none that is read.
+fn refused(path: &Path, problem: &str) -> SceneError {
+    SceneError::Gaussians { path: path.to_path_buf(), place: FaultLocation::File, problem: problem.to_owned() }
 }

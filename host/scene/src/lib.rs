@@ -6,6 +6,7 @@
 //! numpy         arrays as NumPy's files
 //! scene         a folder of posed photographs, in any layout: Scene, View, Photograph, ScenePoint
 //!               reader: what a layout's reader is, and READERS, all of them
+//! parser_world  the world of nerfstudio's training
 //! ply           headers of PLY files: PlyElement, PlyProperty
 //! gaussians     scenes of Gaussians and their files: GaussianScene
 //! dataset       folders of many scenes: Dataset, Split
@@ -28,6 +29,7 @@ pub mod gaussians;
 pub mod inspect;
 pub mod listing;
 pub mod numpy;
+mod parser_world;
 pub mod path;
 pub mod photographs;
 pub mod ply;

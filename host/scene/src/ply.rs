@@ -86,6 +86,8 @@ impl PlyElement {
 pub(crate) struct PlyHeader<'a> {
     path: &'a Path,
     elements: Vec<PlyElement>,
+    /// What `comment` and `obj_info` say, each with its line.
+    pub(crate) comments: Vec<(usize, String)>,
     length: usize,
 }
 
@@ -95,6 +97,7 @@ impl<'a> PlyHeader<'a> {
     pub(crate) fn read(path: &'a Path, bytes: &[u8]) -> Result<PlyHeader<'a>, SceneError> {
         let failed = |line, fault| wrong(path, line, fault);
         let (mut elements, mut length, mut has_format) = (Vec::<PlyElement>::new(), 0, false);
+        let mut comments = Vec::new();
         let mut line = 0;
         loop {
             line += 1;
@@ -110,7 +113,8 @@ impl<'a> PlyHeader<'a> {
             match words[..] {
                 [MAGIC] if line == 1 => {}
                 _ if line == 1 => return Err(failed(line, PlyFault::Magic)),
-                [] | ["comment" | "obj_info", ..] => {}
+                [] => {}
+                ["comment" | "obj_info", ref words @ ..] => comments.push((line, words.join(" "))),
                 ["format", ref format @ ..] if format.join(" ") == FORMAT => has_format = true,
                 ["format", ref format @ ..] => return Err(failed(line, PlyFault::Format(excerpt(&format.join(" "))))),
                 ["element", name, count] => {
@@ -122,7 +126,7 @@ impl<'a> PlyHeader<'a> {
                     let place = elements.last_mut().ok_or(PlyFault::NoElement);
                     place.and_then(|element| add(element, property)).map_err(|fault| failed(line, fault))?;
                 }
-                ["end_header"] if has_format => return Ok(PlyHeader { path, elements, length }),
+                ["end_header"] if has_format => return Ok(PlyHeader { path, elements, comments, length }),
                 _ => return Err(failed(line, PlyFault::Line(excerpt(&text)))),
             }
         }
@@ -153,17 +157,29 @@ impl<'a> PlyHeader<'a> {
         Err(fault(PlyFault::NoSuchElement(name)))
     }
 
+    /// The elements in the order of the file.
+    pub(crate) fn elements(&self) -> &[PlyElement] {
+        &self.elements
+    }
+
     fn path(&self) -> PathBuf {
         self.path.to_path_buf()
     }
 }
 
-/// The header of a file with one element, to be followed by its rows: `properties` are types and names.
-pub fn header<'a>(element: &str, count: usize, properties: impl IntoIterator<Item = (&'a str, String)>) -> Vec<u8> {
-    let mut text = format!("{MAGIC}\nformat {FORMAT}\ncomment viewfuse\nelement {element} {count}\n");
+/// The header of a file with one element, to be followed by its rows: `properties` are types and names. Comments stand
+/// behind the properties: strict readers take the third line for the element's.
+pub fn header<'a>(
+    element: &str,
+    count: usize,
+    properties: impl IntoIterator<Item = (&'a str, String)>,
+    comments: &[String],
+) -> Vec<u8> {
+    let mut text = format!("{MAGIC}\nformat {FORMAT}\nelement {element} {count}\n");
     for (kind, name) in properties {
         text.push_str(&format!("property {kind} {name}\n"));
     }
+    comments.iter().for_each(|comment| text.push_str(&format!("comment {comment}\n")));
     text.push_str("end_header\n");
     text.into_bytes()
 }

@@ -65,7 +65,7 @@ fn scene() -> GaussianScene {
         let colour = [level, 0.9 - level, 0.4];
         gaussian(0.5 * normal, Quat::from_rotation_arc(Vec3::Z, normal), [0.03, 0.02, 0.003], colour)
     });
-    GaussianScene { gaussians: ground.chain(ball).collect(), degree: 0, f_rest: Vec::new() }
+    GaussianScene { gaussians: ground.chain(ball).collect(), ..GaussianScene::default() }
 }
 
 fn cameras() -> [(String, Camera); VIEWS] {

@@ -25,7 +25,7 @@ impl Target for Gaussians {
         let seed = |degree: u32| {
             let f_rest = vec![0.125; 2 * 3 * REST_COUNTS[degree as usize] as usize];
             let path = self.0.path.with_extension("seed");
-            let scene = GaussianScene { gaussians: vec![gaussian; 2], degree, f_rest };
+            let scene = GaussianScene { gaussians: vec![gaussian; 2], degree, f_rest, is_antialiased: false };
             scene.write(&path, &SceneFrame::FILE).expect("a file");
             std::fs::read(&path).expect("a file")
         };
@@ -49,7 +49,7 @@ impl Target for Gaussians {
     fn run(&mut self, bytes: &[u8]) -> Result<Verdict, String> {
         let path = self.0.write(bytes);
         let outcome = GaussianScene::read(path, &SceneFrame::FILE);
-        if let Ok(GaussianScene { gaussians, degree, f_rest }) = &outcome {
+        if let Ok(GaussianScene { gaussians, degree, f_rest, .. }) = &outcome {
             if f_rest.len() != gaussians.len() * 3 * REST_COUNTS[*degree as usize] as usize {
                 return Err(format!(
                     "{} Gaussians of degree {degree} have {} coefficients",

@@ -26,7 +26,7 @@ use viewfuse_job::progress::{Progress, Silent};
 use viewfuse_output::gaussian_page::{GaussianPage, write_html};
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{Selection, Target, target_of};
-use viewfuse_scene::gaussians::GaussianScene;
+use viewfuse_scene::gaussians::GaussianFile;
 use viewfuse_scene::photographs::Album;
 use viewfuse_scene::unit::RigUnit;
 use viewfuse_weighting::sources::SourcePoses;
@@ -45,7 +45,7 @@ const TOWARDS: u32 = 60;
     viewfuse render photos/ --gaussians photos.ply --orbit 24 -o out\n\n\
     Begins with the surfaces that the training-free field finds, and takes a few seconds. Ctrl-C writes what there is so far, \
     and a .ply is written every 40 iterations: --resume goes on from it with the iterations of the finest size. The file has the layout of \"3D Gaussian Splatting\", which other viewers read, in the \
-    coordinates of the scene's files.")]
+    coordinates of the scene's files; a .spz has a sixteenth of its bytes, a .splat an eighth.")]
 pub(crate) struct Arguments {
     /// The scene
     scene: PathBuf,
@@ -73,7 +73,7 @@ pub(crate) struct Arguments {
     picture: PictureOptions,
     #[command(flatten)]
     device: DeviceOptions,
-    /// The .ply file, or an .html page with the source cameras and their weights
+    /// The .ply file, a smaller .spz or .splat, or an .html page with the source cameras and their weights
     #[arg(short, long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(known_file))]
     output: PathBuf,
 }
@@ -93,9 +93,9 @@ fn count_help() -> String {
 
 /// A file of a format that is written.
 fn known_file(path: PathBuf) -> Result<PathBuf, &'static str> {
-    match ["ply", "html"].iter().any(|own| is_of(&path, own)) {
+    match ["ply", "splat", "spz", "html"].iter().any(|own| is_of(&path, own)) {
         true => Ok(path),
-        false => Err("scenes of Gaussians are written as .ply or .html"),
+        false => Err("scenes of Gaussians are written as .ply or .html, and smaller as .splat or .spz"),
     }
 }
 
@@ -134,7 +134,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let options = arguments.picture.to_render_options(false, &about)?;
     check_writable(&arguments.output)?;
     keep_file_apart([&scene], &arguments.output)?;
-    let before = arguments.resume.as_ref().map(|path| GaussianScene::read(path, &scene.frame)).transpose()?;
+    let before = arguments.resume.as_ref().map(|path| GaussianFile::open(path, &scene)).transpose()?;
     let Chosen { device, reason } = arguments.device.open()?;
     let progress = Terminal::new("optimising");
     let sources_of_job = sources.clone();
@@ -179,7 +179,7 @@ struct Job<'a> {
     towards: Vec<Target>,
     options: RenderOptions,
     weighting: Weighting,
-    before: Option<GaussianScene>,
+    before: Option<GaussianFile>,
 }
 
 impl Job<'_> {
@@ -203,7 +203,8 @@ impl Job<'_> {
             bail!("{}: too few views agree on any surface to begin Gaussians with", self.scene.path.display());
         };
         if let Some(before) = &self.before {
-            optimiser.resume(&before.blocks(Vec3::ZERO));
+            before.notes.iter().for_each(|note| progress.warn(note));
+            optimiser.resume(&before.scene.blocks(Vec3::ZERO));
         }
         progress.stage("optimising", 3..10, 10);
         let more = if self.towards.is_empty() { 0 } else { TOWARDS };
@@ -262,7 +263,7 @@ impl Job<'_> {
 
     /// Mean PSNR of the views that are left out.
     fn score(&self, gaussians: &[GaussianBlock], any: &AnyDevice, album: &Album<'_>) -> anyhow::Result<f64> {
-        let given = AnyField::new(GivenGaussians { scene: scene_of(gaussians) });
+        let given = AnyField::new(GivenGaussians { scene: scene_of(gaussians), notes: Vec::new() });
         let renderer = given.on(any);
         let mut stage = Stage::prepare(self.scene, album, &self.sources, renderer.as_ref(), &self.options, &Silent)?;
         let mut sum = 0.0;

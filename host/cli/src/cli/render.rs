@@ -21,7 +21,6 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use viewfuse_field::AnyField;
 use viewfuse_field::gaussians::GivenGaussians;
-use viewfuse_scene::gaussians::GaussianScene;
 use viewfuse_scene::{READERS, Scene, looked_for};
 use viewfuse_weighting::{Weighting, WeightingChoice};
 
@@ -91,7 +90,7 @@ impl Arguments {
     /// The field that renders the scene.
     fn field(&self, scene: &Scene) -> anyhow::Result<AnyField> {
         match &self.gaussians {
-            Some(path) => Ok(AnyField::new(GivenGaussians { scene: GaussianScene::read(path, &scene.frame)? })),
+            Some(path) => Ok(AnyField::new(GivenGaussians::open(path, scene)?)),
             None => self.model.open(self.seed, Some(&self.sequence)),
         }
     }

@@ -14,7 +14,6 @@ use viewfuse_device::choice::Chosen;
 use viewfuse_field::AnyField;
 use viewfuse_field::gaussians::GivenGaussians;
 use viewfuse_job::shell::quoted;
-use viewfuse_scene::gaussians::GaussianScene;
 use viewfuse_scene::{READERS, looked_for};
 use viewfuse_view::{Commands, ViewError, Viewed, Viewer};
 use viewfuse_weighting::{Weighting, WeightingChoice};
@@ -76,7 +75,7 @@ pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> 
     let (folder, scene) = arguments.pose.open(&arguments.scene, &arguments.picture.masks)?;
     warn_of(&scene);
     let field = match &arguments.gaussians {
-        Some(path) => AnyField::new(GivenGaussians { scene: GaussianScene::read(path, &scene.frame)? }),
+        Some(path) => AnyField::new(GivenGaussians::open(path, &scene)?),
         None => arguments.model.open(arguments.seed, None)?,
     };
     let about = field.about();

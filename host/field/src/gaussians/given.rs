@@ -1,15 +1,19 @@
 //! A scene of Gaussians that is there already, as a field: optimised before, or by another program.
 
+use super::covers;
 use super::picture::Splatter;
 use crate::{About, Encoding, Field, FieldError, Prepared, Rendered, Request};
+use std::path::Path;
 use viewfuse_core::Vec3;
-use viewfuse_core::gaussian::SH_0;
+use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::gaussian::{DILATION, SH_0, image_axes, opacity};
 use viewfuse_core::random::uniform;
 use viewfuse_device::{Device, DeviceError};
 use viewfuse_job::progress::Progress;
 use viewfuse_kernels::rows::GaussianBlock;
-use viewfuse_scene::gaussians::{Gaussian, GaussianScene};
+use viewfuse_scene::gaussians::{Gaussian, GaussianFile, GaussianScene};
 use viewfuse_scene::photographs::SourceImages;
+use viewfuse_scene::{Scene, SceneError};
 
 /// Depth from which on Gaussians are seen, relative to their median depth in the sources.
 const NEAR: f32 = 0.1;
@@ -23,6 +27,8 @@ const MIN_OPACITY: f32 = 0.5;
 pub struct GivenGaussians {
     /// The Gaussians.
     pub scene: GaussianScene,
+    /// What their file says beyond them, told before the first picture.
+    pub notes: Vec<String>,
 }
 
 /// The same for a scene's sources.
@@ -39,8 +45,8 @@ struct Prepare<'a, D: Device> {
 struct Uploaded<D: Device> {
     gaussians: D::Buffer<GaussianBlock>,
     count: usize,
-    /// What their colours are seen from; those of degree 0 are the same from everywhere.
-    centre_world: Vec3,
+    /// What their colours, or opacities, are for; those of degree 0 are the same for all cameras.
+    camera: CameraBlock,
 }
 
 impl Field for GivenGaussians {
@@ -53,15 +59,27 @@ impl Field for GivenGaussians {
         &'a self,
         device: &'a D,
         sources: &SourceImages,
-        _progress: &dyn Progress,
+        progress: &dyn Progress,
     ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
         let near = NEAR * self.median_depth(sources);
         let background = behind(sources);
-        Ok(Box::new(Prepare { device, scene: &self.scene, near, background, uploaded: None }))
+        let mut prepared = Prepare { device, scene: &self.scene, near, background, uploaded: None };
+        self.notes.iter().for_each(|note| progress.warn(note));
+        covers::warning(sources, |camera| prepared.picture(camera))?.iter().for_each(|warning| progress.warn(warning));
+        Ok(Box::new(prepared))
     }
 }
 
 impl GivenGaussians {
+    /// The Gaussians of a file for a scene.
+    ///
+    /// # Errors
+    /// As [`GaussianFile::open`].
+    pub fn open(path: &Path, scene: &Scene) -> Result<GivenGaussians, SceneError> {
+        let GaussianFile { scene, notes } = GaussianFile::open(path, scene)?;
+        Ok(GivenGaussians { scene, notes })
+    }
+
     /// The median depth of the Gaussians that the sources see; 1 if they see none.
     fn median_depth(&self, sources: &SourceImages) -> f32 {
         let count = self.scene.gaussians.len();
@@ -81,23 +99,50 @@ impl GivenGaussians {
 }
 
 impl<D: Device> Prepare<'_, D> {
-    /// The Gaussians on the device with the colours that a camera at this point sees. Those of one colour in all
-    /// directions are taken there once.
-    fn uploaded(&mut self, centre_world: Vec3) -> Result<&Uploaded<D>, DeviceError> {
-        let is_there = |own: &Uploaded<D>| self.scene.degree == 0 || own.centre_world == centre_world;
+    /// The Gaussians on the device as this camera sees them. Those that all cameras see alike are taken there once.
+    fn uploaded(&mut self, camera: &CameraBlock) -> Result<&Uploaded<D>, DeviceError> {
+        let scene = self.scene;
+        let is_there = |own: &Uploaded<D>| match scene.is_antialiased {
+            true => own.camera == *camera,
+            false => scene.degree == 0 || own.camera.centre_world() == camera.centre_world(),
+        };
         let kept = self.uploaded.take().filter(is_there);
         let uploaded = match kept {
             Some(uploaded) => uploaded,
             None => {
-                let mut blocks = self.scene.blocks(centre_world);
+                let mut blocks = scene.blocks(camera.centre_world());
+                if scene.is_antialiased {
+                    blocks.iter_mut().for_each(|block| fade(block, camera));
+                }
                 if blocks.is_empty() {
                     // No device has empty buffers.
                     blocks.push(GaussianBlock { opacity: -80.0, ..GaussianBlock::default() });
                 }
-                Uploaded { gaussians: self.device.upload(&blocks)?, count: blocks.len(), centre_world }
+                Uploaded { gaussians: self.device.upload(&blocks)?, count: blocks.len(), camera: *camera }
             }
         };
         Ok(self.uploaded.insert(uploaded))
+    }
+
+    fn picture(&mut self, camera: &CameraBlock) -> Result<Rendered, FieldError> {
+        let splatter = Splatter { device: self.device, near: self.near, background: self.background };
+        let Uploaded { gaussians, count, .. } = self.uploaded(camera)?;
+        Ok(splatter.rendered(gaussians, *count, camera, MIN_OPACITY)?)
+    }
+}
+
+/// Makes a Gaussian fainter by as much as [`DILATION`] widens it in the image: its integral remains.
+fn fade(block: &mut GaussianBlock, camera: &CameraBlock) {
+    let place = camera.pose.rotate_to_camera(Vec3::from(block.position) - camera.centre_world());
+    if !(place.z > 0.0) {
+        return;
+    }
+    let [u, v] = image_axes(block, camera, place);
+    let own = u.cross(v).length_squared();
+    let dilated = own + DILATION * (u.length_squared() + v.length_squared()) + DILATION * DILATION;
+    let fainter = opacity(block.opacity) * (own / dilated).max(0.0).sqrt();
+    if fainter.is_finite() {
+        block.opacity = (fainter / (1.0 - fainter)).ln().clamp(-80.0, 80.0);
     }
 }
 
@@ -112,10 +157,7 @@ impl<D: Device> Prepared for Prepare<'_, D> {
 
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
         progress.check()?;
-        let camera = request.camera.block(0);
-        let splatter = Splatter { device: self.device, near: self.near, background: self.background };
-        let Uploaded { gaussians, count, .. } = self.uploaded(camera.centre_world())?;
-        Ok(splatter.rendered(gaussians, *count, &camera, MIN_OPACITY)?)
+        self.picture(&request.camera.block(0))
     }
 }
 

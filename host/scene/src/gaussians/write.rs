@@ -2,46 +2,70 @@
 
 use std::path::Path;
 
+use glam::DVec3;
 use viewfuse_core::Vec3;
 use viewfuse_core::gaussian::REST_COUNTS;
 use viewfuse_job::files::{WriteError, write_whole};
 
-use super::{GaussianScene, MAX_DEGREE};
+use super::harmonics::padded;
+use super::{GaussianScene, MAX_DEGREE, comments, splat, spz};
 use crate::SceneFrame;
 use crate::ply::header;
+use crate::scene::files::has_extension;
 
 pub(super) fn write(scene: &GaussianScene, path: &Path, frame: &SceneFrame) -> Result<(), WriteError> {
-    let is_double = *frame != SceneFrame::FILE;
-    let rest_count = 3 * REST_COUNTS[scene.degree.min(MAX_DEGREE) as usize] as usize;
-    let mut bytes = header("vertex", scene.gaussians.len(), properties(is_double, rest_count));
-    let log_scale = frame.scale.ln();
-    for (index, gaussian) in scene.gaussians.iter().enumerate() {
-        for coordinate in frame.file(Vec3::from(gaussian.position).as_dvec3()).to_array() {
-            match is_double {
-                true => bytes.extend(coordinate.to_le_bytes()),
-                false => bytes.extend((coordinate as f32).to_le_bytes()),
-            }
-        }
-        let rest = scene.f_rest.get(index * rest_count..(index + 1) * rest_count).unwrap_or_default();
-        let log_scales = gaussian.log_scales.map(|value| (f64::from(value) + log_scale) as f32);
-        let normal_and_colour = [0.0; 3].into_iter().chain(gaussian.f_dc).chain(rest.iter().copied());
-        let values = normal_and_colour.chain([gaussian.opacity]).chain(log_scales).chain(gaussian.rotation);
-        values.for_each(|value| bytes.extend(value.to_le_bytes()));
+    let is_splat = has_extension(path, &["splat"]);
+    let unwritten = |cause: String| WriteError::Encode { path: path.to_path_buf(), cause: cause.into() };
+    if !is_splat && !has_extension(path, &["spz"]) {
+        return write_whole(path, &ply(scene, frame));
     }
+    if frame.origin != DVec3::ZERO {
+        // `float` and fixed point lose such coordinates, and no header states an origin.
+        let [x, y, z] = frame.origin.to_array();
+        return Err(unwritten(format!(
+            "the scene is around ({x}, {y}, {z}): .splat and .spz hold no such coordinates and state no origin; write a .ply"
+        )));
+    }
+    let bytes = if is_splat { splat::bytes(scene, frame) } else { spz::bytes(scene, frame).map_err(unwritten)? };
     write_whole(path, &bytes)
 }
 
+fn ply(scene: &GaussianScene, frame: &SceneFrame) -> Vec<u8> {
+    let rest_count = 3 * REST_COUNTS[scene.degree.min(MAX_DEGREE) as usize] as usize;
+    let mut comments = vec!["viewfuse".to_owned()];
+    if frame.origin != DVec3::ZERO {
+        comments.push(comments::origin(frame.origin));
+    }
+    if scene.is_antialiased {
+        comments.push("SplatRenderMode: mip".to_owned());
+    }
+    let mut bytes = header("vertex", scene.gaussians.len(), properties(), &comments);
+    let log_scale = frame.scale.ln();
+    for (index, gaussian) in scene.gaussians.iter().enumerate() {
+        // About the origin, in the file's units.
+        let position = match *frame == SceneFrame::FILE {
+            true => gaussian.position,
+            false => (frame.scale * Vec3::from(gaussian.position).as_dvec3()).as_vec3().to_array(),
+        };
+        let rest = scene.f_rest.get(index * rest_count..(index + 1) * rest_count).unwrap_or_default();
+        let log_scales = gaussian.log_scales.map(|value| (f64::from(value) + log_scale) as f32);
+        let place_and_colour = position.into_iter().chain([0.0; 3]).chain(gaussian.f_dc);
+        let values = place_and_colour.chain(padded(rest, scene.degree.min(MAX_DEGREE))).chain([gaussian.opacity]);
+        values.chain(log_scales).chain(gaussian.rotation).for_each(|value| bytes.extend(value.to_le_bytes()));
+    }
+    bytes
+}
+
 /// Types and names, in the order of the published code.
-fn properties(is_double: bool, rest_count: usize) -> impl Iterator<Item = (&'static str, String)> {
-    let coordinate = if is_double { "double" } else { "float" };
-    let numbered = |name: &'static str, count: usize| (0..count).map(move |index| ("float", format!("{name}_{index}")));
-    ["x", "y", "z"]
+fn properties() -> impl Iterator<Item = (&'static str, String)> {
+    let numbered = |name: &'static str, count: usize| (0..count).map(move |index| format!("{name}_{index}"));
+    ["x", "y", "z", "nx", "ny", "nz"]
         .into_iter()
-        .map(move |name| (coordinate, name.to_owned()))
-        .chain(["nx", "ny", "nz"].into_iter().map(|name| ("float", name.to_owned())))
+        .map(str::to_owned)
         .chain(numbered("f_dc", 3))
-        .chain(numbered("f_rest", rest_count))
-        .chain([("float", "opacity".to_owned())])
+        .chain(numbered("f_rest", 45))
+        .chain(["opacity".to_owned()])
         .chain(numbered("scale", 3))
         .chain(numbered("rot", 4))
+        .map(|name| ("float", name))
 }

@@ -407,6 +407,16 @@ pub enum SceneError {
         /// What is wrong.
         fault: PlyFault,
     },
+    /// A file of Gaussians with another meaning than those that are read, or none.
+    #[error("{path}{place}: {problem}")]
+    Gaussians {
+        /// The file.
+        path: PathBuf,
+        /// The place in it.
+        place: FaultLocation,
+        /// What is wrong with it, and the way out.
+        problem: String,
+    },
     /// Not a zip archive.
     #[error("{path}: not a readable zip archive: {cause}")]
     Zip {
