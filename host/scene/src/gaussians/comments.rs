@@ -72,10 +72,6 @@ impl Comments {
                 ("colorspace" | "colourspace", _) => {
                     return Err(refused("only sRGB colours are read; export them in sRGB"));
                 }
-                ("shorder", "channel-major" | "channel major") => {}
-                ("shorder", _) => {
-                    return Err(refused("f_rest are read with all coefficients of red first, then green, then blue"));
-                }
                 _ if text.trim().is_empty() || HARMLESS.iter().any(|own| small.starts_with(own)) => {}
                 _ => found.unknown.push(text.chars().take(80).collect()),
             }
