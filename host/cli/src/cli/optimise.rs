@@ -45,7 +45,7 @@ const TOWARDS: u32 = 60;
     viewfuse render photos/ --gaussians photos.ply --orbit 24 -o out\n\n\
     Begins with the surfaces that the training-free field finds, and takes a few seconds. Ctrl-C writes what there is so far, \
     and a .ply is written every 40 iterations: --resume goes on from it with the iterations of the finest size. The file has the layout of \"3D Gaussian Splatting\", which other viewers read, in the \
-    coordinates of the scene's files; a .spz has a sixteenth of its bytes, a .splat an eighth.")]
+    coordinates of the scene's files; a .spz has less than a tenth of its bytes, a .splat an eighth.")]
 pub(crate) struct Arguments {
     /// The scene
     scene: PathBuf,
