@@ -6,6 +6,7 @@ mod coverage;
 mod datasets;
 mod errors;
 mod formats;
+mod gaussian_files;
 mod gaussians;
 mod generated;
 mod large;
