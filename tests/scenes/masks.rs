@@ -96,7 +96,8 @@ fn masks_of_instant_ngp_are_inverted() {
 
 #[test]
 fn levels_of_0_and_1_are_whole() {
-    let shapes: [(&str, fn(GrayImage) -> DynamicImage); 5] = [
+    type Shape = fn(GrayImage) -> DynamicImage;
+    let shapes: [(&str, Shape); 5] = [
         ("0 and 1", |mask| GrayImage::from_fn(320, 240, |x, y| Luma([mask.get_pixel(x, y)[0] / 255])).into()),
         ("16 bits", |mask| DynamicImage::from(mask).into_luma16().into()),
         ("16 bits, 0 and 1", |mask| {
@@ -109,10 +110,10 @@ fn levels_of_0_and_1_are_whole() {
             image::RgbaImage::from_fn(320, 240, level).into()
         }),
     ];
-    for (shape, of) in shapes {
+    for (shape, shaped) in shapes {
         let folder = sample("room");
         for view in 0..COUNT {
-            let picture = of(mask(|x, y| !thing(view, x, y)));
+            let picture = shaped(mask(|x, y| !thing(view, x, y)));
             picture.save(folder.file(&format!("room/masks/{view:03}.png"))).expect("a mask");
         }
         let scene = opened(&folder, MaskChoice::Auto);

@@ -244,8 +244,12 @@ fn what_is_not_read_is_said() {
         transforms["frames"][2]["k1"] = json!(0.25);
         transforms["frames"][2]["fl_x"] = json!(20);
     }));
-    let [own, telling, moving] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
-    assert!(own.contains("1 of 3 frames state k1 otherwise than the top of the file: each frame's"), "{own}");
+    let [telling, moving] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
+    let [overriding] = &scene.conventions[..] else { panic!("{:?}", scene.conventions) };
+    assert!(
+        overriding.contains("1 of 3 frames state k1 otherwise than the top of the file: each frame's"),
+        "{overriding}"
+    );
     assert!(telling.contains("rolling_shutter, white_transparent change pictures and are not read"), "{telling}");
     assert!(moving.contains("different times (time): the scene moves"), "{moving}");
     // One time is a still scene.

@@ -121,6 +121,7 @@ fn read(path: &Path, split: Option<Split>) -> Result<RawScene, SceneError> {
     scene.warnings.extend(missing.warning(path)?);
     scene.warnings.extend(lists.warning(path));
     scene.warnings.extend(keys.warnings(path));
+    scene.conventions.extend(keys.convention());
     scene.unused.extend(keys.unused(path));
     if depth_count > 0 {
         scene.warnings.push(format!(

@@ -102,19 +102,21 @@ impl<'a> Keys<'a> {
         }
     }
 
+    /// How frames state what the top of the file states otherwise.
+    pub(super) fn convention(&self) -> Option<String> {
+        let (all, count, keys) = (self.frame_count, self.overriding_count, list(&self.overridden));
+        (count > 0).then(|| {
+            format!(
+                "{count} of {all} frames state {keys} otherwise than the top of the file: each frame's values are taken \
+                 (nerfstudio takes those at the top)"
+            )
+        })
+    }
+
     /// What changes pictures, a line each.
     pub(super) fn warnings(&self, path: &Path) -> Vec<String> {
-        let (path, all) = (path.display(), self.frame_count);
-        let list = |keys: &BTreeSet<&str>| keys.iter().copied().collect::<Vec<_>>().join(", ");
+        let path = path.display();
         let mut lines = Vec::new();
-        if !self.overridden.is_empty() {
-            lines.push(format!(
-                "{path}: {} of {all} frames state {} otherwise than the top of the file: each frame's values are taken \
-                 (nerfstudio takes those at the top)",
-                self.overriding_count,
-                list(&self.overridden)
-            ));
-        }
         if !self.telling.is_empty() {
             lines.push(format!("{path}: {} change pictures and are not read", list(&self.telling)));
         }
@@ -133,6 +135,10 @@ impl<'a> Keys<'a> {
         let keys = top.chain(frames).collect::<Vec<_>>().join(", ");
         (!keys.is_empty()).then(|| format!("{}: {keys}", path.display()))
     }
+}
+
+fn list(keys: &BTreeSet<&str>) -> String {
+    keys.iter().copied().collect::<Vec<_>>().join(", ")
 }
 
 fn is_read(key: &str) -> bool {
