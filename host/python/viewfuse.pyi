@@ -21,7 +21,7 @@ class Scene:
     Each access makes a new array.
     """
 
-    def __init__(self, path: Union[str, PathLike[str]]) -> None:
+    def __init__(self, path: Union[str, PathLike[str]], masks: str = "auto") -> None:
         """Opens a folder, or a file that describes one, in any of the layouts. ValueError if it is none."""
     @property
     def path(self) -> Path:
@@ -191,8 +191,12 @@ class Frame:
         """Writes the picture as a PNG, whole or not at all: the bytes that the command writes. OSError if it cannot."""
     def __repr__(self) -> str: ...
 
-def open(path: Union[str, PathLike[str]]) -> Scene:
-    """Opens a scene: a folder, or a file that describes one, in any of the layouts. The same as Scene(path)."""
+def open(path: Union[str, PathLike[str]], masks: str = "auto") -> Scene:
+    """Opens a scene: a folder, or a file that describes one, in any of the layouts. The same as Scene(path, masks).
+
+    `masks` says what masks and alpha channels say: "object" (where it is), "ignore" (which pixels do not count), "none"
+    (they are not used), or "auto": what their layout and the masks themselves show.
+    """
 
 def psnr(prediction: NDArray[np.uint8], truth: NDArray[np.uint8]) -> float:
     """Peak signal to noise ratio of two pictures [height][width][3] in decibels; infinite if they are equal."""

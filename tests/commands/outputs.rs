@@ -131,7 +131,7 @@ fn no_option_names_both_an_input_and_an_output() {
     folder.write("p.csv", "x,y,z,look_x,look_y,look_z\n0.1,0.2,1.3,0,0,0\n");
     let checkpoint = viewfuse_tests::places::data("pixelnerf_small.safetensors");
     fs::copy(checkpoint, folder.file("m.safetensors")).expect("a copy");
-    fs::copy(viewfuse_tests::places::data("attention.json"), folder.file("a.ply")).expect("a copy");
+    fs::copy(viewfuse_tests::places::data("attention.safetensors"), folder.file("a.ply")).expect("a copy");
     for (arguments, input) in [
         ("weights toy --camera-path p.csv --npy p.csv", "p.csv"),
         ("weights toy --camera-path p.csv --npy ./toy/../p.csv", "p.csv"),

@@ -123,7 +123,7 @@ fn lacking(candidate: &Candidate) -> Adapter {
         Missing::ComputeQueue,
     ];
     let mut adapter = candidate.adapter.clone();
-    adapter.missing = missing;
+    (adapter.index, adapter.missing) = (0, missing);
     adapter
 }
 

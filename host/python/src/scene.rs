@@ -12,8 +12,8 @@ use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
-use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::view_list;
+use viewfuse::scene::{MaskChoice, Scene, UnknownMasks};
 
 /// A scene: posed photographs, of which the poses and the headers of the photographs have been read and checked.
 ///
@@ -26,10 +26,13 @@ pub(crate) struct PyScene {
 
 #[pymethods]
 impl PyScene {
-    /// Opens a folder, or a file that describes one, in any of the layouts.
+    /// Opens a folder, or a file that describes one, in any of the layouts. `masks` says what masks and alpha channels
+    /// say: "object" (where it is), "ignore" (which pixels do not count), "none" (they are not used) or "auto".
     #[new]
-    pub(crate) fn open(py: Python<'_>, path: PathBuf) -> PyResult<PyScene> {
-        let scene = interruptible(py, |_| Ok(Scene::open(path)?))?;
+    #[pyo3(signature = (path, masks = "auto"))]
+    pub(crate) fn open(py: Python<'_>, path: PathBuf, masks: &str) -> PyResult<PyScene> {
+        let masks: MaskChoice = masks.parse().map_err(|error: UnknownMasks| Failure::Input(error.to_string()))?;
+        let scene = interruptible(py, |_| Ok(Scene::open_masked(path, masks)?))?;
         Ok(PyScene { scene })
     }
 
@@ -151,8 +154,9 @@ impl PyScene {
     }
 }
 
-/// Opens a scene: a folder, or a file that describes one, in any of the layouts.
+/// Opens a scene: a folder, or a file that describes one, in any of the layouts. The same as `Scene(path, masks)`.
 #[pyfunction]
-pub(crate) fn open(py: Python<'_>, path: PathBuf) -> PyResult<PyScene> {
-    PyScene::open(py, path)
+#[pyo3(signature = (path, masks = "auto"))]
+pub(crate) fn open(py: Python<'_>, path: PathBuf, masks: &str) -> PyResult<PyScene> {
+    PyScene::open(py, path, masks)
 }

@@ -217,6 +217,11 @@ class Pictures(unittest.TestCase):
         expected, low, high = frame.expected
         self.assertTrue(low < expected < high)
 
+    def test_masks_mean_what_is_said(self):
+        self.assertEqual(len(viewfuse.open(ROOM, masks="none")), len(viewfuse.open(ROOM)))
+        with self.assertRaisesRegex(ValueError, "ignore"):
+            viewfuse.open(ROOM, masks="perhaps")
+
     def test_progress(self):
         scene, told = viewfuse.open(ROOM), []
         arguments = {"targets": "5", "sources": "4,6", "size": SMALL}

@@ -98,6 +98,14 @@ impl GaussianScene {
         write::write(self, path, frame)
     }
 
+    /// Whether a file of this name can hold the coordinates of a scene's files: before there are Gaussians to write.
+    ///
+    /// # Errors
+    /// [`WriteError`] for a `.splat` or a `.spz` where the scene was moved when it was opened.
+    pub fn check_place(path: &Path, frame: &SceneFrame) -> Result<(), WriteError> {
+        write::check_place(path, frame)
+    }
+
     /// The Gaussians as a kernel reads them, with their colours from a camera at `centre_world`.
     pub fn blocks(&self, centre_world: Vec3) -> Vec<GaussianBlock> {
         let rest_count = 3 * REST_COUNTS[self.degree.min(MAX_DEGREE) as usize] as usize;

@@ -26,7 +26,7 @@ use viewfuse_job::progress::{Progress, Silent};
 use viewfuse_output::gaussian_page::{GaussianPage, write_html};
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{Selection, Target, target_of};
-use viewfuse_scene::gaussians::GaussianFile;
+use viewfuse_scene::gaussians::{GaussianFile, GaussianScene};
 use viewfuse_scene::photographs::Album;
 use viewfuse_scene::unit::RigUnit;
 use viewfuse_weighting::sources::SourcePoses;
@@ -134,6 +134,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let options = arguments.picture.to_render_options(false, &about)?;
     check_writable(&arguments.output)?;
     keep_file_apart([&scene], &arguments.output)?;
+    GaussianScene::check_place(&arguments.output, &scene.frame)?;
     let before = arguments.resume.as_ref().map(|path| GaussianFile::open(path, &scene)).transpose()?;
     let Chosen { device, reason } = arguments.device.open()?;
     let progress = Terminal::new("optimising");

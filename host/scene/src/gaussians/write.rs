@@ -14,20 +14,31 @@ use crate::ply::header;
 use crate::scene::files::has_extension;
 
 pub(super) fn write(scene: &GaussianScene, path: &Path, frame: &SceneFrame) -> Result<(), WriteError> {
-    let is_splat = has_extension(path, &["splat"]);
-    let unwritten = |cause: String| WriteError::Encode { path: path.to_path_buf(), cause: cause.into() };
-    if !is_splat && !has_extension(path, &["spz"]) {
-        return write_whole(path, &ply(scene, frame));
-    }
-    if frame.origin != DVec3::ZERO {
-        // `float` and fixed point lose such coordinates, and no header states an origin.
-        let [x, y, z] = frame.origin.to_array();
-        return Err(unwritten(format!(
-            "the scene is around ({x}, {y}, {z}): .splat and .spz hold no such coordinates and state no origin; write a .ply"
-        )));
-    }
-    let bytes = if is_splat { splat::bytes(scene, frame) } else { spz::bytes(scene, frame).map_err(unwritten)? };
+    check_place(path, frame)?;
+    let bytes = if has_extension(path, &["splat"]) {
+        splat::bytes(scene, frame)
+    } else if has_extension(path, &["spz"]) {
+        spz::bytes(scene, frame).map_err(|cause| unwritten(path, cause))?
+    } else {
+        ply(scene, frame)
+    };
     write_whole(path, &bytes)
+}
+
+pub(super) fn check_place(path: &Path, frame: &SceneFrame) -> Result<(), WriteError> {
+    if frame.origin == DVec3::ZERO || !has_extension(path, &["splat", "spz"]) {
+        return Ok(());
+    }
+    // `float` and fixed point lose such coordinates, and no header states an origin.
+    let [x, y, z] = frame.origin.to_array();
+    let cause = format!(
+        "the scene is around ({x}, {y}, {z}): .splat and .spz hold no such coordinates and state no origin; write a .ply"
+    );
+    Err(unwritten(path, cause))
+}
+
+fn unwritten(path: &Path, cause: String) -> WriteError {
+    WriteError::Encode { path: path.to_path_buf(), cause: cause.into() }
 }
 
 fn ply(scene: &GaussianScene, frame: &SceneFrame) -> Vec<u8> {

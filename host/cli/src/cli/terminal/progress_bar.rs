@@ -163,7 +163,7 @@ mod tests {
     #[test]
     fn a_bar_is_shorter_than_the_terminal() {
         assert_eq!(bar("view 2", 0.5, 24), "view 2 [####----]  50 %");
-        assert_eq!(bar("a\u{1b}[2J", 0.0, 24), "a\\u001b[2J [------]   0 %", "no names that control it");
+        assert_eq!(bar("a\u{1b}[2J", 0.0, 24), "a\\u001b[2J [----]   0 %", "no names that control it");
         assert_eq!(bar("\u{6f22}", 1.0, 24), "\u{6f22} [############] 100 %");
         assert_eq!(bar("a long name of a stage", 0.999, 20), "a long name o  99 %");
         for width in 0..40 {
