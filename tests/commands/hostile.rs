@@ -27,7 +27,9 @@ fn a_decoder_that_panics_is_an_error() {
     assert_refused(BINARY, folder.path(), "compare palette.png toy/rgb/000000.png", &parts);
     assert_refused(BINARY, folder.path(), "compare toy/rgb/000000.png palette.png", &parts);
     // The same as a mask, of the photograph's shape at another scale, which is read on all cores.
-    (0..24).for_each(|view| drop(folder.write(&format!("toy/masks/{view:06}.png"), PALETTE)));
+    for view in 0..24 {
+        folder.write(&format!("toy/masks/{view:06}.png"), PALETTE);
+    }
     let parts = ["toy/masks/0000", ".png: not a readable image: the decoder panicked"];
     assert_refused(BINARY, folder.path(), "render toy --targets 20 --size 16x16 --device cpu -o out", &parts);
 }

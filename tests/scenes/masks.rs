@@ -260,3 +260,28 @@ fn layouts_without_ignore_masks_hold_them_as_transparency_or_not_at_all() {
     let error = write(&scene, Layout::Neus, &out.path().join("neus"), &Silent).expect_err("no place").to_string();
     assert!(error.contains("cannot hold this scene: its masks say where the object is"), "{error}");
 }
+
+#[test]
+fn what_is_hidden_before_an_objects_background_is_background() {
+    let folder = toy();
+    let path = folder.path().join("toy");
+    let plain = Scene::open(&path).expect("the sample");
+    let pinhole = plain.views[0].camera.pinhole;
+    let (width, height) = (pinhole.width(), pinhole.height());
+    for view in 0..plain.views.len() {
+        let level = |x, y| Luma([if x < width / 8 && y < height / 8 { 0 } else { 255 }]);
+        let mask = GrayImage::from_fn(width, height, level);
+        mask.save(folder.file(&format!("toy/masks/{view:06}.png"))).expect("a mask");
+    }
+    let scene = Scene::open_masked(&path, MaskChoice::Ignore).expect("a scene");
+    assert!(scene.photograph(3).is_ok_and(|photograph| photograph.seen.is_some()));
+    let sources = |scene: &Scene| {
+        let album = Album::open(scene, [3, 9], &Silent).expect("photographs");
+        album.sources(&[3, 9], width, BackgroundChoice::Auto, &Silent).expect("sources")
+    };
+    let (hidden, all) = (sources(&scene), sources(&plain));
+    assert!(hidden.has_silhouettes && all.has_silhouettes);
+    for (hidden, all) in hidden.images.iter().zip(&all.images) {
+        assert_eq!(hidden.texels, all.texels);
+    }
+}

@@ -262,7 +262,7 @@ fn photographs_that_no_frame_names_are_counted() {
     let folder = changed(2, |_| {});
     folder.image("images/3.png", 16, 12).image("images/10.png", 16, 12);
     // Pictures that belong to a photograph are none.
-    for name in ["1_depth_0001", "2_normal", "1.alpha", "dynamic_mask_1"] {
+    for name in ["1_depth_0001", "2_normal", "1.alpha", "mask_1"] {
         folder.image(&format!("images/{name}.png"), 16, 12);
     }
     let [warning] = &open(&folder).warnings[..] else { panic!("one warning") };

@@ -356,7 +356,8 @@ fn hostile_names() -> Vec<(String, Vec<Layout>)> {
     all.extend(["line\nbreak", "a\rb", "\ta", " leading", "\u{2003}em"].map(|name| (name.to_owned(), lines())));
     all.extend(["a b", "trailing ", "\u{2028}", "a\tb"].map(|name| (name.to_owned(), vec![Layout::Middlebury])));
     if cfg!(unix) {
-        all.push(("back\\slash".to_owned(), vec![Layout::Transforms]));
+        let lists = vec![Layout::Transforms, Layout::Colmap, Layout::ColmapBinary, Layout::Middlebury];
+        all.push(("back\\slash".to_owned(), lists));
     }
     // A separator at the beginning of a line is a blank to a reader of words.
     all.iter_mut().filter(|(name, _)| name == "\u{2028}").for_each(|(_, layouts)| layouts.push(Layout::Colmap));

@@ -53,7 +53,7 @@ pub(super) fn write(out: &mut Draft, form: Form) -> Result<usize, WriteSceneErro
     let mut views = Vec::with_capacity(scene.views.len());
     for (index, view) in scene.views.iter().enumerate() {
         let name = match &view.lens {
-            Some(lens) if !holds(lens) => out.pinhole_photograph(index, "images")?,
+            Some(lens) if !holds(lens) => out.pinhole_photograph_and_ignore_mask(index)?.0,
             _ => out.stored_photograph_and_mask(index)?.0,
         };
         let pinhole = &view.camera.pinhole;

@@ -15,7 +15,9 @@ pub fn check_name(layout: Layout, name: &str) -> Result<(), String> {
         _ if !is_name(name) => "is no name of a file",
         Layout::Colmap if has_breaks => "has a line break in it",
         Layout::Colmap if name.starts_with(char::is_whitespace) => "begins with a blank",
-        Layout::Transforms if name.contains('\\') => "has a backslash in it, which separates folders there",
+        Layout::Transforms | Layout::Colmap | Layout::ColmapBinary | Layout::Middlebury if name.contains('\\') => {
+            "has a backslash in it, which separates folders there"
+        }
         Layout::Middlebury if name.contains(char::is_whitespace) => "has a blank in it",
         // Their photographs are those that lie in a folder.
         Layout::Srn | Layout::Llff | Layout::Neus if is_hidden => "begins with a dot, as hidden files do",

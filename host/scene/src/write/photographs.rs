@@ -66,6 +66,20 @@ impl Draft<'_> {
         Ok(name)
     }
 
+    /// Writes the undistorted picture of a view into `images` as [`Draft::pinhole_photograph`], but an ignore mask into
+    /// `masks`. Returns both names.
+    pub(super) fn pinhole_photograph_and_ignore_mask(
+        &self,
+        view: usize,
+    ) -> Result<(String, Option<String>), WriteSceneError> {
+        let changed = &self.scene.views[view];
+        if changed.mask.is_none() || self.scene.has_object_mask(changed) {
+            return Ok((self.pinhole_photograph(view, "images")?, None));
+        }
+        let name = self.pinhole_photograph_and_mask(view, "images", "masks")?;
+        Ok((name.clone(), Some(name)))
+    }
+
     /// Writes the undistorted picture of a view and its undistorted mask as two PNGs; returns the first one's name.
     pub(super) fn pinhole_photograph_and_mask(
         &self,
@@ -74,10 +88,13 @@ impl Draft<'_> {
         mask_folder: &str,
     ) -> Result<String, WriteSceneError> {
         self.progress.check()?;
-        let Photograph { pixels, .. } = self.scene.photograph(view)?;
+        let Photograph { pixels, seen, .. } = self.scene.photograph(view)?;
         let name = &self.scene.views[view].name;
         let (width, height) = pixels.dimensions();
-        let mask = GrayImage::from_fn(width, height, |x, y| image::Luma([pixels.get_pixel(x, y)[3]]));
+        let mask = match seen {
+            Some(seen) if !self.scene.has_object_mask(&self.scene.views[view]) => seen,
+            _ => GrayImage::from_fn(width, height, |x, y| image::Luma([pixels.get_pixel(x, y)[3]])),
+        };
         self.png(mask_folder, name, mask.into())?;
         let written = self.png(folder, name, DynamicImage::ImageRgba8(pixels).into_rgb8().into())?;
         self.progress.step();

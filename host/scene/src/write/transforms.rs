@@ -12,7 +12,7 @@ pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
     for (index, view) in out.scene.views.iter().enumerate() {
         let keyed = view.lens.as_ref().map(|lens| KeyedLens::of(lens).map(|keyed| (keyed, lens.coefficients())));
         let (photograph, mask) = match keyed {
-            Some(None) => (out.pinhole_photograph(index, "images")?, None),
+            Some(None) => out.pinhole_photograph_and_ignore_mask(index)?,
             _ => out.stored_photograph_and_mask(index)?,
         };
         let file_path = format!("images/{photograph}");
