@@ -273,7 +273,7 @@ fn what_is_hidden_before_an_objects_background_is_background() {
         let mask = GrayImage::from_fn(width, height, level);
         mask.save(folder.file(&format!("toy/masks/{view:06}.png"))).expect("a mask");
     }
-    let scene = Scene::open_masked(&path, MaskChoice::Ignore).expect("a scene");
+    let scene = Scene::open(&path).expect("a scene");
     assert!(scene.photograph(3).is_ok_and(|photograph| photograph.seen.is_some()));
     let sources = |scene: &Scene| {
         let album = Album::open(scene, [3, 9], &Silent).expect("photographs");
