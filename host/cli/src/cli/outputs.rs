@@ -117,15 +117,15 @@ mod tests {
 
     #[test]
     fn paths_are_found_within_values() {
-        let of = |value: &str, part: &str| parts(value.as_ref()).iter().any(|own| own == part);
-        for (value, part) in [
+        let has = |value: &str, path: &str| parts(value.as_ref()).iter().any(|part| part == path);
+        for (value, path) in [
             ("p.csv", "p.csv"),
             ("attention:a.safetensors", "a.safetensors"),
             ("cars=attention:a=b/c:d", "a=b/c:d"),
             ("alex=a,b.pth,heads=c.pt", "a,b.pth"),
             ("alex=a.pth,heads=c.pt", "c.pt"),
         ] {
-            assert!(of(value, part), "{value}: {:?}", parts(value.as_ref()));
+            assert!(has(value, path), "{value}: {:?}", parts(value.as_ref()));
         }
     }
 }

@@ -34,7 +34,7 @@ pub(crate) fn complain(message: impl Display) {
     let _ = writeln!(io::stderr().lock(), "viewfuse: {}", shown_in_line(message));
 }
 
-/// Says what was left out of a scene.
+/// Says the warnings of a scene: what of its files is not used.
 pub(crate) fn warn_of(scene: &Scene) {
     scene.warnings.iter().for_each(|warning| complain(format_args!("warning: {warning}")));
 }
