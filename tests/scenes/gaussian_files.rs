@@ -224,7 +224,7 @@ fn properties<'a>(lines: &[&'a str]) -> Vec<&'a str> {
     lines.iter().filter_map(|line| line.strip_prefix("property ")).collect()
 }
 
-/// SIBR: line 3 is the element's; rows are floats in the published order, with all 45 coefficients.
+/// SIBR (GaussianView.cpp): line 3 is the element's; rows are floats in the published order, with all 45 coefficients.
 fn sibr(lines: &[&str]) -> Result<(), String> {
     need(lines[0] == "ply" && lines[2].starts_with("element vertex "), "the third line")?;
     let properties = properties(lines);
@@ -245,19 +245,30 @@ fn antimatter(lines: &[&str]) -> Result<(), String> {
         .try_for_each(|name| need(lines.contains(&format!("property float {name}").as_str()), name))
 }
 
-/// gsplat.js: every property is a float or an int.
+/// gsplat.js (PLYLoader.ts): the header is in the first 10 KiB; every property is a float or an int.
 fn gsplat(lines: &[&str]) -> Result<(), String> {
+    need(lines.iter().map(|line| line.len() + 1).sum::<usize>() < 10 * 1024, "10 KiB")?;
     need(properties(lines).iter().all(|own| own.starts_with("float ") || own.starts_with("int ")), "types")
 }
 
-/// SuperSplat: known words only, at line beginnings.
+/// PlayCanvas and SuperSplat (the engine's ply.js, read-ply.ts of splat-transform): known words only, a text behind
+/// `comment`, three words for an element and a property.
 fn supersplat(lines: &[&str]) -> Result<(), String> {
-    let words = ["ply", "format", "comment", "element", "property", "end_header"];
-    need(lines.iter().all(|line| words.contains(&line.split(' ').next().unwrap_or(""))), "words")
+    let is_read = |line: &&str| match line.split(' ').collect::<Vec<_>>()[..] {
+        ["ply" | "end_header"] | ["format", ..] | ["comment", _, ..] => true,
+        ["element", _, count] => count.parse::<usize>().is_ok(),
+        ["property", "float", _] => true,
+        _ => false,
+    };
+    need(lines.iter().all(|line| is_read(&line)), "words")
 }
 
-/// three.js and mkkellogg's: degree by the number of coefficients.
+/// mkkellogg's three.js (PlyParserUtils.js): the degree by the number of coefficients, counted in every line; the format
+/// by words in every line, comments too.
 fn three(lines: &[&str]) -> Result<(), String> {
+    let comments = lines.iter().filter(|line| line.starts_with("comment"));
+    let words = ["packed_", "f_rest_", "end_header", "element chunk"];
+    need(!comments.into_iter().any(|line| words.iter().any(|word| line.contains(word))), "comments")?;
     let count = properties(lines).iter().filter(|own| own.contains(" f_rest_")).count();
     need([0, 9, 24, 45].contains(&count) && lines.last() == Some(&"end_header"), "degree")
 }

@@ -156,9 +156,14 @@ fn a_view_is_found_by_name_or_by_its_number() {
     let scene = open(&scenes::middlebury());
     assert_eq!(scene.view_named("toy0002"), Some(1));
     assert_eq!(scene.view_named("2"), Some(1));
-    assert_eq!(scene.view_named("0001"), Some(0));
-    for nobody in ["0", "3", "", "toy", "toy2", "-1", "1.0", "99999999999999999999999999"] {
-        assert_eq!(scene.view_named(nobody), None, "{nobody}");
+    assert_eq!(["0001", "0", "#0", "#1"].map(|text| scene.view_named(text)), [Some(0), Some(0), Some(0), Some(1)]);
+    // The number of one and the index of the other.
+    assert_eq!((scene.views_meant("1"), scene.view_named("1")), (vec![0, 1], None));
+    let error = viewfuse::scene::few_shot::view_list(&scene, "2,1").expect_err("two views").to_string();
+    let said = "'1' may be the view 'toy0001' (index 0) or 'toy0002' (index 1): write the name, or the index as '#0'";
+    assert!(error.ends_with(said), "{error}");
+    for nobody in ["3", "", "toy", "toy2", "-1", "+1", "#2", "##0", "1.0", "99999999999999999999999999"] {
+        assert!(scene.views_meant(nobody).is_empty(), "{nobody}");
     }
 
     let folder = scenes::srn();
@@ -167,6 +172,8 @@ fn a_view_is_found_by_name_or_by_its_number() {
         (scene.view_named("1"), scene.view_named("target_1"), scene.view_named("02")),
         (Some(2), Some(2), Some(0))
     );
+    // Where names are numbers, a number is no index.
+    assert_eq!(scene.view_named("0"), None);
     // An exact name wins; of a photograph and a target pose of one number the photograph is meant.
     folder.write("target_pose/2.txt", scenes::words(&scenes::WORLD_FROM_CAMERA));
     let scene = open(&folder);

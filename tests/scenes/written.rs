@@ -16,7 +16,9 @@ fn written(scene: &Scene, layout: Layout) -> (Folder, Scene, Written) {
     let written = write(scene, layout, &path, &Silent).unwrap_or_else(|error| panic!("{error}"));
     let read = Scene::open(&path).unwrap_or_else(|error| panic!("{layout}: {error}"));
     assert_eq!(read.layout, layout.reader());
-    assert_eq!(read.warnings, Vec::<String>::new());
+    // Half a photograph, as masks are below, may be an object.
+    let warnings: Vec<_> = read.warnings.iter().filter(|line| !line.contains("--masks object")).collect();
+    assert!(warnings.is_empty(), "{warnings:?}");
     (folder, read, written)
 }
 

@@ -1,7 +1,7 @@
 //! The selection of source views and target cameras.
 //!
-//! Views are chosen by a list of items separated by commas: a view's name or number, its index as `#3` (from
-//! 0, in any scene), a range `A..B` of these (both ends included), `all`, a split of the scene (`train`, `val`, `test`,
+//! Views are chosen by a list of items separated by commas: a view's name, its index (from 0; `#3` in any scene, 3 where
+//! this can be nothing else, [`Scene::views_meant`]), a range `A..B` of these (both ends included), `all`, a split of the scene (`train`, `val`, `test`,
 //! where its files define splits), and `/STEP` after either to take every `STEP`-th.
 
 mod targets;
@@ -33,6 +33,18 @@ pub enum SelectionError {
         nearest: String,
         /// The scene's views, in words.
         views: String,
+    },
+    /// A number in a list is the number that one view's name ends in and another's index, or ends several names.
+    #[error("{scene}: '{text}' may be the view {views}: write the name, or the index as {index}")]
+    AmbiguousView {
+        /// The scene's path.
+        scene: String,
+        /// The given number.
+        text: String,
+        /// The names of the views.
+        views: String,
+        /// The first one's index, as it is written.
+        index: String,
     },
     /// A step is not a positive whole number.
     #[error("view list '{item}': the step behind '/' must be a whole number of at least 1")]
@@ -302,21 +314,30 @@ pub fn target_of(scene: &Scene, view: usize) -> Target {
 
 /// The view of a name, a number or an index.
 fn view_of(scene: &Scene, name: &str) -> Result<usize, SelectionError> {
+    let meant = scene.views_meant(name);
+    if let [view] = meant[..] {
+        return Ok(view);
+    }
+    let (path, text) = (scene.path.display().to_string(), name.to_owned());
+    if let [first, ..] = meant[..] {
+        let views: Vec<String> =
+            meant.iter().map(|&view| format!("'{}' (index {view})", scene.views[view].name)).collect();
+        return Err(SelectionError::AmbiguousView {
+            scene: path,
+            text,
+            views: views.join(" or "),
+            index: format!("'#{first}'"),
+        });
+    }
     let names = || scene.views.iter().map(|view| view.name.as_str());
-    scene.view_named(name).ok_or_else(|| {
-        let near: Vec<String> = nearest(name, names(), NEAREST).iter().map(|own| format!("'{own}'")).collect();
-        let (first, last) = (names().next().unwrap_or_default(), names().next_back().unwrap_or_default());
-        let count = scene.views.len();
-        SelectionError::NoSuchView {
-            scene: scene.path.display().to_string(),
-            name: name.to_owned(),
-            nearest: if near.is_empty() {
-                String::new()
-            } else {
-                format!(", the nearest names are {}", near.join(", "))
-            },
-            views: format!("{count} views are {first} .. {last}, or by index #0 .. #{}", count.saturating_sub(1)),
-        }
+    let near: Vec<String> = nearest(name, names(), NEAREST).iter().map(|near| format!("'{near}'")).collect();
+    let (first, last) = (names().next().unwrap_or_default(), names().next_back().unwrap_or_default());
+    let count = scene.views.len();
+    Err(SelectionError::NoSuchView {
+        scene: path,
+        name: text,
+        nearest: if near.is_empty() { String::new() } else { format!(", the nearest names are {}", near.join(", ")) },
+        views: format!("{count} views are {first} .. {last}, or by index #0 .. #{}", count.saturating_sub(1)),
     })
 }
 

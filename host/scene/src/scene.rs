@@ -46,6 +46,7 @@ pub use fault::{FaultLocation, FileFault, IntrinsicsFault, NumpyFault, PlyFault}
 pub use frame::SRN_DISTANCE;
 use images::Turn;
 pub use images::{encode_png, picture_size, read_picture};
+use masks::meaning::Decision;
 pub use masks::meaning::{MaskChoice, MaskMeaning, UnknownMasks};
 use reader::Reader;
 pub use split::{Split, UnknownSplit};
@@ -230,8 +231,10 @@ impl Scene {
             } else {
                 checked.warnings.extend(masks::find(path, &mut checked.views));
             }
-            let (masks, line) = masks::meaning::decide(&checked.views, mask_choice, reader.masks());
+            let Decision { meaning: masks, line, warning } =
+                masks::meaning::decide(&checked.views, mask_choice, reader.masks());
             checked.conventions.extend(line);
+            checked.warnings.extend(warning);
             let mut names = HashSet::new();
             for view in &checked.views {
                 if !names.insert(view.name.as_str()) {
@@ -343,37 +346,45 @@ impl Scene {
         image.as_deref().ok_or_else(missing)
     }
 
-    /// The index of the view that `text` refers to: the view of exactly this name; otherwise, if `text` is a
-    /// whole number, the one view whose name ends in that number, leading zeros aside.
-    ///
-    /// `1` finds `dinoSR0001`, `3` finds `000003`, also where the count starts at 0. Where names end in numbers, a
-    /// number alone is never an index into [`Scene::views`]: some data sets count from 1 and some from 0. Where none
-    /// does (`left`, `right`), it is. Of a photograph and a target pose of the same number the photograph is meant.
-    /// `#3` is the index 3, in any scene without a view of just this name. `None` if no view fits or, by number,
-    /// several do.
+    /// The index of the view that `text` refers to; `None` if it may be none or several ([`Scene::views_meant`]).
     pub fn view_named(&self, text: &str) -> Option<usize> {
-        if let Some(view) = self.views.iter().position(|view| view.name == text) {
-            return Some(view);
-        }
-        if let Some(index) = text.strip_prefix('#') {
-            let is_number = index.bytes().all(|byte| byte.is_ascii_digit());
-            return index.parse().ok().filter(|index| is_number && *index < self.views.len());
-        }
-        let wanted = trailing_number(text).filter(|_| text.bytes().all(|byte| byte.is_ascii_digit()))?;
-        if self.views.iter().all(|view| trailing_number(&view.name).is_none()) {
-            return text.parse().ok().filter(|index| *index < self.views.len());
-        }
-        let fitting = |has_image: bool| {
-            let fits =
-                move |view: &View| view.image.is_some() == has_image && trailing_number(&view.name) == Some(wanted);
-            let mut found = self.views.iter().enumerate().filter(move |(_, view)| fits(view)).map(|(index, _)| index);
-            (found.next(), found.next())
-        };
-        match (fitting(true), fitting(false)) {
-            ((Some(view), None), _) | ((None, _), (Some(view), None)) => Some(view),
+        match self.views_meant(text)[..] {
+            [view] => Some(view),
             _ => None,
         }
     }
+
+    /// The views that `text` may refer to: the view of exactly this name; `#3` is the index 3; a whole number is an
+    /// index, and the number that a name ends in, leading zeros aside.
+    ///
+    /// Both, because some data sets count from 1 and some from 0: in `toy0001, toy0002` the number 1 may mean either,
+    /// which the caller says, and 2 can only be `toy0002`. A number with leading zeros is no index, and where names are
+    /// nothing but numbers (`000048`), a number is a name. Of a photograph and a target pose of the same number the
+    /// photograph is meant.
+    pub fn views_meant(&self, text: &str) -> Vec<usize> {
+        if let Some(view) = self.views.iter().position(|view| view.name == text) {
+            return vec![view];
+        }
+        let number = text.strip_prefix('#').unwrap_or(text);
+        let index = number.parse().ok().filter(|index| is_number(number) && *index < self.views.len());
+        if number != text || !is_number(number) {
+            return index.into_iter().collect();
+        }
+        let ends_in = |view: &usize| trailing_number(&self.views[*view].name) == trailing_number(text);
+        let (photographs, poses): (Vec<usize>, Vec<usize>) =
+            (0..self.views.len()).filter(ends_in).partition(|view| self.views[*view].image.is_some());
+        let mut meant = if photographs.is_empty() { poses } else { photographs };
+        let is_index = |index: &usize| {
+            index.to_string() == text && !meant.contains(index) && !self.views.iter().any(|view| is_number(&view.name))
+        };
+        meant.extend(index.filter(is_index));
+        meant
+    }
+}
+
+/// Whether a text is nothing but digits.
+fn is_number(text: &str) -> bool {
+    !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
 }
 
 /// Views of several cameras are often numbered alike, in a folder for each camera: their names get the folder's name as

@@ -121,8 +121,8 @@ impl DeviceOptions {
 /// The choice of source views.
 #[derive(Args)]
 pub(crate) struct SourceOptions {
-    /// Source views: names or their numbers, '#3' for the view of index 3 (`inspect --views` lists them), ranges A..B
-    /// with both ends included, `all`, each with /STEP, separated by commas [default: all but the targets]
+    /// Source views: names or indices (`inspect --views` lists them; '#3' is always the index 3), ranges A..B with both
+    /// ends included, `all`, each with /STEP, separated by commas [default: all but the targets]
     #[arg(long, value_name = "VIEWS")]
     sources: Option<String>,
     /// Use at most this many sources, as far apart as possible

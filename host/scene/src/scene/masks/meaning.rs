@@ -87,17 +87,23 @@ const MAX_BORDER: f64 = 0.05;
 const MAX_DIFFERENCE: f64 = 0.02;
 /// Least share of the photographs that ignore masks leave. A fisheye's circle leaves 0.44 of a 16:9 picture.
 const MIN_LEFT: f64 = 0.4;
+/// Below this share, masks that touch the border may also be of an object that is near: what they are taken for is said.
+const MAX_DOUBTFUL: f64 = 0.7;
 
-/// What masks mean, and a line that says it; `layout` is what their layout says. Masks that cannot be read say nothing:
-/// the error comes with their photographs.
-pub(in super::super) fn decide(
-    views: &[View],
-    choice: MaskChoice,
-    layout: Option<MaskMeaning>,
-) -> (MaskMeaning, Option<String>) {
+/// What masks mean, with a line that says it, and a warning where it was guessed and may be wrong.
+#[derive(Default)]
+pub(in super::super) struct Decision {
+    pub meaning: MaskMeaning,
+    pub line: Option<String>,
+    pub warning: Option<String>,
+}
+
+/// What masks mean; `layout` is what their layout says. Masks that cannot be read say nothing: the error comes with
+/// their photographs.
+pub(in super::super) fn decide(views: &[View], choice: MaskChoice, layout: Option<MaskMeaning>) -> Decision {
     let masked: Vec<&View> = views.iter().filter(|view| view.mask.is_some()).collect();
     if masked.is_empty() {
-        return (MaskMeaning::default(), None);
+        return Decision::default();
     }
     let step = masked.len().div_ceil(MAX_LOOKED_AT);
     let looks: Vec<Look> = masked.par_iter().step_by(step).filter_map(|view| Look::of(view)).collect();
@@ -120,7 +126,15 @@ pub(in super::super) fn decide(
     if inverted > 0 {
         line += &format!(", white where they do not count ({INVERTED}*.png, {inverted} files)");
     }
-    (meaning, Some(line))
+    let is_doubtful = choice == MaskChoice::Auto && layout.is_none() && inverted == 0 && left < MAX_DOUBTFUL;
+    let warning = (meaning == MaskMeaning::Ignore && is_doubtful).then(|| {
+        format!(
+            "masks that leave {:.0} % of the pixels are taken to say which pixels do not count; `--masks object` if \
+             they show the object",
+            100.0 * left
+        )
+    });
+    Decision { meaning, line: Some(line), warning }
 }
 
 /// What is seen of a mask.
