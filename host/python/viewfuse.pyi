@@ -68,7 +68,7 @@ class Scene:
         """
     def render(
         self,
-        weights: Optional[str] = None,
+        weights: Union[None, str, ArrayLike, Callable[[NDArray[np.float64], NDArray[np.float64]], ArrayLike]] = None,
         *,
         size: Optional[tuple[int, int]] = None,
         model: Union[None, str, PathLike[str]] = None,
@@ -88,7 +88,11 @@ class Scene:
     ) -> list[Frame]:
         """Renders targets; all frames stay in memory. Ctrl-C ends it with KeyboardInterrupt.
 
-        weights: the scheme; "auto" (the default without a model) chooses the best for the scene.
+        weights: the scheme; "auto" (the default without a model) chooses the best for the scene. Or weights of your own, none
+            below 0, which are divided by their sum: an array, [source] or [target][source]; or a function of the sources'
+            camera-to-world matrices, [source][4][4], and the target's, [4][4], which returns an array [source]. It is called
+            for each target and, for the sources' own depths, for each source with others; with an array the default scheme
+            chooses those. What it raises ends the render.
         size: width and height; by default the views' size, at most 512 pixels on a side.
         model: a checkpoint of a PixelNeRF or a GeNVS; by default the training-free field.
         device: auto, cpu, vulkan, vulkan:NUMBER or vulkan:NAME.
@@ -175,6 +179,9 @@ class Frame:
     @property
     def psnr(self) -> Optional[float]:
         """Peak signal to noise ratio against the photograph where it is seen, decibels. None without one."""
+    @property
+    def corrected_psnr(self) -> Optional[float]:
+        """The same after a gain and an offset of each channel were fitted to the photograph. None without one."""
     @property
     def ssim(self) -> Optional[float]:
         """Structural similarity with the photograph. None without one, or if the picture is smaller than 7x7."""

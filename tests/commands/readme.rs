@@ -37,7 +37,7 @@ fn commands() -> Vec<String> {
 }
 
 /// Lines of `sh` blocks that are not run here: how they begin, and why.
-const NOT_RUN: [(&str, &str); 16] = [
+const NOT_RUN: [(&str, &str); 17] = [
     ("#", "a comment"),
     ("git clone", "the network"),
     ("tests/run", "it runs this test"),
@@ -49,6 +49,7 @@ const NOT_RUN: [(&str, &str); 16] = [
     ("cargo run --release -- pose ", "`pose.rs` runs it where `viewfuse-openmvg` is"),
     ("cargo install", "it would change the machine"),
     ("pip install", "it would change the machine"),
+    ("pip wheel", "`python.rs` builds the wheel where it is asked for"),
     ("host/python/test", "`python.rs` runs it where it is asked for"),
     ("VIEWFUSE_FUZZ_", "`fuzz` runs a part of it; the whole takes minutes"),
     ("seq ", "`protocols/cluster.rs` runs it where GNU parallel is"),

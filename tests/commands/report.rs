@@ -193,8 +193,8 @@ fn a_person_sees_what_was_measured(browser: &Browser) {
             "at {width}"
         );
         assert_eq!(view["images"], page.matches("<img ").count(), "at {width}");
-        // Two metrics with a figure and one of differences each, and the sweep.
-        assert_eq!((&view["scripts"], &view["figures"]), (&json!(0), &json!(5)), "at {width}");
+        // Three metrics with a figure and one of differences each, and the sweep.
+        assert_eq!((&view["scripts"], &view["figures"]), (&json!(0), &json!(7)), "at {width}");
         assert!(view["smallestText"].as_f64().is_some_and(|size| size >= 11.0), "{}", view["smallestText"]);
         let tables = view["tables"].as_array().expect("tables");
         assert_eq!(tables.len(), 3 + 1 + 1);

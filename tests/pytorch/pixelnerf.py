@@ -101,23 +101,27 @@ def architecture():
 
 
 def parameters(model):
-    """Tensors by name, where in a pixel its centre is (0 as published), and the largest side of source images."""
+    """Tensors by name, where in a pixel its centre is (0 as published), the largest side of source images, and whether
+    the trunk has its max pool."""
     if model == "formula":
         gain = lambda name: 6 if "lin_out.weight" in name else 1
-        return {name: by_formula(name, shape, gain(name)) for name, shape in architecture()}, 0.0, SOURCE_SIDE
+        return {name: by_formula(name, shape, gain(name)) for name, shape in architecture()}, 0.0, SOURCE_SIDE, True
     with safe_open(model, "pt") as file:
         metadata = file.metadata() or {}
     pixel_centre = float(metadata.get("viewfuse.pixel_centre", 0))
     source_side = int(metadata.get("viewfuse.source_side", SOURCE_SIDE))
-    return {name: tensor.float().to(DEVICE) for name, tensor in load_file(model).items()}, pixel_centre, source_side
+    has_pool = float(metadata.get("viewfuse.first_pool", 1)) == 1
+    tensors = {name: tensor.float().to(DEVICE) for name, tensor in load_file(model).items()}
+    return tensors, pixel_centre, source_side, has_pool
 
 
 # Network
 
 
 class PixelNerf:
-    def __init__(self, tensors, pixel_centre, source_side):
+    def __init__(self, tensors, pixel_centre, source_side, has_pool):
         self.tensors, self.pixel_centre, self.source_side = tensors, pixel_centre, source_side
+        self.has_pool = has_pool
         latent = tensors["mlp_coarse.lin_z.0.weight"].shape[1]
         self.levels, channels = [], tensors["encoder.model.conv1.weight"].shape[0]
         while channels < latent:
@@ -140,7 +144,7 @@ class PixelNerf:
         self.side = images.shape[-1]
         x = F.relu(self.convolve(images, "conv1", "bn1", stride=2, padding=3))
         levels = [x]
-        x = F.max_pool2d(x, 3, 2, 1)
+        x = F.max_pool2d(x, 3, 2, 1) if self.has_pool else x
         for level, count in enumerate(self.levels, 1):
             for block in range(count):
                 x = self.basic_block(x, f"layer{level}.{block}", 2 if level > 1 and block == 0 else 1)

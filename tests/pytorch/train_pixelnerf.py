@@ -150,10 +150,10 @@ def main():
     if options.threads:
         torch.set_num_threads(options.threads)
     torch.manual_seed(0)
-    tensors, pixel_centre, source_side = parameters(options.model)
+    tensors, pixel_centre, source_side, has_pool = parameters(options.model)
     data = Data(options.scenes, (0.8, 1.8), pixel_centre)
-    network = Batched(tensors, pixel_centre, source_side)
-    check(network, PixelNerf(tensors, pixel_centre, source_side), data)
+    network = Batched(tensors, pixel_centre, source_side, has_pool)
+    check(network, PixelNerf(tensors, pixel_centre, source_side, has_pool), data)
     learned = [tensor for name, tensor in tensors.items() if not name.endswith(("running_mean", "running_var"))]
     learned = [tensor.requires_grad_() for tensor in learned if tensor.is_floating_point()]
     adam = torch.optim.Adam(learned, lr=RATE)

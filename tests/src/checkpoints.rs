@@ -239,7 +239,7 @@ pub fn changed(made: &Checkpoint, change: impl FnOnce(&mut Vec<(TensorShape, Vec
     };
     let mut tensors = made.shapes().iter().map(tensor).collect();
     change(&mut tensors);
-    Checkpoint::in_memory("changed", tensors, BTreeMap::new())
+    Checkpoint::in_memory("changed", tensors, made.metadata().clone())
 }
 
 /// A file with these bytes, in a folder that goes away.

@@ -56,6 +56,9 @@ impl Hinted for EvaluateError {
 /// Name of the peak signal to noise ratio in decibels, of 8-bit values; infinite for equal pictures. Names of metrics
 /// are those of [`Scored`](crate::metrics::Scored).
 pub const PSNR: &str = "psnr";
+/// Name of the peak signal to noise ratio of corrected colours
+/// ([`corrected_psnr_of_seen`](viewfuse_field::scores::corrected_psnr_of_seen)).
+pub const PSNR_CORRECTED: &str = "psnr-corrected";
 /// Name of the structural similarity; pictures that are too small have none.
 pub const SSIM: &str = "ssim";
 

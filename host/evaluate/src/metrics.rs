@@ -37,7 +37,7 @@ use image::{GrayImage, RgbImage};
 use lpips::Lpips;
 use viewfuse_device::{Device, DeviceError};
 use viewfuse_field::finite::NotFinite;
-use viewfuse_field::scores::{psnr_of_seen, ssim_of_seen, with_truth_unseen};
+use viewfuse_field::scores::{corrected_psnr_of_seen, psnr_of_seen, ssim_of_seen, with_truth_unseen};
 use viewfuse_nn::checkpoint::CheckpointError;
 use viewfuse_nn::image::HostImage;
 
@@ -74,7 +74,7 @@ pub enum MetricError {
 /// A score of a picture, by name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scored {
-    /// `psnr`, `ssim`, `lpips-alex`, `lpips-vgg`, `lpips-squeeze` or `dists`.
+    /// `psnr`, `ssim`, `psnr-corrected`, `lpips-alex`, `lpips-vgg`, `lpips-squeeze` or `dists`.
     pub name: &'static str,
     /// PSNR in decibels, infinite for equal pictures; the others have no unit.
     pub value: f64,
@@ -100,7 +100,7 @@ impl<D: Device> Metrics<D> {
         Metrics { convention: Convention::Plain, lpips: Vec::new(), dists: None, inception: None }
     }
 
-    /// Scores a prediction: PSNR, SSIM if the pictures are at least 7x7, and the metrics of the loaded networks, in the
+    /// Scores a prediction: PSNR, SSIM if the pictures are at least 7x7, PSNR of corrected colours, and the metrics of the loaded networks, in the
     /// order of [`Scored::name`]'s list.
     ///
     /// `seen` is 0 where the photograph shows nothing; without it all pixels are scored. PSNR and SSIM leave unseen
@@ -123,6 +123,8 @@ impl<D: Device> Metrics<D> {
         if let Some(value) = ssim_of_seen(&shown, &shown_truth, seen) {
             scores.push(Scored { name: "ssim", value, more_is_better: true });
         }
+        let value = corrected_psnr_of_seen(&shown, &shown_truth, seen);
+        scores.push(Scored { name: crate::PSNR_CORRECTED, value, more_is_better: true });
         let shown = with_truth_unseen(&shown, truth, seen);
         // Networks see the prediction as it was saved and the photograph as it is.
         for lpips in &self.lpips {

@@ -23,7 +23,7 @@ mod gain;
 mod held_out;
 mod regions;
 
-pub use calibration::{Calibration, Group, POOR};
+pub use calibration::{Calibration, Group};
 pub use expectation::{Basis, Expected, PixelErrors, TERMS};
 pub use held_out::HOLD_OUT;
 
@@ -170,10 +170,8 @@ impl Chosen {
     pub fn expected(&self, frame: &Frame) -> Option<Expected> {
         let calibrated = self.calibrated(frame);
         let expected = self.basis?.expected(self.standing(frame), calibrated, frame.seen);
-        let pixels = self.calibration.as_ref().zip(calibrated).map(|(calibration, calibrated)| {
-            let scale = 10.0_f64.powf((calibrated - expected.psnr) / 20.0) as f32;
-            PixelErrors { scale, poor: calibration.poor(&frame.confidences, scale) }
-        });
+        let scale = |calibrated: f64| 10.0_f64.powf((calibrated - expected.psnr) / 20.0) as f32;
+        let pixels = calibrated.map(|calibrated| PixelErrors { scale: scale(calibrated) });
         Some(Expected { pixels, ..expected })
     }
 }

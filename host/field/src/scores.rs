@@ -1,4 +1,4 @@
-//! PSNR and SSIM of what a photograph shows.
+//! PSNR, as it is and of corrected colours, and SSIM of what a photograph shows.
 //!
 //! A photograph that was taken through a lens does not show the whole picture of its pinhole
 //! ([`GroundTruth::seen`](viewfuse_scene::photographs::GroundTruth::seen)). What it does not show has no truth and is
@@ -18,6 +18,31 @@ pub fn psnr_of_seen(prediction: &RgbImage, truth: &RgbImage, seen: Option<&GrayI
         pixels.flat_map(|(pixel, _)| pixel.0).collect()
     };
     psnr(&levels(prediction), &levels(truth))
+}
+
+/// [`psnr_of_seen`] after each of the prediction's channels was corrected by the gain and offset that fit it best, by
+/// least squares over the seen pixels, to the truth's; corrected levels are clamped to 0..=255 and not rounded. What it
+/// is above PSNR is the price of the camera's exposure and white balance, which no other view tells. Never below PSNR,
+/// rounding aside. A channel of one level gets an offset alone.
+///
+/// As the `cc_psnr` of nerfstudio and the `color_correct` of multinerf (RawNeRF, Zip-NeRF), with an affine function of
+/// each channel for their quadratic one of all three.
+pub fn corrected_psnr_of_seen(prediction: &RgbImage, truth: &RgbImage, seen: Option<&GrayImage>) -> f64 {
+    let is_seen = |at: usize| seen.is_none_or(|seen| seen.as_raw()[at] > 0);
+    let pairs: Vec<_> = prediction.pixels().zip(truth.pixels()).enumerate().filter(|(at, _)| is_seen(*at)).collect();
+    let count = pairs.len() as f64;
+    let mut error = 0.0;
+    for channel in 0..3 {
+        let levels = || pairs.iter().map(|(_, (p, t))| [f64::from(p.0[channel]), f64::from(t.0[channel])]);
+        // Whole numbers below 2^53: the sums are exact.
+        let [p, t, pp, pt] =
+            levels().fold([0.0; 4], |sum, [p, t]| [sum[0] + p, sum[1] + t, sum[2] + p * p, sum[3] + p * t]);
+        let variation = count * pp - p * p;
+        let gain = if variation > 0.0 { (count * pt - p * t) / variation } else { 1.0 };
+        let offset = (t - gain * p) / count;
+        error += levels().map(|[p, t]| ((gain * p + offset).clamp(0.0, 255.0) - t).powi(2)).sum::<f64>();
+    }
+    if error > 0.0 { 10.0 * (3.0 * count * 255.0 * 255.0 / error).log10() } else { f64::INFINITY }
 }
 
 /// [`ssim`] over the windows whose pixels are all seen; `None` if there is no such window. All pictures must have one
@@ -80,6 +105,43 @@ mod tests {
         assert_eq!(psnr_of_seen(&prediction, &truth, Some(&all)), psnr_of_seen(&prediction, &truth, None));
         let [with, without] = [Some(&all), None].map(|seen| ssim_of_seen(&prediction, &truth, seen).expect("large"));
         assert!((with - without).abs() < 1e-12, "{with} {without}");
+    }
+
+    #[test]
+    fn exposure_costs_what_the_correction_gains() {
+        let [_, truth] = pictures();
+        // Darker, and redder; the noise on it is no exposure.
+        let noisy = |x: u32, y: u32| (x * 7 + y * 5) % 3;
+        let exposed = |x: u32, y: u32, gain: [f64; 3], offset: f64| {
+            let level = |c: usize| gain[c] * f64::from(truth.get_pixel(x, y)[c]) + offset;
+            Rgb([0, 1, 2].map(|c| (level(c).round() as u32 + noisy(x, y)) as u8))
+        };
+        let plain = RgbImage::from_fn(23, 17, |x, y| exposed(x, y, [0.9; 3], 10.0));
+        let dark = RgbImage::from_fn(23, 17, |x, y| exposed(x, y, [0.7, 0.5, 0.45], 3.0));
+        let [of_plain, of_dark] = [&plain, &dark].map(|picture| corrected_psnr_of_seen(picture, &truth, None));
+        assert!(psnr_of_seen(&dark, &truth, None) < 15.0 && of_dark > 40.0, "{of_dark}");
+        assert!(of_plain > of_dark && of_plain > psnr_of_seen(&plain, &truth, None) + 10.0, "{of_plain}");
+        // The gain and the offset of least squares, by their normal equations.
+        let (mut best, step) = (f64::INFINITY, 1.0e-3);
+        for at in 0..200 {
+            let gain = 1.0 / 0.7 - 0.1 + step * f64::from(at);
+            let rest: Vec<f64> =
+                dark.pixels().zip(truth.pixels()).map(|(p, t)| f64::from(t[0]) - gain * f64::from(p[0])).collect();
+            let mean = rest.iter().sum::<f64>() / rest.len() as f64;
+            best = best.min(rest.iter().map(|rest| (rest - mean).powi(2)).sum::<f64>() / rest.len() as f64);
+        }
+        let red = |picture: &RgbImage| RgbImage::from_fn(23, 17, |x, y| Rgb([picture.get_pixel(x, y)[0]; 3]));
+        let corrected = corrected_psnr_of_seen(&red(&dark), &red(&truth), None);
+        assert!((corrected - 10.0 * (255.0 * 255.0 / best).log10()).abs() < 0.01, "{corrected} {best}");
+        // Equal pictures, one level, and pixels that are not seen.
+        assert_eq!(corrected_psnr_of_seen(&truth, &truth, None), f64::INFINITY);
+        let flat = RgbImage::from_pixel(23, 17, Rgb([7, 80, 200]));
+        assert_eq!(corrected_psnr_of_seen(&flat, &RgbImage::from_pixel(23, 17, Rgb([9, 9, 9])), None), f64::INFINITY);
+        let seen = GrayImage::from_fn(23, 17, |x, _| Luma([u8::from(x > 5)]));
+        let mut other = dark.clone();
+        other.enumerate_pixels_mut().filter(|(x, _, _)| *x <= 5).for_each(|(_, _, pixel)| pixel.0 = [255, 0, 255]);
+        let of_seen = [&dark, &other].map(|picture| corrected_psnr_of_seen(picture, &truth, Some(&seen)));
+        assert!(of_seen[0] == of_seen[1] && of_seen[0] > 40.0, "{of_seen:?}");
     }
 
     #[test]

@@ -22,6 +22,7 @@ mod legacy;
 mod location;
 mod modules;
 pub mod pickle;
+mod published;
 mod safe;
 mod sizes;
 mod snapshot;
@@ -99,7 +100,7 @@ impl Checkpoint {
             }
             let kind = Kind::of(&file)?;
             let mut origin = kind.name().to_owned();
-            let (places, metadata) = match kind {
+            let (places, mut metadata) = match kind {
                 Kind::Safetensors => safe::open(&file, facts.len())?,
                 Kind::TorchZip | Kind::TorchLegacy | Kind::Snapshot => {
                     let (found, places) = match kind {
@@ -114,6 +115,7 @@ impl Checkpoint {
                     (places, found.settings)
                 }
             };
+            metadata.extend(published::metadata(path));
             let total = places.values().map(|place| 4 * u128::from(place.count())).sum();
             if total > MAX_TOTAL_BYTES.into() {
                 return Err(Problem::TooLarge {

@@ -14,10 +14,8 @@ pub const BATCH_NORM_EPSILON: f64 = 1.0e-5;
 
 /// The first convolution.
 const STEM: ConvolutionOptions = ConvolutionOptions { stride: 2, ..ConvolutionOptions::RELU };
-/// The layers behind it.
+/// Behind it.
 const POOL: MaxPool = MaxPool { size: 3, stride: 2, padding: 1, ceil_mode: false };
-/// Pixels of the input from one pixel of the first level to the next.
-const FIRST_STRIDE: u32 = 4;
 
 /// A level of the trunk: basic blocks of two 3x3 convolutions.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -57,6 +55,8 @@ pub struct BasicBlock<L> {
 pub struct ResNet<L> {
     /// The first convolution, 7x7 with stride 2.
     pub stem: L,
+    /// Whether a 3x3 max pool with stride 2 is behind it, as published. PixelNeRF's networks for 64 pixels have none.
+    pub has_pool: bool,
     /// `[level][block]`.
     pub levels: Vec<Vec<BasicBlock<L>>>,
 }
@@ -92,7 +92,7 @@ impl ResNet<ResNetLayer> {
         let levels = (1..).zip(levels);
         let levels =
             levels.map(|(level, sizes)| (0..sizes.block_count).map(|at| block(level, at, sizes.channels)).collect());
-        ResNet { stem, levels: levels.collect() }
+        ResNet { stem, has_pool: true, levels: levels.collect() }
     }
 }
 
@@ -111,7 +111,11 @@ impl<L> ResNet<L> {
             })
         };
         let mut level = |blocks: &Vec<BasicBlock<L>>| blocks.iter().map(&mut block).collect();
-        Ok(ResNet { stem, levels: self.levels.iter().map(&mut level).collect::<Result<_, _>>()? })
+        Ok(ResNet {
+            stem,
+            has_pool: self.has_pool,
+            levels: self.levels.iter().map(&mut level).collect::<Result<_, _>>()?,
+        })
     }
 }
 
@@ -148,9 +152,10 @@ impl<D: Device> ResNet<Convolution<D>> {
         output_stride: u32,
     ) -> Result<Vec<Image<D>>, DeviceError> {
         let stem = self.stem.run(scratch, STEM, image, Residual::None)?;
-        let mut x = Some(POOL.run(scratch, &stem)?);
+        let mut x = self.has_pool.then(|| POOL.run(scratch, &stem)).transpose()?;
         let mut images = vec![stem];
-        let mut level_stride = FIRST_STRIDE;
+        // Pixels of the input from one pixel of the level to the next.
+        let mut level_stride: u32 = if self.has_pool { 4 } else { 2 };
         for (level, blocks) in self.levels.iter().enumerate() {
             let dilation = (level_stride / output_stride).max(1);
             let first_stride = if level > 0 && dilation == 1 { 2 } else { 1 };

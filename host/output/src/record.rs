@@ -225,6 +225,10 @@ pub struct FrameRecord {
     /// Peak signal to noise ratio against the ground truth, decibels; null for equal pictures or without a ground
     /// truth.
     pub psnr: Option<f64>,
+    /// The same after a gain and an offset of each channel were fitted to the truth: without the price of the camera's
+    /// exposure. Null as `psnr`, and in records of older versions.
+    #[serde(default)]
+    pub corrected_psnr: Option<f64>,
     /// The score to expect without a ground truth; null where the scheme was given, and with too few sources.
     pub expected: Option<Expected>,
     /// Structural similarity with the ground truth.
@@ -263,6 +267,7 @@ impl FrameRecord {
             shares: frame.shares.clone(),
             left_out_weight: frame.omission.omitted_weight,
             psnr: frame.truth.as_ref().map(|truth| truth.psnr).filter(|psnr| psnr.is_finite()),
+            corrected_psnr: frame.truth.as_ref().map(|truth| truth.corrected_psnr).filter(|psnr| psnr.is_finite()),
             expected: None,
             ssim: frame.truth.as_ref().and_then(|truth| truth.ssim),
             depth_step: (!frame.depths.is_empty()).then(|| space.file_length(depth_step(&frame.depths))),

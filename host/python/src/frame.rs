@@ -42,6 +42,9 @@ pub(crate) struct PyFrame {
     seen: Option<Py<PyArray2<u8>>>,
     /// Peak signal to noise ratio against the photograph, decibels. None without one.
     psnr: Option<f64>,
+    /// The same after a gain and an offset of each channel were fitted to the photograph: without the price of its
+    /// exposure. None without one.
+    corrected_psnr: Option<f64>,
     /// Structural similarity with the photograph. None without one, or if the picture is smaller than 7x7.
     ssim: Option<f64>,
     /// The PSNR to expect and the ends of the interval that holds four of five, decibels. None unless the scheme was
@@ -94,11 +97,9 @@ pub(crate) fn to_python(py: Python<'_>, scene: &Scene, sources: &[usize], finish
     let own: Option<Pinhole> = target.camera.pinhole.resized(width as u32, height as u32).ok();
     let matrix = intrinsic_matrix(&own.unwrap_or(target.camera.pinhole));
     let pose = scene.frame.file_from_camera(&target.camera.pose);
-    let (psnr, ssim) = (truth.as_ref().map(|truth| truth.psnr), truth.as_ref().and_then(|truth| truth.ssim));
-    let (truth, seen) = match truth {
-        Some(Truth { picture, seen, .. }) => (Some(picture), seen),
-        None => (None, None),
-    };
+    let (psnr, corrected_psnr) = truth.as_ref().map(|truth| (truth.psnr, truth.corrected_psnr)).unzip();
+    let ssim = truth.as_ref().and_then(|truth| truth.ssim);
+    let (truth, seen) = truth.map_or((None, None), |Truth { picture, seen, .. }| (Some(picture), seen));
     Ok(PyFrame {
         name: target.name,
         scheme,
@@ -113,6 +114,7 @@ pub(crate) fn to_python(py: Python<'_>, scene: &Scene, sources: &[usize], finish
         truth: truth.map(|truth| array(py, [height, width, 3], truth.into_raw())).transpose()?,
         seen: seen.map(|seen| array(py, [height, width], seen.into_raw())).transpose()?,
         psnr,
+        corrected_psnr,
         ssim,
         expected: expected.map(|Expected { psnr, interval: [low, high], .. }| (psnr, low, high)),
         seconds: time.as_secs_f64(),

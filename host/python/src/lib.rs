@@ -1,21 +1,23 @@
 //! The Python package `viewfuse`: scenes, weights and pictures as numpy arrays.
 //!
 //! ```text
-//! error       errors as Python exceptions
-//! progress    the course of long work, as a bar or for a function
-//! interrupt   work without Python's lock, which Ctrl-C ends
-//! arrays      arrays in and out
-//! request     what to render: targets and sources from Python's arguments
-//! weights     weights of the sources for targets
-//! frame       a rendered view
-//! render      the render loop
-//! scene       a scene, with the methods that use the modules above
-//! scores      PSNR and SSIM of two pictures
+//! error          errors as Python exceptions
+//! progress       the course of long work, as a bar or for a function
+//! interrupt      work without Python's lock, which Ctrl-C ends
+//! arrays         arrays in and out
+//! request        what to render: targets and sources from Python's arguments
+//! weights        weights of the sources for targets
+//! given_weights  weights of the caller's own: an array, or a function
+//! frame          a rendered view
+//! render         the render loop
+//! scene          a scene, with the methods that use the modules above
+//! scores         PSNR and SSIM of two pictures
 //! ```
 
 mod arrays;
 mod error;
 mod frame;
+mod given_weights;
 mod interrupt;
 mod progress;
 mod render;

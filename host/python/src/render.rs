@@ -2,8 +2,10 @@
 
 use crate::error::Failure;
 use crate::frame::Finished;
+use crate::given_weights::{GivenWeights, Raised};
 use crate::request::Request;
 use std::path::PathBuf;
+use std::sync::PoisonError;
 use viewfuse::device::choice::{self, DeviceChoice, DeviceOptions};
 use viewfuse::field::auto::{self, Chosen};
 use viewfuse::field::options::Given;
@@ -12,13 +14,16 @@ use viewfuse::field::{AnyField, rows};
 use viewfuse::job::progress::Progress;
 use viewfuse::nn::checkpoint::Checkpoint;
 use viewfuse::scene::Scene;
+use viewfuse::scene::few_shot::FewShot;
 use viewfuse::scene::photographs::{BackgroundChoice, SourceImages};
-use viewfuse::weighting::{Weighting, WeightingChoice};
+use viewfuse::weighting::Weighting;
 
 /// The arguments of a render.
 pub(crate) struct Order {
     pub(crate) request: Request,
-    pub(crate) weights: Option<String>,
+    pub(crate) weights: Option<GivenWeights>,
+    /// What a function that gives weights raised.
+    pub(crate) raised: Raised,
     pub(crate) size: Option<(u32, u32)>,
     pub(crate) model: Option<PathBuf>,
     pub(crate) device: String,
@@ -37,13 +42,16 @@ impl Order {
         scene: &Scene,
         progress: &dyn Progress,
     ) -> Result<(Vec<usize>, Vec<Finished>), Failure> {
-        let weighting = self.weighting()?;
         let field = match &self.model {
             None => AnyField::default(),
             Some(path) => rows::open(Checkpoint::open(path)?, &Given { seed: self.seed, ..Given::default() })?,
         };
         let about = field.about();
         let job = self.request.resolve(scene, about.least_sources)?;
+        let weighting = self.weighting(scene, &job)?;
+        if self.has_raised() {
+            return Ok((job.sources, Vec::new()));
+        }
         let options = RenderOptions {
             size: self.size()?,
             background: self.background()?,
@@ -68,13 +76,16 @@ impl Order {
 
     /// `None` for the best of the scene, which is the default without a network: trying schemes takes a network too
     /// long.
-    fn weighting(&self) -> Result<Option<Weighting>, Failure> {
-        let choice = self.weights.as_deref().map(str::parse::<WeightingChoice>).transpose()?;
-        match choice {
-            Some(WeightingChoice::Given(spec)) => Ok(Some(spec.open()?)),
-            None if self.model.is_some() => Ok(Some(Weighting::default_scheme())),
-            Some(WeightingChoice::Auto) | None => Ok(None),
+    fn weighting(&self, scene: &Scene, job: &FewShot) -> Result<Option<Weighting>, Failure> {
+        match &self.weights {
+            Some(given) => given.weighting(scene, job, &self.raised),
+            None => Ok(self.model.is_some().then(Weighting::default_scheme)),
         }
+    }
+
+    /// Whether a function that gives weights cannot be used.
+    fn has_raised(&self) -> bool {
+        self.raised.lock().unwrap_or_else(PoisonError::into_inner).is_some()
     }
 
     fn size(&self) -> Result<Option<[u32; 2]>, Failure> {

@@ -3,6 +3,7 @@
 use crate::arrays::{array, intrinsic_matrix};
 use crate::error::Failure;
 use crate::frame::{PyFrame, to_python};
+use crate::given_weights::{GivenWeights, Raised, raised};
 use crate::interrupt::{interruptible, reported};
 use crate::progress::Reporter;
 use crate::render::Order;
@@ -12,6 +13,7 @@ use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
+use std::sync::Arc;
 use viewfuse::scene::few_shot::view_list;
 use viewfuse::scene::{MaskChoice, Scene, UnknownMasks};
 
@@ -122,7 +124,7 @@ impl PyScene {
     fn render(
         &self,
         py: Python<'_>,
-        weights: Option<String>,
+        weights: Option<GivenWeights>,
         size: Option<(u32, u32)>,
         model: Option<PathBuf>,
         device: &str,
@@ -134,12 +136,15 @@ impl PyScene {
     ) -> PyResult<Vec<PyFrame>> {
         let request = Request::of("render", selection)?;
         let (device, background) = (device.to_owned(), background.to_owned());
-        let order = Order { request, weights, size, model, device, background, leave_out, seed };
+        let errors = Raised::default();
+        let raised_by_weights = Arc::clone(&errors);
+        let order = Order { request, weights, raised: errors, size, model, device, background, leave_out, seed };
         let reporter = Reporter::of(py, progress)?;
         let rendered = reported(py, reporter.as_ref(), |progress| order.carry_out(&self.scene, progress));
         if let Some(reporter) = reporter {
             reporter.end(py)?;
         }
+        raised(&raised_by_weights)?;
         let (sources, frames) = rendered?;
         frames.into_iter().map(|frame| to_python(py, &self.scene, &sources, frame)).collect()
     }

@@ -310,6 +310,62 @@ class Pictures(unittest.TestCase):
         np.testing.assert_array_equal(frame.picture, decoded(files["000048.png"]))
 
 
+class OwnWeights(unittest.TestCase):
+    """Weights that are no scheme's: arrays and functions."""
+
+    def render(self, weights, **more):
+        return viewfuse.open(ROOM).render(weights, targets="2,5", sources="0,1,3,4,6,7", size=SMALL, **more)
+
+    def test_a_function_is_a_scheme(self):
+        def alike(sources, target):
+            assert sources.dtype == target.dtype == np.float64 and target.shape == (4, 4)
+            assert sources.shape == (len(sources), 4, 4)
+            return np.ones(len(sources))
+
+        for own, mean in zip(self.render(alike), self.render("mean")):
+            np.testing.assert_array_equal(own.colours, mean.colours)
+            self.assertEqual((own.scheme, mean.scheme), ("alike", "mean"))
+
+        # Matrices are in the coordinates of the scene's files.
+        poses, seen = viewfuse.open(ROOM).poses, []
+
+        def nearest(sources, target):
+            seen.append((sources, target))
+            return 1 / np.linalg.norm(sources[:, :3, 3] - target[:3, 3], axis=1) ** 2
+
+        for own, named in zip(self.render(nearest, leave_out=0), self.render("distance:power=2", leave_out=0)):
+            np.testing.assert_allclose(own.weights, named.weights, atol=1e-4)
+        targets = [target for _, target in seen]
+        for view in [2, 5]:
+            self.assertTrue(any(np.allclose(target, poses[view], atol=1e-5) for target in targets))
+
+    def test_an_array_is_for_all_targets_or_each(self):
+        row = [0, 4, 0, 1, 0, 0]
+        for weights in (row, np.array(row, np.float32), np.array([row, row])):
+            for frame in self.render(weights, leave_out=0):
+                np.testing.assert_allclose(frame.weights, np.array(row) / 5, atol=1e-6)
+                self.assertEqual(frame.scheme, "array")
+        first, second = self.render(np.array([row, row[::-1]]), leave_out=0)
+        np.testing.assert_allclose(second.weights, first.weights[::-1], atol=1e-6)
+
+    def test_what_cannot_be_weights(self):
+        def fails(sources, target):
+            raise KeyError("mine")
+
+        with self.assertRaisesRegex(KeyError, "mine"):
+            self.render(fails)
+        for weights, text in [
+            ([1, 2, 3], "shape \\[3\\]; it must be \\[6\\] or \\[2, 6\\]"),
+            (np.zeros(6), "at least 0, one of them above 0"),
+            ([[1] * 6, [1] * 5 + [float("nan")]], "target 1: weights are finite"),
+            ([-1, 1, 1, 1, 1, 1], "at least 0"),
+            (lambda sources, target: [1, 2], "the function returned: 2 numbers for 6 sources"),
+            (b"mean", "a scheme's name, an array of numbers or a function"),
+        ]:
+            with self.assertRaisesRegex(ValueError, text):
+                self.render(weights)
+
+
 class Scores(unittest.TestCase):
     def test_by_definition(self):
         noise = np.random.default_rng(0)

@@ -25,8 +25,3 @@ pub use choice::{WeightingChoice, choice_grammar};
 pub use opened::OpenedChoice;
 pub use spec::{WeightingError, WeightingSpec, grammar, scheme_names};
 pub use weighting::{Weigh, Weighting};
-
-/// The examples of the README, compiled and run.
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;

@@ -2,6 +2,8 @@
 
 use super::{assert_sound, exact, picture, sources, target};
 use std::collections::BTreeMap;
+use viewfuse::device::cpu::Cpu;
+use viewfuse::field::pixelnerf::reference::Reference;
 use viewfuse::field::pixelnerf::{Architecture, Level, PixelNerf, test_networks};
 use viewfuse::nn::checkpoint::{Checkpoint, TensorShape};
 use viewfuse_tests::checkpoints::changed;
@@ -26,6 +28,7 @@ fn sizes_come_from_the_checkpoint() {
         small.clone(),
         Architecture { levels: vec![level(4, 2)], ..small.clone() },
         Architecture { levels: vec![level(8, 1), level(4, 1), level(12, 2), level(4, 1)], ..small.clone() },
+        Architecture { has_pool: false, source_side: 64, ..small.clone() },
         Architecture { width: 40, block_count: 2, injected_count: 2, ..small.clone() },
         Architecture { block_count: 1, injected_count: 1, frequency_count: 1, has_fine: false, ..small },
     ] {
@@ -36,6 +39,29 @@ fn sizes_come_from_the_checkpoint() {
             assert_sound(&picture(&field, &sources(2), &target(6)));
         }
     }
+}
+
+#[test]
+fn a_trunk_without_a_pool_keeps_the_stem_s_size() {
+    // Level 1 as the identity: its block adds nothing to its input, which the stem's rectifier made positive.
+    let latents = |has_pool: bool| {
+        let architecture = Architecture { has_pool, ..Architecture::small(16) };
+        let checkpoint = changed(&test_networks::deterministic(&architecture), |tensors| {
+            let block = "encoder.model.layer1.0.";
+            tensors.iter_mut().filter(|(tensor, _)| tensor.name.starts_with(block)).for_each(|(tensor, values)| {
+                let rest = if tensor.name.ends_with("running_var") { 1.0 } else { 0.0 };
+                values.fill(rest);
+            });
+        });
+        let field = PixelNerf::new(&checkpoint, exact()).expect("a member of the family");
+        let latents = Reference::new(&field, &Cpu, &sources(1)).expect("sources").latents().expect("latents");
+        let channels = architecture.latent_channels();
+        latents.chunks_exact(channels).map(|node| (node[..4].to_vec(), node[4..8].to_vec())).collect::<Vec<_>>()
+    };
+    let [with, without] = [true, false].map(latents);
+    assert!(without.iter().all(|(stem, level)| stem == level));
+    assert!(with.iter().any(|(stem, level)| stem != level) && with.len() == without.len());
+    assert!(with.iter().zip(&without).all(|((a, _), (b, _))| a == b), "the stem is the same");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use crate::metrics::interval::Interval;
 use crate::metrics::masked::{PSNR_MASKED, SSIM_MASKED};
-use crate::{PSNR, SSIM};
+use crate::{PSNR, PSNR_CORRECTED, SSIM};
 use serde::Serialize;
 
 /// How a metric is printed and read.
@@ -25,6 +25,7 @@ impl Metric {
     pub fn named(name: &str) -> Metric {
         let (label, unit, decimals, larger_is_better) = match name {
             PSNR => ("PSNR".to_owned(), "dB", 2, true),
+            PSNR_CORRECTED => ("PSNR corrected".to_owned(), "dB", 2, true),
             SSIM => ("SSIM".to_owned(), "", 3, true),
             PSNR_MASKED => ("PSNR masked".to_owned(), "dB", 2, true),
             SSIM_MASKED => ("SSIM masked".to_owned(), "", 3, true),

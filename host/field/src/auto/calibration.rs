@@ -7,9 +7,6 @@ use serde::Serialize;
 const MAX_GROUPS: usize = 16;
 /// Fewest pixels of a group.
 const MIN_PIXELS: usize = 64;
-/// The expected root mean square error, as a share of a colour's range, from which on a pixel counts as poor: a picture
-/// that is everywhere as wrong has a PSNR of 20 dB.
-pub const POOR: f32 = 0.1;
 
 /// A pixel of a held-out source: its confidence, and the mean square error of its colours, each in `[0, 1]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,13 +71,6 @@ impl Calibration {
         let sum: f64 = confidences.map(|confidence| f64::from(self.square(confidence))).sum();
         (count > 0).then(|| sum / count as f64)
     }
-
-    /// The share of the pixels of these confidences whose expected root mean square error, times `scale`, is above
-    /// [`POOR`].
-    pub(super) fn poor(&self, confidences: &[f32], scale: f32) -> f32 {
-        let is_poor = |confidence: &&f32| scale * self.square(**confidence).sqrt() > POOR;
-        confidences.iter().filter(is_poor).count() as f32 / confidences.len().max(1) as f32
-    }
 }
 
 #[cfg(test)]
@@ -108,7 +98,6 @@ mod tests {
         let square = calibration.mean_square([0.0, 1.0].into_iter()).expect("pixels");
         assert!((square - 0.02).abs() < 0.001, "{square}");
         assert_eq!(calibration.mean_square([].into_iter()), None);
-        assert_eq!([0.4, 1.0, 9.0].map(|scale| calibration.poor(&[0.0, 1.0], scale)), [0.0, 0.5, 1.0]);
     }
 
     #[test]

@@ -42,8 +42,6 @@ pub struct PixelErrors {
     /// A pixel's expected root mean square error, as a share of a colour's range, is this times that of its confidence
     /// in the calibration ([`Calibration`](super::Calibration)): so the whole picture has the expected score.
     pub scale: f32,
-    /// The share of the pixels for which that is above [`POOR`](super::POOR).
-    pub poor: f32,
 }
 
 /// The statistics of the held-out sources.

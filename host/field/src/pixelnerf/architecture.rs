@@ -32,6 +32,9 @@ pub struct Architecture {
     pub frequency: f32,
     /// Whether there is a second point network for the fine pass. Without one the first serves both.
     pub has_fine: bool,
+    /// Whether the trunk has its max pool ([`resnet::ResNet::has_pool`]). The networks for 64 pixels have none
+    /// (`use_first_pool=False` of `conf/exp/sn64.conf`), which their tensors do not tell.
+    pub has_pool: bool,
     /// Where in a pixel its centre is; see [`viewfuse_core::rays::CastBlock::pixel_centre`]. 0 as published.
     pub pixel_centre: f32,
     /// Longest side of source photographs, pixels: the size at which the network was trained. Larger ones are resized,
@@ -76,6 +79,7 @@ impl Architecture {
             frequency_count: 6,
             frequency: 1.5,
             has_fine: true,
+            has_pool: true,
             pixel_centre: 0.0,
             source_side: SOURCE_SIDE,
         }
@@ -176,6 +180,7 @@ impl Architecture {
             frequency_count: (embedded_len - 6) / 6,
             frequency: frequency(&sizes, (embedded_len - 6) / 6)?,
             has_fine: checkpoint.shapes().keys().any(|name| name.starts_with("mlp_fine.")),
+            has_pool: has_pool(&sizes)?,
             pixel_centre: sizes.number("viewfuse.pixel_centre", 0.0)?,
             source_side: source_side(&sizes)?,
         };
@@ -229,6 +234,7 @@ impl Architecture {
         let number = |key: &str, value: f32| (key.to_owned(), value.to_string());
         BTreeMap::from([
             number("viewfuse.frequency", self.frequency),
+            number("viewfuse.first_pool", if self.has_pool { 1.0 } else { 0.0 }),
             number("viewfuse.pixel_centre", self.pixel_centre),
             number("viewfuse.source_side", self.source_side as f32),
         ])
@@ -255,6 +261,16 @@ fn source_side(sizes: &Sizes<'_>) -> Result<u32, CheckpointError> {
         );
     }
     Ok(side as u32)
+}
+
+/// Whether there is a max pool, from the metadata.
+fn has_pool(sizes: &Sizes<'_>) -> Result<bool, CheckpointError> {
+    const KEY: &str = "viewfuse.first_pool";
+    match sizes.number(KEY, 1.0)? {
+        0.0 => Ok(false),
+        1.0 => Ok(true),
+        other => Err(sizes.refuse(format!("its metadata says {KEY} = {other}, which is neither 0 nor 1"))),
+    }
 }
 
 /// The lowest frequency: from the checkpoint's table if it has one, otherwise the published one.

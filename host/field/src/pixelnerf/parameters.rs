@@ -41,7 +41,8 @@ impl HostParameters {
     /// Reads them from a checkpoint of this architecture.
     pub(super) fn read(checkpoint: &Checkpoint, architecture: &Architecture) -> Result<Self, CheckpointError> {
         let tensors = Tensors { checkpoint, prefix: TRUNK };
-        let trunk = ResNet::new(architecture.stem_channels, &architecture.levels)
+        let trunk = ResNet::new(architecture.stem_channels, &architecture.levels);
+        let trunk = ResNet { has_pool: architecture.has_pool, ..trunk }
             .try_map(|layer| tensors.convolution_with_norm(&layer.name, &layer.norm, BATCH_NORM_EPSILON))?;
         let network = |pass: &Pass| PointNetwork::read(checkpoint, architecture, *pass);
         Ok(Parameters { trunk, networks: architecture.passes().iter().map(network).collect::<Result<_, _>>()? })

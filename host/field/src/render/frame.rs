@@ -2,7 +2,7 @@
 
 use super::Seen;
 use crate::budget::Kept;
-use crate::scores::{psnr_of_seen, ssim_of_seen};
+use crate::scores::{corrected_psnr_of_seen, psnr_of_seen, ssim_of_seen};
 use image::{GrayImage, RgbImage};
 use std::time::Duration;
 use viewfuse_core::weights::Omission;
@@ -52,6 +52,8 @@ pub struct Truth {
     pub seen: Option<GrayImage>,
     /// Peak signal to noise ratio in decibels, of 8-bit values.
     pub psnr: f64,
+    /// The same of corrected colours ([`corrected_psnr_of_seen`]): without the price of the camera's exposure.
+    pub corrected_psnr: f64,
     /// Structural similarity (uniform 7x7 window), if the picture is large enough.
     pub ssim: Option<f64>,
 }
@@ -62,6 +64,7 @@ impl Truth {
         let GroundTruth { picture, seen } = truth;
         let psnr = psnr_of_seen(prediction, &picture, seen.as_ref());
         let ssim = ssim_of_seen(prediction, &picture, seen.as_ref());
-        Truth { picture, seen, psnr, ssim }
+        let corrected_psnr = corrected_psnr_of_seen(prediction, &picture, seen.as_ref());
+        Truth { picture, seen, psnr, corrected_psnr, ssim }
     }
 }

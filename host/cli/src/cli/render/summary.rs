@@ -2,7 +2,7 @@
 
 use crate::cli::printing::say;
 use std::path::Path;
-use viewfuse_field::auto::{Candidate, Expected, PixelErrors};
+use viewfuse_field::auto::{Candidate, Expected};
 use viewfuse_field::budget::{Estimate, Kept};
 use viewfuse_field::render::Seen;
 use viewfuse_output::record::{ChosenRecord, FrameRecord, RunRecord};
@@ -10,8 +10,8 @@ use viewfuse_output::run::RECORD;
 
 /// From which share on a picture that few photographs show is said to be one.
 const MIN_FEW: f32 = 0.2;
-/// Share of pixels that are expected to be poor from which on a person is told.
-const MIN_POOR: f32 = 0.1;
+/// Decibels of exposure from which a picture's line says what it has without.
+const MIN_EXPOSURE: f64 = 0.5;
 
 /// Prints the summary of a run.
 pub(super) fn print(record: &RunRecord, folder: &Path) -> std::io::Result<()> {
@@ -68,17 +68,19 @@ fn choice(chosen: &ChosenRecord, weighting: &str) -> String {
 }
 
 fn summary(frame: &FrameRecord, sources: &[String], folder: &Path) -> String {
-    let score = match (frame.psnr, frame.ssim) {
-        (Some(psnr), Some(ssim)) => format!("  PSNR {psnr:.2} dB  SSIM {ssim:.3}"),
-        (Some(psnr), None) => format!("  PSNR {psnr:.2} dB"),
+    let corrected = match (frame.psnr, frame.corrected_psnr) {
+        (Some(psnr), Some(corrected)) if corrected - psnr >= MIN_EXPOSURE => {
+            format!(" ({corrected:.2} colour-corrected)")
+        }
         _ => String::new(),
     };
-    let expected = frame.expected.map_or_else(String::new, |Expected { psnr, interval: [low, high], pixels }| {
-        let poor =
-            pixels.filter(|pixels| pixels.poor >= MIN_POOR).map_or_else(String::new, |PixelErrors { poor, .. }| {
-                format!(", {:.0} % of it off by more than a tenth of the range", 100.0 * poor)
-            });
-        format!("  expected PSNR {psnr:.1} dB (80 %: {low:.1} to {high:.1}){poor}")
+    let score = match (frame.psnr, frame.ssim) {
+        (Some(psnr), Some(ssim)) => format!("  PSNR {psnr:.2} dB{corrected}  SSIM {ssim:.3}"),
+        (Some(psnr), None) => format!("  PSNR {psnr:.2} dB{corrected}"),
+        _ => String::new(),
+    };
+    let expected = frame.expected.map_or_else(String::new, |Expected { psnr, interval: [low, high], .. }| {
+        format!("  expected PSNR {psnr:.1} dB (80 %: {low:.1} to {high:.1})")
     });
     let left_out = match frame.left_out.len() {
         0 => String::new(),

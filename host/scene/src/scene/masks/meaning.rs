@@ -126,7 +126,8 @@ pub(in super::super) fn decide(views: &[View], choice: MaskChoice, layout: Optio
     if inverted > 0 {
         line += &format!(", white where they do not count ({INVERTED}*.png, {inverted} files)");
     }
-    let is_doubtful = choice == MaskChoice::Auto && layout.is_none() && inverted == 0 && left < MAX_DOUBTFUL;
+    let is_guessed = choice == MaskChoice::Auto && layout.is_none() && inverted == 0;
+    let is_doubtful = is_guessed && !looks.is_empty() && left < MAX_DOUBTFUL;
     let warning = (meaning == MaskMeaning::Ignore && is_doubtful).then(|| {
         format!(
             "masks that leave {:.0} % of the pixels are taken to say which pixels do not count; `--masks object` if \
