@@ -1,6 +1,5 @@
 //! Checkpoints made by hand, byte by byte: right ones, and all that PyTorch would never write; and changed ones.
 
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use tempfile::TempDir;
 use viewfuse::nn::checkpoint::{Checkpoint, TensorShape};
