@@ -4,6 +4,7 @@
 //! it.
 
 mod colmap;
+mod helper;
 mod on_the_way;
 mod stopped;
 
@@ -58,7 +59,12 @@ pub(crate) fn trials() -> Vec<Trial> {
         trial("commands::pose::what_lies_beside_the_output_stays", what_lies_beside_the_output_stays),
         trial("commands::pose::bare_photographs_say_how", bare_photographs_say_how),
     ];
-    own.into_iter().chain(colmap::trials()).chain(on_the_way::trials()).chain(stopped::trials()).collect()
+    own.into_iter()
+        .chain(colmap::trials())
+        .chain(helper::trials())
+        .chain(on_the_way::trials())
+        .chain(stopped::trials())
+        .collect()
 }
 
 /// The program, if there is one.

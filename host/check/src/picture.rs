@@ -8,13 +8,13 @@ use super::report::{CheckError, PictureReport, PictureVersusCpu};
 use image::RgbImage;
 use std::path::Path;
 use std::time::{Duration, Instant};
-use tempfile::TempDir;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::metrics::psnr;
 use viewfuse_device::choice::AnyDevice;
 use viewfuse_device::cpu::Cpu;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, RenderRun, render};
 use viewfuse_field::{AnyField, Renderer};
+use viewfuse_job::files::Scratch;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{FewShot, Selection};
@@ -46,7 +46,7 @@ pub struct Picture {
     reference: RgbImage,
     reference_time: Duration,
     /// Keeps the temporary folder of the synthetic photographs.
-    _folder: Option<TempDir>,
+    _folder: Option<Scratch>,
 }
 
 impl Picture {
@@ -124,8 +124,8 @@ fn size(camera: &Camera) -> Option<[u32; 2]> {
 }
 
 /// A temporary folder with the synthetic lorry.
-fn lorry() -> Result<TempDir, AnyError> {
-    let folder = tempfile::tempdir()?;
+fn lorry() -> Result<Scratch, AnyError> {
+    let folder = Scratch::new()?;
     let path = |name: &str| folder.path().join(name);
     std::fs::create_dir(path("rgb"))?;
     std::fs::create_dir(path("pose"))?;

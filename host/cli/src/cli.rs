@@ -172,11 +172,13 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
     }
 }
 
-/// Makes Ctrl-C set a flag that the work looks at, and keeps panics silent that become errors.
+/// Makes Ctrl-C set a flag that the work looks at and the limit of files' sizes an error, and keeps panics silent that
+/// become errors.
 ///
 /// # Errors
 /// If another handler is already installed.
 pub fn listen() -> anyhow::Result<()> {
     terminal::silence_caught_panics();
+    terminal::survive_full_files();
     Ok(terminal::listen()?)
 }

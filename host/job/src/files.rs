@@ -5,6 +5,7 @@ mod folder;
 mod journal;
 mod lock;
 mod ordinary;
+mod scratch;
 mod unfinished;
 
 pub use bounded::read_at_most;
@@ -12,12 +13,13 @@ pub use folder::WholeFolder;
 pub use journal::{Journal, JournalLines};
 pub use lock::FolderLock;
 pub use ordinary::{is_ordinary, open_ordinary};
+pub use scratch::Scratch;
 pub use unfinished::{remove_all, remove_unfinished};
 
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
-use unfinished::Own;
+use unfinished::{Own, PREFIXES, clean};
 
 /// Why an output could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -82,7 +84,8 @@ impl WholeFile {
             }
             builder.tempfile_in(folder)
         };
-        let (file, unfinished) = Own::make(folder, make, |file| file.path().to_path_buf()).map_err(failed)?;
+        clean(folder);
+        let (file, unfinished) = Own::make(PREFIXES[0], make, |file| file.path().to_path_buf()).map_err(failed)?;
         Ok(WholeFile { path: path.to_path_buf(), writer: BufWriter::new(file), unfinished })
     }
 

@@ -10,6 +10,7 @@
 //! progress   progress reports and cancellation                Progress, Silent, Interrupted
 //! panics     panics of other libraries as errors              caught
 //! files      output files, completely or not at all           write_whole, WholeFile, WholeFolder
+//! process    processes that end with their owner              Process
 //! digest     SHA-256 of inputs
 //! ```
 #![forbid(unsafe_code)]
@@ -18,6 +19,7 @@ pub mod digest;
 pub mod files;
 pub mod hint;
 pub mod panics;
+pub mod process;
 pub mod progress;
 pub mod shell;
 pub mod text;

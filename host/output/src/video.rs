@@ -11,11 +11,15 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::str::FromStr;
 use viewfuse_job::files::{WholeFile, WriteError, write_whole};
+use viewfuse_job::process::Process;
 use viewfuse_job::progress::{Interrupted, Progress};
 use viewfuse_scene::{SceneError, picture_size, read_picture};
 
 /// The program that compresses videos, where a person has it.
 const FFMPEG: &str = "ffmpeg";
+
+/// Most bytes of what it says that are read.
+const MAX_SAID: u64 = 1 << 16;
 
 /// A format of moving pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -229,24 +233,25 @@ fn compress(path: &Path, frames: &Frames<'_>, rate: FrameRate) -> Result<(), Vid
     // Players would guess by the size which matrix the colours were made with.
     command.args(["-colorspace", "smpte170m", "-color_primaries", "bt709", "-color_trc", "iec61966-2-1"]);
     command.args(["-color_range", "tv", "-f", "mp4"]).arg(draft.path());
-    let started = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn();
-    let mut child = started.map_err(|cause| match cause.kind() {
+    command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+    let process = Process::start(&mut command).map_err(|cause| match cause.kind() {
         io::ErrorKind::NotFound => VideoError::NoProgram,
         _ => io_error(path, cause),
     })?;
-    let sent = match child.stdin.take() {
+    let (input, _, errors) = process.pipes();
+    let sent = match input {
         Some(input) => frames.stream(&mut BufWriter::new(input), rate, |cause| io_error(path, cause)),
         None => Ok(()),
     };
     if matches!(sent, Err(VideoError::Interrupted(_) | VideoError::Frame(_) | VideoError::Sizes { .. })) {
         // It would make a video of the frames that it got.
-        child.kill().ok();
+        process.end();
     }
     let mut said = String::new();
-    if let Some(errors) = &mut child.stderr {
-        errors.read_to_string(&mut said).ok();
+    if let Some(errors) = errors {
+        errors.take(MAX_SAID).read_to_string(&mut said).ok();
     }
-    let ended = child.wait().map_err(|cause| io_error(path, cause));
+    let ended = process.wait().map_err(|cause| io_error(path, cause));
     let outcome = match (sent, ended) {
         (Err(error @ (VideoError::Interrupted(_) | VideoError::Frame(_) | VideoError::Sizes { .. })), _) => Err(error),
         (_, Err(error)) => Err(error),

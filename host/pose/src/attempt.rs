@@ -105,7 +105,7 @@ pub(crate) fn attempts(
                 tried.focal = focal(&solution, cameras, &intake.photos);
                 tried.reprojection_error = solution.reprojection_error();
                 tried.points = solution.points.len();
-                tried.support = Some(Support::of(&solution));
+                tried.support = Some(Support::of(&solution, &part)?);
                 Some(solution)
             }
             Err(SolverError::Nothing(reason)) => {

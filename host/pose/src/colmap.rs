@@ -12,6 +12,7 @@ use crate::solution::{Features, Job, Solution, Solver, SolverError};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use viewfuse_job::files::Scratch;
 use viewfuse_job::progress::Progress;
 
 /// The solver's name.
@@ -40,7 +41,7 @@ impl Solver for Colmap {
     }
 
     fn identity(&self, progress: &dyn Progress) -> Option<String> {
-        self.version(tempfile::tempdir().ok()?.path(), progress).ok()
+        self.version(Scratch::new().ok()?.path(), progress).ok()
     }
 
     fn solve(&self, job: &Job, progress: &dyn Progress) -> Result<Solution, SolverError> {

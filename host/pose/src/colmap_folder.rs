@@ -11,7 +11,7 @@ use crate::solution::{Job, Solution, SolvedCamera, SolvedPhotograph, SolvedPoint
 use serde::Serialize;
 use std::fs;
 use std::path::{Path, PathBuf};
-use tempfile::TempDir;
+use viewfuse_job::files::Scratch;
 use viewfuse_scene::READERS;
 use viewfuse_scene::reader::{PoseForm, RawScene, RawView, Reader};
 
@@ -30,7 +30,7 @@ pub(crate) struct FolderCamera {
 
 /// The folder.
 pub(crate) struct ColmapFolder {
-    scratch: TempDir,
+    scratch: Scratch,
     pub(crate) cameras: Vec<FolderCamera>,
 }
 
@@ -44,7 +44,7 @@ impl ColmapFolder {
     /// # Errors
     /// What the system says.
     pub(crate) fn of(job: &Job) -> std::io::Result<ColmapFolder> {
-        let scratch = tempfile::tempdir()?;
+        let scratch = Scratch::new()?;
         let folder = scratch.path();
         fs::create_dir(folder.join("images"))?;
         fs::create_dir(folder.join("sparse"))?;

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-use tempfile::TempDir;
+use viewfuse_job::files::Scratch;
 use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_job::progress::{Interrupted, Progress};
 use viewfuse_scene::reader::{ImageFile, folders, list};
@@ -87,7 +87,7 @@ pub struct Intake {
     /// Files that were not taken for photographs of this folder, a line for each reason.
     pub passed_over: Vec<Unusable>,
     /// Copies at working size, which go with it.
-    _scratch: TempDir,
+    _scratch: Scratch,
 }
 
 /// Why a folder's photographs could not be taken in.
@@ -177,7 +177,7 @@ impl Intake {
     /// [`IntakeError`].
     pub fn read(folder: &Path, every: usize, progress: &dyn Progress) -> Result<Intake, IntakeError> {
         let Listed { root, files, passed_over } = files(folder, every)?;
-        let scratch = tempfile::tempdir().map_err(|cause| IntakeError::Io { path: folder.to_path_buf(), cause })?;
+        let scratch = Scratch::new().map_err(|cause| IntakeError::Io { path: folder.to_path_buf(), cause })?;
         progress.expect(files.len());
         let mut read = Vec::with_capacity(files.len());
         for some in files.chunks(AT_ONCE) {

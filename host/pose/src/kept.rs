@@ -4,7 +4,7 @@
 //! An answer is kept under a digest of all that it depends on: the photographs' pixels, the cameras, the features, the
 //! seed, the program that is asked, and this crate's version.
 
-use crate::solution::{Features, Job, Solution, Solver, SolverError};
+use crate::solution::{Features, Job, MAX_ANSWER, Solution, Solver, SolverError};
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::io::{self, ErrorKind};
@@ -17,8 +17,6 @@ use viewfuse_job::progress::Progress;
 
 /// What the name of an answer's file ends in, behind its digest.
 const SUFFIX: &str = ".json";
-/// Most bytes of an answer: larger files are none.
-const MAX_ANSWER: u64 = 1 << 30;
 
 /// A solver whose answers are kept in a folder.
 pub struct Kept<'a> {

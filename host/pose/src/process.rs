@@ -1,25 +1,22 @@
-//! Programs as processes that end with their owner.
+//! Programs of others, as processes: what they say is bounded, and ends.
 
 use crate::solution::SolverError;
 use std::fs::{self, File};
 use std::path::Path;
-use std::process::{Child, Command, ExitStatus, Stdio};
-use std::time::Duration;
-use viewfuse_job::progress::Progress;
+use std::process::{Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+use viewfuse_job::files::read_at_most;
+use viewfuse_job::process::Process;
+use viewfuse_job::progress::{Interrupted, Progress};
 
 /// How often the person's wish to stop is looked at while a process says nothing.
 pub(crate) const LOOK: Duration = Duration::from_millis(50);
 
-/// A process, killed when it is dropped.
-pub(crate) struct Process(pub(crate) Child);
+/// Time for what should come at once: an end behind the last word, the last word behind an end.
+pub(crate) const GRACE: Duration = Duration::from_secs(2);
 
-impl Drop for Process {
-    fn drop(&mut self) {
-        // It may have ended by itself.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
+/// Most bytes of a program's log.
+const MAX_LOG: u64 = 64 << 20;
 
 /// How a process ended, and what it said on standard output and standard error.
 pub(crate) struct Ended {
@@ -38,7 +35,7 @@ impl Ended {
 ///
 /// # Errors
 /// [`SolverError::Missing`] with the name of the `solver` if it cannot be started, [`SolverError::Broken`] if the log
-/// cannot be written or read, [`SolverError::Interrupted`].
+/// cannot be written or read or grows too long, [`SolverError::Interrupted`].
 pub(crate) fn run(
     command: &mut Command,
     solver: &'static str,
@@ -46,21 +43,34 @@ pub(crate) fn run(
     progress: &dyn Progress,
 ) -> Result<Ended, SolverError> {
     let program = Path::new(command.get_program()).to_path_buf();
-    let broken = |error: std::io::Error| SolverError::Broken {
-        program: program.clone(),
-        problem: format!("{}: {error}", log.display()),
-    };
-    let output = File::create(log).map_err(broken)?;
-    let errors = output.try_clone().map_err(broken)?;
-    let started = command.stdin(Stdio::null()).stdout(output).stderr(errors).spawn();
-    let mut process = Process(started.map_err(|cause| SolverError::not_started(solver, &program, &cause))?);
+    let broken = |problem: String| SolverError::Broken { program: program.clone(), problem };
+    let of_log = |error: std::io::Error| broken(format!("{}: {error}", log.display()));
+    let output = File::create(log).map_err(of_log)?;
+    let errors = output.try_clone().map_err(of_log)?;
+    command.stdin(Stdio::null()).stdout(output).stderr(errors);
+    let process = Process::start(command).map_err(|cause| SolverError::not_started(solver, &program, &cause))?;
     let status = loop {
         progress.check()?;
-        match process.0.try_wait().map_err(broken)? {
+        if fs::metadata(log).map_err(of_log)?.len() > MAX_LOG {
+            return Err(broken(format!("says more than {} MiB", MAX_LOG >> 20)));
+        }
+        match process.try_wait().map_err(of_log)? {
             Some(status) => break status,
             None => std::thread::sleep(LOOK),
         }
     };
-    let said = String::from_utf8_lossy(&fs::read(log).map_err(broken)?).into_owned();
+    let said = String::from_utf8_lossy(&read_at_most(log, MAX_LOG).map_err(of_log)?).into_owned();
     Ok(Ended { status, said })
+}
+
+/// How a process ended that has nothing more to say; `None` if it stays.
+pub(crate) fn end_of(process: &Process, progress: &dyn Progress) -> Result<Option<ExitStatus>, Interrupted> {
+    let start = Instant::now();
+    loop {
+        progress.check()?;
+        match process.try_wait().ok().flatten() {
+            None if start.elapsed() < GRACE => std::thread::sleep(LOOK),
+            status => return Ok(status),
+        }
+    }
 }

@@ -7,6 +7,7 @@ use crate::solution::{Features, Job, Solution, Solver, SolverError};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::Command;
+use viewfuse_job::files::Scratch;
 use viewfuse_job::progress::Progress;
 
 /// The solver's name.
@@ -47,7 +48,7 @@ impl Solver for PyColmap {
     }
 
     fn identity(&self, progress: &dyn Progress) -> Option<String> {
-        let folder = tempfile::tempdir().ok()?;
+        let folder = Scratch::new().ok()?;
         let mut command = Command::new(&self.python);
         command.arg("-c").arg("import pycolmap; print(pycolmap.__version__)");
         let ended = run(&mut command, NAME, &folder.path().join("log.txt"), progress).ok()?;

@@ -7,6 +7,12 @@ use std::path::{Path, PathBuf};
 use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_job::progress::{Interrupted, Progress};
 
+/// Most bytes of an answer: what is longer is not one.
+pub(crate) const MAX_ANSWER: u64 = 128 << 20;
+
+/// Most times that a point may be seen, for each photograph of a job: COLMAP matches some twice.
+const MAX_SEEN: usize = 8;
+
 /// A kind of features.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -149,8 +155,8 @@ impl Solution {
         self.points.iter().map(|point| point.error).sum::<f64>() / self.points.len().max(1) as f64
     }
 
-    /// Whether every number is finite, every index is that of a photograph or camera of the job, and focal lengths are
-    /// positive: a process answered.
+    /// Whether every number is finite, every index is that of a photograph or camera of the job, focal lengths are
+    /// positive, and nothing is more than a job can have: a process answered.
     pub(crate) fn fits(&self, job: &Job) -> bool {
         let count = job.photographs.len();
         let poses = self.photographs.iter().filter_map(|photograph| photograph.camera_from_world);
@@ -169,8 +175,10 @@ impl Solution {
             && self.points.iter().all(|point| {
                 finite(&point.position)
                     && point.error.is_finite()
+                    && point.seen.len() <= MAX_SEEN * count
                     && point.seen.iter().all(|(photograph, place)| *photograph < count && finite(place))
             })
+            && self.pairs.len() <= count * count
             && self.pairs.iter().all(|pair| pair.photographs.iter().all(|own| *own < count))
     }
 }

@@ -3,6 +3,7 @@
 use crate::agreement::median;
 use crate::solution::Solution;
 use glam::{DMat3, DVec3};
+use viewfuse_job::progress::{Interrupted, Progress};
 
 /// How well a solution is determined.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -17,11 +18,15 @@ pub struct Support {
 
 impl Support {
     /// Of a solution.
-    pub(crate) fn of(solution: &Solution) -> Support {
+    ///
+    /// # Errors
+    /// [`Interrupted`].
+    pub(crate) fn of(solution: &Solution, progress: &dyn Progress) -> Result<Support, Interrupted> {
         let centres: Vec<Option<DVec3>> = solution.photographs.iter().map(|own| own.centre()).collect();
         let mut seen = vec![0_usize; solution.photographs.len()];
         let mut angles = Vec::new();
         for point in &solution.points {
+            progress.check()?;
             let position = DVec3::from_array(point.position);
             let towards: Vec<DVec3> = point
                 .seen
@@ -33,7 +38,7 @@ impl Support {
             point.seen.iter().for_each(|(photograph, _)| seen[*photograph] += 1);
         }
         let fewest_points = solution.registered().into_iter().map(|own| seen[own]).min().unwrap_or(0);
-        Support { parallax: median(angles), thickness: thickness(solution), fewest_points }
+        Ok(Support { parallax: median(angles), thickness: thickness(solution), fewest_points })
     }
 }
 

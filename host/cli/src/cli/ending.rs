@@ -5,6 +5,7 @@ use std::process::exit;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 use viewfuse_job::files::remove_all;
+use viewfuse_job::process::end_all;
 
 /// The exit code of an interrupted process.
 pub(crate) const INTERRUPTED: u8 = 130;
@@ -34,8 +35,9 @@ pub(crate) fn watch() -> ! {
     }
 }
 
-/// Ends the process at once; unfinished files are removed.
+/// Ends the process at once, and those that it started; unfinished files are removed.
 pub(crate) fn end() -> ! {
+    end_all();
     remove_all();
     super::printing::complain(viewfuse_job::progress::Interrupted);
     exit(INTERRUPTED.into())

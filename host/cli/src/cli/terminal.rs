@@ -39,6 +39,19 @@ pub(crate) fn listen() -> Result<(), ctrlc::Error> {
     })
 }
 
+/// Makes the limit of files' sizes (`ulimit -f`) an error of what is written instead of the end of the process. Programs
+/// that are started have the usual end again.
+pub(crate) fn survive_full_files() {
+    #[cfg(unix)]
+    {
+        use nix::sys::signal::{SigSet, Signal};
+        let mut full = SigSet::empty();
+        full.add(Signal::SIGXFSZ);
+        // Of this thread, and of those that it starts.
+        let _ = full.thread_block();
+    }
+}
+
 /// Keeps panics silent that become errors.
 pub(crate) fn silence_caught_panics() {
     let hook = std::panic::take_hook();

@@ -5,14 +5,14 @@
 //! locks it stays.
 
 use std::collections::BTreeSet;
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use tempfile::Builder;
 
 /// What the names of temporary files begin with. The second one is of earlier versions.
-const PREFIXES: [&str; 2] = [".viewfuse-", ".unfinished-"];
+pub(super) const PREFIXES: [&str; 2] = [".viewfuse-", ".unfinished-"];
 /// Random characters behind it.
 const RANDOM: usize = 6;
 /// How many times a temporary file is made again that another process took for one that a kill left.
@@ -49,15 +49,15 @@ pub(super) struct Own {
 }
 
 impl Own {
-    /// Makes a temporary file or folder in `folder` by `make`, locks it by the handle that `open` gives, and lists it.
+    /// Makes a temporary file or folder with a name that begins with `prefix` by `make`, locks it and lists it.
+    /// Callers look before it for what a kill left ([`clean`]).
     pub(super) fn make<T>(
-        folder: &Path,
+        prefix: &str,
         make: impl Fn(&mut Builder<'_, '_>) -> io::Result<T>,
         place: impl Fn(&T) -> PathBuf,
     ) -> io::Result<(T, Own)> {
-        clean(folder);
         let mut builder = Builder::new();
-        builder.prefix(PREFIXES[0]).rand_bytes(RANDOM);
+        builder.prefix(prefix).rand_bytes(RANDOM);
         let mut attempt = 0;
         loop {
             // Nothing is begun while the process ends.
@@ -65,11 +65,13 @@ impl Own {
             let made = make(&mut builder)?;
             let path = place(&made);
             // A folder cannot be opened on every system: it is then not recognised after a kill.
-            let locked = File::open(&path).ok().filter(|file| file.try_lock().is_ok());
+            let locked = File::open(&path).ok().map(|file| (file.try_lock(), file));
             attempt += 1;
-            // Between making and locking, another process may have taken it for one that a kill left.
-            if path.exists() || attempt == ATTEMPTS {
+            // Between making and locking, another process may have taken it for one that a kill left, or be about to.
+            let is_taken = matches!(locked, Some((Err(TryLockError::WouldBlock), _))) || !path.exists();
+            if !is_taken || attempt == ATTEMPTS {
                 paths.insert(path.clone());
+                let locked = locked.and_then(|(outcome, file)| outcome.is_ok().then_some(file));
                 return Ok((made, Own { path, _locked: locked }));
             }
         }
@@ -91,7 +93,7 @@ impl Drop for Own {
 }
 
 /// Removes what killed processes left in a folder; once for each process and folder.
-fn clean(folder: &Path) {
+pub(super) fn clean(folder: &Path) {
     let whole = fs::canonicalize(folder).unwrap_or_else(|_| folder.to_path_buf());
     if lock(&CLEANED).insert(whole) {
         remove_unfinished(folder);
@@ -100,14 +102,20 @@ fn clean(folder: &Path) {
 
 /// Removes the temporary files and folders that killed processes left in a folder.
 pub fn remove_unfinished(folder: &Path) {
+    remove_left(folder, &PREFIXES, |_| true);
+}
+
+/// Removes what killed processes left in a folder under names with one of these prefixes, where `is_own` says so, too.
+pub(super) fn remove_left(folder: &Path, prefixes: &[&str], is_own: impl Fn(&Path) -> bool) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let path = entry.path();
         // No links, and nothing that waits for a writer when it is opened.
         let is_of_kind = entry.file_type().is_ok_and(|kind| kind.is_file() || kind.is_dir());
-        if is_of_kind && is_temporary(&entry.file_name().to_string_lossy()) && !lock(&OWN).contains(&path) {
+        let is_named_so = is_temporary(&entry.file_name().to_string_lossy(), prefixes);
+        if is_of_kind && is_named_so && !lock(&OWN).contains(&path) {
             // Only of what nobody has locked.
             let Ok(file) = File::open(&path) else { continue };
-            if file.try_lock().is_ok() && fs::remove_file(&path).is_err() {
+            if file.try_lock().is_ok() && is_own(&path) && fs::remove_file(&path).is_err() {
                 let _ = fs::remove_dir_all(&path);
             }
         }
@@ -115,8 +123,8 @@ pub fn remove_unfinished(folder: &Path) {
 }
 
 /// Whether a name is one that temporary files get.
-fn is_temporary(name: &str) -> bool {
-    let rest = PREFIXES.iter().find_map(|prefix| name.strip_prefix(prefix));
+fn is_temporary(name: &str, prefixes: &[&str]) -> bool {
+    let rest = prefixes.iter().find_map(|prefix| name.strip_prefix(prefix));
     rest.is_some_and(|rest| rest.len() == RANDOM && rest.bytes().all(|byte| byte.is_ascii_alphanumeric()))
 }
 
@@ -126,6 +134,7 @@ mod tests {
 
     #[test]
     fn only_temporary_names_are() {
+        let is_temporary = |name: &str| is_temporary(name, &PREFIXES);
         assert!(is_temporary(".viewfuse-aB3xYz") && is_temporary(".unfinished-000000"));
         for other in [".viewfuse-", ".viewfuse-aB3xY", ".viewfuse-aB3xYzz", ".viewfuse-a.3xYz", "viewfuse-aB3xYz"] {
             assert!(!is_temporary(other), "{other}");
