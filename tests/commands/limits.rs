@@ -2,13 +2,19 @@
 
 use super::{BINARY, done};
 use std::fs;
-use viewfuse_tests::command::{Outcome, assert_command_refused, assert_wrong_arguments, command, toy};
+use viewfuse_tests::command::{
+    Outcome, assert_command_refused, assert_wrong_arguments, command, names_in, sample, toy,
+};
+use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![
     a_compressed_colour_profile_takes_no_memory,
     an_image_of_too_many_pixels_is_refused,
     a_text_that_is_too_long_is_not_read,
     a_picture_that_does_not_fit_is_refused,
+    a_photograph_longer_than_its_pixels_is_refused,
+    narrow_photographs_have_narrow_pictures,
+    a_file_that_may_not_grow_is_an_error,
 ];
 
 /// What the process may take, in KiB of addresses: less than one such file took.
@@ -118,3 +124,85 @@ fn a_picture_that_does_not_fit_is_refused() {
         assert_wrong_arguments(BINARY, folder.path(), &render, &parts);
     }
 }
+
+/// Zeros behind a photograph, which take no room on a disk.
+fn a_photograph_longer_than_its_pixels_is_refused() {
+    let folder = sample("room");
+    let lengthen = |file: &str, mebibytes: u64| {
+        let file = fs::OpenOptions::new().write(true).open(folder.path().join(file)).expect("a photograph");
+        file.set_len(mebibytes << 20).expect("a sparse file");
+    };
+    let photograph = "room/images/001.jpg";
+    let render = "render room --targets 3 --size 32x24 --weights mean --device cpu -o out";
+    for (mebibytes, said) in
+        [(3072, "the file has 3072 MiB; of an image at most 2048 MiB"), (600, "of 320 x 240 at most 257 MiB")]
+    {
+        lengthen(photograph, mebibytes);
+        for arguments in ["inspect room", render] {
+            assert_command_refused(limited(folder.path(), arguments), folder.path(), &[photograph, said]);
+        }
+    }
+    // Among photographs without poses it is left out by name.
+    for view in [0, 2] {
+        fs::copy(folder.path().join(format!("room/images/00{view}.jpg")), folder.file(&format!("bare/{view}.jpg")))
+            .expect("a copy");
+    }
+    fs::copy(folder.path().join("room/images/003.jpg"), folder.file("bare/1.jpg")).expect("a copy");
+    lengthen("bare/1.jpg", 3072);
+    let parts = ["bare: 2 photographs can be used", "1.jpg: the file has 3072 MiB"];
+    assert_command_refused(limited(folder.path(), "pose bare -o posed"), folder.path(), &parts);
+}
+
+/// 13 by 999 pixels: reduced, they are two or seven pixels wide, which nobody asked for.
+fn narrow_photographs_have_narrow_pictures() {
+    let folder = Folder::new();
+    let mut frames = Vec::new();
+    for view in 0..6_u32 {
+        let level =
+            |x: u32, y: u32| image::Rgb([((x * 31 + y / 3 * 7 + view) % 251) as u8, (y % 250) as u8, (y / 4) as u8]);
+        image::RgbImage::from_fn(13, 999, level).save(folder.file(&format!("thin/{view}.png"))).expect("a photograph");
+        let (sine, cosine) = (0.08 * f64::from(view)).sin_cos();
+        frames.push(serde_json::json!({ "file_path": format!("{view}.png"), "transform_matrix": [
+            [cosine, 0.0, sine, 2.0 * sine], [0.0, 1.0, 0.0, 0.0], [-sine, 0.0, cosine, 2.0 * cosine], [0.0, 0.0, 0.0, 1.0]] }));
+    }
+    let camera =
+        serde_json::json!({ "fl_x": 1000, "fl_y": 1000, "cx": 6.5, "cy": 499.5, "w": 13, "h": 999, "frames": frames });
+    folder.write("thin/transforms.json", camera.to_string());
+    let outcome = Outcome::of(command(BINARY, folder.path(), "render thin --targets 3 --device cpu -o out"));
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let picture = image::open(folder.path().join("out/3.png")).expect("a picture");
+    assert_eq!((picture.width(), picture.height()), (7, 512));
+    let other = "render thin --targets 3 --size 9x500 --device cpu -o other";
+    assert_command_refused(command(BINARY, folder.path(), other), folder.path(), &["9x500 does not keep the shape"]);
+}
+
+/// `ulimit -f`: a write beyond it is an error like that of a full disk, and nothing is left.
+#[cfg(unix)]
+fn a_file_that_may_not_grow_is_an_error() {
+    let folder = toy();
+    let small = |arguments: &str| {
+        let mut small = command("sh", folder.path(), "");
+        small.args(["-c", "ulimit -f 2; exec \"$@\"", "sh", super::binary(arguments)]).args(arguments.split(' '));
+        small
+    };
+    for (arguments, file) in [
+        ("points toy --size 32x32 --device cpu -o toy.ply", "toy.ply"),
+        ("export toy --layout transforms -o exported", "exported"),
+        ("inspect toy -o cameras.png", "cameras.png"),
+    ] {
+        let before = names_in(folder.path());
+        let Outcome { code, stderr, .. } = Outcome::of(small(arguments));
+        assert_eq!(code, Some(1), "{arguments}: {stderr}");
+        assert!(stderr.contains(file) && stderr.contains("File too large"), "{arguments}: {stderr}");
+        assert_eq!(names_in(folder.path()), before, "{arguments} left something");
+    }
+    // What was finished stays, and nothing of what was not.
+    let Outcome { code, stderr, .. } = Outcome::of(small("render toy --targets 20 --size 64x64 --device cpu -o out"));
+    assert_eq!(code, Some(1), "{stderr}");
+    assert!(stderr.contains("File too large"), "{stderr}");
+    let left = names_in(&folder.path().join("out"));
+    assert!(!left.iter().any(|name| name.starts_with('.') || name == "run.json"), "{left:?}");
+}
+
+#[cfg(not(unix))]
+fn a_file_that_may_not_grow_is_an_error() {}

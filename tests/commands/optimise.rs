@@ -22,6 +22,7 @@ viewfuse_tests::trials![
     what_it_refuses,
     hostile_files_are_errors_of_every_command,
     a_page_holds_what_the_file_holds,
+    without_a_view_that_is_kept_back_it_says_what_its_figure_is,
 ];
 
 const OPTIMISE: &str = "optimise toy --size 48x48 --device cpu";
@@ -46,6 +47,7 @@ fn views_left_out_are_scored_on_the_way() {
     let scores = scores(&text);
     assert_eq!(scores.iter().map(|own| own.0).collect::<Vec<_>>(), [40, 80, 120, 160, 200, 240], "{text}");
     assert!(scores[5].1 > scores[0].1 + 3.0, "it becomes better: {text}");
+    assert!(!text.contains("fit: "), "{text}");
     let count = gaussians(&folder.path().join("a.ply")).gaussians.len();
     assert!(text.contains(&format!("a.ply: {count} Gaussians after 240 of 240 iterations\n")), "{text}");
     // The last score is that of `render` with the file, from the same sources.
@@ -198,4 +200,13 @@ fn a_page_holds_what_the_file_holds() {
     assert!(!page.contains("src=\"http") && !page.contains("href=\"http"), "it needs a network");
     let bytes = files_below(folder.path()).into_iter().find(|(path, _)| path.ends_with("toy.ply")).expect("a file").1;
     assert!((page.len() as u64) < bytes + 200_000, "{} bytes of a page for {bytes} of a file", page.len());
+}
+
+fn without_a_view_that_is_kept_back_it_says_what_its_figure_is() {
+    let folder = toy();
+    let text = done(folder.path(), "optimise toy --sources 0..5 --size 32x32 --iterations 20 --device cpu -o a.ply");
+    let line = text.lines().find_map(|line| line.strip_prefix("fit: PSNR ")).unwrap_or_else(|| panic!("{text}"));
+    let (psnr, rest) = line.split_once(" dB on 3 of the sources themselves").expect("what it is of");
+    assert!(psnr.parse::<f64>().is_ok_and(|psnr| (5.0..50.0).contains(&psnr)), "{psnr}");
+    assert!(rest.contains("says nothing of new views") && rest.contains("--left-out VIEW"), "{rest}");
 }

@@ -16,6 +16,8 @@ viewfuse_tests::trials![
     files_of_a_person_are_no_pictures_of_a_run,
     links_to_nothing_are_noticed_first,
     what_a_kill_left_is_removed,
+    names_that_no_file_has_are_noticed_first,
+    files_are_no_folders_of_pictures,
 ];
 
 const RENDER: &str = "render toy --targets 20 --size 16x16 --device cpu";
@@ -223,4 +225,43 @@ fn what_a_kill_left_is_removed() {
     busy.unlock().expect("unlocked");
     done(folder.path(), &format!("{RENDER} -o out"));
     assert!(!path.exists());
+}
+
+/// Nothing is printed: the work has not begun.
+#[cfg(target_os = "linux")]
+fn names_that_no_file_has_are_noticed_first() {
+    let folder = toy();
+    let long = "x".repeat(300);
+    for arguments in [
+        format!("{EVALUATE} -o {long}.csv"),
+        format!("{RENDER} -o new/{long}"),
+        format!("optimise toy --size 16x16 --device cpu -o {long}.ply"),
+    ] {
+        let refused = viewfuse_tests::command::run(BINARY, folder.path(), &arguments);
+        assert_eq!((refused.code, refused.stdout.as_str()), (Some(1), ""), "{}", refused.stderr);
+        assert!(
+            refused.stderr.ends_with("cannot be written: File name too long (os error 36)\n"),
+            "{}",
+            refused.stderr
+        );
+        assert_eq!(names_in(folder.path()), ["toy"]);
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+fn names_that_no_file_has_are_noticed_first() {}
+
+fn files_are_no_folders_of_pictures() {
+    let folder = toy();
+    for (name, way) in [
+        ("clip.mp4", "--output clip --video mp4 writes clip/video.mp4"),
+        ("new/clip.GIF", "--output new/clip --video gif writes new/clip/video.gif"),
+        ("view.png", "--output view is one"),
+    ] {
+        let parts = [&format!("{name}: is the name of a file"), way];
+        assert_kept(&folder, &format!("{RENDER} -o {name}"), &parts);
+    }
+    // A folder that is there is one, whatever its name is.
+    fs::create_dir(folder.path().join("old.gif")).expect("a folder");
+    done(folder.path(), &format!("{RENDER} -o old.gif"));
 }

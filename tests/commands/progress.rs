@@ -4,15 +4,23 @@
 use super::{BINARY, binary};
 use std::fs;
 use std::io::{BufRead, BufReader};
+use std::ops::Range;
 use std::path::Path;
 use std::process::Stdio;
+use std::sync::Mutex;
+use viewfuse::check::check_kernel;
+use viewfuse::check::measure::Role;
+use viewfuse::device::cpu::Cpu;
+use viewfuse::job::progress::Progress;
 use viewfuse_tests::command::{command, toy};
 use viewfuse_tests::places::data;
+use viewfuse_vulkan::kernel::Kernel;
 
 viewfuse_tests::trials![
     every_long_command_names_its_stages,
     training_and_its_scenes_name_their_stages,
     lines_come_while_it_works,
+    a_check_says_what_is_compiled,
 ];
 
 /// A line of progress.
@@ -139,4 +147,23 @@ fn lines_come_while_it_works() {
     let mut quick = command(BINARY, scene.path(), "inspect toy --json");
     let quick = quick.env("VIEWFUSE_PROGRESS", "100000").output().expect("the command starts");
     assert!(quick.status.success() && quick.stderr.is_empty(), "{}", String::from_utf8_lossy(&quick.stderr));
+}
+
+/// Names of stages.
+#[derive(Default)]
+struct Stages(Mutex<Vec<String>>);
+
+impl Progress for Stages {
+    fn stage(&self, name: &str, _: Range<usize>, _: usize) {
+        self.0.lock().expect("no panic").push(name.to_owned());
+    }
+}
+
+/// Of a device other than the CPU, which has nothing to compile; here the CPU stands for it.
+fn a_check_says_what_is_compiled() {
+    for (role, expected) in [(Role::Other, ["compiling", "comparing"].as_slice()), (Role::Reference, &[])] {
+        let stages = Stages::default();
+        check_kernel(&Cpu, role, Kernel::ALL[0], 1, &stages).expect("a report");
+        assert_eq!(stages.0.into_inner().expect("no panic"), expected);
+    }
 }

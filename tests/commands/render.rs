@@ -5,7 +5,7 @@ use image::{ColorType, DynamicImage};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use viewfuse_tests::command::{change_poses, names_in, run, toy};
+use viewfuse_tests::command::{Outcome, change_poses, names_in, run, toy};
 
 viewfuse_tests::trials![
     writes_a_picture_a_depth_map_a_sheet_and_a_record,
@@ -17,6 +17,7 @@ viewfuse_tests::trials![
     chooses_sources,
     a_second_run_replaces_the_first,
     weights_change_the_picture,
+    a_network_is_told_the_scale_it_gets,
 ];
 
 fn record(folder: &Path, output: &str) -> Value {
@@ -235,4 +236,22 @@ fn weights_change_the_picture() {
     mean.iter().for_each(|weight| assert_near(*weight, 1.0 / 23.0, 1.0e-7));
     let prediction = |output: &str| picture(folder, &format!("{output}/000020.png")).to_rgb8();
     assert!(prediction("a") != prediction("b") && prediction("b") != prediction("c"));
+}
+
+/// A PixelNeRF takes lengths as they are near the distance of published scenes, and in their unit elsewhere.
+fn a_network_is_told_the_scale_it_gets() {
+    for (scale, said) in [
+        (1.0, None),
+        (1.05, None),
+        (2.0, Some("the cameras are 2.60 units from what they look at, and the network takes lengths as they are")),
+        (100.0, Some("all lengths are divided by 1.000e2")),
+    ] {
+        let folder = toy();
+        change_poses(&folder, |_, matrix| [3, 7, 11].into_iter().for_each(|at| matrix[at] *= scale));
+        let render = "render toy --targets 20 --sources 0..2 --model formula:8 --size 16x16 --device cpu -o out";
+        let Outcome { code, stderr, .. } = run(BINARY, folder.path(), render);
+        assert_eq!(code, Some(0), "{stderr}");
+        assert_eq!(stderr.contains("units from what they look at"), said.is_some(), "{scale}: {stderr}");
+        assert!(said.is_none_or(|said| stderr.contains(said)), "{scale}: {stderr}");
+    }
 }

@@ -17,6 +17,7 @@ viewfuse_tests::trials![
     numbers_without_sense_are_refused,
     a_damaged_state_is_refused_and_an_empty_one_is_none,
     a_loss_is_shown_once_there_is_one,
+    more_steps_go_on_from_fewer,
 ];
 
 /// Small enough for a second a run.
@@ -264,4 +265,26 @@ fn a_loss_is_shown_once_there_is_one() {
     let run = PIXELNERF.replace("--validate-every 10", "--validate-every 1").replace("--steps 30", "--steps 2");
     let said = done(folder.path(), &format!("{run} -o run"));
     assert!(said.contains("step 1: loss 0.") && !said.contains("NaN"), "{said}");
+}
+
+fn more_steps_go_on_from_fewer() {
+    let folder = scenes();
+    let path = folder.path();
+    let run = |steps: u32| format!("{} -o run", PIXELNERF.replace("--steps 30", &format!("--steps {steps}")));
+    let record = || serde_json::from_slice::<serde_json::Value>(&bytes(path, "run/record.json")).expect("a record");
+    done(path, &run(4));
+    assert!(record()["extended"].is_null(), "{}", record());
+    let short = bytes(path, "run/model.safetensors");
+    let said = done(path, &run(7));
+    assert!(said.starts_with("goes on at step 4 of a run of 4: from here the rate is that of 7 steps\n"), "{said}");
+    assert!(said.contains("7 steps in"), "{said}");
+    assert_eq!((&record()["steps"], &record()["extended"]), (&7.into(), &serde_json::json!([[4, 4]])));
+    let long = bytes(path, "run/model.safetensors");
+    assert!(long != short, "it learned");
+    // Once more: there is nothing to do, and nothing is said of it.
+    assert!(!done(path, &run(7)).contains("goes on"));
+    assert_eq!(bytes(path, "run/model.safetensors"), long);
+    assert_eq!(record()["extended"], serde_json::json!([[4, 4]]));
+    // Fewer steps are another run.
+    assert_refused(lab(), path, &run(5), &["run/state.safetensors", "schedule.steps was 7"]);
 }

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
 use viewfuse_device::cpu::Cpu;
-use viewfuse_job::progress::Progress;
+use viewfuse_job::progress::{Part, Progress};
 use viewfuse_vulkan::kernel::Kernel;
 
 /// The default number of seeds for a kernel's check.
@@ -38,8 +38,8 @@ pub fn check_device<D: Device>(
 ) -> Result<DeviceReport, CheckError> {
     let mut kernels = Vec::new();
     for (index, kernel) in Kernel::ALL.into_iter().enumerate() {
-        progress.stage(kernel.name(), index..index + 1, Kernel::ALL.len());
-        kernels.push(check_kernel(device, role, kernel, seed_count, progress)?);
+        let part = Part::begin(progress, kernel.name(), index..index + 1, Kernel::ALL.len());
+        kernels.push(check_kernel(device, role, kernel, seed_count, &part)?);
     }
     Ok(DeviceReport { device: device.name(), kernels, picture: None })
 }
@@ -75,9 +75,15 @@ impl<D: Device> Visitor for Check<'_, D> {
         let mut on_cpu = Vec::new();
         let mut expected: Vec<Option<Bounded>> = Vec::new();
         for seed in 1..=u64::from(self.seed_count) {
-            for size in SIZES {
+            for (index, size) in SIZES.into_iter().enumerate() {
                 self.progress.check()?;
                 let inputs = C::inputs(seed, size);
+                // A device has a kernel compiled, or reads it back, where it is first called.
+                match (self.role, seed, index) {
+                    (Role::Other, 1, 0) => self.progress.stage("compiling", 0..1, 2),
+                    (Role::Other, 1, 1) => self.progress.stage("comparing", 1..2, 2),
+                    _ => {}
+                }
                 actual.extend(C::results(self.device, &inputs).map_err(failed)?);
                 expected.extend(C::all_expected(&inputs));
                 if self.role == Role::Other {

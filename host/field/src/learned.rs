@@ -42,8 +42,19 @@ pub(super) fn in_network_unit(sources: &SourceImages) -> (RigUnit, Vec<Camera>) 
     (unit, cameras)
 }
 
-/// Says that a network measures in another unit than the world's, if it does.
-pub(super) fn warn_of_unit(unit: RigUnit, progress: &dyn Progress) {
+/// Relative difference from [`SRN_DISTANCE`] up to which cameras count as being at it.
+const SAME_DISTANCE: f32 = 0.1;
+
+/// Says that a network measures in another unit than the world's, if it does; or that it measures in the world's, where
+/// its cameras may have been nearer or farther while it learned.
+pub(super) fn warn_of_unit(unit: RigUnit, sources: &SourceImages, progress: &dyn Progress) {
+    let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
+    let distance = SRN_DISTANCE * RigUnit::of(&cameras).length();
+    if unit.is_world() && (distance / SRN_DISTANCE - 1.0).abs() > SAME_DISTANCE {
+        progress.warn(&format!(
+            "the cameras are {distance:.2} units from what they look at, and the network takes lengths as they are: a network              that learned from cameras at another distance ({SRN_DISTANCE} in the scenes of SRN) draws something else; scale              the scene to what it learned from"
+        ));
+    }
     if !unit.is_world() {
         progress.warn(&format!(
             "the cameras are {:.3e} units from what they look at: for the network all lengths are divided by {:.3e}, so that this \

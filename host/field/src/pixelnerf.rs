@@ -157,7 +157,7 @@ impl Field for PixelNerf {
         progress: &dyn Progress,
     ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
         let views = self.views(device, sources)?;
-        warn_of_unit(views.unit, progress);
+        warn_of_unit(views.unit, sources, progress);
         Ok(Box::new(views))
     }
 }

@@ -16,6 +16,7 @@ pub use ordinary::{is_ordinary, open_ordinary};
 pub use scratch::Scratch;
 pub use unfinished::{remove_all, remove_unfinished};
 
+use std::io::ErrorKind::{NotADirectory, NotFound, PermissionDenied};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
@@ -127,8 +128,9 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     file.finish()
 }
 
-/// Checks, before long work, that `path` can be written: it is not a folder, no part of it is a link to nothing, and
-/// files can be created in the nearest existing folder above it. No file remains.
+/// Checks, before long work, that `path` can be written: it is not a folder, no part of it is a link to nothing or has
+/// a name that the system does not take, and files can be created in the nearest existing folder above it. No file
+/// remains.
 ///
 /// # Errors
 /// [`WriteError::Io`].
@@ -143,6 +145,16 @@ pub fn check_writable(path: &Path) -> Result<(), WriteError> {
     }
     let above = || path.ancestors().skip(1).map(|folder| if folder == "" { Path::new(".") } else { folder });
     let Some(nearest) = above().find(|folder| folder.exists()) else { return Ok(()) };
+    // Names that the file system does not take, each alone: of those in folders that are missing nothing is said.
+    let missing = path.strip_prefix(nearest).unwrap_or(path);
+    for name in missing.components().map(|own| nearest.join(own)) {
+        match std::fs::symlink_metadata(&name) {
+            Err(cause) if !matches!(cause.kind(), NotFound | NotADirectory | PermissionDenied) => {
+                return Err(failed(cause));
+            }
+            _ => {}
+        }
+    }
     if !nearest.is_dir() {
         return Err(failed(std::io::Error::other(format!("{} is not a folder", nearest.display()))));
     }

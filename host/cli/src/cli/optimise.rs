@@ -34,6 +34,8 @@ use viewfuse_weighting::{Weighting, WeightingSpec, grammar};
 
 /// Iterations between two scores, and between two files on the way.
 const SCORED: u32 = 40;
+/// Sources that are scored where no view is kept back.
+const FIT_SOURCES: usize = 3;
 /// Iterations with the weights of `--towards`.
 const TOWARDS: u32 = 60;
 
@@ -110,6 +112,8 @@ struct Ended {
     background: [f32; 3],
     done: u32,
     of: u32,
+    /// Mean PSNR of the first sources, and how many they are, where no view is kept back.
+    fit: Option<(f64, usize)>,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
@@ -147,7 +151,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         AnyDevice::Vulkan(own) => job.optimise(own.as_ref(), &device, &field, &progress),
     })??;
     drop(progress);
-    let Ended { gaussians, background, done, of } = &ended;
+    let Ended { gaussians, background, done, of, fit } = &ended;
     match is_of(&arguments.output, "html") {
         true => {
             let cameras: Vec<(String, Camera)> =
@@ -160,6 +164,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     }
     let count = gaussians.len();
     say(format_args!("{}: {count} Gaussians after {done} of {of} iterations", arguments.output.display()))?;
+    if let Some((psnr, count)) = fit {
+        say(format_args!(
+            "fit: PSNR {psnr:.2} dB on {count} of the sources themselves, which says nothing of new views: --left-out VIEW keeps \
+             one back and scores it"
+        ))?;
+    }
     let loops = match &device {
         AnyDevice::Vulkan(own) if own.is_software() => {
             "; a software driver: the steps were made by the CPU's own loops"
@@ -217,7 +227,11 @@ impl Job<'_> {
             self.advance(&mut optimiser, any, &album, progress)?;
         }
         let (gaussians, done, of) = (optimiser.optimised().gaussians, optimiser.done(), optimiser.iteration_count());
-        Ok(Ended { gaussians, background: behind(&stage.images), done, of })
+        let sources = &self.sources[..self.sources.len().min(FIT_SOURCES)];
+        let is_alone = self.targets.is_empty() && !progress.is_cancelled();
+        let fit = is_alone.then(|| self.score(&gaussians, any, &album, sources)).transpose()?;
+        let fit = fit.map(|psnr| (psnr, sources.len()));
+        Ok(Ended { gaussians, background: behind(&stage.images), done, of, fit })
     }
 
     /// All iterations, with scores and files on the way; fewer if it is cancelled.
@@ -242,7 +256,7 @@ impl Job<'_> {
                 scene_of(&gaussians).write(&self.arguments.output, &self.scene.frame)?;
             }
             if !self.targets.is_empty() {
-                let psnr = self.score(&gaussians, any, album)?;
+                let psnr = self.score(&gaussians, any, album, &self.targets)?;
                 progress.note(&format!("iteration {done} of {of}: views left out have a PSNR of {psnr:.2} dB"));
             }
         }
@@ -262,16 +276,22 @@ impl Job<'_> {
         Ok(sums)
     }
 
-    /// Mean PSNR of the views that are left out.
-    fn score(&self, gaussians: &[GaussianBlock], any: &AnyDevice, album: &Album<'_>) -> anyhow::Result<f64> {
+    /// Mean PSNR of these views.
+    fn score(
+        &self,
+        gaussians: &[GaussianBlock],
+        any: &AnyDevice,
+        album: &Album<'_>,
+        views: &[usize],
+    ) -> anyhow::Result<f64> {
         let given = AnyField::new(GivenGaussians { scene: scene_of(gaussians), notes: Vec::new() });
         let renderer = given.on(any);
         let mut stage = Stage::prepare(self.scene, album, &self.sources, renderer.as_ref(), &self.options, &Silent)?;
         let mut sum = 0.0;
-        for view in &self.targets {
+        for view in views {
             let frame = stage.frame(&self.weighting, &target_of(self.scene, *view), &Silent)?;
             sum += frame.truth.map_or(0.0, |truth| truth.psnr);
         }
-        Ok(sum / self.targets.len() as f64)
+        Ok(sum / views.len() as f64)
     }
 }

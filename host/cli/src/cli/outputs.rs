@@ -6,6 +6,8 @@ use clap::{Arg, ArgMatches, Command};
 use std::ffi::{OsStr, OsString};
 use std::fs::canonicalize;
 use std::path::Path;
+use viewfuse_job::shell::quoted;
+use viewfuse_output::video::VideoFormat;
 use viewfuse_scene::Scene;
 
 /// The options that name what a command writes, by identifier. All others may name what it reads.
@@ -47,6 +49,29 @@ pub(super) fn keep_folder_apart<'a>(scenes: impl IntoIterator<Item = &'a Scene>,
         Some(scene) => Err(inside(scene, folder, "folder")),
         None => Ok(()),
     }
+}
+
+/// Refuses the name of a file, by its extension, for a folder of pictures that is not there yet: it would become the
+/// folder's.
+pub(super) fn refuse_file(folder: &Path) -> anyhow::Result<()> {
+    const FILES: [&str; 12] = ["mp4", "webp", "gif", "y4m", "mov", "mkv", "avi", "webm", "png", "jpg", "jpeg", "exr"];
+    let extension = folder.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    if folder.is_dir() || !FILES.contains(&extension.as_str()) {
+        return Ok(());
+    }
+    let (path, stem) = (folder.display(), folder.with_extension(""));
+    let video = VideoFormat::ALL.iter().map(VideoFormat::to_string).find(|format| *format == extension);
+    let way = match video {
+        Some(format) => {
+            format!(
+                "--output {} --video {format} writes {}",
+                quoted(&stem),
+                stem.join(format!("video.{format}")).display()
+            )
+        }
+        None => format!("--output {} is one", quoted(&stem)),
+    };
+    Err(wrong(format_args!("--output {path}: is the name of a file, and pictures go to a folder; {way}")))
 }
 
 /// Refuses a file that one of the scenes is read from, or would be.

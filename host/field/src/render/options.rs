@@ -4,7 +4,7 @@ use super::RenderError;
 use crate::budget::Bound;
 use crate::{AnyOptions, Mixture, Renderer};
 use viewfuse_job::progress::Progress;
-use viewfuse_scene::photographs::{Album, BackgroundChoice, longest_side};
+use viewfuse_scene::photographs::{Album, BackgroundChoice, longest_side, scaled_size};
 use viewfuse_scene::{Scene, View};
 
 /// The options of a render.
@@ -63,7 +63,9 @@ pub fn working_side(scene: &Scene, options: &RenderOptions, longest: u32) -> Res
         let (view_width, view_height) = (camera.pinhole.width(), camera.pinhole.height());
         camera.pinhole.resized(width, height).map_err(|error| RenderError::Size { width, height, error })?;
         let fitting_height = (f64::from(view_height) * f64::from(width) / f64::from(view_width)).round() as u32;
-        if fitting_height.abs_diff(height) > 1 {
+        // Of a narrow picture a width of whole pixels says little: the size to which the views are reduced is right.
+        let is_reduced = scaled_size(camera, width.max(height)) == (width, height);
+        if !is_reduced && fitting_height.abs_diff(height) > 1 {
             return Err(RenderError::Shape { width, height, view_width, view_height, fitting_height });
         }
     }

@@ -151,6 +151,12 @@ pub(crate) fn run(
     let average = Average::new(learner.parameters(), AVERAGING)?;
     let learned = Learned { parameters: learner.parameters(), adam: Adam::new(learner.parameters())?, average };
     let mut so_far = state::read(&run.state(), settings, &learned)?.unwrap_or_default();
+    if let Some((step, planned)) = so_far.extended.last().filter(|(step, _)| *step == so_far.steps) {
+        progress.note(&format!(
+            "goes on at step {step} of a run of {planned}: from here the rate is that of {} steps",
+            schedule.steps
+        ));
+    }
     progress.stage("training", 1..STAGES, STAGES);
     progress.expect(schedule.steps.saturating_sub(so_far.steps) as usize);
     let mut written = Instant::now();
@@ -232,7 +238,7 @@ impl Run<'_> {
             &Silent,
         )?;
         write_whole(&self.folder.join(CURVE), curve::svg(so_far, self.score_name).as_bytes())?;
-        let record = serde_json::json!({
+        let mut record = serde_json::json!({
             "program": concat!("viewfuse ", env!("CARGO_PKG_VERSION")),
             "settings": self.settings,
             "steps": so_far.steps,
@@ -242,6 +248,9 @@ impl Run<'_> {
             "score": self.score_name,
             "scores": so_far.scores,
         });
+        if !so_far.extended.is_empty() {
+            record["extended"] = serde_json::json!(so_far.extended);
+        }
         write_whole(&self.folder.join(RECORD), format!("{record:#}\n").as_bytes())?;
         state::write(&self.state(), self.settings, so_far, learned)
     }

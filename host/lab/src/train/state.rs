@@ -27,7 +27,13 @@ pub(crate) struct Progressed {
     pub(crate) pending: (f64, u32),
     /// Step and score in validation.
     pub(crate) scores: Vec<(u32, f64)>,
+    /// Where the run was made longer: the step that it had come to, and the steps that were planned until then.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) extended: Vec<(u32, u32)>,
 }
+
+/// Where the settings have the steps of a run.
+const STEPS: &str = "/schedule/steps";
 
 /// Most bytes of a state.
 const LONGEST_STATE: u64 = 16 << 30;
@@ -38,7 +44,7 @@ const MAX_SCORE: f64 = 1.0e9;
 impl Progressed {
     /// What is wrong with its numbers, which a damaged file may hold.
     fn check(&self) -> Result<(), String> {
-        let Progressed { steps, seconds, losses, pending, scores } = self;
+        let Progressed { steps, seconds, losses, pending, scores, extended: _ } = self;
         let sound = |points: &[(u32, f64)], largest: f64| {
             points.iter().all(|(step, value)| step <= steps && value.abs() <= largest)
         };
@@ -105,7 +111,7 @@ pub(crate) fn write(
     Ok(write_whole(path, &file)?)
 }
 
-/// Loads the state into the parameters and moments, if there is one.
+/// Loads the state into the parameters and moments, if there is one. A run of more steps goes on from one of fewer.
 ///
 /// # Errors
 /// [`TrainError::OtherRun`] if it has other settings, [`TrainError::State`] if it is invalid.
@@ -118,7 +124,14 @@ pub(crate) fn read(path: &Path, settings: &Value, learned: &Learned<'_>) -> Resu
         Err(cause) if cause.kind() == std::io::ErrorKind::NotFound => return Ok(None),
         Err(cause) => return Err(wrong(cause.to_string())),
     };
-    let Saved { file, settings: earlier, progressed } = parse(path, &bytes)?;
+    let Saved { file, settings: mut earlier, mut progressed } = parse(path, &bytes)?;
+    let steps = |settings: &Value| settings.pointer(STEPS).and_then(Value::as_u64);
+    if let (Some(before), Some(now)) = (steps(&earlier), steps(settings))
+        && before < now
+    {
+        progressed.extended.push((progressed.steps, u32::try_from(before).unwrap_or(u32::MAX)));
+        earlier.pointer_mut(STEPS).into_iter().for_each(|own| *own = now.into());
+    }
     if let Some(difference) = difference(&earlier, settings) {
         return Err(TrainError::OtherRun { path: path.to_path_buf(), difference });
     }

@@ -304,6 +304,18 @@ pub enum SceneError {
         /// The most that are used.
         most: u64,
     },
+    /// An image file that is longer than any image of its size.
+    #[error("{path}: the file has {} MiB; of an image{of_size} at most {} MiB are read", length >> 20, most >> 20)]
+    LongImage {
+        /// The image file.
+        path: PathBuf,
+        /// Bytes of the file.
+        length: u64,
+        /// Its size in words, where the header says it.
+        of_size: String,
+        /// Most bytes that are read.
+        most: u64,
+    },
     /// An image file that is too short for the size in its header.
     #[error("{path}: the image is {width} x {height}, and its file has only {length} bytes")]
     Hollow {

@@ -39,6 +39,10 @@ const DECODER_ALLOWANCE: u64 = 16 << 20;
 /// megapixels of 8-bit RGB fit.
 const MAX_DECODING: u64 = 1 << 30;
 
+/// Most bytes of an image file, twice what its pixels take apart: thumbnails, colour profiles, the moment's video that
+/// some phones put behind the picture.
+const FILE_ALLOWANCE: u64 = 256 << 20;
+
 /// Bytes of a JPEG file that are read first for its header: the tags with their thumbnail, colour profiles. The decoder
 /// would read the whole file.
 const JPEG_HEADER: u64 = 256 << 10;
@@ -63,8 +67,11 @@ pub(super) struct Header {
 ///
 /// # Errors
 /// [`SceneError::TooLarge`] if a side has more than [`MAX_SIDE`] pixels, [`SceneError::TooMuch`] if all pixels together
-/// take too much memory; otherwise as for any unreadable image.
+/// take too much memory, [`SceneError::LongImage`] if the file is longer than such an image; otherwise as for any unreadable image.
 pub(super) fn header(path: &Path) -> Result<Header, SceneError> {
+    let length = path.metadata().map_err(|cause| unreadable(path, cause))?.len();
+    // Decoders of some formats read all of it, before they know a size.
+    not_longer(path, length, 2 * MAX_DECODING, String::new)?;
     let found = match beginning_of_jpeg(path)? {
         Some(found) => found,
         None => described(path, open(path)?)?,
@@ -77,7 +84,13 @@ pub(super) fn header(path: &Path) -> Result<Header, SceneError> {
     if bytes > MAX_DECODING {
         return Err(SceneError::TooMuch { path: path.to_path_buf(), width, height, bytes, most: MAX_DECODING });
     }
+    not_longer(path, length, 2 * bytes + FILE_ALLOWANCE, || format!(" of {width} x {height}"))?;
     Ok(found)
+}
+
+fn not_longer(path: &Path, length: u64, most: u64, of_size: impl Fn() -> String) -> Result<(), SceneError> {
+    let too_long = || SceneError::LongImage { path: path.to_path_buf(), length, of_size: of_size(), most };
+    if length > most { Err(too_long()) } else { Ok(()) }
 }
 
 /// The header in the first bytes of a JPEG file; `None` for other files, and if more bytes are needed.

@@ -1,7 +1,7 @@
 //! What a render needs before its first picture: everything that can be refused is refused here.
 
 use super::Arguments;
-use crate::cli::outputs::keep_folder_apart;
+use crate::cli::outputs::{keep_folder_apart, refuse_file};
 use crate::cli::printing::warn_of;
 use crate::cli::terminal::Terminal;
 use std::path::PathBuf;
@@ -41,6 +41,9 @@ pub(super) struct Prepared {
 impl Prepared {
     pub(super) fn open(arguments: &Arguments) -> anyhow::Result<Prepared> {
         let start = Instant::now();
+        if !arguments.is_stream() {
+            refuse_file(&arguments.output)?;
+        }
         let weighting = arguments.weighting()?;
         let (folder, scene) = arguments.pose.open(&arguments.scene, &arguments.picture.masks)?;
         warn_of(&scene);
