@@ -52,7 +52,9 @@ pub(super) fn warn_of_unit(unit: RigUnit, sources: &SourceImages, progress: &dyn
     let distance = SRN_DISTANCE * RigUnit::of(&cameras).length();
     if unit.is_world() && (distance / SRN_DISTANCE - 1.0).abs() > SAME_DISTANCE {
         progress.warn(&format!(
-            "the cameras are {distance:.2} units from what they look at, and the network takes lengths as they are: a network              that learned from cameras at another distance ({SRN_DISTANCE} in the scenes of SRN) draws something else; scale              the scene to what it learned from"
+            "the cameras are {distance:.2} units from what they look at, and the network takes lengths as they are: a \
+             network that learned from cameras at another distance ({SRN_DISTANCE} in SRN's cars) draws something else; \
+             scale the scene to what it learned from"
         ));
     }
     if !unit.is_world() {
