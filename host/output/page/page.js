@@ -3,6 +3,7 @@
 import { listenToHands, listenToKeys } from './hands.js';
 import { orbitActions } from './orbits.js';
 import { poseOf } from './poses.js';
+import { seenFrom, tellSeen } from './seen.js';
 import { cameraButton, tellShares } from './shares.js';
 import { stageOf } from './stage.js';
 import { weightsOf } from './weights.js';
@@ -48,6 +49,8 @@ async function begin() {
     [view, lens] = [own, through];
     const weights = weightsOf(told.cameras, view.pose);
     tellShares(buttons, weights);
+    const isOutside = tellSeen(element('support'), seenFrom(told, view.pose.centre));
+    element('frame').classList.toggle('outside', isOutside);
     stage.show(view, lens, weights);
   }
   const back = () => show({ pose: start.pose, focus: told.focus }, start.lens);

@@ -19,10 +19,11 @@ use viewfuse_job::files::{WriteError, write_whole};
 use viewfuse_scene::gaussians::{Gaussian, GaussianScene};
 use viewfuse_scene::rig::Rig;
 
-use crate::scripts::{BASE_STYLE, COLOURS, HANDS, ORBITS, OUTLINES, POSES, SHARES, Script, VECTORS, joined};
+use crate::ring::{RingPlace, ring};
+use crate::scripts::{BASE_STYLE, COLOURS, HANDS, ORBITS, OUTLINES, POSES, SEEN, SHARES, Script, VECTORS, joined};
 
 /// Scripts in the order of their imports.
-const SCRIPTS: [Script; 11] = [
+const SCRIPTS: [Script; 12] = [
     VECTORS,
     POSES,
     COLOURS,
@@ -30,6 +31,7 @@ const SCRIPTS: [Script; 11] = [
     SHARES,
     ORBITS,
     HANDS,
+    SEEN,
     Script { name: "weights.js", text: include_str!("../page/weights.js") },
     Script { name: "gaussians.js", text: include_str!("../page/gaussians.js") },
     Script { name: "stage.js", text: include_str!("../page/stage.js") },
@@ -63,7 +65,7 @@ pub fn write_html(path: &Path, page: &GaussianPage<'_>) -> Result<(), WriteError
     // The first picture is that of the camera in the middle, and the frame has its shape.
     let shape = page.cameras.get(start(page.cameras)).map_or([1; 2], |(_, camera)| sides(camera));
     let [red, green, blue] = page.background.map(level);
-    let values = HashMap::from([
+    let mut values = HashMap::from([
         ("title", escaped(page.title)),
         ("style", format!("{BASE_STYLE}{STYLE}")),
         ("count", page.scene.gaussians.len().to_string()),
@@ -76,6 +78,9 @@ pub fn write_html(path: &Path, page: &GaussianPage<'_>) -> Result<(), WriteError
         // No text of a file ends the element that it is in.
         ("scene", told.replace('<', "\\u003c")),
     ]);
+    // The page says its own size, to a tenth of a megabyte.
+    let length = filled(TEMPLATE, &values).len();
+    values.insert("size", format!("{:.1}", length as f64 / 1.0e6));
     write_whole(path, filled(TEMPLATE, &values).as_bytes())
 }
 
@@ -107,6 +112,7 @@ struct Told<'a> {
     up: [f32; 3],
     /// Mean distance of the cameras from the focus.
     distance: f32,
+    ring: Vec<RingPlace>,
     /// The viewer's unit: the median standard deviation, because it keeps variances in half precision.
     unit: f32,
 }
@@ -156,6 +162,7 @@ impl<'a> Told<'a> {
             focus: rig.focus.to_array(),
             up: rig.up.to_array(),
             distance: rig.distance,
+            ring: ring(&cameras),
             unit: deviations.get(deviations.len() / 2).copied().unwrap_or(1.0),
         }
     }

@@ -12,6 +12,7 @@
 //! depth    depth maps as files of any format
 //! ply      point clouds as PLY
 //! scripts  scripts that pages share
+//! ring           how much is seen from around a subject
 //! gaussian_page  a scene of Gaussians as one page
 //! rate     frames per second
 //! webp     animated pictures
@@ -41,6 +42,7 @@ pub mod ply;
 pub mod png;
 pub mod rate;
 pub mod record;
+pub mod ring;
 pub mod run;
 pub mod scripts;
 pub mod selected;

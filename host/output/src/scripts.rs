@@ -25,6 +25,9 @@ pub const ORBITS: Script = Script { name: "orbits.js", text: include_str!("../pa
 /// Pointers, wheel and keys.
 pub const HANDS: Script = Script { name: "hands.js", text: include_str!("../page/hands.js") };
 
+/// How much of a view the photographs show.
+pub const SEEN: Script = Script { name: "seen.js", text: include_str!("../page/seen.js") };
+
 /// The style that pages share: colours by day and by night, and what both have.
 pub const BASE_STYLE: &str = include_str!("../page/base.css");
 

@@ -3,8 +3,8 @@
 import { fitted } from './canvas.js';
 import { drawSources } from './frusta.js';
 import { NEAR, drawFrustum, frustum } from './outlines.js';
-import { MIN_SEEN } from './picture.js';
 import { inCamera, lookAt } from './poses.js';
+import { MIN_SEEN } from './seen.js';
 import { element, state } from './state.js';
 import { add, cross, dot, length, sub, times, turned, unit } from './vectors.js';
 

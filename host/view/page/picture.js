@@ -2,6 +2,7 @@
 
 import { fitted } from './canvas.js';
 import { drawSources } from './frusta.js';
+import { tellSeen } from './seen.js';
 import { element, state } from './state.js';
 
 export function drawPicture() {
@@ -31,7 +32,7 @@ export function drawPicture() {
     drawSources(context, state.shown.pose, project, ratio, state.shown.weights, false);
     context.restore();
   }
-  if (tellSupport()) {
+  if (tellSeen(element('support'), state.shown.seen)) {
     context.fillStyle = 'rgba(0, 0, 0, 0.5)';
     context.fillRect(left, top, own * scale, tall * scale);
   }
@@ -39,21 +40,6 @@ export function drawPicture() {
   canvas.dataset.pictures = Number(canvas.dataset.pictures || 0) + 1;
   canvas.dataset.kind = state.shown.full ? 'full' : 'coarse';
   canvas.dataset.size = state.shown.size.join('x');
-}
-
-// A picture of which less was photographed is said to be one; below half of it, it is dimmed.
-const MOSTLY_SEEN = 0.9;
-export const MIN_SEEN = 0.5;
-
-// Whether the picture leaves what the photographs show.
-function tellSupport() {
-  const { seen } = state.shown;
-  const percent = Math.round(100 * seen);
-  element('support').hidden = seen >= MOSTLY_SEEN;
-  element('support').textContent = seen < MIN_SEEN
-    ? `Not photographed from here: the photographs show ${percent} % of this.`
-    : `The photographs show ${percent} % of this.`;
-  return seen < MIN_SEEN;
 }
 
 const recent = [];           // when the last coarse pictures were drawn

@@ -1,6 +1,6 @@
 //! The page's files, which are part of the program.
 
-use viewfuse_output::scripts::{BASE_STYLE, COLOURS, HANDS, ORBITS, OUTLINES, POSES, SHARES, Script, VECTORS};
+use viewfuse_output::scripts::{BASE_STYLE, COLOURS, HANDS, ORBITS, OUTLINES, POSES, SEEN, SHARES, Script, VECTORS};
 
 /// A file that the page consists of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,7 +27,7 @@ const fn shared(source: Script) -> PageFile {
 }
 
 /// All of them. Scripts are modules in the order of their imports.
-pub(crate) const FILES: [PageFile; 27] = [
+pub(crate) const FILES: [PageFile; 28] = [
     PageFile { name: "", media_type: "text/html; charset=utf-8", text: include_str!("../page/index.html") },
     style("base.css", BASE_STYLE),
     style("view.css", include_str!("../page/view.css")),
@@ -38,6 +38,7 @@ pub(crate) const FILES: [PageFile; 27] = [
     shared(SHARES),
     shared(ORBITS),
     shared(HANDS),
+    shared(SEEN),
     script("canvas.js", include_str!("../page/canvas.js")),
     script("state.js", include_str!("../page/state.js")),
     script("frusta.js", include_str!("../page/frusta.js")),
@@ -59,7 +60,7 @@ pub(crate) const FILES: [PageFile; 27] = [
 
 #[cfg(test)]
 mod tests {
-    use super::{COLOURS, FILES, HANDS, ORBITS, OUTLINES, POSES, SHARES, VECTORS};
+    use super::{COLOURS, FILES, HANDS, ORBITS, OUTLINES, POSES, SEEN, SHARES, VECTORS};
     use std::collections::BTreeSet;
 
     /// Most lines of a file of the page.
@@ -83,7 +84,7 @@ mod tests {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/page");
         let entries = std::fs::read_dir(folder).expect("the folder").map(|entry| entry.expect("a file").file_name());
         let mut there: BTreeSet<String> = entries.map(|name| name.to_string_lossy().into_owned()).collect();
-        let scripts = [VECTORS, POSES, COLOURS, OUTLINES, SHARES, ORBITS, HANDS].map(|script| script.name);
+        let scripts = [VECTORS, POSES, COLOURS, OUTLINES, SHARES, ORBITS, HANDS, SEEN].map(|script| script.name);
         for name in scripts.into_iter().chain(["base.css"]) {
             assert!(there.insert(name.to_owned()), "{name} is shared and there");
         }

@@ -9,17 +9,13 @@ use viewfuse_core::pose::Pose;
 use viewfuse_core::weighting::ROWS;
 use viewfuse_field::About;
 use viewfuse_job::shell::quoted;
+use viewfuse_output::ring::{RingPlace, ring};
 use viewfuse_scene::View;
-use viewfuse_scene::coverage::Coverage;
-use viewfuse_scene::path::arc::Arc;
-use viewfuse_scene::path::generated::orbit;
 use viewfuse_scene::rig::Rig;
 use viewfuse_weighting::scheme_names;
 
 /// A greater limit of a parameter than this is none.
 const MAX_LIMIT: f32 = 1.0e9;
-/// Places of the ring: one for every 10 degrees.
-const RING_PLACES: usize = 36;
 
 /// The scene as the page gets it. World coordinates; poses are world from camera, row-major, in OpenCV axes.
 #[derive(Debug, Serialize)]
@@ -52,14 +48,6 @@ pub(crate) struct Subject {
     /// Whether another one may be chosen for the scene.
     chooses: bool,
     commands: Commands,
-}
-
-/// A place on the ring.
-#[derive(Debug, Serialize)]
-struct RingPlace {
-    place: [f32; 3],
-    /// Share of a picture from there that a photograph shows from within 30 degrees.
-    seen: f32,
 }
 
 /// A camera.
@@ -164,15 +152,6 @@ impl Intrinsics {
         let pinhole = &camera.pinhole;
         Intrinsics { focal: pinhole.focal(), principal: pinhole.principal(), size: [pinhole.width(), pinhole.height()] }
     }
-}
-
-/// How much the photographs show around the focus; empty if the cameras span no circle.
-fn ring(cameras: &[Camera]) -> Vec<RingPlace> {
-    let Some(first) = cameras.first() else { return Vec::new() };
-    let places = orbit(cameras, &Arc::full(cameras), first.pinhole, RING_PLACES).unwrap_or_default();
-    let coverage = Coverage::of(cameras);
-    let of = |camera: &Camera| RingPlace { place: camera.pose.centre_world().to_array(), seen: coverage.seen(camera) };
-    places.iter().map(of).collect()
 }
 
 /// The first pose: half-way between the camera nearest to the middle of all and its nearest neighbour, so that it is a

@@ -40,6 +40,9 @@ const BACKGROUND: [f32; 3] = [0.7, 0.75, 0.8];
 /// at 1 / 255, keeps variances in half precision and mixes in 8 bits; measured: 33.7 to 36.3, and 34.8 of the page that
 /// the command writes.
 const MIN_PSNR: f64 = 32.0;
+/// What is said of how much was photographed, and whether the picture is dimmed.
+const SAID: &str = "document.getElementById('support').hidden ? '' : document.getElementById('support').textContent";
+const IS_DIMMED: &str = "String(document.getElementById('frame').classList.contains('outside'))";
 const STILL: &str = "document.body?.dataset.state === 'still'";
 
 /// A ball above a chequered ground.
@@ -154,7 +157,11 @@ fn a_page_shows_the_gaussians_of_core(browser: &Browser) {
     tab.wait_for(STILL);
     assert_eq!(tab.text("document.title"), "</title><b>ball");
     assert_eq!(tab.text("document.querySelector('#sources span').textContent"), "<view> 0");
-    assert_eq!(tab.text("document.querySelector('header p').textContent"), "6221 Gaussians of 5 source views");
+    let first = tab.text("document.querySelector('header p').textContent");
+    let (size, rest) = first.split_once(" MB, ").expect("a size");
+    assert!(rest.starts_with("6221 Gaussians fitted to 5 photographs: "), "{rest}");
+    let length = std::fs::metadata(address.trim_start_matches("file://")).expect("a page").len();
+    assert_eq!(size, format!("{:.1}", length as f64 / 1.0e6));
     tab.evaluate("document.getElementById('shows-outlines').click()");
     // It begins in the middle; then from the side.
     for view in [2, 0, 3] {
@@ -183,7 +190,15 @@ fn a_page_follows_a_hand_and_a_finger(browser: &Browser) {
     tab.wait_for(STILL);
     assert_ne!(tab.picture(), before, "the picture follows the hand");
     // A quarter turn of keys is 30 of them; the weights are those of the scheme from where the camera is then.
+    // On the other side nothing was photographed.
+    assert_eq!((tab.text(SAID), tab.text(IS_DIMMED)), (String::new(), "false".to_owned()));
+    (0..60).for_each(|_| tab.key("ArrowRight"));
+    tab.wait_for(STILL);
+    let said = "Not photographed from here: the photographs show 0 % of this.";
+    assert_eq!((tab.text(SAID).as_str(), tab.text(IS_DIMMED).as_str()), (said, "true"));
+    keep(&tab, "one_file_outside.png");
     tab.evaluate("document.getElementById('home').click()");
+    assert_eq!((tab.text(SAID), tab.text(IS_DIMMED)), (String::new(), "false".to_owned()));
     tab.key("ArrowRight");
     tab.wait_for(STILL);
     let poses = cameras().map(|(_, camera)| camera.pose);
