@@ -5,6 +5,7 @@ mod budget;
 mod every;
 mod gaussians;
 mod genvs;
+mod near;
 mod pixelnerf;
 mod plane_sweep;
 mod posed;

@@ -280,7 +280,8 @@ pub enum Encoding {
     /// Each when a target first gives it a weight. Views without a weight do not contribute to a picture.
     Used,
     /// As `Used`, and where something may be left out, only so many views of greatest weight contribute to a picture:
-    /// views of less weight add more errors than they show. Views of equal weight stay together.
+    /// views of less weight add more errors than they show. Views of equal weight stay together. The field compares
+    /// views to find depth: where fewer than four have a weight, the next ones get a small one.
     Greatest(usize),
 }
 

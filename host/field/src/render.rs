@@ -5,10 +5,12 @@
 //! stage     sources on a device, from which targets are rendered
 //! frame     the result
 //! seen      how many photographs show what it shows
+//! compared  the weights of fields that compare views
 //! most_views  the weight of sources that are more than a field uses
 //! error     errors
 //! ```
 
+mod compared;
 mod error;
 mod frame;
 mod most_views;

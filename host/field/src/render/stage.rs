@@ -1,5 +1,6 @@
 //! Sources on a device, from which targets are rendered.
 
+use super::compared::{comparable, weighed_count};
 use super::most_views::weight_beyond;
 use super::seen::seen;
 use super::{Frame, RenderError, RenderOptions, Truth, working_side};
@@ -317,12 +318,18 @@ impl<'a> Stage<'a> {
         progress: &dyn Progress,
     ) -> Result<Frame, RenderError> {
         let start = Instant::now();
-        let weights = weighting.weigh(&self.sources, &self.unit.pose(&target.camera.pose));
-        let omission = weights.without_least(self.left_out_total(&weights));
+        let pose = self.unit.pose(&target.camera.pose);
+        let weights = weighting.weigh(&self.sources, &pose);
+        let compares = matches!(self.session.prepared.encoding(), Encoding::Greatest(_));
+        let omitting = |total: f32| match weights.without_least(total) {
+            omission if compares => comparable(&weights, omission, &self.sources, &pose),
+            omission => omission,
+        };
+        let (omission, all) = (omitting(self.left_out_total(&weights)), omitting(0.0).weights);
         let early_termination = self.options.early_termination;
         let (rendered, kept, encode) = match &mut self.controller {
             Some(controller) => {
-                let view = View { camera, all: &weights, used: &omission.weights, early_termination };
+                let view = View { camera, all: &all, used: &omission.weights, early_termination };
                 let bounded = controller.render(&mut self.session, view, progress);
                 bounded.map(|(rendered, kept, encode)| (rendered, Some(kept), encode))
             }
@@ -407,6 +414,10 @@ fn same_size(a: &Camera, b: &Camera) -> bool {
     a.pinhole.width() == b.pinhole.width() && a.pinhole.height() == b.pinhole.height()
 }
 
+/// Nothing is omitted where fewer others than this would have a weight: a source's depths are found by comparing it
+/// with others.
+const MIN_COMPARED: usize = 3;
+
 /// The weights of all sources for each source as a target; a source's weight for itself is 0.
 fn relevance_among(sources: &SourcePoses, weighting: &Weighting, leave_out: f32) -> Vec<SourceWeights> {
     let count = sources.count();
@@ -417,7 +428,9 @@ fn relevance_among(sources: &SourcePoses, weighting: &Weighting, leave_out: f32)
             let Ok(others) = SourcePoses::new(&others) else {
                 return Weights::mean(count);
             };
-            let weights = weighting.weigh(&others, sources.pose(view)).without_least(leave_out).weights;
+            let all = weighting.weigh(&others, sources.pose(view));
+            let most = all.without_least(leave_out).weights;
+            let weights = if weighed_count(&most) < MIN_COMPARED { all } else { most };
             let mut scores = [0.0; MAX_SOURCES];
             for other in 0..count {
                 if other != view {

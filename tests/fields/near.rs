@@ -1,0 +1,97 @@
+//! Pictures at, beside and between photographs: as a camera comes nearer to a photograph, its picture becomes the
+//! photograph.
+
+use viewfuse::device::cpu::Cpu;
+use viewfuse::field::On;
+use viewfuse::field::render::{Frame, RenderOptions, Stage, open_album};
+use viewfuse::field::scores::psnr_of_seen;
+use viewfuse::field::training_free::TrainingFree;
+use viewfuse::job::progress::Silent;
+use viewfuse::scene::Scene;
+use viewfuse::scene::few_shot::Target;
+use viewfuse::weighting::Weighting;
+use viewfuse_core::Vec3;
+use viewfuse_core::camera::Camera;
+use viewfuse_core::pose::Pose;
+use viewfuse_tests::places;
+
+/// Schemes, and whether a photograph has all the weight at its own place.
+const SCHEMES: [(&str, bool); 10] = [
+    ("distance:power=1", true),
+    ("distance:power=2", true),
+    ("distance:power=3", true),
+    ("error:alpha=1", true),
+    ("error:alpha=0.5", true),
+    ("l1", true),
+    ("frobenius", true),
+    ("relative-frobenius", false),
+    ("gaussian:beta=1", false),
+    ("mean", false),
+];
+/// Shares of the way to the next photograph, from the middle to the photograph itself.
+const AWAY: [f32; 7] = [0.5, 0.3, 0.15, 0.08, 0.03, 0.01, 0.0];
+/// Most decibels that a picture loses as its camera comes nearer.
+const MAX_LOSS: f64 = 0.5;
+/// Decibels of a picture at a photograph that has all the weight, and share of it that two photographs show.
+const MIN_AT: f64 = 35.0;
+const MIN_CONFIRMED: f32 = 0.5;
+
+/// A camera this far away from one, towards a place, and turned with it towards what the other looks at.
+fn away(from: &Camera, to: Vec3, ahead: Vec3, share: f32) -> Camera {
+    if share == 0.0 {
+        return *from;
+    }
+    let mix = |a: Vec3, b: Vec3| a * (1.0 - share) + b * share;
+    let centre = mix(from.pose.centre_world(), to);
+    let forward = mix(from.pose.forward_world(), ahead);
+    Camera { pose: Pose::look_at(centre, centre + forward, -from.pose.down_world()).expect("a pose"), ..*from }
+}
+
+fn frame(stage: &mut Stage<'_>, weighting: &Weighting, camera: Camera) -> Frame {
+    stage.frame(weighting, &Target { name: String::new(), camera, truth: None }, &Silent).expect("a frame")
+}
+
+/// `leave_out` of the weight is omitted.
+fn nearer_is_better(leave_out: f32) {
+    let scene = Scene::open(places::data("room")).expect("a scene");
+    let field = TrainingFree::default();
+    let renderer = On { device: &Cpu, field: &field };
+    let options = RenderOptions { size: Some([64, 48]), leave_out, ..RenderOptions::default() };
+    let sources: Vec<usize> = (0..scene.views.len()).collect();
+    let album = open_album(&scene, sources.iter().copied(), &renderer, &options, &Silent).expect("photographs");
+    let mut stage = Stage::prepare(&scene, &album, &sources, &renderer, &options, &Silent).expect("prepared");
+    let (at, next) = (5, 6);
+    let photograph = stage.images.picture(at);
+    let [own, other] = [at, next].map(|view: usize| scene.views[view].camera);
+    let step = other.pose.distance(&own.pose);
+    let beside = own.pose.centre_world() - own.pose.down_world() * step;
+    for (scheme, is_all) in SCHEMES {
+        let weighting = Weighting::open(scheme).expect("a scheme");
+        stage.weigh(&weighting, &Silent).expect("weighed");
+        for (way, to, ahead) in [
+            ("between", other.pose.centre_world(), other.pose.forward_world()),
+            ("beside", beside, own.pose.forward_world()),
+        ] {
+            let frames = AWAY.map(|share| frame(&mut stage, &weighting, away(&own, to, ahead, share)));
+            let scores = frames.each_ref().map(|frame| psnr_of_seen(&frame.picture, &photograph, None));
+            println!("{scheme}, {way}: {scores:.1?}");
+            let worst = scores.windows(2).map(|pair| pair[0] - pair[1]).fold(f64::MIN, f64::max);
+            assert!(worst <= MAX_LOSS, "{scheme}, {way}: {worst:.1} dB lost on the way, {scores:.1?}");
+            if let ([.., at], true, Some(seen)) = (&scores[..], is_all, frames[AWAY.len() - 1].seen) {
+                assert!(*at >= MIN_AT, "{scheme}: {at:.1} dB at the photograph");
+                assert!(seen.by_none + seen.by_one < 1.0 - MIN_CONFIRMED, "{scheme}: {seen:?} at the photograph");
+            }
+        }
+    }
+}
+
+#[test]
+fn pictures_become_the_photograph_as_the_camera_comes_nearer() {
+    nearer_is_better(0.01);
+}
+
+#[test]
+fn the_same_with_all_weights_and_with_few() {
+    nearer_is_better(0.0);
+    nearer_is_better(0.2);
+}
