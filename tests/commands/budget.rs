@@ -4,10 +4,12 @@ use super::{BINARY, done};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
+use viewfuse::field::scores::psnr_of_seen;
 use viewfuse_tests::command::{assert_wrong_arguments, run, toy};
 
 viewfuse_tests::trials![
     a_bound_on_the_error_is_kept_and_recorded,
+    a_network_keeps_45_decibels_unless_options_say_what_is_left_out,
     a_time_that_is_too_short_is_said,
     an_evaluation_says_how_its_bound_is_kept,
     wrong_bounds_are_refused,
@@ -43,6 +45,42 @@ fn a_bound_on_the_error_is_kept_and_recorded() {
     fs::remove_dir_all(folder.path().join("out")).expect("removed");
     done(folder.path(), &format!("render toy {NETWORK} --max-error 119dB -o out"));
     assert!(frames(folder.path()).iter().all(|frame| frame["kept"]["effort"] == "exact"));
+}
+
+/// With what was left out of these test networks before there was a default bound they are 24, 52 and 35 dB from their
+/// exact pictures.
+fn a_network_keeps_45_decibels_unless_options_say_what_is_left_out() {
+    let folder = toy();
+    let render = |options: &str| {
+        if folder.path().join("out").exists() {
+            fs::remove_dir_all(folder.path().join("out")).expect("removed");
+        }
+        let printed = done(
+            folder.path(),
+            &format!("render toy --targets 20 --views 3 --size 24x24 --device cpu {options} -o out"),
+        );
+        let picture = image::open(folder.path().join("out/000020.png")).expect("a picture").to_rgb8();
+        (picture, frames(folder.path())[0]["kept"].clone(), printed)
+    };
+    for model in ["--model formula:16", "--model body:16", "--model genvs:small"] {
+        let (exact, kept, _) = render(&format!("{model} --exact"));
+        assert!(kept.is_null(), "{kept}");
+        let (picture, kept, printed) = render(model);
+        assert!((kept["most_error"].as_f64().expect("a bound") - 10.0_f64.powf(-2.25)).abs() < 1.0e-6, "{kept}");
+        assert!(kept["is_kept"] == true && printed.contains(" dB from exact (at least "), "{kept}: {printed}");
+        assert!(printed.contains(kept["effort"].as_str().expect("an effort")), "{kept}: {printed}");
+        let psnr = psnr_of_seen(&picture, &exact, None);
+        assert!(psnr > 44.5, "{model}: {psnr} dB from exact");
+    }
+    for chosen in ["--compute layers", "--probe-step 8", "--leave-out 0.2", "--early-termination 0.1", "--half-latents"]
+    {
+        let (_, kept, _) = render(&format!("--model body:16 {chosen}"));
+        assert!(kept.is_null(), "{chosen}: {kept}");
+    }
+    let (_, kept, _) = render("--model body:16 --leave-out 0");
+    assert_eq!(kept["is_kept"], true, "leaving out less keeps the bound");
+    let (_, kept, _) = render("--weights mean");
+    assert!(kept.is_null(), "the training-free field: {kept}");
 }
 
 fn a_time_that_is_too_short_is_said() {

@@ -2,9 +2,10 @@
 //! [`rows`](crate::rows).
 
 use super::any::AnyField;
+use super::budget::DEFAULT_BOUND;
 use super::options::{Flag, Given, OpenError};
 use super::record::{Omission, VIEWS};
-use super::render::RenderOptions;
+use super::render::{DEFAULT_EARLY_TERMINATION, DEFAULT_LEAVE_OUT, RenderOptions};
 use super::variant::Variant;
 use viewfuse_nn::checkpoint::Checkpoint;
 
@@ -80,6 +81,14 @@ impl Row {
             Origin::TrainingFree { .. } => None,
             Origin::Learned { prefix, .. } => Some(prefix),
         }
+    }
+
+    /// The options of a render, with [`DEFAULT_BOUND`] for a learned field where they have no bound and do not say to
+    /// omit more than by default.
+    pub fn bounded(&self, options: RenderOptions) -> RenderOptions {
+        let is_more = options.leave_out > DEFAULT_LEAVE_OUT || options.early_termination > DEFAULT_EARLY_TERMINATION;
+        let usual = (self.prefix().is_some() && !is_more).then_some(DEFAULT_BOUND);
+        RenderOptions { bound: options.bound.or(usual), ..options }
     }
 
     /// Its test networks.

@@ -59,6 +59,10 @@ impl Order {
             early_termination: if about.ends_rays { DEFAULT_EARLY_TERMINATION } else { 0.0 },
             ..RenderOptions::default()
         };
+        let options = match rows::named(about.name) {
+            Some(row) => row.bounded(options),
+            None => options,
+        };
         let device = choice::open(&self.device.parse::<DeviceChoice>()?, &DeviceOptions::default())?.device;
         let renderer = field.on(&device);
         let renderer = renderer.as_ref();

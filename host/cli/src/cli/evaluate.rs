@@ -118,7 +118,9 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);
     arguments.output.as_deref().map_or(Ok(()), check_writable)?;
     let field = arguments.model.open(arguments.seed, None)?;
-    let options = arguments.bound.bounded(arguments.picture.to_render_options(arguments.model.exact, &field.about())?);
+    let about = field.about();
+    let options = arguments.picture.to_render_options(arguments.model.exact, &about)?;
+    let options = arguments.bound.bounded(options, &about, arguments.model.says_omissions());
     let Chosen { device, reason } = arguments.device.open()?;
     // All are opened before the first is computed: a wrong path shows at once.
     let paths = arguments.paths()?;

@@ -40,7 +40,7 @@ pub(crate) struct ModelOptions {
     /// published run, heun over 25 levels, unless --sampler, --steps or --tolerance are given
     #[arg(long, conflicts_with_all = ["compute", "leave_out", "early_termination"], help_heading = EFFORTS)]
     pub(crate) exact: bool,
-    /// Switch omissions of the default effort off: compute what the scene does not need
+    /// Leave out all that can be but this, without a bound on the error: compute what the scene does not need
     #[arg(long, value_name = "WHAT", value_parser = PossibleValuesParser::new(omissions()), value_delimiter = ',', requires = "model", help_heading = EFFORTS)]
     compute: Vec<String>,
     #[command(flatten)]
@@ -96,6 +96,11 @@ impl ModelOptions {
     /// The file of the network's parameters, if there is one.
     pub(crate) fn file(&self) -> Option<&Path> {
         self.network.file()
+    }
+
+    /// Whether options say what is omitted: no bound is to choose it.
+    pub(crate) fn says_omissions(&self) -> bool {
+        self.exact || !self.compute.is_empty() || !self.flags.is_empty()
     }
 
     /// Opens the field, for pictures of their own or for a sequence of them.

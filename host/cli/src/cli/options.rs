@@ -85,7 +85,8 @@ const CHOSEN_BY_A_BOUND: [&str; 2] = ["exact", "compute"];
 #[derive(Args)]
 pub(crate) struct BoundOptions {
     /// Choose the effort: leave out what the pictures do not need for this root mean square difference from the exact
-    /// ones, in decibels (40dB) or with colours from 0 to 1 (0.01)
+    /// ones, in decibels (40dB) or with colours from 0 to 1 (0.01) [default with a network: 45dB, unless options say
+    /// what is left out]
     #[arg(long, value_name = "ERROR", value_parser = parse_error, conflicts_with_all = CHOSEN_BY_A_BOUND, help_heading = EFFORTS)]
     max_error: Option<f32>,
     /// Choose the effort: leave out what does not fit into this time for each picture: seconds, or milliseconds as
@@ -95,9 +96,15 @@ pub(crate) struct BoundOptions {
 }
 
 impl BoundOptions {
-    /// The options with this bound.
-    pub(crate) fn bounded(&self, options: RenderOptions) -> RenderOptions {
-        RenderOptions { bound: self.max_error.map(Bound::Error).or(self.max_time.map(Bound::Time)), ..options }
+    /// The options with this bound; where none is given and no further option says what is omitted, with that of the
+    /// field's row.
+    pub(crate) fn bounded(&self, options: RenderOptions, field: &About, says_omissions: bool) -> RenderOptions {
+        let bound = self.max_error.map(Bound::Error).or(self.max_time.map(Bound::Time));
+        let options = RenderOptions { bound, ..options };
+        match rows::named(field.name) {
+            Some(row) if !says_omissions => row.bounded(options),
+            _ => options,
+        }
     }
 }
 

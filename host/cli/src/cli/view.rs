@@ -80,7 +80,8 @@ pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> 
     };
     let about = field.about();
     let sources = arguments.sources.to_selection(None, None).sources_without(&scene, &[], about.least_sources)?;
-    let options = arguments.bound.bounded(arguments.picture.to_render_options(arguments.model.exact, &about)?);
+    let options = arguments.picture.to_render_options(arguments.model.exact, &about)?;
+    let options = arguments.bound.bounded(options, &about, arguments.model.says_omissions());
     let Chosen { device, reason } = arguments.device.open()?;
     on_threads(arguments.picture.threads, || -> anyhow::Result<()> {
         let viewed = Viewed {

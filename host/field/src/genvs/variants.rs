@@ -15,7 +15,7 @@ use viewfuse_core::schedule::NoiseSchedule;
 /// Calls of the denoiser, with the error that is typical of so many, from noise alone and from the colours of the
 /// feature image, and what the error is relative to what the run itself tells (`host/results/efforts.md`,
 /// on the network of the published size, the included one, and one without colours after 200 steps of training).
-const CALLS: [(u32, [f32; 2], Relative); 8] = [
+const CALLS: [(u32, [f32; 2], Relative); 9] = [
     (2, [0.12, 0.08], Relative::ToLastChange(4.3)),
     (3, [0.08, 0.033], Relative::ToLastChange(1.65)),
     (4, [0.05, 0.019], Relative::ToSteps(1.35)),
@@ -23,6 +23,7 @@ const CALLS: [(u32, [f32; 2], Relative); 8] = [
     (6, [0.018, 0.01], Relative::ToSteps(0.64)),
     (8, [0.009, 0.008], Relative::ToSteps(0.65)),
     (12, [0.004, 0.0035], Relative::ToSteps(0.3)),
+    (14, [0.0028, 0.0025], Relative::ToSteps(0.25)),
     (18, [0.0008, 0.0008], Relative::ToSteps(0.17)),
 ];
 

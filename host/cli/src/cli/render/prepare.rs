@@ -55,7 +55,12 @@ impl Prepared {
         let about = field.about();
         let selection = arguments.sources.to_selection(arguments.targets.as_deref(), arguments.path.choice());
         let job = selection.resolve(&scene, about.least_sources)?;
-        let options = arguments.bound.bounded(arguments.picture.to_render_options(arguments.model.exact, &about)?);
+        let options = arguments.picture.to_render_options(arguments.model.exact, &about)?;
+        let options = arguments.bound.bounded(
+            options,
+            &about,
+            arguments.model.says_omissions() || !arguments.sequence.is_empty(),
+        );
         let rate = arguments.outputs.rate(job.frames_per_second);
         if !arguments.is_stream() {
             check_writable(&arguments.output.join(RECORD))?;
