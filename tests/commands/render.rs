@@ -18,6 +18,7 @@ viewfuse_tests::trials![
     a_second_run_replaces_the_first,
     weights_change_the_picture,
     a_network_is_told_the_scale_it_gets,
+    fast_tries_nothing,
 ];
 
 fn record(folder: &Path, output: &str) -> Value {
@@ -254,4 +255,18 @@ fn a_network_is_told_the_scale_it_gets() {
         assert_eq!(stderr.contains("units from what they look at"), said.is_some(), "{scale}: {stderr}");
         assert!(said.is_none_or(|said| stderr.contains(said)), "{scale}: {stderr}");
     }
+}
+
+fn fast_tries_nothing() {
+    let scene = toy();
+    let render = "render toy --targets 20 --size 32x32 --device cpu --no-sheets";
+    let printed = done(scene.path(), &format!("{render} --fast -o fast"));
+    assert!(!printed.contains("chosen: ") && !printed.contains("expected PSNR"), "{printed}");
+    let fast = record(scene.path(), "fast");
+    assert!(fast["chosen"].is_null() && fast["weighting"] == "distance:power=2", "{fast}");
+    done(scene.path(), &format!("{render} --weights distance:power=2 -o given"));
+    let [fast, given] = ["fast", "given"].map(|output| pictures(&scene.path().join(output)));
+    assert_eq!(fast, given);
+    let arguments = format!("{render} --fast --weights mean -o both");
+    viewfuse_tests::command::assert_wrong_arguments(BINARY, scene.path(), &arguments, &["--fast", "--weights"]);
 }

@@ -8,7 +8,7 @@ use viewfuse::device::cpu::Cpu;
 use viewfuse::field::auto::{self, Chosen, HOLD_OUT, choose, schemes};
 use viewfuse::field::pixelnerf::{Architecture, PixelNerf, PixelNerfOptions, test_networks};
 use viewfuse::field::render::{Frame, RenderError, RenderOptions, RenderRun, Stage, render};
-use viewfuse::field::training_free::TrainingFree;
+use viewfuse::field::training_free::{Cache, TrainingFree};
 use viewfuse::field::{AnyOptions, Field, On};
 use viewfuse::job::progress::{Interrupted, Progress, Silent};
 use viewfuse::scene::Scene;
@@ -221,6 +221,72 @@ fn a_field_without_scalars_has_its_scheme_chosen() -> Result<(), Box<dyn Error>>
     let field = PixelNerf::new(&network, PixelNerfOptions::default())?;
     let chosen = chosen(&scene, &[0, 1, 2], &field, &Silent)?;
     assert_eq!((chosen.candidates.len(), chosen.options.settings().len()), (schemes().len(), 0));
+    Ok(())
+}
+
+/// Counts how often it is asked whether to stop: work asks often.
+#[derive(Default)]
+struct Asked {
+    times: AtomicUsize,
+    warnings: AtomicUsize,
+}
+
+impl Progress for Asked {
+    fn is_cancelled(&self) -> bool {
+        self.times.fetch_add(1, Ordering::Relaxed);
+        false
+    }
+
+    fn warn(&self, _warning: &str) {
+        self.warnings.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+#[test]
+fn a_choice_is_kept_for_the_same_sources_and_options_alone() -> Result<(), Box<dyn Error>> {
+    const SMALL: [u32; 2] = [48, 36];
+    let scene = &SIX.scene;
+    let folder = tempfile::tempdir()?;
+    let field = TrainingFree { cache: Some(Cache::open(folder.path())?), ..TrainingFree::default() };
+    let sources = middle(scene).sources;
+    // The choice, how much work it took, and the warnings.
+    let choose = |sources: &[usize], size: [u32; 2], leave_out: f32| -> Result<(Chosen, [usize; 2]), Box<dyn Error>> {
+        let options = RenderOptions { size: Some(size), leave_out, ..RenderOptions::default() };
+        let (renderer, asked) = (On { device: &Cpu, field: &field }, Asked::default());
+        let album = Album::open(scene, sources.iter().copied(), &Silent)?;
+        let stage = Stage::prepare(scene, &album, sources, &renderer, &options, &Silent)?;
+        let chosen = choose(&stage, &renderer, &options, &asked)?;
+        Ok((chosen, [asked.times.into_inner(), asked.warnings.into_inner()]))
+    };
+    let (first, [work, warnings]) = choose(&sources, SMALL, 0.01)?;
+    let is_first = |other: &Chosen| {
+        assert_eq!((&other.candidates, &other.held_out), (&first.candidates, &first.held_out));
+        assert_eq!((&other.mixture, &other.options, other.basis), (&first.mixture, &first.options, first.basis));
+        assert_eq!(
+            (other.weighting.to_string(), &other.calibration),
+            (first.weighting.to_string(), &first.calibration)
+        );
+    };
+    let (second, [less, _]) = choose(&sources, SMALL, 0.01)?;
+    is_first(&second);
+    assert!(10 * less < work, "{less} of {work}");
+    for (sources, size, leave_out) in
+        [(&sources[1..], SMALL, 0.01), (&sources, SMALL.map(|side| side * 4 / 3), 0.01), (&sources, SMALL, 0.0)]
+    {
+        let (_, [anew, _]) = choose(sources, size, leave_out)?;
+        assert!(4 * anew > work, "{anew} of {work} with {sources:?}, {size:?}, {leave_out}");
+    }
+    // What is damaged is not used.
+    for file in std::fs::read_dir(folder.path())? {
+        let path = file?.path();
+        let mut bytes = std::fs::read(&path)?;
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 1;
+        std::fs::write(path, bytes)?;
+    }
+    let (third, [again, told]) = choose(&sources, SMALL, 0.01)?;
+    is_first(&third);
+    assert!(4 * again > work && told > warnings, "{again} of {work}, {told} warnings");
     Ok(())
 }
 

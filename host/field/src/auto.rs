@@ -3,6 +3,7 @@
 //!
 //! ```text
 //! held_out      sources rendered from the others
+//! kept          their pictures, kept between runs
 //! regions       the mixture of pictures under several settings
 //! gain          whether a candidate is better than another on the held-out sources
 //! calibration   the errors that pixels of a confidence have
@@ -21,6 +22,7 @@ mod detail;
 mod expectation;
 mod gain;
 mod held_out;
+mod kept;
 mod regions;
 
 pub use calibration::{Calibration, Group};
@@ -51,6 +53,11 @@ pub fn schemes() -> Vec<Scheme> {
     let first = [scheme(Formula::Distance, 2, 0.0), scheme(Formula::Distance, 3, 0.0), scheme(Formula::Error, 0, 0.5)];
     let plain = [Scheme::ERROR, Scheme::MEAN, Scheme::L1, Scheme::of(Formula::Gaussian)];
     first.into_iter().flatten().chain(plain).collect()
+}
+
+/// The scheme that is taken where none is tried: the first one.
+pub fn usual() -> Weighting {
+    schemes().into_iter().next().map_or_else(Weighting::default_scheme, Weighting::from)
 }
 
 /// The number of the scheme, from 0, that stands for those after it: where it loses to the first one by more than half
@@ -267,6 +274,7 @@ fn choose_of(
     let detail = detail::lost_detail(&stage.images.images, coarse_side(&coarse));
     chosen.basis = Some(Basis::of(&best, chosen.calibration.as_ref(), detail, has_silhouettes));
     chosen.held_out = scored(&best, &held_out);
+    held_out.keep(progress);
     if let (Some(warning), Some(of)) = (chosen.copy_warning(), stage.scene()) {
         progress.warn(&format!("{}: {warning}", of.scene.path.display()));
     }

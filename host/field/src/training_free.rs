@@ -26,7 +26,7 @@ use super::gaussians::Recipe;
 use super::options::{Given, OpenError, flags};
 use super::row::{Origin, Row};
 use super::{About, AnyField, AnyOptions, Field, FieldError, Options, Prepared, Setting, SourceSide};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
@@ -89,6 +89,10 @@ impl Options for TrainingFree {
     fn settings(&self) -> Vec<Setting> {
         self.sweep.settings().into_iter().chain(self.shown.setting()).collect()
     }
+
+    fn folder(&self) -> Option<&Path> {
+        self.cache.as_ref().map(Cache::folder)
+    }
 }
 
 /// The training-free field's row.
@@ -105,8 +109,8 @@ pub(crate) const ROW: Row = Row {
 flags! {
     Option<PathBuf>;
     "cache", "FOLDER", parse_folder, Picture, &[],
-        "Keep what is found of the sources in this folder, and start from what is there: it may be deleted at any \
-         time",
+        "Keep what is found of the sources and what is chosen for them in this folder, and start from what is there: \
+         it may be deleted at any time",
         |own, folder| *own = Some(folder);
 }
 

@@ -7,6 +7,7 @@
 use serde::{Serialize, Serializer};
 use std::any::Any;
 use std::fmt;
+use std::path::Path;
 use std::sync::Arc;
 
 /// A value of a field's options.
@@ -58,6 +59,11 @@ pub trait Options: Clone + PartialEq + fmt::Debug + Send + Sync + 'static {
     fn settings(&self) -> Vec<Setting> {
         Vec::new()
     }
+
+    /// The folder in which what is found of a scene is kept between runs, if there is one.
+    fn folder(&self) -> Option<&Path> {
+        None
+    }
 }
 
 /// A field without options.
@@ -88,6 +94,8 @@ trait Erased: Any + fmt::Debug + Send + Sync {
     fn is(&self, other: &dyn Any) -> bool;
 
     fn encodes_alike(&self, other: &dyn Any) -> bool;
+
+    fn folder(&self) -> Option<&Path>;
 }
 
 impl<O: Options> Erased for O {
@@ -97,6 +105,10 @@ impl<O: Options> Erased for O {
 
     fn encodes_alike(&self, other: &dyn Any) -> bool {
         other.downcast_ref::<O>().is_some_and(|other| Options::encodes_alike(self, other))
+    }
+
+    fn folder(&self) -> Option<&Path> {
+        Options::folder(self)
     }
 }
 
@@ -127,6 +139,11 @@ impl AnyOptions {
     /// Whether views that were encoded under these options serve pictures under others.
     pub fn encodes_alike(&self, other: &AnyOptions) -> bool {
         self.value.encodes_alike(other.value.as_ref())
+    }
+
+    /// The folder in which what is found of a scene is kept between runs, if there is one.
+    pub fn folder(&self) -> Option<&Path> {
+        self.value.folder()
     }
 
     /// The scalars that a record says of them: those that are not at their defaults.

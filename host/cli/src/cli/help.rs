@@ -7,7 +7,7 @@ use std::ffi::OsString;
 use viewfuse_field::rows::ROWS;
 
 /// Options that `-h` shows of the commands that have dozens, by their identifiers.
-const FIRST: [&str; 24] = [
+const FIRST: [&str; 25] = [
     "scene",
     "scenes",
     "targets",
@@ -15,6 +15,7 @@ const FIRST: [&str; 24] = [
     "camera_path",
     "sources",
     "weights",
+    "fast",
     "size",
     "background",
     "model",

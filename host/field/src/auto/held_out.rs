@@ -2,18 +2,20 @@
 //! truth.
 
 use super::calibration::Sample;
+use super::kept::Kept;
 use crate::budget::Bound;
 use crate::held_out::{HeldOut, HoldOut, Photographs};
-use crate::render::{Frame, RenderError, RenderOptions, SceneSources, Stage};
+use crate::render::{RenderError, RenderOptions, SceneSources, Stage};
 use crate::renderer::Renderer;
 use crate::standing::{Measure, Standing};
-use crate::{AnyOptions, Check, Purpose};
+use crate::{AnyOptions, Check, Purpose, Rendered};
+use bytemuck::{bytes_of, cast_slice};
 use image::{Rgb, RgbImage};
 use std::ops::Range;
 use viewfuse_core::pose::Pose;
 use viewfuse_job::progress::{Interrupted, Progress, Quiet};
 use viewfuse_scene::few_shot::Target;
-use viewfuse_scene::photographs::{GroundTruth, scaled_size};
+use viewfuse_scene::photographs::{GroundTruth, SourceImages, scaled_size, to_rgb8};
 use viewfuse_weighting::Weighting;
 
 /// Sources are held out one at a time, small, and each is rendered from its neighbours.
@@ -26,11 +28,17 @@ const MAX_ERROR: f32 = 0.01;
 /// The sources that are held out, each with the others on the device.
 pub(super) struct HeldOutSources<'a> {
     sources: Vec<Source<'a>>,
+    /// The weighting under which the others are encoded.
+    weighting: Weighting,
+    /// Their pictures of earlier runs, and what is added to them.
+    kept: Option<Kept>,
 }
 
 /// A source that is held out.
 struct Source<'a> {
     held_out: HeldOut<'a>,
+    /// Whether the others are encoded.
+    is_encoded: bool,
     target: Target,
     /// Its geometry among the others.
     standing: Standing,
@@ -68,8 +76,8 @@ pub(super) fn coarse_side(coarse: &RenderOptions) -> u32 {
 }
 
 impl<'a> HeldOutSources<'a> {
-    /// Holds out sources of `stage` and encodes the others, weighted by `weighting`, with the field's own options.
-    /// Empty if there are too few sources. A source without which the field finds no object is skipped.
+    /// Holds out sources of `stage`; the others will be encoded when a picture needs them, weighted by `weighting`, with
+    /// the field's own options. Empty if there are too few sources. A source without which the field finds no object is skipped.
     pub(super) fn prepare(
         stage: &Stage<'a>,
         weighting: &Weighting,
@@ -79,12 +87,13 @@ impl<'a> HeldOutSources<'a> {
     ) -> Result<HeldOutSources<'a>, RenderError> {
         let about = renderer.about();
         let mut sources = Vec::new();
+        let weighting = weighting.clone();
         let Some(&SceneSources { scene, album, ref views }) = stage.scene() else {
-            return Ok(HeldOutSources { sources });
+            return Ok(HeldOutSources { sources, weighting, kept: None });
         };
         let poses: Vec<Pose> = views.iter().map(|&view| scene.views[view].camera.pose).collect();
         if poses.len() <= about.least_sources {
-            return Ok(HeldOutSources { sources });
+            return Ok(HeldOutSources { sources, weighting, kept: None });
         }
         let cameras: Vec<_> = stage.images.images.iter().map(|image| image.camera).collect();
         let measure = Measure::of(&cameras);
@@ -101,8 +110,6 @@ impl<'a> HeldOutSources<'a> {
             let standing = measure.standing(&poses[source], others.iter().map(|&other| &poses[other]));
             let prepared = photographs.hold_out(source, others, renderer, options, quiet).and_then(|mut held_out| {
                 held_out.stage.reduce(Purpose::Trial)?;
-                held_out.stage.weigh(weighting, quiet)?;
-                held_out.stage.encode_all(quiet)?;
                 Ok(held_out)
             });
             progress.step();
@@ -116,9 +123,14 @@ impl<'a> HeldOutSources<'a> {
                 continue;
             }
             let copy = held_out.score(&held_out.nearest_copy());
-            sources.push(Source { held_out, target, standing, copy });
+            sources.push(Source { held_out, is_encoded: false, target, standing, copy });
         }
-        Ok(HeldOutSources { sources })
+        let field = renderer.options();
+        let kept = field.folder().map(|folder| {
+            let depends_on = format!("{} {} {field:?} {options:?} {weighting}", about.name, renderer.device_name());
+            Kept::open(folder, &[depends_on.as_bytes(), &bytes(images)].concat(), progress)
+        });
+        Ok(HeldOutSources { sources, weighting, kept })
     }
 
     /// Whether nothing could be held out.
@@ -145,26 +157,46 @@ impl<'a> HeldOutSources<'a> {
         progress: &dyn Progress,
     ) -> Result<Vec<Outcome>, RenderError> {
         let frames = self.frames(which.clone(), weighting, options, progress)?;
-        let outcome = |(index, frame): (usize, &Frame)| self.outcome(index, &frame.picture, &frame.confidences);
+        let outcome = |(index, frame): (usize, &Rendered)| {
+            let picture = to_rgb8(&frame.colours, [frame.width, frame.height]);
+            self.outcome(index, &picture, &frame.confidences)
+        };
         Ok(which.zip(&frames).map(outcome).collect())
     }
 
-    /// The pictures of these of the held-out sources.
+    /// The pictures of these of the held-out sources: those that were kept, or rendered.
     pub(super) fn frames(
         &mut self,
         which: Range<usize>,
         weighting: &Weighting,
         options: &AnyOptions,
         progress: &dyn Progress,
-    ) -> Result<Vec<Frame>, RenderError> {
+    ) -> Result<Vec<Rendered>, RenderError> {
         let mut frames = Vec::with_capacity(which.len());
-        for Source { held_out, target, .. } in &mut self.sources[which] {
+        for index in which {
             progress.check().map_err(stopped)?;
-            held_out.stage.vary(Some(options), None, progress)?;
-            frames.push(held_out.stage.frame(weighting, target, &Quiet(progress))?);
+            let name = self.kept.as_ref().map(|_| Kept::name(index, weighting, options));
+            let known = self.kept.as_ref().zip(name.as_ref()).and_then(|(kept, name)| kept.picture(name));
+            let frame = match known {
+                Some(known) => known.clone(),
+                None => self.sources[index].frame(&self.weighting, weighting, options, progress)?,
+            };
+            if let (Some(kept), Some(name)) = (&mut self.kept, name)
+                && kept.picture(&name).is_none()
+            {
+                kept.add(name, &frame);
+            }
+            frames.push(frame);
             progress.step();
         }
         Ok(frames)
+    }
+
+    /// Keeps the pictures for the next run, if there is a folder for them.
+    pub(super) fn keep(&mut self, progress: &dyn Progress) {
+        if let Some(kept) = &mut self.kept {
+            kept.write(progress);
+        }
     }
 
     /// What the held-out sources show.
@@ -187,6 +219,39 @@ impl<'a> HeldOutSources<'a> {
         let (psnr, confidence) = (held_out.score(picture), mean(confidences));
         Outcome { psnr, confidence, samples, standing: *standing, copy: *copy }
     }
+}
+
+impl Source<'_> {
+    /// Its picture from the others, which are encoded under the `first` weighting.
+    fn frame(
+        &mut self,
+        first: &Weighting,
+        weighting: &Weighting,
+        options: &AnyOptions,
+        progress: &dyn Progress,
+    ) -> Result<Rendered, RenderError> {
+        let (stage, quiet) = (&mut self.held_out.stage, &Quiet(progress));
+        if !self.is_encoded {
+            stage.weigh(first, quiet)?;
+            stage.encode_all(quiet)?;
+            self.is_encoded = true;
+        }
+        stage.vary(Some(options), None, progress)?;
+        let frame = stage.frame(weighting, &self.target, quiet)?;
+        let (width, height) = frame.picture.dimensions();
+        Ok(Rendered { colours: frame.colours, depths: frame.depths, confidences: frame.confidences, width, height })
+    }
+}
+
+/// All that is known of the sources, as bytes.
+fn bytes(images: &SourceImages) -> Vec<u8> {
+    let SourceImages { images, background, has_silhouettes, points, near_far, warnings: _ } = images;
+    let mut bytes = format!("{background:?} {has_silhouettes} {points:?} {near_far:?}").into_bytes();
+    for image in images {
+        bytes.extend(bytes_of(&image.camera.block(0)));
+        bytes.extend(cast_slice::<_, u8>(&image.texels));
+    }
+    bytes
 }
 
 /// The mean of confidences; `None` if there are none.

@@ -9,7 +9,7 @@
 use super::held_out::{HeldOutSources, Outcome};
 use super::{MAX_LOSS, mean_score};
 use crate::mixture::{Mixture, term_count, terms};
-use crate::render::{Frame, RenderError};
+use crate::render::RenderError;
 use crate::{AnyOptions, Rendered};
 use image::RgbImage;
 use viewfuse_job::progress::Progress;
@@ -95,11 +95,9 @@ pub(super) fn mixed(
 }
 
 /// Adds another picture of each example.
-fn add(examples: &mut [Example], frames: Vec<Frame>) {
+fn add(examples: &mut [Example], frames: Vec<Rendered>) {
     for (example, frame) in examples.iter_mut().zip(frames) {
-        let (width, height) = frame.picture.dimensions();
-        let Frame { colours, depths, confidences, .. } = frame;
-        example.parts.push(Rendered { colours, depths, confidences, width, height });
+        example.parts.push(frame);
     }
 }
 

@@ -59,6 +59,11 @@ impl Cache {
         check_writable(&folder.join("file"))?;
         Ok(Cache { folder: folder.to_path_buf() })
     }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
 }
 
 impl Kept {
