@@ -201,11 +201,15 @@ fn links_to_nothing_are_noticed_first() {}
 
 fn what_a_kill_left_is_removed() {
     let folder = toy();
-    for left in ["out/.viewfuse-aB3xYz", "learn/.unfinished-000001/rgb/0.png", "learn/.viewfuse-000002/x"] {
+    for left in [
+        "out/.viewfuse-unfinished-aB3xYz",
+        "learn/.viewfuse-unfinished-000001/rgb/0.png",
+        "learn/.viewfuse-unfinished-000002/x",
+    ] {
         folder.write(left, "half of a file");
     }
     // Of other programs, and of people.
-    for other in ["out/.viewfuse-notes", "out/.hidden", "learn/.unfinished-1/x"] {
+    for other in ["out/.viewfuse-backup", "out/.hidden", "learn/.unfinished-drafts/x"] {
         folder.write(other, "whole");
     }
     done(folder.path(), &format!("{RENDER} -o out"));
@@ -213,11 +217,11 @@ fn what_a_kill_left_is_removed() {
         let names = names_in(&folder.path().join(name));
         names.into_iter().filter(|name| name.starts_with('.')).collect::<Vec<_>>()
     };
-    assert_eq!(hidden("out"), [".hidden", ".viewfuse-notes"]);
+    assert_eq!(hidden("out"), [".hidden", ".viewfuse-backup"]);
     done(folder.path(), "export toy --layout transforms -o learn/toy");
-    assert_eq!(hidden("learn"), [".unfinished-1"]);
+    assert_eq!(hidden("learn"), [".unfinished-drafts"]);
     // What another process still writes stays.
-    let path = folder.path().join("out/.viewfuse-busyyy");
+    let path = folder.path().join("out/.viewfuse-unfinished-busyyy");
     let busy = fs::File::create(&path).expect("a file");
     busy.lock().expect("a lock");
     done(folder.path(), &format!("{RENDER} -o out"));

@@ -20,7 +20,7 @@ use std::io::ErrorKind::{NotADirectory, NotFound, PermissionDenied};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
-use unfinished::{Own, PREFIXES, clean};
+use unfinished::{Own, PREFIX, clean};
 
 /// Why an output could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -86,7 +86,7 @@ impl WholeFile {
             builder.tempfile_in(folder)
         };
         clean(folder);
-        let (file, unfinished) = Own::make(PREFIXES[0], make, |file| file.path().to_path_buf()).map_err(failed)?;
+        let (file, unfinished) = Own::make(PREFIX, make, |file| file.path().to_path_buf()).map_err(failed)?;
         Ok(WholeFile { path: path.to_path_buf(), writer: BufWriter::new(file), unfinished })
     }
 

@@ -29,7 +29,7 @@ impl Scratch {
         let make = |builder: &mut Builder<'_, '_>| builder.tempdir();
         let (folder, unfinished) = Own::make(PREFIX, make, |made: &TempDir| made.path().to_path_buf())?;
         fs::write(folder.path().join(MARK.0), MARK.1)?;
-        remove_left(folder.path().parent().unwrap_or(Path::new("/")), &[PREFIX], is_own);
+        remove_left(folder.path().parent().unwrap_or(Path::new("/")), PREFIX, is_own);
         Ok(Scratch { folder, _unfinished: unfinished })
     }
 

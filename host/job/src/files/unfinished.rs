@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use tempfile::Builder;
 
-/// What the names of temporary files begin with. The second one is of earlier versions.
-pub(super) const PREFIXES: [&str; 2] = [".viewfuse-", ".unfinished-"];
+/// What the names of temporary files begin with: nothing that a person's own files may be called.
+pub(super) const PREFIX: &str = ".viewfuse-unfinished-";
 /// Random characters behind it.
 const RANDOM: usize = 6;
 /// How many times a temporary file is made again that another process took for one that a kill left.
@@ -102,16 +102,16 @@ pub(super) fn clean(folder: &Path) {
 
 /// Removes the temporary files and folders that killed processes left in a folder.
 pub fn remove_unfinished(folder: &Path) {
-    remove_left(folder, &PREFIXES, |_| true);
+    remove_left(folder, PREFIX, |_| true);
 }
 
-/// Removes what killed processes left in a folder under names with one of these prefixes, where `is_own` says so, too.
-pub(super) fn remove_left(folder: &Path, prefixes: &[&str], is_own: impl Fn(&Path) -> bool) {
+/// Removes what killed processes left in a folder under names with this prefix, where `is_own` says so, too.
+pub(super) fn remove_left(folder: &Path, prefix: &str, is_own: impl Fn(&Path) -> bool) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let path = entry.path();
         // No links, and nothing that waits for a writer when it is opened.
         let is_of_kind = entry.file_type().is_ok_and(|kind| kind.is_file() || kind.is_dir());
-        let is_named_so = is_temporary(&entry.file_name().to_string_lossy(), prefixes);
+        let is_named_so = is_temporary(&entry.file_name().to_string_lossy(), prefix);
         if is_of_kind && is_named_so && !lock(&OWN).contains(&path) {
             // Only of what nobody has locked.
             let Ok(file) = File::open(&path) else { continue };
@@ -123,9 +123,9 @@ pub(super) fn remove_left(folder: &Path, prefixes: &[&str], is_own: impl Fn(&Pat
 }
 
 /// Whether a name is one that temporary files get.
-fn is_temporary(name: &str, prefixes: &[&str]) -> bool {
-    let rest = prefixes.iter().find_map(|prefix| name.strip_prefix(prefix));
-    rest.is_some_and(|rest| rest.len() == RANDOM && rest.bytes().all(|byte| byte.is_ascii_alphanumeric()))
+fn is_temporary(name: &str, prefix: &str) -> bool {
+    name.strip_prefix(prefix)
+        .is_some_and(|rest| rest.len() == RANDOM && rest.bytes().all(|byte| byte.is_ascii_alphanumeric()))
 }
 
 #[cfg(test)]
@@ -134,10 +134,12 @@ mod tests {
 
     #[test]
     fn only_temporary_names_are() {
-        let is_temporary = |name: &str| is_temporary(name, &PREFIXES);
-        assert!(is_temporary(".viewfuse-aB3xYz") && is_temporary(".unfinished-000000"));
-        for other in [".viewfuse-", ".viewfuse-aB3xY", ".viewfuse-aB3xYzz", ".viewfuse-a.3xYz", "viewfuse-aB3xYz"] {
-            assert!(!is_temporary(other), "{other}");
+        let is_ours = |name: &str| is_temporary(name, PREFIX);
+        assert!(is_ours(&format!("{PREFIX}aB3xYz")));
+        for rest in ["", "aB3xY", "aB3xYzz", "a.3xYz"] {
+            assert!(!is_ours(&format!("{PREFIX}{rest}")), "{rest}");
         }
+        // What a person may call a file.
+        assert!(![".viewfuse-backup", ".unfinished-drafts", "viewfuse-unfinished-aB3xYz"].into_iter().any(is_ours));
     }
 }
