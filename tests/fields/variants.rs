@@ -52,7 +52,7 @@ fn assert_encodings_serve(
     let mut variants = others.clone();
     variants.extend(prepared.efforts(&base).into_iter().map(|Variant { options, .. }| options));
     variants.extend((0..).map(|step| prepared.candidates(&base, step)).take_while(|some| !some.is_empty()).flatten());
-    variants.extend(prepared.parts(&base));
+    variants.extend(prepared.mixtures(&base).into_iter().flat_map(|mixture| mixture.options));
     variants.push(prepared.reduced(&base, Purpose::Trial));
     for variant in &variants {
         let alone = picture(&mut weighed(variant), variant);

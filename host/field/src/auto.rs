@@ -13,9 +13,9 @@
 //!
 //! The choice is a coordinate search: the scheme first, then each step of the field's candidates. All candidates are
 //! rendered from one encoding, under the first scheme. A candidate replaces the current choice only if its gain exceeds
-//! the noise; of an object with silhouettes, a scheme also where a held-out source is nearest to the others. At last,
-//! pictures under several settings are mixed by region, where that is not worse. With too few sources to hold one out,
-//! everything stays at its default.
+//! the noise; of an object with silhouettes, a scheme also where a held-out source is nearest to the others, and
+//! if it is better than mixtures under the first scheme. At last, pictures under several settings are mixed by region,
+//! where that is not worse. With too few sources to hold one out, everything stays at its default.
 
 mod calibration;
 mod detail;
@@ -34,9 +34,9 @@ use crate::mixture::NearTargets;
 use crate::render::{Finished, Frame, RenderError, RenderOptions, RenderRun, Stage, render_chosen};
 use crate::standing::Measure;
 pub use crate::standing::Standing;
-use crate::{AnyOptions, Mixture, Renderer, Setting};
+use crate::{AnyOptions, Mixture, Renderer, Setting, Variant};
 use expectation::decibels;
-use gain::{gain_where_nearest, is_better, is_lost, mean_score, median_gain};
+use gain::{is_better, is_better_near, is_lost, is_worth_mixing, mean_score, median_gain};
 use held_out::{HeldOutSources, Outcome, coarse, coarse_side};
 use regions::Mixed;
 use serde::Serialize;
@@ -82,6 +82,8 @@ pub struct Candidate {
     /// The field's options, in a record their scalars that are not at their defaults.
     #[serde(rename = "settings")]
     pub options: AnyOptions,
+    /// What is mixed, in a few words; null for one picture.
+    pub mixture: Option<String>,
     /// Mean score of the held-out sources, decibels; null if it was given up before the last of them.
     pub psnr: Option<f64>,
     /// The score of each; of the first ones alone where so many of these do not gain that the median cannot.
@@ -246,8 +248,10 @@ fn choose_of(
     let mut search = Search { held_out: &mut held_out, candidates: Vec::new(), progress };
     let mut best = search.outcomes(&chosen.weighting, &chosen.options, &[])?;
     let has_silhouettes = stage.images.has_silhouettes;
+    let mut first = None;
     if let Some((outcomes, weighting)) = search.scheme(schemes, &chosen.options, &best, has_silhouettes)? {
-        (best, chosen.weighting) = (outcomes, weighting);
+        let replaced = (std::mem::replace(&mut best, outcomes), std::mem::replace(&mut chosen.weighting, weighting));
+        first = has_silhouettes.then_some(replaced);
     }
     for step in 0.. {
         let (before, others) = (best.clone(), candidates(&chosen.options, step));
@@ -261,12 +265,24 @@ fn choose_of(
             }
         }
     }
-    let parts = if varies { stage.session.prepared.parts(&chosen.options) } else { Vec::new() };
-    if let Some(Mixed { mixture, outcomes, .. }) = search.mixed(&chosen.weighting, &chosen.options, parts)?
-        && mean_score(&outcomes) > mean_score(&best) - MAX_LOSS
-        && !(has_silhouettes && gain_where_nearest(&outcomes, &best) < -MAX_LOSS)
-    {
-        let near = has_silhouettes.then(|| NearTargets::of(chosen.measure, chosen.poses.clone()));
+    let mixtures = if varies { stage.session.prepared.mixtures(&chosen.options) } else { Vec::new() };
+    // What gains on an object's held-out sources may lose on its targets, which are nearer to their sources, and a
+    // mixture gains more than a scheme does: the scheme stays the first one unless another is better than that.
+    let mut mixed = None;
+    if let Some((outcomes, weighting)) = first {
+        mixed = search.mixed(&weighting, &chosen.options, mixtures.clone(), &outcomes, has_silhouettes)?;
+        mixed = mixed.filter(|mixed| !is_better_near(&best, &mixed.outcomes));
+        if mixed.is_some() {
+            (best, chosen.weighting) = (outcomes, weighting);
+        }
+    }
+    if mixed.is_none() {
+        mixed = search.mixed(&chosen.weighting, &chosen.options, mixtures, &best, has_silhouettes)?;
+    }
+    if let Some(Mixed { mixture, outcomes, last_at_nearest, .. }) = mixed {
+        // Gaussians that are too soft near the sources: a share of the hull's picture stays there.
+        let is_soft = has_silhouettes && best[search.held_out.nearest()].psnr > last_at_nearest;
+        let near = is_soft.then(|| NearTargets::of(chosen.measure, chosen.poses.clone()));
         (best, chosen.mixture) = (outcomes, Some(Mixture { near, ..mixture }));
     }
     chosen.candidates = search.candidates;
@@ -319,7 +335,8 @@ impl Search<'_, '_> {
         }
         let scores: Vec<f64> = outcomes.iter().map(|outcome| outcome.psnr).collect();
         let psnr = (outcomes.len() == self.held_out.len()).then(|| mean_score(&outcomes));
-        self.candidates.push(Candidate { weighting: weighting.to_string(), options: options.clone(), psnr, scores });
+        let (weighting, options) = (weighting.to_string(), options.clone());
+        self.candidates.push(Candidate { weighting, options, mixture: None, psnr, scores });
         Ok(outcomes)
     }
 
@@ -341,7 +358,7 @@ impl Search<'_, '_> {
             let outcomes = self.outcomes(&weighting, options, first)?;
             has_lost = number == LEADER && median_gain(&outcomes, first) < -0.5 * MIN_GAIN;
             let before = best.as_ref().map_or(first, |(outcomes, _)| outcomes);
-            let is_for_targets = !has_silhouettes || gain_where_nearest(&outcomes, first) > MIN_GAIN;
+            let is_for_targets = !has_silhouettes || is_better_near(&outcomes, first);
             if is_better(&outcomes, before, first) && is_for_targets {
                 best = Some((outcomes, weighting));
             }
@@ -349,23 +366,23 @@ impl Search<'_, '_> {
         Ok(best)
     }
 
-    /// Mixes pictures under these settings.
+    /// The best of these mixtures, if it is worth mixing in place of one picture.
     fn mixed(
         &mut self,
         weighting: &Weighting,
         chosen: &AnyOptions,
-        parts: Vec<AnyOptions>,
+        mixtures: Vec<Variant<Vec<AnyOptions>>>,
+        single: &[Outcome],
+        has_silhouettes: bool,
     ) -> Result<Option<Mixed>, RenderError> {
-        let count = parts.len();
-        self.progress.expect(self.held_out.len() * count);
-        let mixed = regions::mixed(self.held_out, weighting, parts, self.progress)?;
-        if let Some(Mixed { outcomes, .. }) = &mixed {
-            let options = chosen.also_stating(Setting { name: MIXED, value: count as f32 });
+        let mut mixed = regions::mixed(self.held_out, weighting, mixtures, self.progress)?;
+        for Mixed { label, mixture, outcomes, .. } in &mixed {
+            let options = chosen.also_stating(Setting { name: MIXED, value: mixture.parts.len() as f32 });
             let scores = outcomes.iter().map(|outcome| outcome.psnr).collect();
-            let psnr = Some(mean_score(outcomes));
-            self.candidates.push(Candidate { weighting: weighting.to_string(), options, psnr, scores });
+            let (weighting, mixture, psnr) = (weighting.to_string(), Some(label.clone()), Some(mean_score(outcomes)));
+            self.candidates.push(Candidate { weighting, options, mixture, psnr, scores });
         }
-        Ok(mixed)
+        Ok(mixed.pop().filter(|best| is_worth_mixing(&best.outcomes, single, has_silhouettes)))
     }
 }
 

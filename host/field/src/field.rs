@@ -123,8 +123,9 @@ pub trait Prepared {
         Vec::new()
     }
 
-    /// Options whose pictures are worth mixing where these were chosen.
-    fn parts(&self, _chosen: &AnyOptions) -> Vec<AnyOptions> {
+    /// What is worth mixing where these options were chosen: of each mixture the options of its pictures. A mixture of
+    /// one picture is that picture.
+    fn mixtures(&self, _chosen: &AnyOptions) -> Vec<Variant<Vec<AnyOptions>>> {
         Vec::new()
     }
 

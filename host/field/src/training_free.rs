@@ -87,7 +87,8 @@ impl Options for TrainingFree {
     }
 
     fn settings(&self) -> Vec<Setting> {
-        self.sweep.settings().into_iter().chain(self.shown.setting()).collect()
+        let own = self.sweep.settings().into_iter().chain(self.shown.setting());
+        own.chain(if self.shown == Shown::Depths { Vec::new() } else { self.recipe.settings() }).collect()
     }
 
     fn folder(&self) -> Option<&Path> {

@@ -1,7 +1,7 @@
 //! Whether a candidate is better than another, by its gains on the held-out sources.
 
-use super::MIN_GAIN;
 use super::held_out::Outcome;
+use super::{MAX_LOSS, MIN_GAIN};
 
 /// Whether more than half of the sources gain too little for [`is_better`]'s median, by the first ones' results.
 pub(super) fn is_lost(first: &[Outcome], replaced: &[Outcome]) -> bool {
@@ -37,8 +37,32 @@ pub(super) fn median_gain(candidate: &[Outcome], replaced: &[Outcome]) -> f64 {
 /// near them (`host/results/training_free.md`, "What auto chooses and expects"; of mixtures
 /// `host/results/gaussians.md`).
 pub(super) fn gain_where_nearest(candidate: &[Outcome], replaced: &[Outcome]) -> f64 {
-    let nearest = replaced.iter().zip(candidate).min_by(|(a, _), (b, _)| a.standing.gap.total_cmp(&b.standing.gap));
-    nearest.map_or(0.0, |(replaced, new)| new.psnr - replaced.psnr)
+    let at = nearest(replaced.iter().map(|outcome| outcome.standing.gap));
+    at.map_or(0.0, |at| candidate[at].psnr - replaced[at].psnr)
+}
+
+/// The held-out source with the least of these gaps to the others; `None` without any.
+pub(super) fn nearest(gaps: impl Iterator<Item = f64>) -> Option<usize> {
+    gaps.enumerate().min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(index, _)| index)
+}
+
+/// Whether a candidate is better than one by the noise, and at the held-out source that is nearest to the others, too.
+pub(super) fn is_better_near(candidate: &[Outcome], replaced: &[Outcome]) -> bool {
+    is_better(candidate, replaced, replaced) && gain_where_nearest(candidate, replaced) > MIN_GAIN
+}
+
+/// Whether a mixture goes before another one: by the mean, and where that is nearly the same by the source that is
+/// nearest to the others.
+pub(super) fn is_preferred(mixture: &[Outcome], other: &[Outcome]) -> bool {
+    let gain = mean_score(mixture) - mean_score(other);
+    if gain.abs() > MIN_GAIN { gain > 0.0 } else { gain_where_nearest(mixture, other) > 0.0 }
+}
+
+/// Whether a mixture is worth taking in place of one picture: it does not lose, and of an object not at the source that
+/// is nearest to the others, either.
+pub(super) fn is_worth_mixing(mixture: &[Outcome], single: &[Outcome], has_silhouettes: bool) -> bool {
+    mean_score(mixture) > mean_score(single) - MAX_LOSS
+        && !(has_silhouettes && gain_where_nearest(mixture, single) < -MAX_LOSS)
 }
 
 /// Mean score, decibels.
@@ -68,6 +92,21 @@ mod tests {
         assert_eq!(gain_where_nearest(&at([22.0, 25.0]), &at([17.0, 26.0])), -1.0);
         assert_eq!(gain_where_nearest(&at([16.0, 26.5]), &at([17.0, 26.0])), 0.5);
         assert_eq!(gain_where_nearest(&[], &[]), 0.0);
+    }
+
+    #[test]
+    fn what_loses_at_the_nearest_source_is_not_taken_for_an_object() {
+        let at = |scores: [f64; 2]| -> Vec<Outcome> {
+            let at_gap = |(outcome, gap)| Outcome { standing: Standing { gap, outside: 0.5 }, ..outcome };
+            outcomes(&scores).into_iter().zip([0.5, 0.4]).map(at_gap).collect()
+        };
+        let single = at([20.0, 25.0]);
+        assert!(is_better_near(&at([20.4, 25.2]), &single) && !is_better_near(&at([21.0, 25.06]), &single));
+        assert!(is_preferred(&at([20.5, 24.8]), &single), "more in the mean");
+        assert!(!is_preferred(&at([20.3, 24.8]), &single), "as much in the mean, less at the nearest");
+        assert!(is_preferred(&at([19.7, 25.2]), &single), "as much in the mean, more at the nearest");
+        let losing = at([22.0, 24.9]);
+        assert!(is_worth_mixing(&losing, &single, false) && !is_worth_mixing(&losing, &single, true));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 //! truth.
 
 use super::calibration::Sample;
+use super::gain::nearest;
 use super::kept::Kept;
 use crate::budget::Bound;
 use crate::held_out::{HeldOut, HoldOut, Photographs};
@@ -141,6 +142,11 @@ impl<'a> HeldOutSources<'a> {
     /// How many sources are held out.
     pub(super) fn len(&self) -> usize {
         self.sources.len()
+    }
+
+    /// Which of them is nearest to the others.
+    pub(super) fn nearest(&self) -> usize {
+        nearest(self.sources.iter().map(|source| source.standing.gap)).unwrap_or(0)
     }
 
     /// The names of the held-out sources.

@@ -5,12 +5,16 @@
 //! its errors are the least like the others': it stays out where the mixture without it is better by more than the loss
 //! that a mixture may have, and where its share is too small for what it takes. A source's score is that with constants
 //! that were fitted to the other ones.
+//!
+//! Of several mixtures those are tried further that are not far below the best one at the source that is nearest to the
+//! others, with constants fitted to it alone.
 
+use super::MAX_LOSS;
+use super::gain::{is_preferred, mean_score};
 use super::held_out::{HeldOutSources, Outcome};
-use super::{MAX_LOSS, mean_score};
 use crate::mixture::{Mixture, term_count, terms};
 use crate::render::RenderError;
-use crate::{AnyOptions, Rendered};
+use crate::{AnyOptions, Rendered, Variant};
 use image::RgbImage;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::{GroundTruth, to_rgb8};
@@ -31,10 +35,17 @@ const MIN_LAST_SHARE: f32 = 0.1;
 /// page).
 const MIN_FIRST_SHARE: f32 = 0.5 * MIN_LAST_SHARE;
 
+/// How far below the best of several mixtures another one may be at the source that is nearest to the others, to be
+/// tried on the other ones, decibels (`host/results/objects.md`).
+const MAX_BELOW: f64 = 0.5;
+
 /// A mixture with the scores that it has on the held-out sources.
 pub(super) struct Mixed {
+    pub(super) label: String,
     pub(super) mixture: Mixture,
     pub(super) outcomes: Vec<Outcome>,
+    /// The score of the last picture alone at the source that is nearest to the others, decibels.
+    pub(super) last_at_nearest: f64,
     /// The mean share of the last picture on these sources.
     last_share: f32,
 }
@@ -49,49 +60,98 @@ struct Example {
     seen: Vec<bool>,
 }
 
-/// Mixes the pictures under these options. `None` if there are too few sources or pictures.
+impl Example {
+    fn of(GroundTruth { picture, seen }: &GroundTruth) -> Example {
+        let seen = match seen {
+            Some(seen) => seen.as_raw().iter().map(|level| *level > 0).collect(),
+            None => vec![true; picture.pixels().len()],
+        };
+        Example { parts: Vec::new(), terms: Vec::new(), truth: picture.clone(), seen }
+    }
+}
+
+/// Mixes the pictures of each of these mixtures, as far as it is tried; the best one is the last. Nothing if there are
+/// too few sources.
 ///
 /// # Errors
 /// [`RenderError`].
 pub(super) fn mixed(
     held_out: &mut HeldOutSources<'_>,
     weighting: &Weighting,
-    parts: Vec<AnyOptions>,
+    mixtures: Vec<Variant<Vec<AnyOptions>>>,
     progress: &dyn Progress,
-) -> Result<Option<Mixed>, RenderError> {
-    if parts.len() < 2 || held_out.len() < MIN_SOURCES {
-        return Ok(None);
+) -> Result<Vec<Mixed>, RenderError> {
+    let mut all: Vec<Mixed> = Vec::new();
+    if held_out.len() < MIN_SOURCES {
+        return Ok(all);
     }
-    let mut examples: Vec<Example> = held_out
-        .truths()
-        .map(|GroundTruth { picture, seen }| Example {
-            parts: Vec::new(),
-            terms: Vec::new(),
-            seen: match seen {
-                Some(seen) => seen.as_raw().iter().map(|level| *level > 0).collect(),
-                None => vec![true; picture.pixels().len()],
-            },
-            truth: picture.clone(),
-        })
-        .collect();
+    for Variant { label, options: parts, .. } in further(held_out, weighting, mixtures, progress)? {
+        let mixed = one(held_out, weighting, (label, parts), progress)?;
+        let is_best = all.last().is_none_or(|best| is_preferred(&mixed.outcomes, &best.outcomes));
+        all.insert(if is_best { all.len() } else { all.len() - 1 }, mixed);
+    }
+    Ok(all)
+}
+
+/// The mixtures that are tried further: see the module.
+fn further(
+    held_out: &mut HeldOutSources<'_>,
+    weighting: &Weighting,
+    mixtures: Vec<Variant<Vec<AnyOptions>>>,
+    progress: &dyn Progress,
+) -> Result<Vec<Variant<Vec<AnyOptions>>>, RenderError> {
+    if mixtures.len() < 2 {
+        return Ok(mixtures);
+    }
+    progress.expect(mixtures.iter().map(|mixture| mixture.options.len()).sum());
+    let nearest = held_out.nearest();
+    let mut scores = Vec::with_capacity(mixtures.len());
+    for Variant { options: parts, .. } in &mixtures {
+        let mut example: Vec<Example> = held_out.truths().skip(nearest).take(1).map(Example::of).collect();
+        for options in parts {
+            add(&mut example, held_out.frames(nearest..nearest + 1, weighting, options, progress)?);
+        }
+        let (rendered, _) = by_its_own(&mut example[0], parts);
+        scores.push(held_out.outcome(nearest, &picture(&rendered), &rendered.confidences).psnr);
+    }
+    let is_near = near_the_best(&scores);
+    Ok(mixtures.into_iter().zip(is_near).filter(|(_, is_near)| *is_near).map(|(mixture, _)| mixture).collect())
+}
+
+/// Which of the scores are at most [`MAX_BELOW`] below the best one.
+fn near_the_best(scores: &[f64]) -> Vec<bool> {
+    let best = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    scores.iter().map(|score| *score >= best - MAX_BELOW).collect()
+}
+
+/// Mixes the pictures under these options.
+fn one(
+    held_out: &mut HeldOutSources<'_>,
+    weighting: &Weighting,
+    (label, parts): (String, Vec<AnyOptions>),
+    progress: &dyn Progress,
+) -> Result<Mixed, RenderError> {
+    let mut examples: Vec<Example> = held_out.truths().map(Example::of).collect();
+    progress.expect(examples.len() * parts.len());
     let count = examples.len();
     let cheap = if parts.len() < 3 { parts.len() } else { parts.len() - 1 };
     for options in &parts[..cheap] {
         add(&mut examples, held_out.frames(0..count, weighting, options, progress)?);
     }
-    let without_last = fitted(held_out, &mut examples, &parts[..cheap]);
-    let Some(last) = parts.get(cheap) else { return Ok(Some(without_last)) };
+    let without_last = fitted(held_out, &mut examples, &label, &parts[..cheap]);
+    let Some(last) = parts.get(cheap) else { return Ok(without_last) };
     // The last picture is the dearest one: a source says whether it has a share at all.
     add(&mut examples, held_out.frames(0..1, weighting, last, progress)?);
-    if first_share(&mut examples[0], &parts) < MIN_FIRST_SHARE {
+    let (_, first_shares) = by_its_own(&mut examples[0], &parts);
+    if first_shares.last().is_none_or(|share| *share < MIN_FIRST_SHARE) {
         (1..count).for_each(|_| progress.step());
-        return Ok(Some(without_last));
+        return Ok(without_last);
     }
     add(&mut examples[1..], held_out.frames(1..count, weighting, last, progress)?);
-    let all = fitted(held_out, &mut examples, &parts);
+    let all = fitted(held_out, &mut examples, &label, &parts);
     let is_worth_it =
         mean_score(&all.outcomes) > mean_score(&without_last.outcomes) - MAX_LOSS && all.last_share >= MIN_LAST_SHARE;
-    Ok(Some(if is_worth_it { all } else { without_last }))
+    Ok(if is_worth_it { all } else { without_last })
 }
 
 /// Adds another picture of each example.
@@ -101,16 +161,20 @@ fn add(examples: &mut [Example], frames: Vec<Rendered>) {
     }
 }
 
-/// The mean share of an example's last picture, mixed by its own errors.
-fn first_share(example: &mut Example, parts: &[AnyOptions]) -> f32 {
+/// An example's pictures, mixed by its own errors, with the mean share of each.
+fn by_its_own(example: &mut Example, parts: &[AnyOptions]) -> (Rendered, Vec<f32>) {
     example.terms = terms(&example.parts);
     let constants = solved([Sums::of(example)].iter(), parts.len());
-    let (_, shares) = Mixture::new(parts.to_vec(), constants).mixed(&example.parts);
-    shares.last().copied().unwrap_or(0.0)
+    Mixture::new(parts.to_vec(), constants).mixed(&example.parts)
+}
+
+/// In whole levels.
+fn picture(rendered: &Rendered) -> RgbImage {
+    to_rgb8(&rendered.colours, [rendered.width, rendered.height])
 }
 
 /// The mixture of the examples' pictures.
-fn fitted(held_out: &HeldOutSources<'_>, examples: &mut [Example], parts: &[AnyOptions]) -> Mixed {
+fn fitted(held_out: &HeldOutSources<'_>, examples: &mut [Example], label: &str, parts: &[AnyOptions]) -> Mixed {
     for example in &mut *examples {
         example.terms = terms(&example.parts);
     }
@@ -123,11 +187,13 @@ fn fitted(held_out: &HeldOutSources<'_>, examples: &mut [Example], parts: &[AnyO
         let mixture = Mixture::new(parts.to_vec(), solved(others, count));
         let (rendered, shares) = mixture.mixed(&example.parts);
         last_share += shares.last().copied().unwrap_or(0.0) / examples.len() as f32;
-        let picture = to_rgb8(&rendered.colours, [rendered.width, rendered.height]);
-        outcomes.push(held_out.outcome(index, &picture, &rendered.confidences));
+        outcomes.push(held_out.outcome(index, &picture(&rendered), &rendered.confidences));
     }
     let mixture = Mixture::new(parts.to_vec(), solved(sums.iter(), count));
-    Mixed { mixture, outcomes, last_share }
+    let nearest = held_out.nearest();
+    let alone = examples[nearest].parts.last().map(picture);
+    let last_at_nearest = alone.map_or(0.0, |alone| held_out.outcome(nearest, &alone, &[]).psnr);
+    Mixed { label: label.to_owned(), mixture, outcomes, last_at_nearest, last_share }
 }
 
 /// The normal equations of a source's errors, over the mean square error of the plain mean.
@@ -211,6 +277,12 @@ fn cholesky(mut matrix: Vec<f64>, right: Vec<f64>) -> Vec<f64> {
 mod tests {
     use super::*;
     use image::Rgb;
+
+    #[test]
+    fn one_source_decides_which_mixtures_are_tried_further() {
+        assert_eq!(near_the_best(&[23.0, 25.0, 24.75]), [false, true, true]);
+        assert!(near_the_best(&[]).is_empty());
+    }
 
     #[test]
     fn a_positive_definite_system_is_solved() {

@@ -1,7 +1,7 @@
 //! The settings of an optimisation. What was measured of them is in `host/results/gaussians.md`.
 
-use crate::Purpose;
 use crate::point_cloud::CloudOptions;
+use crate::{Purpose, Setting, Variant};
 use viewfuse_scene::photographs::SourceImages;
 
 /// Most Gaussians that a person can ask for.
@@ -86,21 +86,39 @@ impl Recipe {
         if source_count <= MAX_UNCONFIRMED { CloudOptions { least_views: 1 } } else { own }
     }
 
-    /// The recipe for pictures that are mixed with the field's own. Where there are silhouettes the hull's pictures
-    /// have the detail and a ragged outline: the Gaussians begin on surfaces alone and are few and large, opaque only
-    /// where that gains, and the outline has twice the weight. Alone they would be too soft.
-    pub fn mixed_with(self, images: &SourceImages) -> Recipe {
+    /// The recipes for pictures that are mixed with the field's own; which of them is better is the scene's
+    /// (`host/results/objects.md`). Where there are silhouettes Gaussians begin on surfaces alone, and the outline has
+    /// twice the weight. They are few and large, opaque only where that gains, for glossy objects, of which the sources
+    /// agree on little; or many and small.
+    pub fn mixed_with(self, images: &SourceImages) -> Vec<Variant<Recipe>> {
         if !images.has_silhouettes {
-            return self;
+            return vec![Variant::to_measure("the usual Gaussians", self)];
         }
-        Recipe {
+        let small = Recipe {
             random_count: 0,
+            max_per_pixel: self.max_per_pixel.min(0.4),
+            opacity_penalty: 0.1,
+            silhouette_share: 1.0,
+            ..self
+        };
+        let large = Recipe {
+            max_per_pixel: self.max_per_pixel,
             split_scale: f32::INFINITY,
             opacity_penalty: 0.4,
             structure_share: 0.0,
-            silhouette_share: 1.0,
-            ..self
-        }
+            ..small
+        };
+        vec![Variant::to_measure("few large Gaussians", large), Variant::to_measure("many small Gaussians", small)]
+    }
+
+    /// In a record: those that differ among the recipes for mixtures, where they are not at their defaults.
+    pub(crate) fn settings(&self) -> Vec<Setting> {
+        let scalars = |recipe: &Recipe| {
+            [("opacity penalty", recipe.opacity_penalty), ("structure share", recipe.structure_share)]
+                .map(|(name, value)| Setting { name, value })
+        };
+        let varied = scalars(self).into_iter().zip(scalars(&Recipe::default()));
+        varied.filter(|(scalar, default)| scalar != default).map(|(scalar, _)| scalar).collect()
     }
 
     /// Iterations at all sizes.

@@ -17,6 +17,9 @@ use viewfuse_job::progress::{Progress, Quiet};
 use viewfuse_scene::photographs::longest_side;
 use viewfuse_weighting::sources::SourceWeights;
 
+/// Opacity of the Gaussians below which they carve.
+const CARVED_OPACITY: f32 = 0.5;
+
 /// What a picture shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Shown {
@@ -25,6 +28,8 @@ pub enum Shown {
     Depths,
     /// The hull, filled by the Gaussians where they are more opaque.
     Filled,
+    /// The same, and carved by them where they are less than half opaque.
+    Carved,
     /// The Gaussians.
     Gaussians,
 }
@@ -35,6 +40,7 @@ impl Shown {
         let value = match self {
             Shown::Depths => return None,
             Shown::Filled => 0.5,
+            Shown::Carved => 0.75,
             Shown::Gaussians => 1.0,
         };
         Some(Setting { name: "gaussians", value })
@@ -46,29 +52,31 @@ pub(super) struct Mixed<'a, D: Device> {
     depths: SourceDepths<'a, D>,
     recipe: Recipe,
     shown: Shown,
-    /// The Gaussians of the current weighting and recipe, once they are needed; none where the sources have too few
+    /// The Gaussians of the current weighting by each recipe, once they are needed; none where the sources have too few
     /// surfaces.
-    splats: Option<Option<Splats<D>>>,
+    splats: Vec<(Recipe, Option<Splats<D>>)>,
 }
 
 impl<'a, D: Device> Mixed<'a, D> {
     pub(super) fn new(depths: SourceDepths<'a, D>, options: &TrainingFree) -> Mixed<'a, D> {
-        Mixed { recipe: options.recipe.mixed_with(&depths.images), depths, shown: options.shown, splats: None }
+        Mixed { recipe: options.recipe, depths, shown: options.shown, splats: Vec::new() }
     }
 
     /// The Gaussians, optimised if they are not there yet; `None` where the sources have too few surfaces.
     fn splats(&mut self, progress: &dyn Progress) -> Result<Option<&mut Splats<D>>, FieldError> {
-        if self.splats.is_none() {
-            let splats = match self.depths.optimisation(self.recipe, progress)? {
+        let recipe = self.recipe;
+        let is_there = |splats: &(Recipe, Option<Splats<D>>)| splats.0 == recipe;
+        if !self.splats.iter().any(is_there) {
+            let splats = match self.depths.optimisation(recipe, progress)? {
                 Some(mut optimisation) => {
                     optimisation.run_to(u32::MAX, &Quiet(progress))?;
                     Some(Splats::upload(self.depths.device, optimisation.optimised())?)
                 }
                 None => None,
             };
-            self.splats = Some(splats);
+            self.splats.push((recipe, splats));
         }
-        Ok(self.splats.as_mut().and_then(Option::as_mut))
+        Ok(self.splats.iter_mut().find(|splats| splats.0 == recipe).and_then(|splats| splats.1.as_mut()))
     }
 
     /// The Gaussians' picture of a target; `None` if there are none.
@@ -92,6 +100,19 @@ fn fill(picture: &mut Rendered, from: &Rendered, background: [f32; 3]) {
     }
 }
 
+/// Lowers the opacity of a picture over a background to that of another one where that is below [`CARVED_OPACITY`].
+fn carve(picture: &mut Rendered, by: &Rendered, background: [f32; 3]) {
+    for (colour, other) in picture.colours.iter_mut().zip(&by.colours) {
+        if other[3] < colour[3].min(CARVED_OPACITY) {
+            let share = other[3] / colour[3];
+            (0..3).for_each(|channel| {
+                colour[channel] = background[channel] + share * (colour[channel] - background[channel])
+            });
+            colour[3] = other[3];
+        }
+    }
+}
+
 impl<D: Device> Prepared for Mixed<'_, D> {
     fn encoding(&self) -> Encoding {
         self.depths.views.encoding()
@@ -104,13 +125,17 @@ impl<D: Device> Prepared for Mixed<'_, D> {
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
         let splatted = if self.shown == Shown::Depths { None } else { self.splatted(request, progress)? };
         match splatted {
-            Some(splatted) if self.shown == Shown::Filled => {
-                let mut filled = self.depths.views.render(request, progress)?;
-                fill(&mut filled, &splatted, self.depths.images.background);
-                Ok(filled)
-            }
-            Some(splatted) => Ok(splatted),
+            Some(splatted) if self.shown == Shown::Gaussians => Ok(splatted),
             None => self.depths.views.render(request, progress),
+            Some(splatted) => {
+                let mut picture = self.depths.views.render(request, progress)?;
+                let background = self.depths.images.background;
+                if self.shown == Shown::Carved {
+                    carve(&mut picture, &splatted, background);
+                }
+                fill(&mut picture, &splatted, background);
+                Ok(picture)
+            }
         }
     }
 
@@ -124,11 +149,7 @@ impl<D: Device> Prepared for Mixed<'_, D> {
 
     fn set(&mut self, options: &AnyOptions) -> Result<(), FieldError> {
         let Some(TrainingFree { hull, sweep, recipe, shown, .. }) = options.of() else { return Ok(()) };
-        let recipe = recipe.mixed_with(&self.depths.images);
-        if recipe != self.recipe {
-            self.splats = None;
-        }
-        (self.recipe, self.shown) = (recipe, *shown);
+        (self.recipe, self.shown) = (*recipe, *shown);
         self.depths.set(hull, sweep)
     }
 
@@ -150,8 +171,7 @@ impl<D: Device> Prepared for Mixed<'_, D> {
 
     fn reduced(&self, options: &AnyOptions, purpose: Purpose) -> AnyOptions {
         let Some(whole) = options.of::<TrainingFree>() else { return options.clone() };
-        // Small silhouettes have no efforts, and their Gaussians take little time.
-        let recipe = if self.efforts(options).is_empty() { whole.recipe } else { whole.recipe.reduced(purpose) };
+        let recipe = whole.recipe.reduced(purpose);
         AnyOptions::new(TrainingFree { recipe, ..whole.with(whole.sweep.reduced(purpose)) })
     }
 
@@ -165,19 +185,29 @@ impl<D: Device> Prepared for Mixed<'_, D> {
         }
     }
 
-    /// The sweep's, or the hull's one picture, filled, and that of the Gaussians alone: their errors are the least like
-    /// the others'.
-    fn parts(&self, chosen: &AnyOptions) -> Vec<AnyOptions> {
+    /// The pictures of the sweep and that of the Gaussians, whose errors are the least like the others'; of an object,
+    /// by each recipe, the hull's one picture, filled or carved as well, and that of the Gaussians, or the latter alone.
+    fn mixtures(&self, chosen: &AnyOptions) -> Vec<Variant<Vec<AnyOptions>>> {
         let Some(chosen) = chosen.of::<TrainingFree>() else { return Vec::new() };
-        let showing = |shown: Shown| AnyOptions::new(TrainingFree { shown, ..chosen.clone() });
-        let mut parts = match self.depths.images.has_silhouettes {
-            true => vec![showing(Shown::Filled)],
-            false => {
-                chosen.sweep.parts().map(|(sweep, stated)| AnyOptions::stated(chosen.with(sweep), stated)).to_vec()
+        let has_silhouettes = self.depths.images.has_silhouettes;
+        let by_recipe = |Variant { label, options: recipe, .. }: Variant<Recipe>| {
+            let showing = |shown: Shown| AnyOptions::new(TrainingFree { shown, recipe, ..chosen.clone() });
+            let mixture = |with: &str, mut parts: Vec<AnyOptions>| {
+                parts.push(showing(Shown::Gaussians));
+                Variant::to_measure(format!("{label}{with}"), parts)
+            };
+            if has_silhouettes {
+                let hull = |shown: Shown| vec![showing(shown)];
+                return vec![
+                    mixture(" alone", Vec::new()),
+                    mixture(", the hull filled by them", hull(Shown::Filled)),
+                    mixture(", the hull filled and carved by them", hull(Shown::Carved)),
+                ];
             }
+            let sweeps = chosen.sweep.parts().map(|(sweep, stated)| AnyOptions::stated(chosen.with(sweep), stated));
+            vec![mixture(", three depths of the sweep", sweeps.to_vec())]
         };
-        parts.push(showing(Shown::Gaussians));
-        parts
+        chosen.recipe.mixed_with(&self.depths.images).into_iter().flat_map(by_recipe).collect()
     }
 
     fn geometry(&self) -> Option<&dyn Geometry> {
@@ -187,7 +217,7 @@ impl<D: Device> Prepared for Mixed<'_, D> {
 
 impl<D: Device> Weighted for Mixed<'_, D> {
     fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
-        self.splats = None;
+        self.splats.clear();
         self.depths.weigh(relevance)
     }
 }
@@ -208,5 +238,9 @@ mod tests {
         let mut carved = picture(vec![black(0.0), black(0.5), black(1.0), black(0.0)]);
         fill(&mut carved, &picture(vec![red(0.75), red(1.0), red(0.5), red(0.0)]), [1.0; 3]);
         assert_eq!(carved.colours, [red(0.75), [0.5, 0.0, 0.0, 1.0], black(1.0), black(0.0)]);
+        // Carved: nothing there, a quarter there, half there, and more than the other.
+        let mut whole = picture(vec![black(1.0), black(1.0), black(1.0), black(0.125)]);
+        carve(&mut whole, &picture(vec![red(0.0), red(0.25), red(0.5), red(0.25)]), [1.0; 3]);
+        assert_eq!(whole.colours, [black(0.0), black(0.25), black(1.0), black(0.125)]);
     }
 }

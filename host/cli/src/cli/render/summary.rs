@@ -56,6 +56,7 @@ fn choice(chosen: &ChosenRecord, weighting: &str) -> String {
     let own = own.and_then(|candidate| candidate.psnr).unwrap_or(0.0);
     let gain = own - candidates.first().and_then(|first| first.psnr).unwrap_or(own);
     let with = match mixture {
+        Some(mixture) if mixture.parts.len() == 1 => ", one picture under other settings".to_owned(),
         Some(mixture) => format!(", {} pictures under different settings mixed by region", mixture.parts.len()),
         None if settings.is_empty() => String::new(),
         None => " with settings for these photographs".to_owned(),

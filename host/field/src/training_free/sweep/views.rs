@@ -187,10 +187,11 @@ impl<D: Device> Prepared for Views<'_, D> {
         candidates.into_iter().map(AnyOptions::new).collect()
     }
 
-    fn parts(&self, chosen: &AnyOptions) -> Vec<AnyOptions> {
+    fn mixtures(&self, chosen: &AnyOptions) -> Vec<Variant<Vec<AnyOptions>>> {
         match chosen.of::<Sweep>() {
             Some(settings) if !self.scene.has_silhouettes => {
-                settings.parts().map(|(part, stated)| AnyOptions::stated(part, stated)).to_vec()
+                let parts = settings.parts().map(|(part, stated)| AnyOptions::stated(part, stated)).to_vec();
+                vec![Variant::to_measure("three depths of the sweep", parts)]
             }
             _ => Vec::new(),
         }
