@@ -2,7 +2,6 @@
 //! timing.
 
 use super::architecture::Architecture;
-use std::collections::BTreeMap;
 use viewfuse_nn::checkpoint::{Checkpoint, TensorShape};
 use viewfuse_nn::initialisation;
 
@@ -80,7 +79,7 @@ fn computed(
     architecture: &Architecture,
     values: impl Fn(&TensorShape) -> Vec<f32> + Send + Sync + 'static,
 ) -> Checkpoint {
-    Checkpoint::computed(label, architecture.tensors(), BTreeMap::new(), values)
+    Checkpoint::computed(label, architecture.tensors(), architecture.metadata(), values)
 }
 
 /// [`deterministic`] of the published size, or of the small member of a width.
