@@ -10,6 +10,8 @@ use viewfuse_output::run::RECORD;
 
 /// From which share on a picture that few photographs show is said to be one.
 const MIN_FEW: f32 = 0.2;
+/// From which share on of what no photograph shows: that is invented.
+const MIN_UNSEEN: f32 = 0.05;
 /// Decibels of exposure from which a picture's line says what it has without.
 const MIN_EXPOSURE: f64 = 0.5;
 
@@ -95,17 +97,23 @@ fn summary(frame: &FrameRecord, sources: &[String], folder: &Path) -> String {
 
 /// What a picture lacks, and where to photograph: between the two sources that matter most to it.
 fn few_photographs(frame: &FrameRecord, sources: &[String]) -> Option<String> {
-    let Seen { by_none, by_one } = frame.seen_by.filter(|seen| seen.by_none + seen.by_one >= MIN_FEW)?;
+    let Seen { by_none, by_one } = frame.seen_by?;
+    let percent = |share: f32| (100.0 * share).round();
+    let lacks = if by_none + by_one >= MIN_FEW {
+        format!(
+            "{} % of it seen by fewer than two photographs, {} % by none",
+            percent(by_none + by_one),
+            percent(by_none)
+        )
+    } else if by_none >= MIN_UNSEEN {
+        format!("{} % of it seen by no photograph", percent(by_none))
+    } else {
+        return None;
+    };
     let mut order: Vec<usize> = (0..sources.len().min(frame.weights.len())).collect();
     order.sort_by(|a, b| frame.weights[*b].total_cmp(&frame.weights[*a]));
     let [first, second, ..] = order[..] else { return None };
-    Some(format!(
-        "  {:.0} % of it seen by fewer than two photographs, {:.0} % by none: photograph from between {} and {}",
-        100.0 * (by_none + by_one),
-        100.0 * by_none,
-        sources[first],
-        sources[second]
-    ))
+    Some(format!("  {lacks}: photograph from between {} and {}", sources[first], sources[second]))
 }
 
 /// How a frame keeps its bound.
