@@ -260,7 +260,7 @@ fn supersplat(lines: &[&str]) -> Result<(), String> {
         ["property", "float", _] => true,
         _ => false,
     };
-    need(lines.iter().all(|line| is_read(&line)), "words")
+    need(lines.iter().all(is_read), "words")
 }
 
 /// mkkellogg's three.js (PlyParserUtils.js): the degree by the number of coefficients, counted in every line; the format

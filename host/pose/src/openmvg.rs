@@ -57,7 +57,7 @@ impl Solver for OpenMvg {
     fn solve(&self, job: &Job, progress: &dyn Progress) -> Result<Solution, SolverError> {
         let broken = |problem: String| SolverError::Broken { program: self.program.clone(), problem };
         let unread = |error: &dyn std::fmt::Display| broken(format!("its answer cannot be read: {error}"));
-        let (process, lines, complaint) = self.start(job)?;
+        let Started { process, lines, complaint } = self.start(job)?;
         let (mut begun, mut told, mut has_ended) = (0, 0, None);
         loop {
             progress.check()?;
@@ -144,9 +144,16 @@ fn beginning_of(complained: ChildStderr) -> Receiver<String> {
     text
 }
 
+/// A process at work, the lines of its answer, and what it complains of.
+struct Started {
+    process: Process,
+    lines: Receiver<io::Result<String>>,
+    complaint: Receiver<String>,
+}
+
 impl OpenMvg {
-    /// Starts the process and gives it the job: its answer, and what it complains of.
-    fn start(&self, job: &Job) -> Result<(Process, Receiver<io::Result<String>>, Receiver<String>), SolverError> {
+    /// Starts the process and gives it the job.
+    fn start(&self, job: &Job) -> Result<Started, SolverError> {
         let mut command = Command::new(&self.program);
         command.env("RAYON_NUM_THREADS", rayon::current_num_threads().to_string());
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -159,6 +166,6 @@ impl OpenMvg {
         let text = serde_json::to_vec(job).unwrap_or_default();
         // A process that does not take it, or has ended already, is noticed by its missing answer.
         thread::spawn(move || input.write_all(&text));
-        Ok((process, lines_of(said), beginning_of(complained)))
+        Ok(Started { process, lines: lines_of(said), complaint: beginning_of(complained) })
     }
 }
