@@ -185,8 +185,7 @@ fn what_may_be_a_near_object_is_said() {
     // It reaches the border below, and moves.
     let near: fn(u32, u32, u32) -> bool = |view, x, y| y >= 80 && x >= 4 * view;
     let folder = room(|name| format!("masks/{name}.png"), near);
-    let is_said =
-        |scene: &Scene| scene.warnings.iter().any(|line| line.contains("`--masks object` if they show the object"));
+    let is_said = |scene: &Scene| scene.warnings.iter().any(|line| line.contains("do they show the object instead"));
     let scene = opened(&folder, MaskChoice::Auto);
     assert!(line(&scene).starts_with("masks: pixels that do not count") && is_said(&scene), "{:?}", scene.warnings);
     assert!([MaskChoice::Ignore, MaskChoice::Object].iter().all(|choice| !is_said(&opened(&folder, *choice))));

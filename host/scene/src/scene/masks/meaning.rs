@@ -130,8 +130,8 @@ pub(in super::super) fn decide(views: &[View], choice: MaskChoice, layout: Optio
     let is_doubtful = is_guessed && !looks.is_empty() && left < MAX_DOUBTFUL;
     let warning = (meaning == MaskMeaning::Ignore && is_doubtful).then(|| {
         format!(
-            "masks that leave {:.0} % of the pixels are taken to say which pixels do not count; `--masks object` if \
-             they show the object",
+            "masks that leave {:.0} % of the pixels are taken to say which pixels do not count: do they show the object \
+             instead, it must be said",
             100.0 * left
         )
     });
