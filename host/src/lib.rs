@@ -19,11 +19,6 @@ pub use viewfuse_view as view;
 pub use viewfuse_vulkan as vulkan;
 pub use viewfuse_weighting as weighting;
 
-/// The examples of the weighting's README, which use more than that crate, compiled and run.
-#[cfg(all(doctest, feature = "evaluate"))]
-#[doc = include_str!("../weighting/README.md")]
-struct WeightingReadme;
-
 /// The items of a program that renders: `use viewfuse::prelude::*;`.
 pub mod prelude {
     pub use crate::device::cpu::Cpu;

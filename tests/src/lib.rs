@@ -19,8 +19,8 @@ pub mod source;
 pub mod trials;
 pub mod viewer;
 
-/// The examples of the main README, and of core's and the kernels', compiled and run. These two crates are `no_std` and
-/// become shaders: they have no tests of their own.
+/// The examples of the main README, and of core's, the kernels' and the weighting's, compiled and run. Core and kernels
+/// are `no_std` and become shaders: they have no tests of their own. The weighting's example scores pictures.
 #[cfg(doctest)]
 mod readmes {
     #[doc = include_str!("../../README.md")]
@@ -29,4 +29,6 @@ mod readmes {
     struct Core;
     #[doc = include_str!("../../core/kernels/README.md")]
     struct Kernels;
+    #[doc = include_str!("../../host/weighting/README.md")]
+    struct Weighting;
 }

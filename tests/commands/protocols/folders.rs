@@ -75,7 +75,7 @@ fn shards_together_are_the_whole() {
     assert_eq!(scores(&folder.join("parts")), scores(&folder.join("whole")));
     // Six jobs with two targets, three baselines and three schemes each.
     assert_eq!(scores(&folder.join("whole")).len(), 1 + 6 * 2 * 6);
-    assert_eq!(scores(&folder.join("whole"))[0], "job,scene,trial,scheme,target,sources,psnr_db,ssim");
+    assert_eq!(scores(&folder.join("whole"))[0], "job,scene,trial,scheme,target,sources,psnr_db,ssim,psnr-corrected");
     let journals = names_in(&folder.join("parts"));
     assert_eq!(journals.iter().filter(|name| name.contains("-of-3.jsonl")).count(), 3, "{journals:?}");
     // Once more without shards: nothing is left to do, and the tables are printed.
