@@ -100,8 +100,8 @@ impl<D: Device> Metrics<D> {
         Metrics { convention: Convention::Plain, lpips: Vec::new(), dists: None, inception: None }
     }
 
-    /// Scores a prediction: PSNR, SSIM if the pictures are at least 7x7, PSNR of corrected colours, and the metrics of the loaded networks, in the
-    /// order of [`Scored::name`]'s list.
+    /// Scores a prediction: PSNR, SSIM if the pictures are at least 7x7, PSNR of corrected colours, and the metrics of
+    /// the loaded networks, in the order of [`Scored::name`]'s list.
     ///
     /// `seen` is 0 where the photograph shows nothing; without it all pixels are scored. PSNR and SSIM leave unseen
     /// pixels out ([`viewfuse_field::scores`]); networks see the truth's pixels there in both pictures.

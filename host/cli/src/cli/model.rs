@@ -40,7 +40,7 @@ pub(crate) struct ModelOptions {
     /// published run, heun over 25 levels, unless --sampler, --steps or --tolerance are given
     #[arg(long, conflicts_with_all = ["compute", "leave_out", "early_termination"], help_heading = EFFORTS)]
     pub(crate) exact: bool,
-    /// Leave out all that can be but this, without a bound on the error: compute what the scene does not need
+    /// Omit all that can be but this, without a bound on the error: compute what the scene does not need
     #[arg(long, value_name = "WHAT", value_parser = PossibleValuesParser::new(omissions()), value_delimiter = ',', requires = "model", help_heading = EFFORTS)]
     compute: Vec<String>,
     #[command(flatten)]

@@ -86,7 +86,7 @@ const CHOSEN_BY_A_BOUND: [&str; 2] = ["exact", "compute"];
 pub(crate) struct BoundOptions {
     /// Choose the effort: leave out what the pictures do not need for this root mean square difference from the exact
     /// ones, in decibels (40dB) or with colours from 0 to 1 (0.01) [default with a network: 45dB, unless options say
-    /// what is left out]
+    /// what is omitted]
     #[arg(long, value_name = "ERROR", value_parser = parse_error, conflicts_with_all = CHOSEN_BY_A_BOUND, help_heading = EFFORTS)]
     max_error: Option<f32>,
     /// Choose the effort: leave out what does not fit into this time for each picture: seconds, or milliseconds as

@@ -77,8 +77,9 @@ pub(super) fn coarse_side(coarse: &RenderOptions) -> u32 {
 }
 
 impl<'a> HeldOutSources<'a> {
-    /// Holds out sources of `stage`; the others will be encoded when a picture needs them, weighted by `weighting`, with
-    /// the field's own options. Empty if there are too few sources. A source without which the field finds no object is skipped.
+    /// Holds out sources of `stage`; the others will be encoded when a picture needs them, weighted by `weighting`,
+    /// with the field's own options. Empty if there are too few sources. A source without which the field finds no
+    /// object is skipped.
     pub(super) fn prepare(
         stage: &Stage<'a>,
         weighting: &Weighting,

@@ -55,7 +55,7 @@ flags! {
         };
     "steps", "N", parse_steps, Effort, BOUNDS,
         "Noise levels. Each takes one call of the denoiser; with heun two, except the last [default: as many as the \
-         bound on the error needs; 10 beside other options of what is left out; 25 where nothing is]",
+         bound on the error needs; 10 beside other options of what is omitted; 25 where nothing is]",
         |own, given| if let Steps::Fixed { level_count, .. } = &mut own.plan.steps {
             *level_count = given;
         };

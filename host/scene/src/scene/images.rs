@@ -67,7 +67,8 @@ pub(super) struct Header {
 ///
 /// # Errors
 /// [`SceneError::TooLarge`] if a side has more than [`MAX_SIDE`] pixels, [`SceneError::TooMuch`] if all pixels together
-/// take too much memory, [`SceneError::LongImage`] if the file is longer than such an image; otherwise as for any unreadable image.
+/// take too much memory, [`SceneError::LongImage`] if the file is longer than such an image;
+/// otherwise as for any unreadable image.
 pub(super) fn header(path: &Path) -> Result<Header, SceneError> {
     let length = path.metadata().map_err(|cause| unreadable(path, cause))?.len();
     // Decoders of some formats read all of it, before they know a size.
