@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! shown            text as a terminal may get it
+//! verdict          what a score looks like, in words
 //! printing         results and errors
 //! wrong            the error of arguments, and what a build lacks
 //! hints            what helps on from an error of a library
@@ -50,6 +51,7 @@ mod shown;
 mod table;
 mod terminal;
 mod threads;
+mod verdict;
 mod verify;
 mod view;
 mod weighting;

@@ -9,13 +9,14 @@
 //! calibration   the errors that pixels of a confidence have
 //! detail        the detail that coarse pictures lack
 //! expectation   from these scores to a target's
+//! pair          what two sources are good for
 //! ```
 //!
 //! The choice is a coordinate search: the scheme first, then each step of the field's candidates. All candidates are
 //! rendered from one encoding, under the first scheme. A candidate replaces the current choice only if its gain exceeds
 //! the noise; of an object with silhouettes, a scheme also where a held-out source is nearest to the others, and
-//! if it is better than mixtures under the first scheme. At last, pictures under several settings are mixed by region,
-//! where that is not worse. With too few sources to hold one out, everything stays at its default.
+//! if no mixture under the first scheme gains. At last, pictures under several settings are mixed by region, where that
+//! is not worse. With too few sources to hold one out, everything stays at its default.
 
 mod calibration;
 mod detail;
@@ -23,11 +24,13 @@ mod expectation;
 mod gain;
 mod held_out;
 mod kept;
+mod pair;
 mod regions;
 
 pub use calibration::{Calibration, Group};
-pub use expectation::{Basis, Expected, PixelErrors, TERMS};
+pub use expectation::{Basis, Beyond, Expected, PixelErrors, TERMS};
 pub use held_out::HOLD_OUT;
+pub use pair::{Measured, Pair};
 
 use crate::held_out::nearest;
 use crate::mixture::NearTargets;
@@ -123,6 +126,8 @@ pub struct Chosen {
     /// The errors that pixels of a confidence have; `None` if nothing could be held out, and for fields without
     /// confidences.
     pub calibration: Option<Calibration>,
+    /// What two sources are good for; `None` for more.
+    pub pair: Option<Pair>,
     measure: Measure,
     poses: Vec<Pose>,
 }
@@ -175,8 +180,17 @@ impl Chosen {
         self.calibration.as_ref()?.mean_square(frame.confidences.iter().copied()).map(decibels)
     }
 
-    /// The expected score of a target's picture; `None` if nothing could be held out.
+    /// Why no score is expected of a target's picture although sources were held out; `None` if one is.
+    pub fn beyond(&self, frame: &Frame) -> Option<Beyond> {
+        self.basis?.beyond(self.standing(frame), frame.seen)
+    }
+
+    /// The expected score of a target's picture; `None` if nothing could be held out, and [`beyond`](Self::beyond) what
+    /// is known.
     pub fn expected(&self, frame: &Frame) -> Option<Expected> {
+        if self.beyond(frame).is_some() {
+            return None;
+        }
         let calibrated = self.calibrated(frame);
         let expected = self.basis?.expected(self.standing(frame), calibrated, frame.seen);
         let scale = |calibrated: f64| 10.0_f64.powf((calibrated - expected.psnr) / 20.0) as f32;
@@ -233,6 +247,7 @@ fn choose_of(
         held_out: Vec::new(),
         basis: None,
         calibration: None,
+        pair: Pair::of(&cameras, stage.images.has_silhouettes),
         measure: Measure::of(&cameras),
         poses: cameras.iter().map(|camera| camera.pose).collect(),
     };
@@ -248,36 +263,36 @@ fn choose_of(
     let mut search = Search { held_out: &mut held_out, candidates: Vec::new(), progress };
     let mut best = search.outcomes(&chosen.weighting, &chosen.options, &[])?;
     let has_silhouettes = stage.images.has_silhouettes;
-    let mut first = None;
-    if let Some((outcomes, weighting)) = search.scheme(schemes, &chosen.options, &best, has_silhouettes)? {
-        let replaced = (std::mem::replace(&mut best, outcomes), std::mem::replace(&mut chosen.weighting, weighting));
-        first = has_silhouettes.then_some(replaced);
-    }
-    for step in 0.. {
-        let (before, others) = (best.clone(), candidates(&chosen.options, step));
-        if others.is_empty() {
-            break;
-        }
-        for options in others {
-            let outcomes = search.outcomes(&chosen.weighting, &options, &before)?;
-            if is_better(&outcomes, &best, &before) {
-                (best, chosen.options) = (outcomes, options);
-            }
-        }
-    }
-    let mixtures = if varies { stage.session.prepared.mixtures(&chosen.options) } else { Vec::new() };
-    // What gains on an object's held-out sources may lose on its targets, which are nearer to their sources, and a
-    // mixture gains more than a scheme does: the scheme stays the first one unless another is better than that.
+    let mixtures = |chosen: &AnyOptions| if varies { stage.session.prepared.mixtures(chosen) } else { Vec::new() };
+    // What another scheme gains on an object's held-out sources may be lost on its targets, which are nearer to their
+    // sources, and a mixture gains more than a scheme does: others are tried only where no mixture gains.
     let mut mixed = None;
-    if let Some((outcomes, weighting)) = first {
-        mixed = search.mixed(&weighting, &chosen.options, mixtures.clone(), &outcomes, has_silhouettes)?;
-        mixed = mixed.filter(|mixed| !is_better_near(&best, &mixed.outcomes));
-        if mixed.is_some() {
-            (best, chosen.weighting) = (outcomes, weighting);
-        }
+    if has_silhouettes {
+        let (weighting, options) = (&chosen.weighting, &chosen.options);
+        mixed = search.mixed(weighting, options, mixtures(options), &best, has_silhouettes)?;
     }
     if mixed.is_none() {
-        mixed = search.mixed(&chosen.weighting, &chosen.options, mixtures, &best, has_silhouettes)?;
+        let better = search.scheme(schemes, &chosen.options, &best, has_silhouettes)?;
+        let is_tried = has_silhouettes && better.is_none();
+        if let Some((outcomes, weighting)) = better {
+            (best, chosen.weighting) = (outcomes, weighting);
+        }
+        for step in 0.. {
+            let (before, others) = (best.clone(), candidates(&chosen.options, step));
+            if others.is_empty() {
+                break;
+            }
+            for options in others {
+                let outcomes = search.outcomes(&chosen.weighting, &options, &before)?;
+                if is_better(&outcomes, &best, &before) {
+                    (best, chosen.options) = (outcomes, options);
+                }
+            }
+        }
+        if !is_tried {
+            let (weighting, options) = (&chosen.weighting, &chosen.options);
+            mixed = search.mixed(weighting, options, mixtures(options), &best, has_silhouettes)?;
+        }
     }
     if let Some(Mixed { mixture, outcomes, last_at_nearest, .. }) = mixed {
         // Gaussians that are too soft near the sources: a share of the hull's picture stays there.

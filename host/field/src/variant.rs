@@ -124,6 +124,11 @@ impl AnyOptions {
         AnyOptions { value: Arc::new(options), settings }
     }
 
+    /// All of the value, whatever a record says of it.
+    pub(crate) fn in_full(&self) -> String {
+        format!("{:?}", self.value)
+    }
+
     /// The same with another line in a record.
     pub(crate) fn also_stating(&self, setting: Setting) -> AnyOptions {
         let settings = self.settings.iter().copied().chain([setting]).collect();

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 use viewfuse_device::{KernelTime, Transfers};
-use viewfuse_field::auto::{Calibration, Candidate, Chosen, Expected, HeldOutSource};
+use viewfuse_field::auto::{Beyond, Calibration, Candidate, Chosen, Expected, HeldOutSource, Pair};
 use viewfuse_field::budget::Kept;
 use viewfuse_field::render::{Frame, RenderOptions, Seen, StageCosts};
 use viewfuse_field::{Denoising, LeftOut, Mixture, Setting};
@@ -112,13 +112,16 @@ pub struct ChosenRecord {
     /// have in those pictures; null for fields without confidences. In a frame it is this times
     /// `expected.pixels.scale`.
     pub calibration: Option<Calibration>,
+    /// What two sources are good for, of which none can be left out; null for more.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pair: Option<Pair>,
 }
 
 impl From<Chosen> for ChosenRecord {
     fn from(chosen: Chosen) -> ChosenRecord {
-        let Chosen { options, mixture, candidates, held_out, calibration, .. } = chosen;
+        let Chosen { options, mixture, candidates, held_out, calibration, pair, .. } = chosen;
         let settings = options.settings().to_vec();
-        ChosenRecord { settings, mixture, candidates, left_out: held_out, calibration }
+        ChosenRecord { settings, mixture, candidates, left_out: held_out, calibration, pair }
     }
 }
 
@@ -229,8 +232,14 @@ pub struct FrameRecord {
     /// exposure. Null as `psnr`, and in records of older versions.
     #[serde(default)]
     pub corrected_psnr: Option<f64>,
-    /// The score to expect without a ground truth; null where the scheme was given, and with too few sources.
+    /// The score to expect without a ground truth; null where the scheme was given, with too few sources, and `beyond`
+    /// what is known.
     pub expected: Option<Expected>,
+    /// Why no score is expected although photographs were left out: how many times as far from the sources as the
+    /// farthest of those the camera is, or the share of the picture that no photograph shows; null where a score is
+    /// expected.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub beyond: Option<Beyond>,
     /// Structural similarity with the ground truth.
     pub ssim: Option<f64>,
     /// Depth in one step of the 16-bit depth map, in units of the scene's files; 0 in the map means no surface. Null
@@ -246,6 +255,13 @@ pub struct FrameRecord {
 }
 
 impl FrameRecord {
+    /// The same with what is expected of the frame by what was chosen.
+    #[must_use]
+    pub fn expecting(self, chosen: Option<&Chosen>, frame: &Frame) -> FrameRecord {
+        let expected = chosen.and_then(|chosen| chosen.expected(frame));
+        FrameRecord { expected, beyond: chosen.and_then(|chosen| chosen.beyond(frame)), ..self }
+    }
+
     /// The record of a frame whose sources have these names and this coverage; `space` is the scene's frame.
     pub fn of(frame: &Frame, source_names: &[String], coverage: &Coverage, space: &SceneFrame) -> FrameRecord {
         let count = source_names.len();
@@ -269,6 +285,7 @@ impl FrameRecord {
             psnr: frame.truth.as_ref().map(|truth| truth.psnr).filter(|psnr| psnr.is_finite()),
             corrected_psnr: frame.truth.as_ref().map(|truth| truth.corrected_psnr).filter(|psnr| psnr.is_finite()),
             expected: None,
+            beyond: None,
             ssim: frame.truth.as_ref().and_then(|truth| truth.ssim),
             depth_step: (!frame.depths.is_empty()).then(|| space.file_length(depth_step(&frame.depths))),
             seconds: frame.time.as_secs_f64(),

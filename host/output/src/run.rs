@@ -223,9 +223,8 @@ impl RunWriter {
         self.size = size;
         self.background = sources.background;
         self.warnings.clone_from(&sources.warnings);
-        let expected = self.chosen.as_ref().and_then(|chosen| chosen.expected(frame));
-        let record =
-            FrameRecord { expected, ..FrameRecord::of(frame, &self.source_names, &self.coverage, &self.space) };
+        let record = FrameRecord::of(frame, &self.source_names, &self.coverage, &self.space)
+            .expecting(self.chosen.as_ref(), frame);
         if let Some(journal) = &mut self.journal {
             journal.add(&FinishedFrame { frame: record.clone(), files })?;
         }

@@ -39,7 +39,6 @@ impl PictureRecord {
     ) -> PictureRecord {
         let Viewed { scene, sources, field, options, .. } = *viewed;
         let sources: Vec<String> = sources.iter().map(|&view| scene.views[view].name.clone()).collect();
-        let expected = chosen.and_then(|chosen| chosen.expected(frame));
         PictureRecord {
             viewfuse: env!("CARGO_PKG_VERSION"),
             scene: scene.path.display().to_string(),
@@ -52,7 +51,7 @@ impl PictureRecord {
             leave_out: options.leave_out,
             early_termination: options.early_termination,
             depth_units: DepthUnits::ALL,
-            frames: [FrameRecord { expected, ..FrameRecord::of(frame, &sources, coverage, &scene.frame) }],
+            frames: [FrameRecord::of(frame, &sources, coverage, &scene.frame).expecting(chosen, frame)],
             sources,
         }
     }

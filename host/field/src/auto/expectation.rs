@@ -23,6 +23,11 @@ const MAX_ABOVE: f64 = 3.0;
 /// Half of the interval, decibels: the error that four of five targets of scenes that the fit has not seen stay below
 /// (split conformal, a scene left out at a time).
 const REACH: f64 = 3.0;
+/// How many times as far from its sources as the farthest held-out source a target may be, and the greatest share of
+/// it that no photograph shows, for a score to be expected: beyond them nothing was measured.
+const MOST_FARTHER: f64 = 1.25;
+/// See [`MOST_FARTHER`].
+const MOST_UNSEEN: f32 = 0.15;
 /// Terms of the sum.
 pub const TERMS: usize = 7;
 
@@ -36,6 +41,16 @@ pub struct Expected {
     /// What is expected of single pixels; null for fields without confidences.
     #[serde(default)]
     pub pixels: Option<PixelErrors>,
+}
+
+/// Why no score is expected of a picture: it is beyond what the constants were fitted to.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Beyond {
+    /// Its camera is this many times as far from the sources as the farthest held-out source is from the others.
+    Far(f64),
+    /// No photograph shows this share of it.
+    Unseen(f32),
 }
 
 /// What is expected of a picture's pixels.
@@ -55,6 +70,8 @@ pub struct Basis {
     pub best: f64,
     /// Mean base-2 logarithm of the gaps.
     pub log_gap: f64,
+    /// The greatest gap.
+    pub greatest_gap: f64,
     /// Mean of their scores by the calibration of their confidences, decibels; `None` without one.
     pub calibrated: Option<f64>,
     /// Mean square, in `[0, 1]`, of the detail that the sources have at the pictures' size and not at that of the
@@ -78,6 +95,7 @@ impl Basis {
             psnr: sum(&|outcome| outcome.psnr),
             best: outcomes.iter().map(|outcome| outcome.psnr).fold(f64::NEG_INFINITY, f64::max),
             log_gap: sum(&|outcome| outcome.standing.gap.log2()),
+            greatest_gap: outcomes.iter().map(|outcome| outcome.standing.gap).fold(0.0, f64::max),
             calibrated: calibration.and_then(|calibration| {
                 let scores = outcomes.iter().map(|outcome| {
                     calibration.mean_square(outcome.samples.iter().map(|sample| sample.confidence)).map(decibels)
@@ -102,6 +120,15 @@ impl Basis {
         [1.0, gap, surer, unseen, none, object, object * unseen]
     }
 
+    /// Whether a target of this geometry, with so much of it seen by few, is beyond what is known; why, if it is.
+    pub fn beyond(&self, standing: Standing, seen: Option<Seen>) -> Option<Beyond> {
+        let (farther, unseen) = (standing.gap / self.greatest_gap, seen.map_or(0.0, |seen| seen.by_none));
+        if farther > MOST_FARTHER {
+            return Some(Beyond::Far(farther));
+        }
+        (unseen > MOST_UNSEEN).then_some(Beyond::Unseen(unseen))
+    }
+
     /// The expected score there.
     pub fn expected(&self, standing: Standing, calibrated: Option<f64>, seen: Option<Seen>) -> Expected {
         let terms = self.terms(standing, calibrated, seen);
@@ -120,4 +147,28 @@ impl Basis {
 /// The peak signal to noise ratio of a mean square error, decibels.
 pub(super) fn decibels(square: f64) -> f64 {
     -10.0 * square.max(1.0e-9).log10()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_expected_beyond_what_was_measured() {
+        let basis = Basis {
+            psnr: 25.0,
+            best: 27.0,
+            log_gap: -2.0,
+            greatest_gap: 0.4,
+            calibrated: None,
+            detail: 0.0,
+            has_silhouettes: false,
+        };
+        let beyond =
+            |gap: f64, by_none: f32| basis.beyond(Standing { gap, outside: 0.5 }, Some(Seen { by_none, by_one: 0.0 }));
+        assert_eq!(beyond(0.4 * MOST_FARTHER, MOST_UNSEEN), None);
+        assert_eq!(beyond(0.8, 0.0), Some(Beyond::Far(2.0)));
+        assert_eq!(beyond(0.1, 0.25), Some(Beyond::Unseen(0.25)));
+        assert_eq!(basis.beyond(Standing { gap: 0.1, outside: 0.5 }, None), None, "a field without depths");
+    }
 }

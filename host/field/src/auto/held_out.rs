@@ -31,8 +31,8 @@ pub(super) struct HeldOutSources<'a> {
     sources: Vec<Source<'a>>,
     /// The weighting under which the others are encoded.
     weighting: Weighting,
-    /// Their pictures of earlier runs, and what is added to them.
-    kept: Option<Kept>,
+    /// Their pictures so far, of earlier runs as well.
+    kept: Kept,
 }
 
 /// A source that is held out.
@@ -91,11 +91,11 @@ impl<'a> HeldOutSources<'a> {
         let mut sources = Vec::new();
         let weighting = weighting.clone();
         let Some(&SceneSources { scene, album, ref views }) = stage.scene() else {
-            return Ok(HeldOutSources { sources, weighting, kept: None });
+            return Ok(HeldOutSources { sources, weighting, kept: Kept::default() });
         };
         let poses: Vec<Pose> = views.iter().map(|&view| scene.views[view].camera.pose).collect();
         if poses.len() <= about.least_sources {
-            return Ok(HeldOutSources { sources, weighting, kept: None });
+            return Ok(HeldOutSources { sources, weighting, kept: Kept::default() });
         }
         let cameras: Vec<_> = stage.images.images.iter().map(|image| image.camera).collect();
         let measure = Measure::of(&cameras);
@@ -128,7 +128,7 @@ impl<'a> HeldOutSources<'a> {
             sources.push(Source { held_out, is_encoded: false, target, standing, copy });
         }
         let field = renderer.options();
-        let kept = field.folder().map(|folder| {
+        let kept = field.folder().map_or_else(Kept::default, |folder| {
             let depends_on = format!("{} {} {field:?} {options:?} {weighting}", about.name, renderer.device_name());
             Kept::open(folder, &[depends_on.as_bytes(), &bytes(images)].concat(), progress)
         });
@@ -182,17 +182,15 @@ impl<'a> HeldOutSources<'a> {
         let mut frames = Vec::with_capacity(which.len());
         for index in which {
             progress.check().map_err(stopped)?;
-            let name = self.kept.as_ref().map(|_| Kept::name(index, weighting, options));
-            let known = self.kept.as_ref().zip(name.as_ref()).and_then(|(kept, name)| kept.picture(name));
-            let frame = match known {
+            let name = Kept::name(index, weighting, options);
+            let frame = match self.kept.picture(&name) {
                 Some(known) => known.clone(),
-                None => self.sources[index].frame(&self.weighting, weighting, options, progress)?,
+                None => {
+                    let frame = self.sources[index].frame(&self.weighting, weighting, options, progress)?;
+                    self.kept.add(name, &frame);
+                    frame
+                }
             };
-            if let (Some(kept), Some(name)) = (&mut self.kept, name)
-                && kept.picture(&name).is_none()
-            {
-                kept.add(name, &frame);
-            }
             frames.push(frame);
             progress.step();
         }
@@ -201,9 +199,7 @@ impl<'a> HeldOutSources<'a> {
 
     /// Keeps the pictures for the next run, if there is a folder for them.
     pub(super) fn keep(&mut self, progress: &dyn Progress) {
-        if let Some(kept) = &mut self.kept {
-            kept.write(progress);
-        }
+        self.kept.write(progress);
     }
 
     /// What the held-out sources show.

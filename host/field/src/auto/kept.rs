@@ -1,12 +1,12 @@
-//! Pictures of held-out sources that were rendered before, kept in the field's folder: a second choice for the same
-//! sources under the same options renders none of them again.
+//! Pictures of held-out sources that were rendered before: none is rendered twice. Where the field has a folder they are
+//! kept in it, and a second choice for the same sources under the same options renders none of them again.
 //!
 //! A file's name is the SHA-256 of all that its pictures depend on but scheme and settings, which are in each picture's
 //! own name: another scene, size, option, device or version finds nothing, and makes a file of its own. A file that is
 //! damaged or was kept under another name is not used, and a warning says so. What is chosen follows from the pictures
 //! as if they had been rendered.
 
-use crate::Rendered;
+use crate::{AnyOptions, Rendered};
 use bytemuck::{cast_slice, pod_collect_to_vec};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -21,10 +21,11 @@ const MAX_BYTES: u64 = 256 << 20;
 /// Characters of a name.
 const NAME: usize = 64;
 
-/// The pictures of a file.
+/// The pictures, by their names.
+#[derive(Default)]
 pub(super) struct Kept {
-    path: PathBuf,
-    name: String,
+    /// The file with its name's digest; none without a folder.
+    file: Option<(PathBuf, String)>,
     pictures: BTreeMap<String, Rendered>,
     /// Whether some are not in the file.
     is_new: bool,
@@ -47,12 +48,12 @@ impl Kept {
             let folder = folder.display();
             progress.warn(&format!("{folder}: holds pictures that are not as they were kept; they are rendered anew"));
         }
-        Kept { pictures: pictures.unwrap_or_default(), path, name, is_new: false }
+        Kept { pictures: pictures.unwrap_or_default(), file: Some((path, name)), is_new: false }
     }
 
     /// The name of a held-out source's picture: all that it depends on beside what the file does.
-    pub(super) fn name(source: usize, weighting: &impl ToString, options: &impl std::fmt::Debug) -> String {
-        sha256(format!("{source} {} {options:?}", weighting.to_string()).as_bytes())
+    pub(super) fn name(source: usize, weighting: &impl ToString, options: &AnyOptions) -> String {
+        sha256(format!("{source} {} {}", weighting.to_string(), options.in_full()).as_bytes())
     }
 
     /// The picture of this name.
@@ -66,14 +67,13 @@ impl Kept {
         self.is_new = true;
     }
 
-    /// Writes the file, if there are new pictures. That it cannot be written costs the next run its time, and is a
+    /// Writes the file, if there is one and there are new pictures. That it cannot be written costs the next run its time, and is a
     /// warning.
     pub(super) fn write(&mut self, progress: &dyn Progress) {
-        if !std::mem::take(&mut self.is_new) {
-            return;
-        }
+        let is_new = std::mem::take(&mut self.is_new);
+        let Some((path, digest)) = self.file.as_ref().filter(|_| is_new) else { return };
         let bytes: Vec<u8> = self.pictures.iter().flat_map(|(name, picture)| bytes_of(name, picture)).collect();
-        if let Err(error) = write_whole(&self.path, &sealed(&self.name, &bytes)) {
+        if let Err(error) = write_whole(path, &sealed(digest, &bytes)) {
             progress.warn(&format!("what was chosen for the scene is not kept: {error}"));
         }
     }

@@ -12,9 +12,6 @@ pub const MAX_ITERATIONS: u32 = 100_000;
 /// Most sources whose points count without a second view that confirms them: so few leave too few that are.
 const MAX_UNCONFIRMED: usize = 3;
 
-/// Part of the iterations that are made for pictures of held-out sources.
-const TRIAL_DIVISOR: u32 = 2;
-
 /// Settings of an optimisation. Lengths are in footprints: the size of a level's pixel at the median depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Recipe {
@@ -22,6 +19,8 @@ pub struct Recipe {
     pub side: u32,
     /// Iterations at an eighth, a quarter, a half and the whole of the finest level's size.
     pub iterations: [u32; 4],
+    /// For pictures of held-out sources, which are small and only compared, the iterations are divided by this.
+    pub trial_divisor: u32,
     /// Most Gaussians.
     pub max_count: usize,
     /// Most Gaussians a pixel of a source at the finest level.
@@ -51,6 +50,8 @@ pub struct Recipe {
     pub near: f32,
     /// Weight of the opacity's difference from a silhouette in the loss.
     pub silhouette_share: f32,
+    /// Share of what the Gaussians leave of the photographs that is added to their pictures.
+    pub residual_share: f32,
     /// Seed of what is drawn at random.
     pub seed: u64,
 }
@@ -60,6 +61,7 @@ impl Default for Recipe {
         Recipe {
             side: 280,
             iterations: [0, 100, 80, 60],
+            trial_divisor: 2,
             max_count: 60_000,
             max_per_pixel: 1.5,
             cell: 6.0,
@@ -74,6 +76,7 @@ impl Default for Recipe {
             split_scale: 1.2,
             near: 0.5,
             silhouette_share: 0.5,
+            residual_share: 1.0,
             seed: 0,
         }
     }
@@ -88,13 +91,16 @@ impl Recipe {
 
     /// The recipes for pictures that are mixed with the field's own; which of them is better is the scene's
     /// (`host/results/objects.md`). Where there are silhouettes Gaussians begin on surfaces alone, and the outline has
-    /// twice the weight. They are few and large, opaque only where that gains, for glossy objects, of which the sources
-    /// agree on little; or many and small.
+    /// twice the weight; more than half of an object's time is that of its trials, and pictures get twice the
+    /// iterations. They are few and large, opaque only where that gains, for glossy objects, of which the sources agree
+    /// on little; or many and small.
     pub fn mixed_with(self, images: &SourceImages) -> Vec<Variant<Recipe>> {
         if !images.has_silhouettes {
             return vec![Variant::to_measure("the usual Gaussians", self)];
         }
         let small = Recipe {
+            iterations: self.iterations.map(|count| 2 * count),
+            trial_divisor: 2 * self.trial_divisor,
             random_count: 0,
             max_per_pixel: self.max_per_pixel.min(0.4),
             opacity_penalty: 0.1,
@@ -106,6 +112,7 @@ impl Recipe {
             split_scale: f32::INFINITY,
             opacity_penalty: 0.4,
             structure_share: 0.0,
+            residual_share: 0.5,
             ..small
         };
         vec![Variant::to_measure("few large Gaussians", large), Variant::to_measure("many small Gaussians", small)]
@@ -128,7 +135,7 @@ impl Recipe {
 
     /// The recipe for trials, which are small and only compared. Previews have no Gaussians of their own.
     pub(crate) fn reduced(self, purpose: Purpose) -> Recipe {
-        let divisor = if purpose == Purpose::Trial { TRIAL_DIVISOR } else { 1 };
+        let divisor = if purpose == Purpose::Trial { self.trial_divisor } else { 1 };
         Recipe { iterations: self.iterations.map(|count| count / divisor), ..self }
     }
 

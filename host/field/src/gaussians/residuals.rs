@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! residual_s(q) = photograph_s(q) - gain_s splats_s(q)
-//! added(p)      = SHARE sum_s w_s v_s residual_s(q_s) / (sum_s w_s v_s + LEAST sum_s w_s)
+//! added(p)      = share sum_s w_s v_s residual_s(q_s) / (sum_s w_s v_s + LEAST sum_s w_s)
 //! v_s           = exp(-((depth_s(q_s) - z_s) / (TOLERANCE z_s))^2)
 //! ```
 //!
@@ -20,9 +20,6 @@ use viewfuse_device::parallel::for_each_row;
 use viewfuse_kernels::rows::GaussianBlock;
 use viewfuse_scene::photographs::{SourceImage, SourceImages};
 
-/// Share of the residuals that is added: of whole photographs, and of objects with silhouettes, where the Gaussians are
-/// few and large.
-const SHARES: [f32; 2] = [1.0, 0.5];
 /// Relative difference of the depths of a point and of the surface that a source sees, at which the source counts by `1
 /// / e`.
 const TOLERANCE: f32 = 0.03;
@@ -36,6 +33,8 @@ const MIN_PIXELS: usize = 256;
 #[derive(Clone, Debug)]
 pub struct Residuals {
     views: Vec<Option<View>>,
+    /// How much of them is added.
+    share: f32,
 }
 
 /// What the Gaussians leave of a source, as far as it is added.
@@ -49,9 +48,9 @@ struct View {
 }
 
 impl Residuals {
-    /// Those of so many sources.
-    pub fn new(count: usize) -> Residuals {
-        Residuals { views: vec![None; count] }
+    /// Those of so many sources, of which this share is added.
+    pub fn new(count: usize, share: f32) -> Residuals {
+        Residuals { views: vec![None; count], share }
     }
 
     /// Makes that of a source, if it is not there yet: `gain` is how much brighter the source is than the Gaussians,
@@ -88,7 +87,9 @@ impl Residuals {
                 if depth > 0.0 {
                     let towards = camera.towards(column as f32 + 0.5, row as f32 + 0.5);
                     let added = at(&views, least, camera.centre_world() + towards * depth);
-                    (0..3).for_each(|channel| colour[channel] = (colour[channel] + added[channel]).clamp(0.0, 1.0));
+                    let add =
+                        |(colour, added): (&mut f32, f32)| *colour = (*colour + self.share * added).clamp(0.0, 1.0);
+                    colour.iter_mut().zip(added).for_each(add);
                 }
             }
         });
@@ -97,12 +98,12 @@ impl Residuals {
 
 /// The residual of a source over the background; 0 where its lens saw nothing.
 fn residual(colours: &[[f32; 4]], image: &SourceImage, images: &SourceImages, gain: [f32; 3]) -> Vec<[f32; 3]> {
-    let (behind, share) = (images.background, SHARES[usize::from(images.has_silhouettes)]);
+    let behind = images.background;
     let of = |(own, texel): (&[f32; 4], &[f32; 4])| {
         [0, 1, 2].map(|channel| match images.has_silhouettes {
-            true => share * (texel[channel] + (1.0 - texel[3]) * behind[channel] - gain[channel] * own[channel]),
+            true => texel[channel] + (1.0 - texel[3]) * behind[channel] - gain[channel] * own[channel],
             false if texel[3] < 0.999 => 0.0,
-            false => share * (texel[channel] - gain[channel] * own[channel]),
+            false => texel[channel] - gain[channel] * own[channel],
         })
     };
     colours.iter().zip(&image.texels).map(of).collect()
@@ -150,7 +151,7 @@ mod tests {
             residual: vec![[0.2, -0.9, 0.0]; 48],
             depths: vec![*own; 48],
         };
-        let residuals = Residuals { views: sources.iter().map(|own| Some(view(own))).collect() };
+        let residuals = Residuals { views: sources.iter().map(|own| Some(view(own))).collect(), share: 1.0 };
         let weights: Vec<(usize, f32)> = sources.iter().map(|(_, weight)| *weight).enumerate().collect();
         let mut picture = grey(depth);
         residuals.add(&camera(), &weights, &mut picture);

@@ -158,7 +158,7 @@ impl<D: Device> Alone<'_, D> {
                         self.optimisation = Some(optimisation);
                     }
                     ran?;
-                    Some(Splats::upload(self.depths.device, optimised)?)
+                    Some(Splats::upload(self.depths.device, optimised, &recipe)?)
                 }
                 None => None,
             };

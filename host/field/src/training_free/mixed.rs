@@ -5,6 +5,7 @@
 //! no Gaussians: what is omitted is measured against a picture without.
 
 use super::TrainingFree;
+use super::hull::Hull;
 use super::splats::{SourceDepths, Splats};
 use crate::gaussians::Recipe;
 use crate::variant::erased;
@@ -12,6 +13,7 @@ use crate::{
     AnyOptions, Encoding, FieldError, Geometry, Prepared, Purpose, Record, Rendered, Request, Setting, Variant,
     Weighted,
 };
+use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::Device;
 use viewfuse_job::progress::{Progress, Quiet};
 use viewfuse_scene::photographs::longest_side;
@@ -50,16 +52,21 @@ impl Shown {
 /// The views of the sweep or of the hull, and the Gaussians of the same sources.
 pub(super) struct Mixed<'a, D: Device> {
     depths: SourceDepths<'a, D>,
+    hull: Hull,
     recipe: Recipe,
     shown: Shown,
     /// The Gaussians of the current weighting by each recipe, once they are needed; none where the sources have too few
     /// surfaces.
     splats: Vec<(Recipe, Option<Splats<D>>)>,
+    /// The hull's last picture under the current weighting and options, with what was asked for: camera, weights of the
+    /// views, early termination. It is filled, and carved, by the Gaussians of each recipe.
+    last: Option<((CameraBlock, Vec<f32>, f32), Rendered)>,
 }
 
 impl<'a, D: Device> Mixed<'a, D> {
     pub(super) fn new(depths: SourceDepths<'a, D>, options: &TrainingFree) -> Mixed<'a, D> {
-        Mixed { recipe: options.recipe, depths, shown: options.shown, splats: Vec::new() }
+        let TrainingFree { hull, recipe, shown, .. } = *options;
+        Mixed { depths, hull, recipe, shown, splats: Vec::new(), last: None }
     }
 
     /// The Gaussians, optimised if they are not there yet; `None` where the sources have too few surfaces.
@@ -70,13 +77,27 @@ impl<'a, D: Device> Mixed<'a, D> {
             let splats = match self.depths.optimisation(recipe, progress)? {
                 Some(mut optimisation) => {
                     optimisation.run_to(u32::MAX, &Quiet(progress))?;
-                    Some(Splats::upload(self.depths.device, optimisation.optimised())?)
+                    Some(Splats::upload(self.depths.device, optimisation.optimised(), &recipe)?)
                 }
                 None => None,
             };
             self.splats.push((recipe, splats));
         }
         Ok(self.splats.iter_mut().find(|splats| splats.0 == recipe).and_then(|splats| splats.1.as_mut()))
+    }
+
+    /// The picture of the sweep or the hull; the hull's is rendered once for all that is mixed with it.
+    fn depths_picture(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
+        if !self.depths.images.has_silhouettes {
+            return self.depths.views.render(request, progress);
+        }
+        let asked = (request.camera.block(0), request.view_weights(), request.early_termination);
+        if let Some((_, picture)) = self.last.as_ref().filter(|(last, _)| *last == asked) {
+            return Ok(picture.clone());
+        }
+        let picture = self.depths.views.render(request, progress)?;
+        self.last = Some((asked, picture.clone()));
+        Ok(picture)
     }
 
     /// The Gaussians' picture of a target; `None` if there are none.
@@ -126,9 +147,9 @@ impl<D: Device> Prepared for Mixed<'_, D> {
         let splatted = if self.shown == Shown::Depths { None } else { self.splatted(request, progress)? };
         match splatted {
             Some(splatted) if self.shown == Shown::Gaussians => Ok(splatted),
-            None => self.depths.views.render(request, progress),
+            None => self.depths_picture(request, progress),
             Some(splatted) => {
-                let mut picture = self.depths.views.render(request, progress)?;
+                let mut picture = self.depths_picture(request, progress)?;
                 let background = self.depths.images.background;
                 if self.shown == Shown::Carved {
                     carve(&mut picture, &splatted, background);
@@ -150,6 +171,9 @@ impl<D: Device> Prepared for Mixed<'_, D> {
     fn set(&mut self, options: &AnyOptions) -> Result<(), FieldError> {
         let Some(TrainingFree { hull, sweep, recipe, shown, .. }) = options.of() else { return Ok(()) };
         (self.recipe, self.shown) = (*recipe, *shown);
+        if *hull != self.hull {
+            (self.hull, self.last) = (*hull, None);
+        }
         self.depths.set(hull, sweep)
     }
 
@@ -217,7 +241,7 @@ impl<D: Device> Prepared for Mixed<'_, D> {
 
 impl<D: Device> Weighted for Mixed<'_, D> {
     fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
-        self.splats.clear();
+        (self.splats, self.last) = (Vec::new(), None);
         self.depths.weigh(relevance)
     }
 }

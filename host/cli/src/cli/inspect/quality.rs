@@ -1,10 +1,11 @@
 //! The quality to expect, from photographs that are left out, one at a time, and rendered from the others.
 
 use crate::cli::printing::say;
+use crate::cli::verdict::{in_words, of_two};
 use serde::Serialize;
 use std::time::Instant;
 use viewfuse_device::cpu::Cpu;
-use viewfuse_field::auto::{self, Chosen, Expected, HeldOutSource};
+use viewfuse_field::auto::{self, Chosen, Expected, HeldOutSource, Pair};
 use viewfuse_field::render::{RenderError, RenderOptions, Stage};
 use viewfuse_field::training_free::TrainingFree;
 use viewfuse_field::{Field, On};
@@ -20,6 +21,9 @@ pub(super) struct Quality {
     left_out: Vec<HeldOutSource>,
     /// The score to expect between two neighbouring photographs.
     expected: Option<Expected>,
+    /// What two photographs are good for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pair: Option<Pair>,
     /// Why nothing could be measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     problem: Option<String>,
@@ -36,10 +40,11 @@ impl Quality {
         match measured {
             Ok(chosen) => {
                 let expected = chosen.expected_between();
-                Ok(Quality { left_out: chosen.held_out, expected, problem: None, seconds })
+                Ok(Quality { left_out: chosen.held_out, expected, pair: chosen.pair, problem: None, seconds })
             }
             Err(error) if is_of_scene(&error) => {
-                Ok(Quality { left_out: Vec::new(), expected: None, problem: Some(error.to_string()), seconds })
+                let problem = Some(error.to_string());
+                Ok(Quality { left_out: Vec::new(), expected: None, pair: None, problem, seconds })
             }
             Err(error) => Err(error),
         }
@@ -50,8 +55,9 @@ impl Quality {
         let order = |a: &&HeldOutSource, b: &&HeldOutSource| a.psnr.total_cmp(&b.psnr);
         let (least, most) = (self.left_out.iter().min_by(order), self.left_out.iter().max_by(order));
         let (Some(least), Some(most), Some(expected)) = (least, most, self.expected) else {
+            let two = self.pair.as_ref().map_or_else(String::new, |pair| format!("; {}", of_two(pair)));
             let problem = self.problem.as_deref().unwrap_or("too few photographs to leave one out");
-            return say(format_args!("expected   not measured: {problem}"));
+            return say(format_args!("expected   not measured: {problem}{two}"));
         };
         let count = self.left_out.len() as f64;
         let mean = |value: &dyn Fn(&HeldOutSource) -> f64| self.left_out.iter().map(value).sum::<f64>() / count;
@@ -91,13 +97,4 @@ fn measure(scene: &Scene, background: BackgroundChoice, progress: &dyn Progress)
 /// Whether it is the scene that cannot be rendered, and not this run.
 fn is_of_scene(error: &anyhow::Error) -> bool {
     error.is::<SelectionError>() || matches!(error.downcast_ref(), Some(RenderError::Unsuitable { .. }))
-}
-
-/// What a score looks like.
-fn in_words(psnr: f64) -> &'static str {
-    match psnr {
-        26.0.. => "good: sharp, small errors at edges",
-        20.0.. => "soft: blurred or torn in places",
-        _ => "broken: what is where cannot be relied on",
-    }
 }

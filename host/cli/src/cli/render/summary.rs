@@ -1,8 +1,9 @@
 //! What is printed of a run.
 
 use crate::cli::printing::say;
+use crate::cli::verdict::of_two;
 use std::path::Path;
-use viewfuse_field::auto::{Candidate, Expected};
+use viewfuse_field::auto::{Beyond, Candidate, Expected};
 use viewfuse_field::budget::{Estimate, Kept};
 use viewfuse_field::render::Seen;
 use viewfuse_output::record::{ChosenRecord, FrameRecord, RunRecord};
@@ -45,9 +46,10 @@ pub(super) fn print(record: &RunRecord, folder: &Path) -> std::io::Result<()> {
 
 /// What was chosen for the scene, and what it gained.
 fn choice(chosen: &ChosenRecord, weighting: &str) -> String {
-    let ChosenRecord { settings, mixture, candidates, left_out, .. } = chosen;
+    let ChosenRecord { settings, mixture, candidates, left_out, pair, .. } = chosen;
     if left_out.is_empty() {
-        return format!("chosen: {weighting}, the default: too few sources to leave one out");
+        let two = pair.as_ref().map_or_else(String::new, |pair| format!("; {}", of_two(pair)));
+        return format!("chosen: {weighting}, the default: too few sources to leave one out{two}");
     }
     let of = |candidate: &Candidate| candidate.weighting == weighting && candidate.options.settings() == settings;
     // A mixture is tried last.
@@ -82,9 +84,17 @@ fn summary(frame: &FrameRecord, sources: &[String], folder: &Path) -> String {
         (Some(psnr), None) => format!("  PSNR {psnr:.2} dB{corrected}"),
         _ => String::new(),
     };
-    let expected = frame.expected.map_or_else(String::new, |Expected { psnr, interval: [low, high], .. }| {
-        format!("  expected PSNR {psnr:.1} dB (80 %: {low:.1} to {high:.1})")
-    });
+    let expected = match (frame.expected, frame.beyond) {
+        (Some(Expected { psnr, interval: [low, high], .. }), _) => {
+            format!("  expected PSNR {psnr:.1} dB (80 %: {low:.1} to {high:.1})")
+        }
+        (None, Some(Beyond::Far(times))) => format!(
+            "  no PSNR to expect: the camera is {times:.1} times as far from the photographs as the farthest of these is \
+             from the others"
+        ),
+        (None, Some(Beyond::Unseen(_))) => "  no PSNR to expect: too much of it is invented".to_owned(),
+        (None, None) => String::new(),
+    };
     let left_out = match frame.left_out.len() {
         0 => String::new(),
         1 => format!("  1 source left out (weight {:.4})", frame.left_out_weight),
