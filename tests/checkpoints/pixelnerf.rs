@@ -1,10 +1,12 @@
 //! PixelNeRF's family of networks: what its metadata say.
 
 use std::collections::BTreeMap;
-use viewfuse::field::pixelnerf::{Architecture, test_networks};
+use std::path::Path;
+use viewfuse::field::pixelnerf::Architecture;
 use viewfuse::job::progress::Silent;
 use viewfuse::nn::checkpoint::{Checkpoint, Precision};
 use viewfuse::nn::initialisation;
+use viewfuse_tests::places::repository;
 
 /// A small network with this in its metadata.
 fn saying(key: &str, value: &str) -> Result<Architecture, String> {
@@ -16,34 +18,70 @@ fn saying(key: &str, value: &str) -> Result<Architecture, String> {
     Architecture::of(&checkpoint).map_err(|error| error.to_string())
 }
 
+/// A small network in a file that says this of itself.
+fn written(folder: &Path, place: &str, metadata: &[(&str, &str)]) -> Checkpoint {
+    let mut checkpoint = Checkpoint::computed("it", Architecture::small(16).tensors(), BTreeMap::new(), |tensor| {
+        initialisation::tensor(&tensor.name, &tensor.shape)
+    });
+    metadata.iter().for_each(|(key, value)| checkpoint.set(key, value));
+    let path = folder.join(place);
+    std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+    // The content decides what kind of file it is, not the name.
+    checkpoint.write_safetensors(&path.with_extension("safetensors"), Precision::Kept, &Silent).expect("written");
+    std::fs::rename(path.with_extension("safetensors"), &path).expect("renamed");
+    Checkpoint::open(&path).expect("a checkpoint")
+}
+
 #[test]
 fn the_folder_of_the_authors_archive_says_what_tensors_do_not() {
     let folder = tempfile::tempdir().expect("a folder");
-    let small = test_networks::deterministic(&Architecture::small(16));
-    let opened = |place: &str| {
-        let path = folder.path().join(place);
-        std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
-        // The content decides what kind of file it is, not the name.
-        small.write_safetensors(&path.with_extension("safetensors"), Precision::Kept, &Silent).expect("written");
-        std::fs::rename(path.with_extension("safetensors"), &path).expect("renamed");
-        let checkpoint = Checkpoint::open(&path).expect("a checkpoint");
+    let opened = |place: &str, metadata: &[(&str, &str)]| {
+        let checkpoint = written(folder.path(), place, metadata);
         let architecture = Architecture::of(&checkpoint).expect("a PixelNeRF");
         // Kept by `convert`.
         let converted = folder.path().join("converted.safetensors");
         checkpoint.write_safetensors(&converted, Precision::Kept, &Silent).expect("written");
-        let again = Architecture::of(&Checkpoint::open(&converted).expect("a checkpoint")).expect("a PixelNeRF");
-        assert_eq!(again, architecture, "{place}");
-        (architecture.has_pool, architecture.source_side)
+        let again = Checkpoint::open(&converted).expect("a checkpoint");
+        assert_eq!(Architecture::of(&again).expect("a PixelNeRF"), architecture, "{place}");
+        let is_assumed = [&checkpoint, &again].map(|checkpoint| Architecture::assumption(checkpoint).is_some());
+        (architecture.has_pool, architecture.source_side, is_assumed)
     };
     for place in ["sn64/pixel_nerf_latest", "sn64_unseen/pixel_nerf_latest", "sn64/pixel_nerf_backup"] {
-        assert_eq!(opened(place), (false, 64), "{place}");
+        assert_eq!(opened(place, &[]), (false, 64, [false; 2]), "{place}");
     }
-    for place in ["srn_car/pixel_nerf_latest", "sn64/other", "dtu/pixel_nerf_latest"] {
-        assert_eq!(opened(place), (true, 128), "{place}");
+    for place in ["srn_car/pixel_nerf_latest", "srn_chair/pixel_nerf_backup", "dtu/pixel_nerf_latest"] {
+        assert_eq!(opened(place, &[]), (true, 128, [false; 2]), "{place}");
     }
-    assert_eq!(saying("viewfuse.first_pool", "0").map(|architecture| architecture.has_pool), Ok(false));
+    // What a file says of itself goes before what its folder is called.
+    for place in ["sn64/pixel_nerf_latest", "anywhere/network.pth"] {
+        assert!(opened(place, &[("viewfuse.first_pool", "1")]).0, "{place}");
+        assert!(!opened(place, &[("viewfuse.first_pool", "0")]).0, "{place}");
+    }
     let said = saying("viewfuse.first_pool", "2").expect_err("neither");
     assert!(said.contains("viewfuse.first_pool = 2, which is neither 0 nor 1"), "{said}");
+}
+
+#[test]
+fn what_is_assumed_of_a_network_that_nothing_is_known_of_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let assumed =
+        |place: &str, metadata: &[(&str, &str)]| Architecture::assumption(&written(folder.path(), place, metadata));
+    for place in ["sn64/other", "other/pixel_nerf_latest", "network.pth"] {
+        let said = assumed(place, &[]).expect(place);
+        let path = folder.path().join(place).display().to_string();
+        for part in [&path, "a max pool in the trunk, sources of 128 pixels", "EXPERIMENT/pixel_nerf_latest"] {
+            assert!(said.contains(part), "{said}");
+        }
+    }
+    let said = assumed("network.pth", &[("viewfuse.source_side", "64")]).expect("the pool is not known");
+    assert!(said.contains("sources of 64 pixels"), "{said}");
+    for key in ["viewfuse.first_pool", "viewfuse.pixel_centre"] {
+        assert_eq!(assumed("network.pth", &[(key, "0")]), None, "{key}");
+    }
+    let included = |name: &str| Checkpoint::open(&repository().join("host/models").join(name)).expect(name);
+    for name in ["pixelnerf_cars.safetensors", "genvs_cars.safetensors"] {
+        assert_eq!(Architecture::assumption(&included(name)), None, "{name}");
+    }
 }
 
 #[test]

@@ -1,13 +1,22 @@
 //! `viewfuse convert`: what it prints, and what it refuses.
 
 use super::{BINARY, done};
+use std::collections::BTreeMap;
 use std::path::Path;
-use viewfuse::nn::checkpoint::Checkpoint;
-use viewfuse_tests::command::{assert_refused, files_below};
+use viewfuse::field::pixelnerf::test_networks::deterministic_of_width as formula_of_width;
+use viewfuse::job::progress::Silent;
+use viewfuse::nn::checkpoint::{Checkpoint, Precision, TensorShape};
+use viewfuse_tests::command::{self, Outcome, assert_refused, assert_wrong_arguments, files_below, toy};
 use viewfuse_tests::places::{data, repository};
 use viewfuse_tests::scenes::Folder;
 
-viewfuse_tests::trials![a_training_checkpoint, in_half_precision, refusals, learned_attention_becomes_a_header,];
+viewfuse_tests::trials![
+    a_training_checkpoint,
+    in_half_precision,
+    refusals,
+    an_unknown_max_pool_is_told,
+    learned_attention_becomes_a_header,
+];
 
 /// A folder with a training checkpoint that PyTorch wrote.
 fn training() -> Folder {
@@ -56,6 +65,47 @@ fn refusals() {
     refused("convert page.pth out.safetensors", &["page.pth: not a checkpoint: a web page"]);
     std::fs::remove_file(folder.path().join("page.pth")).expect("removed");
     assert_eq!(files_below(folder.path()), before, "nothing is left behind");
+}
+
+/// Every command that loads a PixelNeRF of which nobody says whether it has a max pool says what is assumed; once
+/// `--set` has said it, none does.
+fn an_unknown_max_pool_is_told() {
+    let folder = toy();
+    let path = folder.path();
+    let deterministic = formula_of_width(Some(8));
+    let tensors =
+        deterministic.shapes().iter().map(|(name, shape)| TensorShape { name: name.clone(), shape: shape.clone() });
+    let value = |tensor: TensorShape| {
+        let values = deterministic.tensor(&tensor.name).expect("a tensor");
+        (tensor, values)
+    };
+    let silent = Checkpoint::in_memory("it", tensors.map(value), BTreeMap::new());
+    silent.write_safetensors(&path.join("a.safetensors"), Precision::Kept, &Silent).expect("written");
+    let run = |model: &str| {
+        let small = format!("--size 16x16 --device cpu --model {model}");
+        [
+            format!("render toy --targets 20 --sources 0,1 {small} -o {model}.out"),
+            format!("evaluate toy --targets 20 --sources 0,1 {small} --weights mean"),
+            format!("pareto toy --targets 20 --views 2 --repeat 1 {small} -o {model}.sweep"),
+            format!("convert {model} again-{model}"),
+        ]
+    };
+    for arguments in run("a.safetensors") {
+        let Outcome { code, stderr, .. } = command::run(BINARY, path, &arguments);
+        let is_told =
+            stderr.matches("viewfuse: warning: a.safetensors: what its tensors do not tell is assumed").count();
+        assert_eq!((code, is_told), (Some(0), 1), "{arguments}\n{stderr}");
+    }
+    let printed = words(path, "convert a.safetensors b.safetensors --set viewfuse.first_pool=0");
+    assert!(printed.contains("kept viewfuse.first_pool = 0"), "{printed}");
+    for arguments in run("b.safetensors") {
+        let Outcome { code, stderr, .. } = command::run(BINARY, path, &arguments);
+        assert_eq!((code, stderr.contains("do not tell")), (Some(0), false), "{arguments}\n{stderr}");
+    }
+    for value in ["viewfuse.first_pool", "=0", "viewfuse.first_pool="] {
+        let arguments = format!("convert a.safetensors c.safetensors --set {value}");
+        assert_wrong_arguments(BINARY, path, &arguments, &["--set", "for example viewfuse.first_pool=0"]);
+    }
 }
 
 fn learned_attention_becomes_a_header() {

@@ -54,6 +54,8 @@ pub struct PixelNerf {
     architecture: Architecture,
     parameters: Arc<HostParameters>,
     options: PixelNerfOptions,
+    /// What is assumed of it ([`Architecture::assumption`]).
+    assumption: Option<String>,
 }
 
 /// Photographs and parameters on a device, with the latents of the views that are encoded.
@@ -96,12 +98,18 @@ impl PixelNerf {
     pub fn new(checkpoint: &Checkpoint, options: PixelNerfOptions) -> Result<PixelNerf, CheckpointError> {
         let architecture = Architecture::of(checkpoint)?;
         let parameters = Arc::new(HostParameters::read(checkpoint, &architecture)?);
-        Ok(PixelNerf { architecture, parameters, options: options.checked() })
+        let assumption = Architecture::assumption(checkpoint);
+        Ok(PixelNerf { architecture, parameters, options: options.checked(), assumption })
     }
 
     /// Its sizes.
     pub fn architecture(&self) -> &Architecture {
         &self.architecture
+    }
+
+    /// What is assumed of it, as a warning ([`Architecture::assumption`]).
+    pub fn assumption(&self) -> Option<&str> {
+        self.assumption.as_deref()
     }
 
     /// Its settings.
@@ -111,9 +119,9 @@ impl PixelNerf {
 
     /// The same network with other settings. The parameters are shared.
     pub fn with_options(&self, options: PixelNerfOptions) -> PixelNerf {
-        let PixelNerf { architecture, parameters, .. } = self;
+        let PixelNerf { architecture, parameters, assumption, .. } = self;
         let (architecture, parameters) = (architecture.clone(), Arc::clone(parameters));
-        PixelNerf { architecture, parameters, options: options.checked() }
+        PixelNerf { architecture, parameters, options: options.checked(), assumption: assumption.clone() }
     }
 
     /// The most bytes that a run from sources of these widths and heights takes, beside photographs and pictures.
@@ -157,6 +165,7 @@ impl Field for PixelNerf {
         progress: &dyn Progress,
     ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
         let views = self.views(device, sources)?;
+        self.assumption.iter().for_each(|assumption| progress.warn(assumption));
         warn_of_unit(views.unit, sources, progress);
         Ok(Box::new(views))
     }

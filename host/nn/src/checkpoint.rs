@@ -115,7 +115,9 @@ impl Checkpoint {
                     (places, found.settings)
                 }
             };
-            metadata.extend(published::metadata(path));
+            for (key, value) in published::metadata(path) {
+                metadata.entry(key).or_insert(value);
+            }
             let total = places.values().map(|place| 4 * u128::from(place.count())).sum();
             if total > MAX_TOTAL_BYTES.into() {
                 return Err(Problem::TooLarge {
@@ -187,6 +189,11 @@ impl Checkpoint {
     /// PyTorch's files.
     pub fn metadata(&self) -> &BTreeMap<String, String> {
         &self.metadata
+    }
+
+    /// Adds to its metadata what the file does not say, or says otherwise.
+    pub fn set(&mut self, key: &str, value: &str) {
+        self.metadata.insert(key.to_owned(), value.to_owned());
     }
 
     /// Memory for reading and keeping these tensors, in bytes: 4 for every element, and the buffers for reading the

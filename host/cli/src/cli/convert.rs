@@ -7,7 +7,9 @@ use anyhow::{bail, ensure};
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use viewfuse_field::pixelnerf::Architecture;
 use viewfuse_job::files::{check_writable, write_whole};
+use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::{Checkpoint, Precision};
 use viewfuse_weighting::attention::quantised::{quantised, rust_source};
 use viewfuse_weighting::attention::{AttentionModel, c_header};
@@ -28,6 +30,17 @@ pub(crate) struct Arguments {
     /// Round floating point numbers to half precision (f16)
     #[arg(long)]
     half: bool,
+    /// Say in the output's metadata what the checkpoint does not say of itself; of a PixelNeRF viewfuse.first_pool,
+    /// whether its trunk has a max pool (0 or 1), and viewfuse.source_side, the longest side of its sources in pixels
+    #[arg(long, value_name = "KEY=VALUE", value_parser = setting)]
+    set: Vec<(String, String)>,
+}
+
+/// A value of `--set`.
+fn setting(text: &str) -> Result<(String, String), String> {
+    let parts = text.split_once('=').filter(|(key, value)| !key.is_empty() && !value.is_empty());
+    let (key, value) = parts.ok_or("a key and a value, for example viewfuse.first_pool=0")?;
+    Ok((key.to_owned(), value.to_owned()))
 }
 
 /// Learned attention for firmware: for the C face, or in Rust with 8 bits a weight.
@@ -70,9 +83,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         output.display()
     );
     check_writable(output)?;
-    let checkpoint = Checkpoint::open(&arguments.input)?;
+    let mut checkpoint = Checkpoint::open(&arguments.input)?;
+    arguments.set.iter().for_each(|(key, value)| checkpoint.set(key, value));
+    let progress = Terminal::new("converting");
+    Architecture::assumption(&checkpoint).iter().for_each(|assumption| progress.warn(assumption));
     let precision = if arguments.half { Precision::Half } else { Precision::Kept };
-    let written = checkpoint.write_safetensors(output, precision, &Terminal::new("converting"))?;
+    let written = checkpoint.write_safetensors(output, precision, &progress)?;
+    drop(progress);
     let mut rows = table(["tensor", "type", "shape", "bytes"].map(str::to_owned));
     for (name, element, shape, bytes) in &written.tensors {
         rows.add_row([name.clone(), element.name().to_owned(), format!("{shape:?}"), bytes.to_string()]);

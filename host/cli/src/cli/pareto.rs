@@ -5,7 +5,7 @@ use super::model::NetworkOptions;
 use super::options::{PictureOptions, SourceOptions};
 use super::outputs::keep_folder_apart;
 use super::parse::parse_seconds;
-use super::printing::{say, warn_of};
+use super::printing::{complain, say, warn_of};
 use super::table::table;
 use super::terminal::Terminal;
 use super::threads::on_threads;
@@ -17,6 +17,7 @@ use viewfuse_device::choice::{AnyDevice, DeviceChoice, Several, open_several};
 use viewfuse_evaluate::pareto::front::{MAX_LOSS, SAME_LOOK};
 use viewfuse_evaluate::pareto::record::{DeviceRecord, DifferenceRecord, ParetoRecord, PointRecord, csv_of};
 use viewfuse_evaluate::pareto::{Measured, Subject, plot, settings};
+use viewfuse_field::pixelnerf::PixelNerf;
 use viewfuse_field::render::RenderOptions;
 use viewfuse_field::row::Drawn;
 use viewfuse_field::variant::EXACT;
@@ -90,6 +91,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let scene = arguments.picture.masks.open(&arguments.scene)?;
     warn_of(&scene);
     let field = arguments.network.open(arguments.seed)?;
+    // Its variants are measured without their warnings.
+    let network = field.downcast_ref::<PixelNerf>().and_then(PixelNerf::assumption);
+    network.iter().for_each(|assumption| complain(format_args!("warning: {assumption}")));
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);
     let job = selection.resolve(&scene, field.about().least_sources)?;
     let options = arguments.picture.to_render_options(false, &field.about())?;

@@ -47,6 +47,11 @@ const SOURCE_SIDE: u32 = 128;
 /// The largest side that a checkpoint may tell.
 const MAX_SIDE: f32 = 65536.0;
 
+/// Keys of the metadata.
+const FIRST_POOL: &str = "viewfuse.first_pool";
+const PIXEL_CENTRE: &str = "viewfuse.pixel_centre";
+const SIDE: &str = "viewfuse.source_side";
+
 /// The two point networks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pass {
@@ -181,11 +186,29 @@ impl Architecture {
             frequency: frequency(&sizes, (embedded_len - 6) / 6)?,
             has_fine: checkpoint.shapes().keys().any(|name| name.starts_with("mlp_fine.")),
             has_pool: has_pool(&sizes)?,
-            pixel_centre: sizes.number("viewfuse.pixel_centre", 0.0)?,
+            pixel_centre: sizes.number(PIXEL_CENTRE, 0.0)?,
             source_side: source_side(&sizes)?,
         };
         checkpoint.check(&architecture.tensors(), |name| architecture.is_optional(name))?;
         Ok(architecture)
+    }
+
+    /// What is assumed of a network whose tensors and metadata leave open whether there is a max pool, as a warning.
+    /// `None` for a network that says it, and for one of another family.
+    pub fn assumption(checkpoint: &Checkpoint) -> Option<String> {
+        let is_of_family = checkpoint.shapes().contains_key("encoder.model.conv1.weight");
+        // The laboratory's networks, all with a pool, told where a pixel's centre is before they told this.
+        let says = [FIRST_POOL, PIXEL_CENTRE].iter().any(|key| checkpoint.metadata().contains_key(*key));
+        let side = checkpoint.metadata().get(SIDE).cloned().unwrap_or_else(|| SOURCE_SIDE.to_string());
+        (is_of_family && !says).then(|| {
+            format!(
+                "{}: what its tensors do not tell is assumed to be as in the authors' srn_car: a max pool in the trunk, \
+                 sources of {side} pixels (their sn64 has no pool, and 64 pixels); keep the file as \
+                 EXPERIMENT/pixel_nerf_latest, as their archive has it, or have `viewfuse convert` write {FIRST_POOL} \
+                 and {SIDE} into it",
+                checkpoint.path().display()
+            )
+        })
     }
 
     /// All required tensors, in the order of the data.
@@ -234,9 +257,9 @@ impl Architecture {
         let number = |key: &str, value: f32| (key.to_owned(), value.to_string());
         BTreeMap::from([
             number("viewfuse.frequency", self.frequency),
-            number("viewfuse.first_pool", if self.has_pool { 1.0 } else { 0.0 }),
-            number("viewfuse.pixel_centre", self.pixel_centre),
-            number("viewfuse.source_side", self.source_side as f32),
+            number(FIRST_POOL, if self.has_pool { 1.0 } else { 0.0 }),
+            number(PIXEL_CENTRE, self.pixel_centre),
+            number(SIDE, self.source_side as f32),
         ])
     }
 
@@ -253,11 +276,10 @@ fn linear(tensors: &mut Vec<TensorShape>, name: &str, out_count: usize, in_count
 
 /// The longest side of source photographs, from the metadata.
 fn source_side(sizes: &Sizes<'_>) -> Result<u32, CheckpointError> {
-    const KEY: &str = "viewfuse.source_side";
-    let side = sizes.number(KEY, SOURCE_SIDE as f32)?;
+    let side = sizes.number(SIDE, SOURCE_SIDE as f32)?;
     if !(1.0..=MAX_SIDE).contains(&side) || side.fract() != 0.0 {
         return Err(
-            sizes.refuse(format!("its metadata says {KEY} = {side}, which is not a whole number from 1 to 65536"))
+            sizes.refuse(format!("its metadata says {SIDE} = {side}, which is not a whole number from 1 to 65536"))
         );
     }
     Ok(side as u32)
@@ -265,11 +287,10 @@ fn source_side(sizes: &Sizes<'_>) -> Result<u32, CheckpointError> {
 
 /// Whether there is a max pool, from the metadata.
 fn has_pool(sizes: &Sizes<'_>) -> Result<bool, CheckpointError> {
-    const KEY: &str = "viewfuse.first_pool";
-    match sizes.number(KEY, 1.0)? {
+    match sizes.number(FIRST_POOL, 1.0)? {
         0.0 => Ok(false),
         1.0 => Ok(true),
-        other => Err(sizes.refuse(format!("its metadata says {KEY} = {other}, which is neither 0 nor 1"))),
+        other => Err(sizes.refuse(format!("its metadata says {FIRST_POOL} = {other}, which is neither 0 nor 1"))),
     }
 }
 

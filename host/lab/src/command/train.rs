@@ -10,7 +10,9 @@ use std::process::ExitCode;
 use viewfuse_cli::shared::{Terminal, keep_input, on_threads, say};
 use viewfuse_core::weighting::Scheme;
 use viewfuse_field::genvs::Estimate;
+use viewfuse_field::pixelnerf;
 use viewfuse_job::files::check_writable;
+use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::Checkpoint;
 use viewfuse_scene::dataset::{Dataset, Split};
 use viewfuse_weighting::{WeightingError, WeightingSpec};
@@ -305,7 +307,7 @@ fn pixelnerf(arguments: &PixelNerfArguments) -> anyhow::Result<ExitCode> {
     let settings = PixelNerfSettings { width, levels, side, objects, rays, coarse, fine, augmentation };
     let [train, validation] = scenes(run, from.as_deref())?;
     let progress = Terminal::new("reading the scenes");
-    let from = from.as_deref().map(Checkpoint::open).transpose()?;
+    let from = from.as_deref().map(|path| network(path, &progress)).transpose()?;
     let train_it =
         || train_pixelnerf(&settings, from.as_ref(), &run.schedule(), [&train, &validation], &run.output, &progress);
     let outcome = on_threads(run.threads, train_it)??;
@@ -334,7 +336,7 @@ fn genvs(arguments: &GenvsArguments) -> anyhow::Result<ExitCode> {
     };
     let [train, validation] = scenes(run, from.as_deref())?;
     let progress = Terminal::new("reading the scenes");
-    let from = from.as_deref().map(Checkpoint::open).transpose()?;
+    let from = from.as_deref().map(|path| network(path, &progress)).transpose()?;
     let train_it =
         || train_genvs(&settings, from.as_ref(), &run.schedule(), [&train, &validation], &run.output, &progress);
     let outcome = on_threads(run.threads, train_it)??;
@@ -350,13 +352,20 @@ fn weighting(arguments: &WeightingArguments) -> anyhow::Result<ExitCode> {
     };
     let settings = WeightingSettings { embedding, side: *side, objects: *objects, rays: *rays };
     let [train, validation] = scenes(run, Some(model))?;
-    let checkpoint = Checkpoint::open(model)?;
     let progress = Terminal::new("reading the scenes");
+    let checkpoint = network(model, &progress)?;
     let (schedule, scenes) = (run.schedule(), [&train[..], &validation[..]]);
     let train_it = || train_weighting(&settings, &checkpoint, &schedule, scenes, &run.output, &progress);
     let outcome = on_threads(run.threads, train_it)??;
     drop(progress);
     report(&outcome)
+}
+
+/// Opens a network, and says what is assumed of it.
+fn network(path: &Path, progress: &Terminal) -> anyhow::Result<Checkpoint> {
+    let checkpoint = Checkpoint::open(path)?;
+    pixelnerf::Architecture::assumption(&checkpoint).iter().for_each(|assumption| progress.warn(assumption));
+    Ok(checkpoint)
 }
 
 /// Training and validation scenes, once the folder of the run is known to be one that can be written and is none of the
