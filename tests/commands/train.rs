@@ -5,7 +5,11 @@ use super::{done, lab};
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
-use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, interrupt, killed_when, names_in, start};
+use std::process::Stdio;
+use viewfuse_tests::command::{
+    assert_refused, assert_wrong_arguments, command, interrupt, killed_when, names_in, start,
+};
+use viewfuse_tests::patience;
 use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![
@@ -17,6 +21,7 @@ viewfuse_tests::trials![
     numbers_without_sense_are_refused,
     a_damaged_state_is_refused_and_an_empty_one_is_none,
     a_loss_is_shown_once_there_is_one,
+    curves_are_there_while_it_runs,
     more_steps_go_on_from_fewer,
 ];
 
@@ -46,7 +51,10 @@ fn a_killed_run_goes_on_and_ends_in_the_same_numbers() {
     let path = folder.path();
     let said = done(path, &format!("{PIXELNERF} -o whole"));
     assert!(said.contains("30 steps in") && said.ends_with("whole/model.safetensors\n"), "{said}");
-    assert_eq!(names_in(&path.join("whole")), ["curve.svg", "model.safetensors", "record.json", "state.safetensors"]);
+    assert_eq!(
+        names_in(&path.join("whole")),
+        ["curve.csv", "curve.svg", "model.safetensors", "record.json", "state.safetensors",]
+    );
     let record: serde_json::Value = serde_json::from_slice(&bytes(path, "whole/record.json")).expect("a record");
     assert_eq!((&record["steps"], record["scores"].as_array().map(Vec::len)), (&30.into(), Some(3)));
     assert!(String::from_utf8_lossy(&bytes(path, "whole/curve.svg")).starts_with("<svg"));
@@ -265,6 +273,50 @@ fn a_loss_is_shown_once_there_is_one() {
     let run = PIXELNERF.replace("--validate-every 10", "--validate-every 1").replace("--steps 30", "--steps 2");
     let said = done(folder.path(), &format!("{run} -o run"));
     assert!(said.contains("step 1: loss 0.") && !said.contains("NaN"), "{said}");
+}
+
+/// A long run tells how far it is: on the terminal, in its folder before its state is written for the first time, and
+/// on a report's page.
+fn curves_are_there_while_it_runs() {
+    let folder = scenes();
+    let path = folder.path();
+    let long = PIXELNERF.replace("--steps 30", "--steps 100000").replace("--write-every 0", "--write-every 1000");
+    let mut run = command(lab(), path, &format!("{long} -o run"));
+    let run = run.env("VIEWFUSE_PROGRESS", "0").stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut child = run.spawn().expect("the command starts");
+    let curve = || fs::read_to_string(path.join("run/curve.csv")).unwrap_or_default();
+    patience::wait_while_running(&mut child, || curve().lines().count() > 2);
+    done(path, "report --training run -o page.html");
+    assert!(!path.join("run/state.safetensors").exists());
+    child.kill().expect("a process to kill");
+    let said = String::from_utf8(child.wait_with_output().expect("a dead process").stderr).expect("text");
+    let live = said.lines().filter(|line| line.contains(" %, training: step "));
+    let live: Vec<&str> = live.collect();
+    assert!(live.iter().any(|line| line.contains(" step 9, loss 0.") && !line.contains("PSNR")), "{said}");
+    assert!(live.iter().any(|line| line.contains(" step 19, loss 0.") && line.contains(", PSNR dB ")), "{said}");
+    let page = fs::read_to_string(path.join("page.html")).expect("a page");
+    assert!(page.contains("<strong>Not finished: </strong>") && page.contains(" of 100000 steps"), "{page:.300}");
+    assert!(page.contains("data:image/svg+xml;base64,"));
+
+    // The table has the points of the record.
+    done(path, &format!("{} -o whole", PIXELNERF.replace("--steps 30", "--steps 70")));
+    let record: serde_json::Value = serde_json::from_slice(&bytes(path, "whole/record.json")).expect("a record");
+    let table = fs::read_to_string(path.join("whole/curve.csv")).expect("a table");
+    let cells: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(cells[0], ["step", "loss", "PSNR dB"]);
+    for (column, key, count) in [(1, "losses", 1), (2, "scores", 7)] {
+        let there = cells.iter().skip(1).filter(|cells| !cells[column].is_empty());
+        let points: Vec<serde_json::Value> =
+            there.map(|cells| serde_json::json!([number(cells[0]) as u32, number(cells[column])])).collect();
+        assert_eq!(points.len(), count, "{table}");
+        assert_eq!(serde_json::Value::from(points), record[key], "{table}");
+    }
+    done(path, "report --training whole -o page.html");
+    assert!(!fs::read_to_string(path.join("page.html")).expect("a page").contains("Not finished"));
+}
+
+fn number(text: &str) -> f64 {
+    text.parse().unwrap_or_else(|_| panic!("{text:?} is no number"))
 }
 
 fn more_steps_go_on_from_fewer() {

@@ -21,6 +21,9 @@ pub trait Progress: Sync {
     /// A piece is done.
     fn step(&self) {}
 
+    /// What the stage has come to: a score, for example. It is shown behind the stage's name until the next stage.
+    fn status(&self, _words: &str) {}
+
     /// A warning that concerns the result; the same warning may come several times.
     fn warn(&self, _warning: &str) {}
 
@@ -87,6 +90,10 @@ impl Progress for Part<'_> {
 
     fn step(&self) {
         self.whole.step();
+    }
+
+    fn status(&self, words: &str) {
+        self.whole.status(words);
     }
 
     fn warn(&self, warning: &str) {

@@ -105,6 +105,11 @@ impl Progress for Terminal {
         self.display.change(Course::step);
     }
 
+    /// It is shown with the next step.
+    fn status(&self, words: &str) {
+        self.display.tell(words);
+    }
+
     /// Shows each warning once.
     fn warn(&self, warning: &str) {
         let Ok(mut told) = self.told.lock() else { return };

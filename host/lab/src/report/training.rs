@@ -43,11 +43,19 @@ impl Training {
         format!("Training{name}")
     }
 
+    /// How far a run is that has not come to its end.
+    fn unfinished(&self) -> Option<String> {
+        let steps = |key: &str| self.record.as_ref()?.get(key)?.as_u64();
+        let (done, planned) = (steps("steps")?, steps("steps_planned")?);
+        (done < planned).then(|| format!("{done} of {planned} steps"))
+    }
+
     pub(super) fn section(&self, id: &str) -> Markup {
         let rows = self.record.iter().flat_map(|record| flat("", record)).collect::<Vec<_>>();
         html! {
             section id=(id) {
                 h2 { (self.title()) }
+                @if let Some(done) = self.unfinished() { p.warning { strong { "Not finished: " } (done) } }
                 @if let Some(curve) = &self.curve {
                     figure.wide { div.scroll {
                         img.paper src=(data_address("image/svg+xml", curve)) alt="loss and validation over the steps";

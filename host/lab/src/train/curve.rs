@@ -1,7 +1,9 @@
-//! The curves of a run as a picture (SVG): loss on a logarithmic axis on the left, score in validation on the right.
+//! The curves of a run as a picture (SVG), loss on a logarithmic axis on the left, score in validation on the right;
+//! and as numbers (CSV).
 
 use super::state::Progressed;
 use plotters::prelude::*;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 const SIZE: (u32, u32) = (900, 480);
@@ -10,6 +12,19 @@ const SCORE: RGBColor = RGBColor(213, 94, 0);
 /// Scores beyond this are drawn as this.
 const MAX_SCORE: f64 = 1.0e6;
 const FONT: &str = "sans-serif";
+
+/// The curves as a table: the step, the mean loss since the point before, the score. Each line has a loss, a score or
+/// both.
+pub(crate) fn csv(so_far: &Progressed, score_name: &str) -> String {
+    let mut lines: BTreeMap<u32, [String; 2]> = BTreeMap::new();
+    for (column, points) in [&so_far.losses, &so_far.scores].into_iter().enumerate() {
+        for (step, value) in points {
+            lines.entry(*step).or_default()[column] = value.to_string();
+        }
+    }
+    let line = |(step, [loss, score]): (u32, [String; 2])| format!("{step},{loss},{score}\n");
+    format!("step,loss,{score_name}\n{}", lines.into_iter().map(line).collect::<String>())
+}
 
 /// Draws the curves; a run without points has empty axes.
 pub(crate) fn svg(so_far: &Progressed, score_name: &str) -> String {

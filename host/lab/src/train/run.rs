@@ -3,8 +3,9 @@
 //! ```text
 //! state.safetensors   the state, for continuing
 //! model.safetensors   the trained parameters (their moving average), written with the state
-//! curve.svg           loss and validation over the steps
-//! record.json         settings, times, scores
+//! curve.svg           loss and validation over the steps; written with the record
+//! curve.csv           the same as numbers
+//! record.json         settings, times, scores; written at the start, after each validation and with the state
 //! ```
 
 use super::TrainError;
@@ -43,6 +44,7 @@ pub struct Schedule {
 
 /// Names of files in the folder of a run.
 const CURVE: &str = "curve.svg";
+const NUMBERS: &str = "curve.csv";
 const RECORD: &str = "record.json";
 
 /// Steps over which the rate rises.
@@ -145,7 +147,7 @@ pub(crate) fn run(
 ) -> Result<Outcome, TrainError> {
     schedule.check()?;
     let run = Run { learner, schedule, settings, score_name, folder };
-    for file in [run.state(), run.model(), folder.join(CURVE), folder.join(RECORD)] {
+    for file in [run.state(), run.model(), folder.join(CURVE), folder.join(NUMBERS), folder.join(RECORD)] {
         check_writable(&file)?;
     }
     let average = Average::new(learner.parameters(), AVERAGING)?;
@@ -157,6 +159,7 @@ pub(crate) fn run(
             schedule.steps
         ));
     }
+    run.tell(&so_far)?;
     progress.stage("training", 1..STAGES, STAGES);
     progress.expect(schedule.steps.saturating_sub(so_far.steps) as usize);
     let mut written = Instant::now();
@@ -185,8 +188,10 @@ pub(crate) fn run(
             let Validated { score, remark } = learned.as_written(|| learner.validate())?;
             so_far.scores.push((so_far.steps, score));
             progress.note(&run.status(&so_far, &remark));
+            run.tell(&so_far)?;
         }
         so_far.seconds += start.elapsed().as_secs_f64();
+        progress.status(&format!("step {}, {}", so_far.steps, run.values(&so_far)));
         progress.step();
         if written.elapsed().as_secs_f64() > schedule.write_every {
             run.write(&so_far, &learned)?;
@@ -215,18 +220,18 @@ impl Run<'_> {
     }
 
     fn status(&self, so_far: &Progressed, remark: &str) -> String {
-        let score = so_far.scores.last().map_or(f64::NAN, |(_, score)| *score);
+        let remark = if remark.is_empty() { String::new() } else { format!(", {remark}") };
+        format!("step {}: {}{remark}, {:.0} s", so_far.steps, self.values(so_far), so_far.seconds)
+    }
+
+    /// The last loss and the last score, as far as there are any.
+    fn values(&self, so_far: &Progressed) -> String {
         // The mean since the last point of the curve, or that point.
         let (sum, count) = so_far.pending;
         let pending = (count > 0).then(|| sum / f64::from(count));
-        let loss = so_far
-            .losses
-            .last()
-            .map(|(_, loss)| *loss)
-            .or(pending)
-            .map_or(String::new(), |loss| format!("loss {loss:.5}, "));
-        let remark = if remark.is_empty() { String::new() } else { format!(", {remark}") };
-        format!("step {}: {loss}{} {score:.3}{remark}, {:.0} s", so_far.steps, self.score_name, so_far.seconds)
+        let loss = so_far.losses.last().map(|(_, loss)| *loss).or(pending).map(|loss| format!("loss {loss:.5}"));
+        let score = so_far.scores.last().map(|(_, score)| format!("{} {score:.3}", self.score_name));
+        [loss, score].into_iter().flatten().collect::<Vec<_>>().join(", ")
     }
 
     /// The state is written last, so that all other files exist when a run continues from it.
@@ -237,7 +242,14 @@ impl Run<'_> {
             Precision::Kept,
             &Silent,
         )?;
+        self.tell(so_far)?;
+        state::write(&self.state(), self.settings, so_far, learned)
+    }
+
+    /// Writes the curves and the record.
+    fn tell(&self, so_far: &Progressed) -> Result<(), TrainError> {
         write_whole(&self.folder.join(CURVE), curve::svg(so_far, self.score_name).as_bytes())?;
+        write_whole(&self.folder.join(NUMBERS), curve::csv(so_far, self.score_name).as_bytes())?;
         let mut record = serde_json::json!({
             "program": concat!("viewfuse ", env!("CARGO_PKG_VERSION")),
             "settings": self.settings,
@@ -251,7 +263,6 @@ impl Run<'_> {
         if !so_far.extended.is_empty() {
             record["extended"] = serde_json::json!(so_far.extended);
         }
-        write_whole(&self.folder.join(RECORD), format!("{record:#}\n").as_bytes())?;
-        state::write(&self.state(), self.settings, so_far, learned)
+        Ok(write_whole(&self.folder.join(RECORD), format!("{record:#}\n").as_bytes())?)
     }
 }

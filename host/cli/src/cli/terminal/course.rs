@@ -24,6 +24,8 @@ const MAX_RISE: Duration = Duration::from_secs(1);
 /// The course of some work.
 pub(super) struct Course {
     stage: String,
+    /// The stage's name, and what it has come to.
+    said: String,
     /// The place of the stage in the whole work, as shares of it.
     place: Range<f64>,
     /// Pieces of the stage that are done, of those that are known.
@@ -50,6 +52,7 @@ impl Course {
     pub(super) fn new(stage: &str, start: Instant) -> Course {
         Course {
             stage: stage.to_owned(),
+            said: stage.to_owned(),
             place: 0.0..1.0,
             pieces: (0, 0),
             share: 0.0,
@@ -66,6 +69,7 @@ impl Course {
     /// As of `Progress::stage`.
     pub(super) fn begin(&mut self, stage: &str, place: Range<usize>, of: usize, now: Instant) {
         stage.clone_into(&mut self.stage);
+        stage.clone_into(&mut self.said);
         let share = |part: usize| if of == 0 { 0.0 } else { (part as f64 / of as f64).min(1.0) };
         (self.place, self.pieces) = (share(place.start)..share(place.end), (0, 0));
         // What the stage before did until its end is of its rate.
@@ -74,6 +78,11 @@ impl Course {
         self.earlier = self.rates.len();
         // Until it names pieces, it is one.
         self.estimate(self.place.end - self.place.start, now);
+    }
+
+    /// As of `Progress::status`.
+    pub(super) fn tell(&mut self, words: &str) {
+        self.said = format!("{}: {words}", self.stage);
     }
 
     pub(super) fn expect(&mut self, pieces: usize) {
@@ -128,19 +137,19 @@ impl Course {
     /// The stage, and the time that is left if it is not more than was told.
     pub(super) fn words(&mut self, now: Instant) -> String {
         let Some((left, since)) = self.left.filter(|_| self.share >= TELLING && self.share < 1.0) else {
-            return self.stage.clone();
+            return self.said.clone();
         };
         let (passed, expected) = (now.duration_since(since), left.saturating_sub(self.next));
         if now.duration_since(self.start) < MIN_PASSED || passed > expected + MAX_RISE {
-            return self.stage.clone();
+            return self.said.clone();
         }
         let left = left.saturating_sub(passed).max(self.next);
         if left > self.told.saturating_add(MAX_RISE) {
-            return self.stage.clone();
+            return self.said.clone();
         }
         let left = left.min(self.told);
         self.told = left;
-        format!("{}, about {} left", self.stage, time_words(left))
+        format!("{}, about {} left", self.said, time_words(left))
     }
 }
 

@@ -63,6 +63,13 @@ impl ProgressDisplay {
         self.aside(|| ());
     }
 
+    /// What the stage has come to, for when the course is shown next.
+    pub(super) fn tell(&self, words: &str) {
+        if let Ok(mut course) = self.course.lock() {
+            course.tell(words);
+        }
+    }
+
     /// Changes the course and shows it.
     pub(super) fn change(&self, change: impl FnOnce(&mut Course, Instant)) {
         if let Ok(mut course) = self.course.lock() {
