@@ -11,7 +11,7 @@ const MAX_FRAMES = 2000;
 
 let playing = 0;             // the animation frame that is due; 0 while nothing is played
 
-const frames = () => clamp(Math.round(Number(element('frames').value)) || 0, 2, MAX_FRAMES);
+export const frames = () => clamp(Math.round(Number(element('frames').value)) || 0, 2, MAX_FRAMES);
 
 function button(text, title, action) {
   const own = document.createElement('button');
@@ -36,7 +36,7 @@ function showKeyframes(go) {
     return item;
   }));
   const isPath = state.keyframes.length > 1;
-  for (const id of ['play', 'save-path']) element(id).disabled = !isPath;
+  for (const id of ['play', 'save-path', 'save-video']) element(id).disabled = !isPath;
   element('path-hint').hidden = isPath;
   tellPath();
 }

@@ -8,7 +8,7 @@
 //   rotations, path    the way between keyframes
 //   files, elsewhere, keyframes
 //                      what is saved and copied
-//   requests           what the program is asked
+//   requests, video    what the program is asked
 //   hand, work, view   what a person does, what the program does, and the beginning
 //
 // A module imports from those above it only.
@@ -25,6 +25,7 @@ import { chooseScheme, schemeText, showSchemes } from './schemes.js';
 import { showPhotographs, showSources } from './sources.js';
 import { element, state } from './state.js';
 import { clamp, length, sub } from './vectors.js';
+import { listenToVideo } from './video.js';
 import { watch } from './work.js';
 
 function schemeChanged() {
@@ -94,6 +95,7 @@ async function begin() {
   state.first = state.scene.chooses ? null : state.scene.scheme;
   listenToSettings();
   listenToKeyframes(goTo);
+  listenToVideo();
   changed();
   const photographs = setInterval(() => {
     if (state.shown === null) return;

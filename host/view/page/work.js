@@ -3,11 +3,12 @@
 import { changed, isWaiting } from './requests.js';
 import { showSchemes } from './schemes.js';
 import { element, state } from './state.js';
+import { isFilming, tellFrames } from './video.js';
 
 // While something is waited for, what the program does.
 export async function watch() {
   const isChoosing = state.scene !== null && state.scene.chooses && state.first === null;
-  if (isWaiting() || isChoosing) {
+  if (isWaiting() || isChoosing || isFilming()) {
     try {
       const status = await (await fetch('status')).json();
       tellWork(status);
@@ -16,7 +17,8 @@ export async function watch() {
   setTimeout(watch, 400);
 }
 
-function tellWork({ stage, done, pieces, warnings, chosen }) {
+function tellWork({ stage, done, pieces, warnings, chosen, video }) {
+  tellFrames(video);
   if (chosen !== null && state.scene !== null && state.first === null) tellChoice(chosen);
   const text = stage === '' ? '' : `${stage}${pieces > 0 ? `: ${Math.min(done, pieces)} of ${pieces}` : ''} …`;
   if (state.shown === null) element('waiting').textContent = text || 'Reading the scene';

@@ -110,6 +110,18 @@ impl<'a> Connection<'a> {
     }
 }
 
+/// Whether the client of a connection has closed it.
+pub(crate) fn is_gone(stream: &TcpStream) -> bool {
+    let is_there = || {
+        stream.set_read_timeout(Some(Duration::from_millis(1)))?;
+        stream.peek(&mut [0])
+    };
+    match is_there() {
+        Ok(count) => count == 0,
+        Err(error) => !matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted),
+    }
+}
+
 /// # Errors
 /// If it has come.
 fn time_until(deadline: Instant) -> io::Result<Duration> {

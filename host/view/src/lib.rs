@@ -8,10 +8,11 @@
 //! answer       a frame as the page gets it
 //! choice       the scheme that suits the scene, chosen beside the pictures
 //! status       what is being done
+//! response     answers of the server, with their headers
 //! mailbox      of each tab only the newest request waits
 //! pace         how coarse a picture has to be to come in time
+//! video        a video of a path, one at a time
 //! subject      what the page has to know of the scene
-//! response     answers of the server, with their headers
 //! coarse       a cheaper form of the field, and smaller sources
 //! render_loop  takes requests, renders, answers
 //! message      requests as HTTP writes them, within limits
@@ -39,6 +40,7 @@ mod response;
 mod server;
 mod status;
 mod subject;
+mod video;
 
 pub use request::COARSE_SIDE;
 pub use server::ListenError;
@@ -159,6 +161,7 @@ impl<'a> Viewer<'a> {
             let rendered = render_loop::run(self, &shared, progress);
             // Connections that wait for a picture get none.
             shared.mailbox.close();
+            shared.studio.close();
             is_over.store(true, Ordering::Relaxed);
             while !serving.is_finished() {
                 self.server.wake();

@@ -12,6 +12,10 @@ const MAX_HEADERS: usize = 64;
 /// Most bytes of a body: the page's own take at most half of it.
 pub(crate) const MAX_BODY: usize = 1024;
 
+/// The same of the path of a video, whose address ends so.
+const MAX_VIDEO_BODY: usize = 128 * 1024;
+const VIDEO: &str = "/video";
+
 /// A request whose head and body are there.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Message {
@@ -78,7 +82,8 @@ impl Message {
         }
         // What has too many digits for a number is too long, too.
         let length = written.parse().unwrap_or(usize::MAX);
-        if length > MAX_BODY { Err(Answer::error(413, "the request is too long")) } else { Ok(length) }
+        let most = if self.target.ends_with(VIDEO) { MAX_VIDEO_BODY } else { MAX_BODY };
+        if length > most { Err(Answer::error(413, "the request is too long")) } else { Ok(length) }
     }
 }
 

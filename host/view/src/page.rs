@@ -27,7 +27,7 @@ const fn shared(source: Script) -> PageFile {
 }
 
 /// All of them. Scripts are modules in the order of their imports.
-pub(crate) const FILES: [PageFile; 28] = [
+pub(crate) const FILES: [PageFile; 29] = [
     PageFile { name: "", media_type: "text/html; charset=utf-8", text: include_str!("../page/index.html") },
     style("base.css", BASE_STYLE),
     style("view.css", include_str!("../page/view.css")),
@@ -53,6 +53,7 @@ pub(crate) const FILES: [PageFile; 28] = [
     script("keyframes.js", include_str!("../page/keyframes.js")),
     script("answers.js", include_str!("../page/answers.js")),
     script("requests.js", include_str!("../page/requests.js")),
+    script("video.js", include_str!("../page/video.js")),
     script("hand.js", include_str!("../page/hand.js")),
     script("work.js", include_str!("../page/work.js")),
     script("view.js", include_str!("../page/view.js")),

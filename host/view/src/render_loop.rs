@@ -13,9 +13,10 @@ use crate::coarse;
 use crate::mailbox::{Mailbox, Queued};
 use crate::pace::{Pace, TIME_OF_A_PICTURE};
 use crate::record::PictureRecord;
-use crate::request::{COARSE_SIDE, Request};
+use crate::request::{COARSE_SIDE, Layer, Request};
 use crate::response::Answer;
 use crate::status::Status;
+use crate::video::{Order, Studio};
 use crate::{Viewed, Viewer};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, OnceLock};
@@ -37,13 +38,19 @@ const PATIENCE: Duration = Duration::from_millis(50);
 pub(crate) struct Shared {
     pub(crate) mailbox: Mailbox<Job>,
     pub(crate) status: Status,
+    pub(crate) studio: Studio,
     /// Pictures of the sources as JPEG, once they are read.
     pub(crate) thumbnails: OnceLock<Vec<Vec<u8>>>,
 }
 
 impl Shared {
     pub(crate) fn new() -> Shared {
-        Shared { mailbox: Mailbox::new(), status: Status::default(), thumbnails: OnceLock::new() }
+        Shared {
+            mailbox: Mailbox::new(),
+            status: Status::default(),
+            studio: Studio::default(),
+            thumbnails: OnceLock::new(),
+        }
     }
 }
 
@@ -165,6 +172,8 @@ struct RenderLoop<'a> {
     /// Time of the last full picture.
     full_time: Option<Duration>,
     choice: Choice,
+    /// The video that is made, and how many of its frames are there.
+    film: Option<(Order, usize)>,
 }
 
 /// Width and height of full pictures at a camera of a view.
@@ -220,6 +229,7 @@ pub(crate) fn run(viewer: &Viewer<'_>, shared: &Shared, outer: &dyn Progress) ->
             pace: Pace::of(about.is_live),
             full_time: None,
             choice: Choice::of(&viewer.viewed),
+            film: None,
         };
         if about.has_previews {
             shared.status.begin("preparing coarse pictures");
@@ -255,8 +265,10 @@ impl<'a> RenderLoop<'a> {
     fn serve(&mut self) -> Result<(), RenderError> {
         while !self.outer.is_cancelled() {
             self.shared.status.begin("");
-            let Some(job) = self.shared.mailbox.take(PATIENCE) else {
+            let films = self.film.is_some() || self.shared.studio.is_waiting();
+            let Some(job) = self.shared.mailbox.take(if films { Duration::ZERO } else { PATIENCE }) else {
                 self.choose()?;
+                self.film()?;
                 continue;
             };
             let request = &job.request;
@@ -309,6 +321,42 @@ impl<'a> RenderLoop<'a> {
             Ok(chosen) => {
                 self.shared.status.choose(chosen.weighting.to_string());
                 self.choice = Choice::Made(Box::new(chosen));
+            }
+        }
+        Ok(())
+    }
+
+    /// The next frame of a video, if one is wanted. Makes way for every request; then it is begun again later. A scheme
+    /// that is to be chosen for the scene is chosen first, so that all frames have the same.
+    fn film(&mut self) -> Result<(), RenderError> {
+        let Some((order, done)) = self.film.take().or_else(|| Some((self.shared.studio.take()?, 0))) else {
+            return Ok(());
+        };
+        let watch = Watch { shared: self.shared, outer: self.outer, makes_way: MakesWay::ToAll };
+        let request = Request {
+            tab: String::new(),
+            pose: order.poses[done],
+            weighting: order.weighting.clone(),
+            layer: Layer::None,
+            is_moving: false,
+            most_side: COARSE_SIDE,
+        };
+        let frame = match (&self.full, &self.choice) {
+            (None, _) => self.prepare(&watch).map(|()| None),
+            (_, Choice::Due) => Ok(None),
+            _ => self.full_frame(&request, &watch).map(Some),
+        };
+        match frame {
+            Ok(None) => self.film = Some((order, done)),
+            Err(error) if is_interruption(&error) => self.film = Some((order, done)),
+            Ok(Some(frame)) => {
+                // To nobody, if the client is gone: then the film ends.
+                let is_wanted = order.frames.send(Ok(frame.picture)).is_ok();
+                self.film = Some((order, done + 1)).filter(|(order, done)| is_wanted && *done < order.poses.len());
+            }
+            Err(error) => {
+                order.frames.send(Err(refusal(&error))).ok();
+                return if error.is_of_device() { Err(error) } else { Ok(()) };
             }
         }
         Ok(())

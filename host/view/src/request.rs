@@ -9,6 +9,9 @@ pub const COARSE_SIDE: u32 = 160;
 /// Longest side of pictures of a live field while the camera moves, in pixels.
 pub(crate) const LIVE_SIDE: u32 = 320;
 
+/// Most frames of a video: ten seconds.
+pub(crate) const MAX_FRAMES: usize = 240;
+
 /// Most characters of a tab's name.
 const LONGEST_TAB: usize = 40;
 
@@ -27,6 +30,9 @@ pub(crate) enum RequestError {
     /// The scheme would read a file that was not named when the program was started.
     #[error("the scheme '{0}' reads a file; only the scheme that the program was started with may")]
     File(String),
+    /// A video is too long, or too short.
+    #[error("a video has from 2 to {MAX_FRAMES} frames, not {0}")]
+    Frames(usize),
     /// The name of the tab is too long.
     #[error("the name of the tab has more than {LONGEST_TAB} characters")]
     Tab,
@@ -86,15 +92,7 @@ impl Request {
         if tab.len() > LONGEST_TAB {
             return Err(RequestError::Tab);
         }
-        let weighting = if scheme == first.to_string() {
-            first.clone()
-        } else {
-            let spec: WeightingSpec = scheme.parse()?;
-            if spec.file().is_some() {
-                return Err(RequestError::File(scheme));
-            }
-            spec.open().map_err(WeightingError::from)?
-        };
+        let weighting = weighting_of(scheme, first)?;
         Ok(Request {
             tab,
             pose: Pose::from_opencv(&pose).map_err(RequestError::Pose)?,
@@ -103,6 +101,48 @@ impl Request {
             is_moving: moving,
             most_side: side.unwrap_or(COARSE_SIDE).clamp(1, LIVE_SIDE),
         })
+    }
+}
+
+/// The weighting of this name. `first` is the one that the program was started with, which may be one of a file.
+fn weighting_of(scheme: String, first: &Weighting) -> Result<Weighting, RequestError> {
+    if scheme == first.to_string() {
+        return Ok(first.clone());
+    }
+    let spec: WeightingSpec = scheme.parse()?;
+    match spec.file() {
+        Some(_) => Err(RequestError::File(scheme)),
+        None => Ok(spec.open().map_err(WeightingError::from)?),
+    }
+}
+
+/// A request for a video, as the page writes it.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenPath {
+    /// World from camera, row-major, OpenCV axes: one a frame.
+    poses: Vec<[[f32; 4]; 4]>,
+    scheme: String,
+}
+
+/// A checked request for a video.
+#[derive(Clone, Debug)]
+pub(crate) struct VideoRequest {
+    /// The cameras, one a frame.
+    pub(crate) poses: Vec<Pose>,
+    /// The weighting.
+    pub(crate) weighting: Weighting,
+}
+
+impl VideoRequest {
+    /// Reads a request; `first` as of [`Request::read`].
+    pub(crate) fn read(text: &[u8], first: &Weighting) -> Result<VideoRequest, RequestError> {
+        let WrittenPath { poses, scheme } = serde_json::from_slice(text)?;
+        if !(2..=MAX_FRAMES).contains(&poses.len()) {
+            return Err(RequestError::Frames(poses.len()));
+        }
+        let poses = poses.iter().map(|pose| Pose::from_opencv(pose).map_err(RequestError::Pose));
+        Ok(VideoRequest { poses: poses.collect::<Result<_, _>>()?, weighting: weighting_of(scheme, first)? })
     }
 }
 

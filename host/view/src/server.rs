@@ -3,15 +3,16 @@
 //! It listens on the loopback interface only. Every address begins with a random token, which other programs and sites
 //! do not know. A request must name this server in `Host`, so that a site whose name was pointed at this machine (DNS
 //! rebinding) gets nothing even if it knew the token; and one that a browser says comes from another site is refused.
-//! Nothing is written: a request changes no file and no state that another tab can see.
+//! Nothing is written but the frames of a video, to a scratch folder: a request changes no file and no state that
+//! another tab can see.
 
 use crate::Viewer;
-use crate::connection::Connection;
+use crate::connection::{Connection, is_gone};
 use crate::connections::{Admission, Connections, Standing};
 use crate::message::Message;
 use crate::page::FILES;
 use crate::render_loop::{Job, Shared};
-use crate::request::Request;
+use crate::request::{Request, VideoRequest};
 use crate::response::Answer;
 use serde::Serialize;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
@@ -80,6 +81,7 @@ enum Route<'a> {
     Source(&'a str),
     Picture,
     Weights,
+    Video,
 }
 
 impl Server {
@@ -136,7 +138,7 @@ impl Server {
         loop {
             let (answer, is_head_only, is_last) = match connection.receive() {
                 Ok(message) => {
-                    let Some(answer) = self.answer(&message, admission, viewer, shared) else { return };
+                    let Some(answer) = self.answer(&message, stream, admission, viewer, shared) else { return };
                     (answer, message.method == "HEAD", message.is_last)
                 }
                 Err(Some(refused)) => {
@@ -158,6 +160,7 @@ impl Server {
     fn answer(
         &self,
         message: &Message,
+        stream: &TcpStream,
         admission: &Admission<'_>,
         viewer: &Viewer<'_>,
         shared: &Shared,
@@ -182,6 +185,18 @@ impl Server {
                 picture.map_or_else(not_found, |picture| Answer::of("image/jpeg", picture.clone()))
             }
             Route::Weights => read().map_or_else(|refused| refused, |request| weights(viewer, &request)),
+            Route::Video => match VideoRequest::read(&message.body, viewer.viewed.weighting) {
+                Err(error) => Answer::error(400, &error.to_string()),
+                Ok(request) => match shared.studio.begin(&shared.status) {
+                    None => Answer::error(409, "another video is being made: it ends first, or is cancelled"),
+                    Some(turn) => {
+                        admission.stands(Standing::Waits);
+                        let answer = turn.make(request, viewer.subject.video.format, &|| is_gone(stream))?;
+                        admission.stands(Standing::OfPage);
+                        answer
+                    }
+                },
+            },
             Route::Picture => match read() {
                 Err(refused) => refused,
                 Ok(request) => {
@@ -246,13 +261,14 @@ fn check<'a>(
         "status" => Route::Status,
         "picture" => Route::Picture,
         "weights" => Route::Weights,
+        "video" => Route::Video,
         rest => match rest.strip_prefix("source/") {
             Some(number) => Route::Source(number),
             None => Route::Page(FILES.iter().position(|file| file.name == rest).ok_or_else(not_found)?),
         },
     };
     let fits = match route {
-        Route::Picture | Route::Weights => method == "POST",
+        Route::Picture | Route::Weights | Route::Video => method == "POST",
         _ => matches!(method, "GET" | "HEAD"),
     };
     if fits { Ok(route) } else { Err(Answer::error(405, "this address does not take this method")) }
@@ -332,9 +348,14 @@ mod tests {
         ] {
             assert_eq!(get(url), 403, "{url}");
         }
-        for (rest, expected) in
-            [("view.js", 200), ("scene", 200), ("../Cargo.toml", 404), ("view.js?x", 404), ("picture", 405)]
-        {
+        for (rest, expected) in [
+            ("view.js", 200),
+            ("scene", 200),
+            ("../Cargo.toml", 404),
+            ("view.js?x", 404),
+            ("picture", 405),
+            ("video", 405),
+        ] {
             assert_eq!(get(&format!("/{TOKEN}/{rest}")), expected, "{rest}");
         }
         for method in ["PUT", "DELETE", "OPTIONS", "get"] {

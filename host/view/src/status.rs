@@ -20,6 +20,8 @@ struct StageStatus {
     warnings: Vec<String>,
     /// The scheme that was chosen for the scene, once it is.
     chosen: Option<String>,
+    /// Of a video that is made the frames that are there, and all.
+    video: Option<[usize; 2]>,
 }
 
 impl Status {
@@ -52,6 +54,11 @@ impl Status {
     /// The scheme for the scene is known.
     pub(crate) fn choose(&self, scheme: String) {
         self.shown().chosen = Some(scheme);
+    }
+
+    /// How far a video is; `None` once there is none.
+    pub(crate) fn film(&self, frames: Option<[usize; 2]>) {
+        self.shown().video = frames;
     }
 
     pub(crate) fn json(&self) -> Vec<u8> {

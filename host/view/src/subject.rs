@@ -2,6 +2,7 @@
 
 use crate::Viewed;
 use crate::pace::Pace;
+use crate::video::Videos;
 use serde::Serialize;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
@@ -48,6 +49,7 @@ pub(crate) struct Subject {
     /// Whether another one may be chosen for the scene.
     chooses: bool,
     commands: Commands,
+    pub(crate) video: Videos,
 }
 
 /// A camera.
@@ -132,6 +134,7 @@ impl Subject {
             scheme: weighting.to_string(),
             chooses,
             commands,
+            video: Videos::of_machine(),
         }
     }
 }

@@ -362,6 +362,17 @@ fn a_path_goes_through_keyframes(browser: &Browser) {
         "(() => { const own = document.getElementById('frames'); own.value = 3; \
          own.dispatchEvent(new Event('input', {bubbles: true})); })()",
     );
+    click("save-video");
+    let format = tab.text("shows.scene.video.format");
+    let film = chromium.folder().join(format!("saved/video.{format}"));
+    wait_until("no video is saved", || film.exists());
+    assert!(tab.text("document.getElementById('said').textContent").ends_with(": 3 frames."));
+    tab.wait_for("document.getElementById('save-video').textContent === 'Save video'");
+    if format == "webp" {
+        let bytes = fs::read(&film).expect("a video");
+        assert!(bytes.starts_with(b"RIFF") && bytes.windows(4).filter(|own| own == b"ANMF").count() == 3);
+    }
+    fs::remove_file(film).expect("a file");
     click("save-path");
     let saved = chromium.folder().join("saved/path.json");
     wait_until("no path is saved", || saved.exists() && names_in(saved.parent().expect("a folder")).len() == 1);

@@ -2,16 +2,22 @@
 
 use super::super::{BINARY, assert_near, numbers};
 use super::{done_with_warnings, room, start};
+use image::codecs::webp::WebPDecoder;
+use image::{AnimationDecoder, DynamicImage};
 use libtest_mimic::Trial;
 use serde_json::{Value, json};
+use std::fs::{self, Permissions};
+use std::io::Cursor;
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
 use std::time::Duration;
-use viewfuse_tests::command::{assert_refused, files_below, toy};
+use viewfuse_tests::command::{assert_refused, command, files_below, names_in, toy};
 use viewfuse_tests::devices::vulkan_devices;
 use viewfuse_tests::patience::wait_until;
 use viewfuse_tests::places::{data, repository};
 use viewfuse_tests::scenes::Folder;
 use viewfuse_tests::trials::{is_required, needing, trial};
-use viewfuse_tests::viewer::{Program, request};
+use viewfuse_tests::viewer::{Answer, Connection, Program, request};
 
 pub(super) fn trials() -> Vec<Trial> {
     let has_vulkan = vulkan_devices().is_ok_and(|(_, adapters)| adapters.iter().any(|own| own.missing.is_empty()));
@@ -25,6 +31,9 @@ pub(super) fn trials() -> Vec<Trial> {
         trial("commands::view::no_view_is_an_error_of_the_server", no_view_is_an_error_of_the_server),
         trial("commands::view::the_scheme_can_be_chosen_for_the_scene", the_scheme_can_be_chosen_for_the_scene),
         trial("commands::view::the_newest_request_wins", the_newest_request_wins),
+        trial("commands::view::a_video_has_the_pictures_of_its_path", a_video_has_the_pictures_of_its_path),
+        trial("commands::view::one_video_at_a_time_for_who_waits", one_video_at_a_time_for_who_waits),
+        trial("commands::view::a_video_is_mp4_where_ffmpeg_is", a_video_is_mp4_where_ffmpeg_is),
         trial("commands::view::ctrl_c_ends_it_and_nothing_is_written", ctrl_c_ends_it_and_nothing_is_written),
         trial("commands::view::a_taken_port_is_an_error", a_taken_port_is_an_error),
         trial("commands::view::learned_fields_are_shown", learned_fields_are_shown),
@@ -70,6 +79,125 @@ fn other_hosts_and_addresses_get_nothing() {
     // After all of that it goes on.
     let (answer, picture) = program.connect().picture(&request("a", start, false)).unpacked();
     assert_eq!((answer["full"].as_bool(), picture.dimensions()), (Some(true), (24, 24)));
+}
+
+/// The room in small pictures, of a program that finds no others but those in this folder.
+fn filming(programs: &Path) -> Program {
+    let arguments = format!(
+        "view {} --sources 003..007 --size 64x48 --weights mean --no-browser --device cpu",
+        data("room").display()
+    );
+    let mut viewer = command(BINARY, &repository(), &arguments);
+    viewer.env("PATH", programs).env("TMPDIR", programs);
+    Program::of(viewer)
+}
+
+/// A path along which a camera moves sideways.
+fn path(start: &Value, frames: usize) -> Value {
+    let pose = |frame: usize| {
+        let mut pose = start.clone();
+        pose[0][3] = (pose[0][3].as_f64().expect("a number") + 0.01 * frame as f64).into();
+        pose
+    };
+    json!({"poses": (0..frames).map(pose).collect::<Vec<_>>(), "scheme": "mean"})
+}
+
+fn send_video(connection: &mut Connection<'_>, program: &Program, path: &Value) {
+    let target = format!("{}video", program.path);
+    connection.send("POST", &target, &[("Host", &program.host)], path.to_string().as_bytes());
+}
+
+fn video(program: &Program, path: &Value) -> Answer {
+    let mut connection = program.connect();
+    send_video(&mut connection, program, path);
+    connection.receive()
+}
+
+fn a_video_has_the_pictures_of_its_path() {
+    let folder = Folder::new();
+    let program = filming(folder.path());
+    let scene = program.scene();
+    assert_eq!(scene["video"], json!({"format": "webp", "most_frames": 240}));
+    let film = path(&scene["start"], 3);
+    let answer = video(&program, &film);
+    assert!(answer.status == 200 && answer.head.contains("Content-Type: image/webp"), "{}", answer.head);
+    let decoder = WebPDecoder::new(Cursor::new(answer.body)).expect("a WebP");
+    let frames = decoder.into_frames().collect_frames().expect("frames");
+    assert_eq!(frames.len(), 3);
+    for (frame, pose) in frames.iter().zip(film["poses"].as_array().expect("poses")) {
+        let mut request = request("a", pose, false);
+        request["scheme"] = "mean".into();
+        let (_, picture) = program.connect().picture(&request).unpacked();
+        assert!(DynamicImage::from(frame.buffer().clone()).into_rgb8() == picture, "without loss");
+        // Rounded to whole milliseconds.
+        let (milliseconds, of) = frame.delay().numer_denom_ms();
+        assert!((41..=42).contains(&(milliseconds / of)), "{milliseconds} / {of}");
+    }
+    for (wrong, part) in [
+        (path(&scene["start"], 1), "from 2 to 240 frames, not 1"),
+        (path(&scene["start"], 241), "from 2 to 240 frames, not 241"),
+        (json!({"poses": film["poses"], "scheme": "attention:Cargo.toml"}), "reads a file"),
+        (json!({"poses": [[1]], "scheme": "mean"}), "cannot be read"),
+    ] {
+        let answer = video(&program, &wrong);
+        assert_eq!(answer.status, 400);
+        assert!(String::from_utf8_lossy(&answer.body).contains(part), "{}", String::from_utf8_lossy(&answer.body));
+    }
+    // Only a path is that long.
+    let long = film.to_string() + &" ".repeat(2000);
+    let target = format!("{}picture", program.path);
+    assert_eq!(program.connect().ask("POST", &target, &[("Host", &program.host)], long.as_bytes()).status, 413);
+    assert_eq!(names_in(folder.path()), [""; 0], "its scratch folder is gone");
+}
+
+fn one_video_at_a_time_for_who_waits() {
+    let folder = Folder::new();
+    let mut program = filming(folder.path());
+    let start = program.scene()["start"].clone();
+    let filmed = || program.get("status").json()["video"].clone();
+    let (short, long) = (path(&start, 2), path(&start, 240));
+    let mut waiting = program.connect();
+    send_video(&mut waiting, &program, &long);
+    wait_until("no frame is made", || filmed()[0].as_u64() >= Some(1));
+    let refused = video(&program, &short);
+    assert_eq!(refused.status, 409, "{}", String::from_utf8_lossy(&refused.body));
+    // Pictures are not kept from anybody meanwhile.
+    let (answer, _) = program.connect().picture(&request("a", &start, false)).unpacked();
+    assert_eq!(answer["full"].as_bool(), Some(true));
+    assert!(filmed()[1] == 240 && filmed()[0].as_u64() < Some(240), "{} was too soon", filmed());
+    // Who goes cancels it, and the next one may.
+    drop(waiting);
+    wait_until("nobody waits for it", || filmed().is_null());
+    assert_eq!(video(&program, &short).status, 200);
+    // The end of the program does not wait for it, and leaves nothing of it.
+    let mut waiting = program.connect();
+    send_video(&mut waiting, &program, &long);
+    wait_until("no frame is made", || filmed()[0].as_u64() >= Some(1));
+    drop(waiting);
+    assert_eq!(program.interrupt().0, Some(130));
+    assert_eq!(names_in(folder.path()), [""; 0]);
+}
+
+fn a_video_is_mp4_where_ffmpeg_is() {
+    let folder = Folder::new();
+    // What comes in is what goes out, to the last argument.
+    let script = "#!/bin/sh\n[ \"$1\" = -version ] && exit\nfor last; do :; done\nexec /bin/cat > \"$last\"\n";
+    folder.write("ffmpeg", script);
+    fs::set_permissions(folder.path().join("ffmpeg"), Permissions::from_mode(0o755)).expect("permissions");
+    let program = filming(folder.path());
+    let scene = program.scene();
+    assert_eq!(scene["video"]["format"], "mp4");
+    let answer = video(&program, &path(&scene["start"], 2));
+    assert!(answer.status == 200 && answer.head.contains("Content-Type: video/mp4"), "{}", answer.head);
+    assert!(answer.body.starts_with(b"YUV4MPEG2 W64 H48 F24:1 "), "{}", String::from_utf8_lossy(&answer.body[..40]));
+    folder.write("ffmpeg", "#!/bin/sh\necho 'no such codec' >&2; exit 1\n");
+    let answer = video(&program, &path(&scene["start"], 2));
+    let said = String::from_utf8_lossy(&answer.body).into_owned();
+    assert!(
+        answer.status == 503 && said.contains("the video cannot be written") && said.contains("no such codec"),
+        "{said}"
+    );
+    assert_eq!(names_in(folder.path()), ["ffmpeg"]);
 }
 
 /// The ring around the subject, and a picture from its other side.
