@@ -1,10 +1,11 @@
 //! Output folders that hold something already: a person's own files, an earlier run, a run that is not finished yet.
 
 use super::{BINARY, done};
+use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use std::process::Stdio;
-use viewfuse_tests::command::{assert_refused, command, files_below, names_in, toy};
+use viewfuse_tests::command::{assert_refused, command, files_below, killed_when, names_in, run, toy};
 use viewfuse_tests::patience::{end, send, wait_while_running};
 use viewfuse_tests::scenes::Folder;
 
@@ -14,6 +15,7 @@ viewfuse_tests::trials![
     a_journal_that_was_cut_anywhere_is_continued,
     two_runs_do_not_mix_in_one_folder,
     an_earlier_run_is_replaced_as_a_whole_or_not_at_all,
+    a_target_is_added_to_a_run_of_the_same_settings,
     what_is_found_of_the_sources_is_kept_where_asked,
 ];
 
@@ -162,6 +164,75 @@ fn an_earlier_run_is_replaced_as_a_whole_or_not_at_all() {
     done(folder.path(), &format!("{} --replace", RENDER.replace("--targets 20", "--targets 21")));
     assert_eq!(fs::read_to_string(folder.path().join("elsewhere.png")).expect("a file"), "mine");
     assert_eq!(fs::read_to_string(folder.path().join("out/notes.txt")).expect("a file"), "mine");
+}
+
+/// The same settings are the same options and sources; what is there stays, whatever happens to the new run.
+fn a_target_is_added_to_a_run_of_the_same_settings() {
+    let folder = toy();
+    let path = folder.path();
+    let render = |more: &str, output: &str| {
+        format!("render toy --sources 0..3 --size 24x24 --device cpu --weights mean --no-sheets {more} -o {output}")
+    };
+    let record = |output: &str| -> Value {
+        serde_json::from_slice(&fs::read(path.join(output).join("run.json")).expect("a record")).expect("JSON")
+    };
+    let targets = |record: &Value| -> Vec<String> {
+        let frames = record["frames"].as_array().expect("frames");
+        frames.iter().map(|frame| frame["target"].as_str().expect("a name").to_owned()).collect()
+    };
+    let pictures = |output: &str| {
+        let is_picture = |name: &String| name.ends_with(".png");
+        let names = names_in(&path.join(output)).into_iter().filter(is_picture);
+        names.map(|name| (name.clone(), fs::read(path.join(output).join(name)).expect("a picture"))).collect::<Vec<_>>()
+    };
+    done(path, &render("--targets 20", "out"));
+    let said = done(path, &render("--targets 21,22", "out"));
+    assert!(said.contains("\nadded to 1 of an earlier run with the same settings and sources\n"), "{said}");
+    done(path, &render("--targets 20,21,22", "whole"));
+    assert!(pictures("out") == pictures("whole"), "other pictures than those of one run");
+    let (added, whole) = (record("out"), record("whole"));
+    assert_eq!((&added["earlier"], &whole["earlier"]), (&1.into(), &0.into()));
+    assert_eq!((targets(&added), &added["settings"]), (targets(&whole), &whole["settings"]));
+    for (own, other) in
+        added["frames"].as_array().expect("frames").iter().zip(whole["frames"].as_array().expect("frames"))
+    {
+        for key in ["world_from_camera", "weights", "psnr"] {
+            assert_eq!(own[key].to_string().get(..8), other[key].to_string().get(..8), "{key}");
+        }
+    }
+    // One of them again: the others stay.
+    done(path, &render("--targets 20", "out"));
+    assert_eq!(targets(&record("out")), ["000021", "000022", "000020"]);
+    assert!(pictures("out") == pictures("whole"));
+
+    for (arguments, reason) in [
+        (render("--targets 23 --seed 1", "out"), "their settings were others"),
+        (render("--targets 23", "out").replace("--no-sheets", ""), "their settings were others"),
+        (render("--targets 23", "out").replace("0..3", "0..4"), "their sources were others"),
+        (render("--targets 2", "out"), "a source"),
+        (render("--targets 23 --video webp", "out"), "a video is of all pictures of one run"),
+    ] {
+        assert_refused(BINARY, path, &arguments, &[reason]);
+    }
+    // A run that is killed while it adds loses nothing; only it may go on.
+    killed_when(BINARY, path, &render("--orbit 800", "out"), || path.join("out/orbit-002.png").exists());
+    assert_eq!(targets(&record("out")), ["000021", "000022", "000020"]);
+    assert_refused(BINARY, path, &render("--targets 23", "out"), &["another run was interrupted there"]);
+    assert!(whole_of(&pictures("whole"), &pictures("out")), "a picture is lost");
+    // It may warn of what the sources do not show.
+    let rendered = |arguments: &str| assert_eq!(run(BINARY, path, arguments).code, Some(0), "{arguments}");
+    rendered(&render("--orbit 3", "other"));
+    done(path, &render("--targets 20", "other"));
+    // Fewer cameras of the same names are elsewhere.
+    assert_refused(BINARY, path, &render("--orbit 2", "other"), &["cameras of the same names were elsewhere"]);
+    // A path that is whole is replaced, beside what stays.
+    rendered(&render("--orbit 3", "other"));
+    assert_eq!(targets(&record("other")), ["000020", "orbit-000", "orbit-001", "orbit-002"]);
+}
+
+/// Whether all of these are among others.
+fn whole_of(all: &[(String, Vec<u8>)], others: &[(String, Vec<u8>)]) -> bool {
+    all.iter().all(|own| others.contains(own))
 }
 
 /// `--cache` without `--model`: the default field has options, too.

@@ -2,7 +2,7 @@
 
 use crate::depth::DepthFormat;
 use crate::journal::FrameJournal;
-use crate::record::{RECORD, SUFFIXES};
+use crate::record::{FrameRecord, RECORD, SUFFIXES};
 use crate::video::VideoFormat;
 use serde::Deserialize;
 use std::collections::BTreeSet;
@@ -20,6 +20,21 @@ struct WrittenRecord {
     _program: String,
     frames: Vec<WrittenFrame>,
     background: Option<WrittenBackground>,
+}
+
+/// A run that another one of the same settings may add frames to.
+#[derive(Deserialize)]
+pub(crate) struct EarlierRun {
+    /// See [`RunRecord::settings`](crate::record::RunRecord::settings).
+    #[serde(default)]
+    pub(crate) settings: Option<String>,
+    pub(crate) sources: Vec<String>,
+    pub(crate) frames: Vec<FrameRecord>,
+}
+
+/// The run of the record in a folder; `None` without one, and for one that cannot be read.
+pub(crate) fn earlier_run(folder: &Path) -> Option<EarlierRun> {
+    serde_json::from_slice(&bytes_of_record(folder)?).ok()
 }
 
 #[derive(Deserialize)]

@@ -1,13 +1,17 @@
 //! Checks of an output folder before work begins: what a run would destroy there, and targets whose files have one
 //! name.
 
-use crate::earlier::{earlier_files, files_of, recorded_targets, was_interrupted};
-use crate::record::{RECORD, SUFFIXES};
+use crate::earlier::{earlier_files, earlier_run, files_of, recorded_targets, was_interrupted};
+use crate::record::{FrameRecord, RECORD, SUFFIXES};
 use crate::video::VideoFormat;
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use viewfuse_job::hint::{Hint, Hinted};
+use viewfuse_scene::SceneFrame;
 use viewfuse_scene::few_shot::Target;
+
+/// Relative difference of the numbers of one pose.
+const SAME_POSE: f64 = 1.0e-9;
 
 /// Why pictures cannot be written to a folder.
 #[derive(Debug, thiserror::Error)]
@@ -26,7 +30,8 @@ pub enum OutputError {
     },
     /// An earlier run wrote other pictures there.
     #[error(
-        "{}: has {count} files of an earlier run, {example} for one, which are not of these targets", folder.display()
+        "{}: has {count} files of an earlier run, {example} for one, which are not of these targets, and cannot be added \
+         to: {reason}", folder.display()
     )]
     OtherRun {
         /// The folder.
@@ -35,6 +40,8 @@ pub enum OutputError {
         count: usize,
         /// One of them.
         example: String,
+        /// Why the new pictures cannot stand beside them.
+        reason: &'static str,
     },
     /// Two targets have files of one name.
     #[error("the targets '{first}' and '{second}' would both be written to {file}; render them to different folders")]
@@ -63,19 +70,33 @@ pub fn recorded_background(folder: &Path) -> Option<Option<[f32; 3]>> {
     crate::earlier::recorded_background(folder)
 }
 
+/// What a render is about to write to a folder.
+#[derive(Clone, Copy, Debug)]
+pub struct Planned<'a> {
+    /// Its targets.
+    pub targets: &'a [Target],
+    /// Names of its sources.
+    pub sources: &'a [String],
+    /// The videos that it makes of its pictures.
+    pub videos: &'a [VideoFormat],
+    /// Its settings ([`crate::record::RunRecord::settings`]), if it may add to an earlier run.
+    pub settings: Option<&'a str>,
+    /// Where poses are recorded.
+    pub frame: &'a SceneFrame,
+    /// Whether pictures of an earlier run may go.
+    pub replaces: bool,
+}
+
 /// Checks that the pictures of these targets, and these videos of them, can be written to a folder: no two files have
 /// one name, there is no record of anything but an earlier render, none replaces a file that no run wrote, and, unless
-/// `replaces` is set, no picture of an earlier render would stay beside the new ones. (With it, such pictures are
-/// removed when the first new one is written.)
+/// `replaces` is set, no picture of an earlier render would stay beside the new ones but those of a run with the same
+/// settings: the frames of its record that stay are returned. (With `replaces`, others are removed when the first new
+/// one is written.)
 ///
 /// # Errors
 /// [`OutputError`].
-pub fn check_folder(
-    folder: &Path,
-    targets: &[Target],
-    videos: &[VideoFormat],
-    replaces: bool,
-) -> Result<(), OutputError> {
+pub fn check_folder(folder: &Path, planned: &Planned<'_>) -> Result<Vec<FrameRecord>, OutputError> {
+    let Planned { targets, videos, replaces, .. } = *planned;
     let mut owners: HashMap<String, &str> = HashMap::new();
     for Target { name, .. } in targets {
         for suffix in SUFFIXES {
@@ -103,10 +124,48 @@ pub fn check_folder(
     let mut others: Vec<String> = earlier.difference(&own).cloned().collect();
     others.retain(|name| !name.starts_with("video."));
     match others.first() {
-        Some(example) if !replaces => {
+        Some(example) if !replaces => frames_that_stay(folder, planned, &others).map_err(|reason| {
             let (folder, count, example) = (folder.to_path_buf(), others.len(), example.clone());
-            Err(OutputError::OtherRun { folder, count, example })
-        }
-        _ => Ok(()),
+            OutputError::OtherRun { folder, count, example, reason }
+        }),
+        _ => Ok(Vec::new()),
+    }
+}
+
+/// The frames of the record in a folder that these targets are added to, or why they cannot be. `others` are the files
+/// of earlier runs that the new pictures do not replace.
+fn frames_that_stay(folder: &Path, planned: &Planned<'_>, others: &[String]) -> Result<Vec<FrameRecord>, &'static str> {
+    let Planned { targets, sources, videos, settings, frame, .. } = *planned;
+    let earlier = earlier_run(folder).ok_or("there is no record of them")?;
+    let (Some(settings), Some(before)) = (settings, earlier.settings) else {
+        return Err("one of the records has no settings");
+    };
+    if earlier.sources != sources {
+        return Err("their sources were others (a target that is held out is no source)");
+    }
+    if before != settings {
+        return Err("their settings were others");
+    }
+    let has_video = VideoFormat::ALL.iter().any(|format| folder.join(format!("video.{format}")).exists());
+    if has_video || !videos.is_empty() {
+        return Err("a video is of all pictures of one run");
+    }
+    let is_same = |a: &[[f64; 4]; 4], b: &[[f64; 4]; 4]| {
+        // As text a number may differ in its last bit.
+        a.iter().flatten().zip(b.iter().flatten()).all(|(a, b)| (a - b).abs() <= SAME_POSE * (1.0 + a.abs()))
+    };
+    let replaced = |own: &FrameRecord| targets.iter().find(|target| target.name == own.target);
+    let moved = |own: &FrameRecord| {
+        replaced(own)
+            .is_some_and(|target| !is_same(&frame.file_from_camera(&target.camera.pose), &own.world_from_camera))
+    };
+    if earlier.frames.iter().any(moved) {
+        return Err("cameras of the same names were elsewhere");
+    }
+    let stay: Vec<FrameRecord> = earlier.frames.into_iter().filter(|own| replaced(own).is_none()).collect();
+    let files: BTreeSet<String> = stay.iter().flat_map(|own| files_of(&own.target)).collect();
+    match others.iter().all(|file| files.contains(file)) {
+        true => Ok(stay),
+        false => Err("another run was interrupted there"),
     }
 }

@@ -72,6 +72,13 @@ pub struct RunRecord {
     pub depth_units: DepthUnits,
     /// Frames that were there already when an interrupted run was continued.
     pub continued: usize,
+    /// A digest of all that the frames depend on but their targets: the program, the options, the device, the scene's
+    /// files, the sources, other files. A run of the same digest may add frames. Null where frames follow from one
+    /// another.
+    pub settings: Option<String>,
+    /// Frames of earlier runs of the same settings, which come first; times, omissions, kernels and transfers are the
+    /// last run's.
+    pub earlier: usize,
     /// One entry a target.
     pub frames: Vec<FrameRecord>,
 }

@@ -70,6 +70,8 @@ pub struct RunWriter {
     source_pictures: Vec<Arc<RgbImage>>,
     coverage: Coverage,
     frames: Vec<FrameRecord>,
+    /// Of earlier runs, which stay.
+    earlier: Vec<FrameRecord>,
     size: [u32; 2],
     background: [f32; 3],
     /// About the scene and the whole run, before those about the photographs.
@@ -90,6 +92,8 @@ pub struct Circumstances {
     pub model: Option<String>,
     /// Whether all omissions are switched off.
     pub exact: bool,
+    /// See [`RunRecord::settings`].
+    pub settings: Option<String>,
     /// Seed of every random draw.
     pub seed: u64,
     /// The time of reading the scene.
@@ -116,6 +120,7 @@ impl RunWriter {
             source_pictures: Vec::new(),
             coverage: Coverage::of(&job.source_cameras(scene)),
             frames: Vec::new(),
+            earlier: Vec::new(),
             size: [0, 0],
             background: [0.0; 3],
             given: scene.warnings.clone(),
@@ -123,6 +128,12 @@ impl RunWriter {
             warnings: Vec::new(),
             chosen: None,
         }
+    }
+
+    /// Adds to an earlier run of the same settings: these frames of its record, and their files, stay
+    /// ([`crate::folder::check_folder`]).
+    pub fn add_to(&mut self, earlier: Vec<FrameRecord>) {
+        self.earlier = earlier;
     }
 
     /// Adds a warning to the record.
@@ -238,14 +249,16 @@ impl RunWriter {
         std::fs::create_dir_all(&self.folder).map_err(failed)?;
         self.lock()?;
         // A journal of this run lists files that stay.
-        let own: BTreeSet<String> = self.target_names.iter().flat_map(|target| files_of(target)).collect();
+        let stay = self.earlier.iter().map(|earlier| &earlier.target);
+        let own: BTreeSet<String> = self.target_names.iter().chain(stay).flat_map(|target| files_of(target)).collect();
         let earlier = earlier_files(&self.folder);
         match &mut self.journal {
             Some(journal) => journal.begin()?,
             None => FrameJournal::remove_any(&self.folder)?,
         }
         earlier.difference(&own).try_for_each(|file| remove_if_there(&self.folder.join(file)))?;
-        remove_if_there(&self.folder.join(RECORD))
+        // What stays is in it: a run that is killed loses nothing of that.
+        if self.earlier.is_empty() { remove_if_there(&self.folder.join(RECORD)) } else { Ok(()) }
     }
 
     /// Writes the pictures of all targets, which are there, as `video.FORMAT`; returns its path. For before the record.
@@ -278,7 +291,8 @@ impl RunWriter {
         circumstances: Circumstances,
     ) -> Result<RunRecord, WriteError> {
         let Finished { costs, record } = finished;
-        let Circumstances { program, device_reason, model, exact, seed, open_time, total_time } = circumstances;
+        let Circumstances { program, device_reason, model, exact, settings, seed, open_time, total_time } =
+            circumstances;
         let path = self.folder.join(RECORD);
         let place = |frame: &FrameRecord| self.target_names.iter().position(|name| *name == frame.target);
         self.frames.sort_by_key(place);
@@ -310,7 +324,9 @@ impl RunWriter {
             transfers: renderer.transfers().into(),
             depth_units: DepthUnits::ALL,
             continued: self.continued,
-            frames: self.frames,
+            settings,
+            earlier: self.earlier.len(),
+            frames: self.earlier.into_iter().chain(self.frames).collect(),
         };
         let json = serde_json::to_vec_pretty(&record)
             .map_err(|cause| WriteError::Encode { path: path.clone(), cause: cause.into() })?;

@@ -59,7 +59,9 @@ fn sentence(hint: Hint) -> Option<&'static str> {
         Hint::Masks => "say it with --masks object or --masks ignore; --masks none does without them",
         Hint::NoObject => "`viewfuse inspect` shows the poses; --background sets the background",
         Hint::PictureSize => "give another --size",
-        Hint::OtherRun => "render all targets in one run, give another folder, or --replace to remove them",
+        Hint::OtherRun => {
+            "render all targets in one run or with the same options and --sources, give another folder, or --replace to remove them"
+        }
         Hint::Shard => "give each its own --shard",
         Hint::BuildWithTiff => {
             "a build with `--features formats` reads it: `cargo install --path host/cli --features formats`"

@@ -117,13 +117,13 @@ impl Arguments {
 
 /// `values` are all options and their values as a person would write them.
 pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> anyhow::Result<ExitCode> {
-    let prepared = Prepared::open(arguments)?;
+    let prepared = Prepared::open(arguments, values)?;
     let progress = Terminal::new("rendering");
     let leaving = prepared.leaving(arguments, &progress);
     if arguments.is_stream() {
         stream::to_stdout(arguments, &prepared, &progress)?;
     } else {
-        write::to_folder(arguments, values, prepared, leaving, progress)?;
+        write::to_folder(arguments, prepared, leaving, progress)?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -6,23 +6,27 @@ use std::fmt::Write;
 use std::path::Path;
 use std::time::UNIX_EPOCH;
 use viewfuse_job::digest::{sha256, sha256_of};
-use viewfuse_scene::few_shot::FewShot;
+use viewfuse_scene::few_shot::Target;
 use viewfuse_scene::{Scene, View};
 
 /// Options that change no frame.
 const NO_CHANGE: [&str; 6] = ["output", "replace", "threads", "time-limit", "video", "fps"];
 
-/// The digest of a run's inputs: the program's version, the options' values, the device, cameras and photographs (by
-/// length and time of change), and the content of other files.
-pub(super) fn run_identity(
+/// Options that say which targets and sources there are: these themselves count.
+const OF_VIEWS: [&str; 8] = ["targets", "orbit", "between", "frames", "spiral", "camera-path", "sources", "views"];
+
+/// The digest of all that frames depend on but their targets: the program's version, the options' values, the device,
+/// cameras and photographs (by length and time of change), the sources, and the content of other files.
+pub(super) fn settings(
     options: &BTreeMap<String, String>,
     device: &str,
     scene: &Scene,
-    job: &FewShot,
+    sources: &[usize],
     files: &[&Path],
 ) -> anyhow::Result<String> {
     let mut text = format!("{} {device}\n", env!("CARGO_PKG_VERSION"));
-    for (name, value) in options.iter().filter(|(name, _)| !NO_CHANGE.contains(&name.as_str())) {
+    let counts = |name: &String| !NO_CHANGE.contains(&name.as_str()) && !OF_VIEWS.contains(&name.as_str());
+    for (name, value) in options.iter().filter(|(name, _)| counts(name)) {
         writeln!(text, "{name} {value}")?;
     }
     for view in &scene.views {
@@ -34,12 +38,18 @@ pub(super) fn run_identity(
             writeln!(text, "{} {} {changed:?}", file.display(), about.len())?;
         }
     }
-    writeln!(text, "{:?} {}", job.sources, scene.points.len())?;
-    for target in &job.targets {
-        writeln!(text, "{} {:?} {:?}", target.name, target.camera, target.truth)?;
-    }
+    writeln!(text, "{sources:?} {}", scene.points.len())?;
     for file in files {
         writeln!(text, "{}", sha256_of(file).with_context(|| file.display().to_string())?)?;
+    }
+    Ok(sha256(text.as_bytes()))
+}
+
+/// The digest of a run of these settings.
+pub(super) fn run_identity(settings: &str, targets: &[Target]) -> anyhow::Result<String> {
+    let mut text = settings.to_owned();
+    for target in targets {
+        writeln!(text, "{} {:?} {:?}", target.name, target.camera, target.truth)?;
     }
     Ok(sha256(text.as_bytes()))
 }

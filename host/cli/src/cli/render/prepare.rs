@@ -1,19 +1,21 @@
 //! What a render needs before its first picture: everything that can be refused is refused here.
 
 use super::Arguments;
+use super::identity::settings;
 use crate::cli::outputs::{keep_folder_apart, refuse_file};
 use crate::cli::printing::warn_of;
 use crate::cli::terminal::Terminal;
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use viewfuse_device::choice::Chosen;
 use viewfuse_field::render::{RenderOptions, RenderRun};
 use viewfuse_field::{AnyField, Renderer};
 use viewfuse_job::files::check_writable;
 use viewfuse_job::progress::Progress;
-use viewfuse_output::folder::check_folder;
+use viewfuse_output::folder::{Planned, check_folder};
 use viewfuse_output::rate::FrameRate;
-use viewfuse_output::record::RECORD;
+use viewfuse_output::record::{FrameRecord, RECORD, source_names};
 use viewfuse_scene::Scene;
 use viewfuse_scene::coverage::Coverage;
 use viewfuse_scene::few_shot::FewShot;
@@ -36,10 +38,15 @@ pub(super) struct Prepared {
     /// Of a video.
     pub(super) rate: FrameRate,
     pub(super) device: Chosen,
+    /// See [`settings`].
+    pub(super) settings: Option<String>,
+    /// Frames of an earlier run that it adds to.
+    pub(super) earlier: Vec<FrameRecord>,
 }
 
 impl Prepared {
-    pub(super) fn open(arguments: &Arguments) -> anyhow::Result<Prepared> {
+    /// `values` are all options and their values.
+    pub(super) fn open(arguments: &Arguments, values: &BTreeMap<String, String>) -> anyhow::Result<Prepared> {
         let start = Instant::now();
         if !arguments.is_stream() {
             refuse_file(&arguments.output)?;
@@ -62,12 +69,41 @@ impl Prepared {
             arguments.model.says_omissions() || !arguments.sequence.is_empty(),
         );
         let rate = arguments.outputs.rate(job.frames_per_second);
+        let device = arguments.device.open()?;
+        let (mut identity, mut earlier) = (None, Vec::new());
         if !arguments.is_stream() {
             check_writable(&arguments.output.join(RECORD))?;
-            check_folder(&arguments.output, &job.targets, &arguments.outputs.video, arguments.outputs.replace)?;
+            // Frames that follow from one another are neither continued nor added to.
+            if arguments.sequence.is_empty() {
+                let files = arguments.files().chain(weighting.as_ref().and_then(Weighting::file));
+                let files: Vec<&Path> = files.collect();
+                identity = Some(settings(values, &device.device.name(), &scene, &job.sources, &files)?);
+            }
+            let planned = Planned {
+                targets: &job.targets,
+                sources: &source_names(&scene, &job),
+                videos: &arguments.outputs.video,
+                settings: identity.as_deref(),
+                frame: &scene.frame,
+                replaces: arguments.outputs.replace,
+            };
+            earlier = check_folder(&arguments.output, &planned)?;
         }
-        let device = arguments.device.open()?;
-        Ok(Prepared { start, weighting, folder, scene, open_time, job, field, options, rate, device })
+        let settings = identity;
+        Ok(Prepared {
+            start,
+            weighting,
+            folder,
+            scene,
+            open_time,
+            job,
+            field,
+            options,
+            rate,
+            device,
+            settings,
+            earlier,
+        })
     }
 
     /// The run of the whole job.

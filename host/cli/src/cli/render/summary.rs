@@ -30,6 +30,9 @@ pub(super) fn print(record: &RunRecord, folder: &Path) -> std::io::Result<()> {
         record.device,
         record.times.total
     ))?;
+    if record.earlier > 0 {
+        say(format_args!("added to {} of an earlier run with the same settings and sources", record.earlier))?;
+    }
     if record.continued > 0 {
         say(format_args!("continued: {} of them were there", record.continued))?;
     }

@@ -7,8 +7,6 @@ use super::summary::print;
 use crate::cli::printing::{complain, say};
 use crate::cli::terminal::Terminal;
 use crate::cli::threads::on_threads;
-use std::collections::BTreeMap;
-use std::path::Path;
 use viewfuse_field::auto::{self, Chosen};
 use viewfuse_field::render::Frame;
 use viewfuse_job::progress::{Part, Progress};
@@ -19,10 +17,9 @@ use viewfuse_output::video::VideoFormat;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_weighting::Weighting;
 
-/// `values` are all options and their values; `warning` is of the whole run.
+/// `warning` is of the whole run.
 pub(super) fn to_folder(
     arguments: &Arguments,
-    values: &BTreeMap<String, String>,
     mut prepared: Prepared,
     warning: Option<String>,
     progress: Terminal,
@@ -34,12 +31,9 @@ pub(super) fn to_folder(
     writer.lock()?;
     writer.set_outputs(arguments.outputs.outputs());
     warning.into_iter().for_each(|warning| writer.warn(warning));
-    // Frames that follow from one another are not continued.
-    if arguments.sequence.is_empty() {
-        let files: Vec<&Path> = arguments.files().chain(before.file()).collect();
-        let device = prepared.device.device.name();
-        let run = run_identity(values, &device, &prepared.scene, &prepared.job, &files)?;
-        let finished = writer.resume(&run)?;
+    writer.add_to(std::mem::take(&mut prepared.earlier));
+    if let Some(settings) = &prepared.settings {
+        let finished = writer.resume(&run_identity(settings, &prepared.job.targets)?)?;
         prepared.job.targets.retain(|target| !finished.contains(&target.name));
     }
     let written = || written(arguments, &prepared, writer, &formats, &progress);
@@ -75,6 +69,7 @@ fn written(
         device_reason: prepared.device.reason.clone(),
         model: arguments.model.label(),
         exact: arguments.model.exact,
+        settings: prepared.settings.clone(),
         seed: arguments.seed,
         open_time: prepared.open_time,
         total_time: prepared.start.elapsed(),
