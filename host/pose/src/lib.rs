@@ -68,7 +68,7 @@ pub use solution::{
 };
 pub use support::Support;
 pub use verdict::{Refusal, Verdict, Verified};
-pub use write::{CameraRecord, Record, is_current, write};
+pub use write::{CameraRecord, Record, has_record, is_current, write};
 
 /// The examples of the README, compiled and run.
 #[cfg(doctest)]

@@ -127,6 +127,12 @@ pub fn write(
     write_with(&verdict.scene, layout, folder, &files, progress)
 }
 
+/// Whether [`write()`] wrote a folder.
+pub fn has_record(posed: &Path) -> bool {
+    let record = std::fs::read(posed.join(RECORD)).unwrap_or_default();
+    serde_json::from_slice::<Earlier>(&record).is_ok()
+}
+
 /// What of a record tells whether a scene is still that of a folder.
 #[derive(Deserialize)]
 struct Earlier {

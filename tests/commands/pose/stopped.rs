@@ -6,7 +6,7 @@ use libtest_mimic::Trial;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use viewfuse_tests::command::{command, files_below, interrupt, spawn};
+use viewfuse_tests::command::{Outcome, command, files_below, interrupt, spawn};
 use viewfuse_tests::patience::{end, wait_while_running};
 use viewfuse_tests::scenes::Folder;
 
@@ -57,9 +57,17 @@ fn goes_on(folder: &Folder) {
     assert!(!folder.path().join("posed").exists(), "no half of a scene");
     let finished = kept(folder).len();
     assert!(finished >= 1, "an attempt was kept");
+    let earlier: Vec<(PathBuf, Vec<u8>)> =
+        kept(folder).into_iter().map(|path| (path.clone(), fs::read(path).expect("a file"))).collect();
     posed(pose(folder, "second", "posed"));
     let all = json(&folder.path().join("posed/pose.json"))["attempts"].as_array().expect("a list").len();
     assert_eq!(asked(folder, "second"), all - finished, "only what was missing");
+    assert!(!folder.path().join(".posed.attempts").exists(), "nothing is kept behind the end");
+    // A kill may come between the scene and the end of what was kept for it: the next run sees that it is not needed.
+    fs::create_dir(folder.path().join(".posed.attempts")).expect("a folder");
+    earlier.iter().for_each(|(path, bytes)| fs::write(path, bytes).expect("a file"));
+    let refused = Outcome::of(pose(folder, "late", "posed"));
+    assert!(refused.code == Some(1) && refused.stderr.contains("posed: exists already"), "{}", refused.stderr);
     assert!(!folder.path().join(".posed.attempts").exists(), "nothing is kept behind the end");
     posed(pose(folder, "whole", "whole"));
     let (posed, whole) = (folder.path().join("posed"), folder.path().join("whole"));

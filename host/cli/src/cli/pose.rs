@@ -15,7 +15,7 @@ use std::process::ExitCode;
 use viewfuse_job::progress::{Interrupted, Progress};
 use viewfuse_job::shell::quoted;
 use viewfuse_output::camera_map::camera_map;
-use viewfuse_pose::{FocalSource, Found, Kept, Options, Record, Refusal, Solver, Verdict, find, write};
+use viewfuse_pose::{FocalSource, Found, Kept, Options, Record, Refusal, Solver, Verdict, find, has_record, write};
 use viewfuse_scene::encode_png;
 use viewfuse_scene::inspect::inspect;
 use viewfuse_scene::photographs::BackgroundChoice;
@@ -75,6 +75,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let Arguments { photographs, output, .. } = arguments;
     let is_empty = || std::fs::read_dir(output).is_ok_and(|mut entries| entries.next().is_none());
     if output.is_symlink() || output.exists() && !is_empty() {
+        remove_kept_for(output);
         bail!("{}: exists already and is not an empty folder; give another name", output.display());
     }
     let options = Options { focal: arguments.focal, seed: arguments.seed, every: arguments.every.into() };
@@ -87,6 +88,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let word = quoted(output.as_os_str());
     say(format_args!("next       viewfuse render {word} --orbit 24 -o out"))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Removes the attempts that were kept for a scene that is there: a kill may have come between both. What cannot be
+/// removed stays.
+fn remove_kept_for(scene: &Path) {
+    if let Some(folder) = Kept::folder_beside(scene).filter(|_| has_record(scene)) {
+        let _ = Kept::remove(&folder);
+    }
 }
 
 /// What `viewfuse pose PHOTOGRAPHS -o OUTPUT` does, told in one line.
