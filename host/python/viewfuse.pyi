@@ -1,6 +1,6 @@
 """Few-shot novel view synthesis: scenes, weights and pictures as numpy arrays."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any, Optional, Union, final
@@ -106,6 +106,59 @@ class Scene:
         orbit, between, spiral, camera_path: targets along a path of cameras, one of the four.
         poses: targets by camera-to-world matrices, [target][4][4], with the intrinsics of the first source.
         """
+    def evaluate(
+        self,
+        weights: Union[
+            None,
+            str,
+            Callable[[NDArray[np.float64], NDArray[np.float64]], ArrayLike],
+            Sequence[Union[str, Callable[[NDArray[np.float64], NDArray[np.float64]], ArrayLike]]],
+        ] = None,
+        *,
+        targets: Optional[str] = None,
+        sources: Optional[str] = None,
+        views: Optional[int] = None,
+        size: Optional[tuple[int, int]] = None,
+        model: Union[None, str, PathLike[str]] = None,
+        device: str = "auto",
+        background: str = "auto",
+        leave_out: float = 0.01,
+        seed: int = 0,
+        progress: Union[None, bool, Callable[[float, str], object]] = None,
+    ) -> list[Score]:
+        """Scores schemes on photographs that are left out: each target from all other views, or, with sources, all other
+        views from these. Without schemes, every one that needs no file. The baselines come first. Ctrl-C ends it.
+
+        weights: a scheme, "auto", a function as for `render`, or several of these. The other keywords are those of `render`.
+        """
+    def optimise(
+        self,
+        output: Union[str, PathLike[str]],
+        *,
+        weights: Optional[str] = None,
+        left_out: Optional[str] = None,
+        towards: Optional[str] = None,
+        sources: Optional[str] = None,
+        views: Optional[int] = None,
+        count: Optional[int] = None,
+        iterations: Optional[int] = None,
+        resume: Union[None, str, PathLike[str]] = None,
+        size: Optional[tuple[int, int]] = None,
+        device: str = "auto",
+        background: str = "auto",
+        seed: int = 0,
+        progress: Union[None, bool, Callable[[float, str], object]] = None,
+    ) -> Gaussians:
+        """Optimises Gaussians for the photographs, and writes them. Ctrl-C ends it with KeyboardInterrupt, and what there is
+        so far is written.
+
+        output: a .ply, a smaller .spz or .splat, or an .html page.
+        weights: the scheme of the surfaces and of `towards`.
+        left_out: views that are no sources, and are scored on the way.
+        towards: views whose weights the iterations end with.
+        count: most Gaussians. iterations: at each size of the sources.
+        resume: a file of Gaussians to go on from, at the finest size.
+        """
     def __len__(self) -> int:
         """The number of views."""
     def __repr__(self) -> str: ...
@@ -198,11 +251,85 @@ class Frame:
         """Writes the picture as a PNG, whole or not at all: the bytes that the command writes. OSError if it cannot."""
     def __repr__(self) -> str: ...
 
+@final
+class Score:
+    """The score of one scheme at one view."""
+
+    @property
+    def scheme(self) -> str:
+        """The scheme, or the name of a baseline."""
+    @property
+    def is_baseline(self) -> bool:
+        """Whether it is a baseline, which needs no field: copies and warps of the nearest sources."""
+    @property
+    def target(self) -> str:
+        """The view's name."""
+    @property
+    def source_count(self) -> int:
+        """Number of sources."""
+    @property
+    def psnr(self) -> float:
+        """Peak signal to noise ratio, decibels."""
+    @property
+    def corrected_psnr(self) -> Optional[float]:
+        """The same after a gain and an offset of each channel were fitted to the photograph."""
+    @property
+    def ssim(self) -> Optional[float]:
+        """Structural similarity. None if the picture is smaller than 7x7."""
+    @property
+    def seconds(self) -> float:
+        """Time for this view with this scheme."""
+    def __repr__(self) -> str: ...
+
+@final
+class Gaussians:
+    """A file of Gaussians that was optimised."""
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+    @property
+    def count(self) -> int:
+        """The number of Gaussians."""
+    @property
+    def iterations(self) -> int:
+        """The iterations that were made."""
+    @property
+    def scores(self) -> list[tuple[int, float]]:
+        """Iteration and mean PSNR in decibels of the views that were left out, on the way. Empty without such views."""
+    @property
+    def fit(self) -> Optional[float]:
+        """Mean PSNR of some of the sources themselves, which says nothing of new views. None where views were left out."""
+    def __repr__(self) -> str: ...
+
 def open(path: Union[str, PathLike[str]], masks: str = "auto") -> Scene:
     """Opens a scene: a folder, or a file that describes one, in any of the layouts. The same as Scene(path, masks).
 
     `masks` says what masks and alpha channels say: "object" (where it is), "ignore" (which pixels do not count), "none"
     (they are not used), or "auto": what their layout and the masks themselves show.
+    """
+
+def pose(
+    photographs: Union[str, PathLike[str]],
+    output: Union[str, PathLike[str]],
+    *,
+    focal: Optional[float] = None,
+    solvers: Union[None, str, Sequence[str], Mapping[str, Union[str, PathLike[str]]]] = None,
+    every: int = 1,
+    layout: str = "colmap",
+    seed: int = 0,
+    progress: Union[None, bool, Callable[[float, str], object]] = None,
+) -> Scene:
+    """Finds the poses of a folder's photographs, and writes them as a scene to a folder that is not there yet, or empty.
+
+    Photographs that are left out are UserWarnings; that no poses can be trusted is a ValueError. Ctrl-C ends it with
+    KeyboardInterrupt; the same call goes on behind the attempts that were finished.
+
+    focal: focal length in pixels of the first photograph; by default as the photographs state it, otherwise found.
+    solvers: "openmvg" (the default: the program viewfuse-openmvg), "colmap", "pycolmap", or several, which confirm one
+        another; or a dictionary of these names and the program of each: {"openmvg": "target/release/viewfuse-openmvg"}.
+    every: every so many photographs are taken, in the order of their names.
+    layout: colmap, colmap-binary or transforms.
     """
 
 def psnr(prediction: NDArray[np.uint8], truth: NDArray[np.uint8]) -> float:

@@ -24,6 +24,7 @@
 //! learned           common parts of learned fields
 //! *                 the fields, a folder each
 //! rows              one row a field
+//! optimise          a scene's photographs to Gaussians, with scores on the way
 //! ```
 //!
 //! A field of your own implements [`Field`] and [`Prepared`]; [`On`] puts it on a device, and [`render::render`]
@@ -42,6 +43,7 @@ pub mod genvs;
 pub mod held_out;
 pub mod learned;
 pub mod mixture;
+pub mod optimise;
 pub mod options;
 pub mod pixelnerf;
 pub mod point_cloud;

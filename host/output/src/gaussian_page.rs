@@ -15,7 +15,9 @@ use serde::Serialize;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::gaussian::{SH_0, opacity};
+use viewfuse_field::optimise::EndedOptimisation;
 use viewfuse_job::files::{WriteError, write_whole};
+use viewfuse_scene::Scene;
 use viewfuse_scene::gaussians::{Gaussian, GaussianScene};
 use viewfuse_scene::rig::Rig;
 
@@ -53,6 +55,45 @@ pub struct GaussianPage<'a> {
     pub cameras: &'a [(String, Camera)],
     /// What lies behind the Gaussians: red, green, blue in `[0, 1]`.
     pub background: [f32; 3],
+}
+
+/// The formats that Gaussians are written in, by extension.
+const FORMATS: [&str; 4] = ["ply", "splat", "spz", "html"];
+
+fn is_of(path: &Path, format: &str) -> bool {
+    path.extension().is_some_and(|own| own.eq_ignore_ascii_case(format))
+}
+
+/// Whether a file of this name can be written.
+///
+/// # Errors
+/// For a format that is none.
+pub fn check_name(path: &Path) -> Result<(), &'static str> {
+    match FORMATS.iter().any(|own| is_of(path, own)) {
+        true => Ok(()),
+        false => Err("scenes of Gaussians are written as .ply or .html, and smaller as .splat or .spz"),
+    }
+}
+
+/// Writes what an optimisation of a scene from these sources ended with: as a page if the file is called so, otherwise
+/// as [`GaussianScene::write`] does.
+///
+/// # Errors
+/// [`WriteError`].
+pub fn write_optimised(
+    path: &Path,
+    scene: &Scene,
+    sources: &[usize],
+    ended: &EndedOptimisation,
+) -> Result<(), WriteError> {
+    let EndedOptimisation { gaussians, background, .. } = ended;
+    if !is_of(path, "html") {
+        return gaussians.write(path, &scene.frame);
+    }
+    let views = sources.iter().map(|view| &scene.views[*view]);
+    let cameras: Vec<(String, Camera)> = views.map(|own| (own.name.clone(), own.camera)).collect();
+    let page = GaussianPage { title: &scene.name(), scene: gaussians, cameras: &cameras, background: *background };
+    write_html(path, &page)
 }
 
 /// Writes the page, completely or not at all. Of 40 thousand Gaussians it has 1.8 MB.

@@ -4,14 +4,19 @@ use pyo3::PyErr;
 use pyo3::exceptions::{PyException, PyKeyboardInterrupt, PyOSError, PyValueError};
 use std::error::Error as StdError;
 use viewfuse::device::choice::UnknownDevice;
+use viewfuse::evaluate::EvaluateError;
+use viewfuse::evaluate::metrics::MetricError;
 use viewfuse::field::FieldError;
+use viewfuse::field::optimise::OptimiseError;
 use viewfuse::field::options::OpenError;
 use viewfuse::field::render::RenderError;
 use viewfuse::job::files::WriteError;
 use viewfuse::job::progress::Interrupted;
 use viewfuse::nn::checkpoint::CheckpointError;
+use viewfuse::pose::{PoseError, SolverError};
 use viewfuse::scene::SceneError;
 use viewfuse::scene::few_shot::SelectionError;
+use viewfuse::scene::write::WriteSceneError;
 use viewfuse::vulkan::VulkanError;
 use viewfuse::weighting::WeightingError;
 use viewfuse::weighting::attention::AttentionError;
@@ -32,6 +37,8 @@ pub(crate) enum Failure {
     File(String),
     /// Something else: `viewfuse.Error`.
     Other(String),
+    /// What a function of the caller raised.
+    Raised(PyErr),
     /// The work was cancelled: `KeyboardInterrupt`.
     Interrupted,
 }
@@ -57,6 +64,47 @@ impl From<RenderError> for Failure {
     }
 }
 
+impl From<EvaluateError> for Failure {
+    fn from(error: EvaluateError) -> Failure {
+        match error {
+            EvaluateError::Render(error) => error.into(),
+            EvaluateError::Metric(MetricError::Device(_) | MetricError::NotFinite(_)) => Failure::Other(text(&error)),
+            error => Failure::Input(text(&error)),
+        }
+    }
+}
+
+impl From<OptimiseError> for Failure {
+    fn from(error: OptimiseError) -> Failure {
+        match error {
+            OptimiseError::Render(error) => error.into(),
+            OptimiseError::Write(error) => error.into(),
+            error => Failure::Input(text(&error)),
+        }
+    }
+}
+
+impl From<PoseError> for Failure {
+    fn from(error: PoseError) -> Failure {
+        match error {
+            _ if causes(&error).any(|cause| cause.is::<Interrupted>()) => Failure::Interrupted,
+            PoseError::Render(error) => error.into(),
+            PoseError::Solver(error @ SolverError::Broken { .. }) => Failure::Other(text(&error)),
+            error => Failure::Input(text(&error)),
+        }
+    }
+}
+
+impl From<WriteSceneError> for Failure {
+    fn from(error: WriteSceneError) -> Failure {
+        match error {
+            WriteSceneError::Interrupted(_) => Failure::Interrupted,
+            WriteSceneError::Io { .. } => Failure::File(text(&error)),
+            error => Failure::Input(text(&error)),
+        }
+    }
+}
+
 /// Errors of what the caller gave.
 macro_rules! input {
     ($($Type:ty),+) => {
@@ -69,6 +117,12 @@ macro_rules! input {
 }
 
 input!(SceneError, SelectionError, WeightingError, AttentionError, UnknownDevice, CheckpointError, OpenError);
+
+impl From<Interrupted> for Failure {
+    fn from(_: Interrupted) -> Failure {
+        Failure::Interrupted
+    }
+}
 
 impl From<VulkanError> for Failure {
     fn from(error: VulkanError) -> Failure {
@@ -88,6 +142,7 @@ impl From<Failure> for PyErr {
             Failure::Input(text) => PyValueError::new_err(text),
             Failure::File(text) => PyOSError::new_err(text),
             Failure::Other(text) => Error::new_err(text),
+            Failure::Raised(error) => error,
             Failure::Interrupted => PyKeyboardInterrupt::new_err(Interrupted.to_string()),
         }
     }

@@ -57,9 +57,7 @@ impl GivenWeights {
         let targets = job.targets.iter().map(|target| unit.pose(&target.camera.pose)).collect();
         let weighting = Python::attach(|py| {
             if object.bind(py).is_callable() {
-                let (function, errors) = (object.clone_ref(py), Arc::clone(errors));
-                let function = Function { function, unit, frame: scene.frame, errors };
-                return Ok(Weighting::custom(function));
+                return Ok(custom(py, object, scene, errors));
             }
             Array::of(object.bind(py), targets, job.sources.len()).map(Weighting::custom)
         })?;
@@ -71,6 +69,36 @@ impl GivenWeights {
         }
         Ok(Some(weighting))
     }
+
+    /// The weighting that a function is, for any sources and targets of a scene.
+    ///
+    /// # Errors
+    /// If it is no function, or fails for the first photograph from the others.
+    pub(crate) fn function(object: &Py<PyAny>, scene: &Scene, errors: &Raised) -> Result<Weighting, Failure> {
+        let weighting = Python::attach(|py| match object.bind(py).is_callable() {
+            true => Ok(custom(py, object, scene, errors)),
+            false => Err(Failure::Input("weights: a scheme's name or a function, or a list of these".to_owned())),
+        })?;
+        let unit = RigUnit::of_scene(scene);
+        let photographed = scene.views.iter().filter(|view| view.image.is_some());
+        let poses: Vec<Pose> = photographed.map(|view| unit.pose(&view.camera.pose)).take(MAX_SOURCES).collect();
+        if let Some((first, others)) = poses.split_first()
+            && let Ok(sources) = SourcePoses::new(others)
+        {
+            weighting.weigh(&sources, first);
+        }
+        match errors.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            // Python's own error, as it is.
+            Some(error) => Err(Failure::Raised(error)),
+            None => Ok(weighting),
+        }
+    }
+}
+
+/// The weighting of a function, which keeps its first error.
+fn custom(py: Python<'_>, object: &Py<PyAny>, scene: &Scene, errors: &Raised) -> Weighting {
+    let (function, errors) = (object.clone_ref(py), Arc::clone(errors));
+    Weighting::custom(Function { function, unit: RigUnit::of_scene(scene), frame: scene.frame, errors })
 }
 
 /// Numbers as weights: as many as there are sources, finite, none below 0, one above.

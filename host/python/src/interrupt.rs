@@ -91,11 +91,28 @@ pub(crate) fn interruptible<T: Send>(
     reported(py, None, work)
 }
 
+/// As [`interruptible`], and the course of the work is shown where `progress=` says.
+///
+/// # Errors
+/// The same, and what the report raised, which ends the work.
+pub(crate) fn watched<T: Send>(
+    py: Python<'_>,
+    progress: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce(&dyn Progress) -> Result<T, Failure> + Send,
+) -> PyResult<T> {
+    let reporter = Reporter::of(py, progress)?;
+    let result = reported(py, reporter.as_ref(), work);
+    if let Some(reporter) = reporter {
+        reporter.end(py)?;
+    }
+    result
+}
+
 /// As [`interruptible`], and the course of the work is reported from the calling thread.
 ///
 /// # Errors
 /// The same, and what the report raised, which ends the work.
-pub(crate) fn reported<T: Send>(
+fn reported<T: Send>(
     py: Python<'_>,
     reporter: Option<&Reporter>,
     work: impl FnOnce(&dyn Progress) -> Result<T, Failure> + Send,

@@ -10,15 +10,21 @@
 //! given_weights  weights of the caller's own: an array, or a function
 //! frame          a rendered view
 //! render         the render loop
+//! evaluate       schemes on views that are left out
+//! optimise       photographs to a file of Gaussians
 //! scene          a scene, with the methods that use the modules above
+//! pose           bare photographs to a scene
 //! scores         PSNR and SSIM of two pictures
 //! ```
 
 mod arrays;
 mod error;
+mod evaluate;
 mod frame;
 mod given_weights;
 mod interrupt;
+mod optimise;
+mod pose;
 mod progress;
 mod render;
 mod request;
@@ -32,7 +38,13 @@ mod module {
     #[pymodule_export]
     use crate::error::Error;
     #[pymodule_export]
+    use crate::evaluate::PyScore;
+    #[pymodule_export]
     use crate::frame::PyFrame;
+    #[pymodule_export]
+    use crate::optimise::PyGaussians;
+    #[pymodule_export]
+    use crate::pose::pose;
     #[pymodule_export]
     use crate::scene::{PyScene, open};
     #[pymodule_export]

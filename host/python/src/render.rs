@@ -3,7 +3,7 @@
 use crate::error::Failure;
 use crate::frame::Finished;
 use crate::given_weights::{GivenWeights, Raised};
-use crate::request::Request;
+use crate::request::{Request, background, leave_out, size};
 use std::path::PathBuf;
 use std::sync::PoisonError;
 use viewfuse::device::choice::{self, DeviceChoice, DeviceOptions};
@@ -15,7 +15,7 @@ use viewfuse::job::progress::Progress;
 use viewfuse::nn::checkpoint::Checkpoint;
 use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::FewShot;
-use viewfuse::scene::photographs::{BackgroundChoice, SourceImages};
+use viewfuse::scene::photographs::SourceImages;
 use viewfuse::weighting::Weighting;
 
 /// The arguments of a render.
@@ -53,9 +53,9 @@ impl Order {
             return Ok((job.sources, Vec::new()));
         }
         let options = RenderOptions {
-            size: self.size()?,
-            background: self.background()?,
-            leave_out: self.leave_out()?,
+            size: size(self.size)?,
+            background: background(&self.background)?,
+            leave_out: leave_out(self.leave_out)?,
             early_termination: if about.ends_rays { DEFAULT_EARLY_TERMINATION } else { 0.0 },
             ..RenderOptions::default()
         };
@@ -90,27 +90,5 @@ impl Order {
     /// Whether a function that gives weights cannot be used.
     fn has_raised(&self) -> bool {
         self.raised.lock().unwrap_or_else(PoisonError::into_inner).is_some()
-    }
-
-    fn size(&self) -> Result<Option<[u32; 2]>, Failure> {
-        let sides = 1..=16_384;
-        match self.size {
-            None => Ok(None),
-            Some((width, height)) if sides.contains(&width) && sides.contains(&height) => Ok(Some([width, height])),
-            Some((width, height)) => {
-                Err(Failure::Input(format!("size: {width}x{height}; width and height are from 1 to 16384")))
-            }
-        }
-    }
-
-    fn background(&self) -> Result<BackgroundChoice, Failure> {
-        self.background.parse().map_err(|error| Failure::Input(format!("{error}")))
-    }
-
-    fn leave_out(&self) -> Result<f32, Failure> {
-        match self.leave_out {
-            share if (0.0..1.0).contains(&share) => Ok(share),
-            share => Err(Failure::Input(format!("leave_out: {share} is not at least 0 and less than 1"))),
-        }
     }
 }

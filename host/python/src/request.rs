@@ -10,6 +10,7 @@ use std::path::PathBuf;
 use viewfuse::core::camera::Camera;
 use viewfuse::core::pose::{Pose, PoseError};
 use viewfuse::scene::few_shot::{FewShot, PathChoice, Selection, SelectionError, Target};
+use viewfuse::scene::photographs::BackgroundChoice;
 use viewfuse::scene::{Scene, SceneFrame};
 
 /// The arguments that choose sources and targets, which several methods take as keywords.
@@ -83,6 +84,49 @@ impl Request {
         }
         Ok(job)
     }
+}
+
+/// Width and height of pictures.
+///
+/// # Errors
+/// Those that no picture has.
+pub(crate) fn size(given: Option<(u32, u32)>) -> Result<Option<[u32; 2]>, Failure> {
+    let sides = 1..=16_384;
+    match given {
+        None => Ok(None),
+        Some((width, height)) if sides.contains(&width) && sides.contains(&height) => Ok(Some([width, height])),
+        Some((width, height)) => {
+            Err(Failure::Input(format!("size: {width}x{height}; width and height are from 1 to 16384")))
+        }
+    }
+}
+
+/// # Errors
+/// What is no background.
+pub(crate) fn background(given: &str) -> Result<BackgroundChoice, Failure> {
+    given.parse().map_err(|error| Failure::Input(format!("{error}")))
+}
+
+/// # Errors
+/// What is no share.
+pub(crate) fn leave_out(given: f32) -> Result<f32, Failure> {
+    match given {
+        share if (0.0..1.0).contains(&share) => Ok(share),
+        share => Err(Failure::Input(format!("leave_out: {share} is not at least 0 and less than 1"))),
+    }
+}
+
+/// The sources and targets of what renders photographs that are held out.
+///
+/// # Errors
+/// A number of views that there cannot be.
+pub(crate) fn held_out(
+    targets: Option<String>,
+    sources: Option<String>,
+    views: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Selection> {
+    let view_count = views.map(|views| count("views", views)).transpose()?;
+    Ok(Selection { targets, path: None, sources, view_count })
 }
 
 /// A number of views or cameras.

@@ -2,12 +2,13 @@
 
 use crate::arrays::{array, intrinsic_matrix};
 use crate::error::Failure;
+use crate::evaluate::{Evaluation, GivenSchemes, PyScore};
 use crate::frame::{PyFrame, to_python};
 use crate::given_weights::{GivenWeights, Raised, raised};
-use crate::interrupt::{interruptible, reported};
-use crate::progress::Reporter;
+use crate::interrupt::{interruptible, watched};
+use crate::optimise::{Optimisation, PyGaussians};
 use crate::render::Order;
-use crate::request::Request;
+use crate::request::{Request, held_out};
 use crate::weights::{PyWeights, Schemes, weigh};
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
@@ -139,14 +140,81 @@ impl PyScene {
         let errors = Raised::default();
         let raised_by_weights = Arc::clone(&errors);
         let order = Order { request, weights, raised: errors, size, model, device, background, leave_out, seed };
-        let reporter = Reporter::of(py, progress)?;
-        let rendered = reported(py, reporter.as_ref(), |progress| order.carry_out(&self.scene, progress));
-        if let Some(reporter) = reporter {
-            reporter.end(py)?;
-        }
+        let rendered = watched(py, progress, |progress| order.carry_out(&self.scene, progress));
         raised(&raised_by_weights)?;
         let (sources, frames) = rendered?;
         frames.into_iter().map(|frame| to_python(py, &self.scene, &sources, frame)).collect()
+    }
+
+    /// Scores schemes on photographs that are left out: each target from all other views, or, with sources, all other
+    /// views from these. The baselines come first. Ctrl-C ends it.
+    #[pyo3(signature = (weights=None, *, targets=None, sources=None, views=None, size=None, model=None, device="auto", background="auto", leave_out=0.01, seed=0, progress=None))]
+    #[allow(clippy::too_many_arguments)]
+    fn evaluate(
+        &self,
+        py: Python<'_>,
+        weights: Option<GivenSchemes>,
+        targets: Option<String>,
+        sources: Option<String>,
+        views: Option<&Bound<'_, PyAny>>,
+        size: Option<(u32, u32)>,
+        model: Option<PathBuf>,
+        device: &str,
+        background: &str,
+        leave_out: f32,
+        seed: u64,
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Vec<PyScore>> {
+        let selection = held_out(targets, sources, views)?;
+        let (device, background) = (device.to_owned(), background.to_owned());
+        let errors = Raised::default();
+        let raised_by_weights = Arc::clone(&errors);
+        let evaluation =
+            Evaluation { selection, weights, raised: errors, size, model, device, background, leave_out, seed };
+        let scores = watched(py, progress, |progress| evaluation.carry_out(&self.scene, progress));
+        raised(&raised_by_weights)?;
+        scores
+    }
+
+    /// Optimises Gaussians for the photographs, and writes them: as .ply, smaller as .spz or .splat, or as an .html
+    /// page. Ctrl-C ends it, and what there is so far is written.
+    #[pyo3(signature = (output, *, weights=None, left_out=None, towards=None, sources=None, views=None, count=None, iterations=None, resume=None, size=None, device="auto", background="auto", seed=0, progress=None))]
+    #[allow(clippy::too_many_arguments)]
+    fn optimise(
+        &self,
+        py: Python<'_>,
+        output: PathBuf,
+        weights: Option<String>,
+        left_out: Option<String>,
+        towards: Option<String>,
+        sources: Option<String>,
+        views: Option<&Bound<'_, PyAny>>,
+        count: Option<u32>,
+        iterations: Option<u32>,
+        resume: Option<PathBuf>,
+        size: Option<(u32, u32)>,
+        device: &str,
+        background: &str,
+        seed: u64,
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<PyGaussians> {
+        let selection = held_out(None, sources, views)?;
+        let (device, background) = (device.to_owned(), background.to_owned());
+        let optimisation = Optimisation {
+            output,
+            selection,
+            weights,
+            left_out,
+            towards,
+            count,
+            iterations,
+            resume,
+            size,
+            device,
+            background,
+            seed,
+        };
+        watched(py, progress, |progress| optimisation.carry_out(&self.scene, progress))
     }
 
     fn __len__(&self) -> usize {

@@ -366,6 +366,183 @@ class OwnWeights(unittest.TestCase):
                 self.render(weights)
 
 
+class Evaluations(unittest.TestCase):
+    def test_scores_are_those_of_the_command(self):
+        schemes = ["mean", "error:alpha=1", "auto"]
+        scores = viewfuse.Scene(TOY).evaluate(schemes, targets="20,22", sources="0..19/4", size=(32, 32), device="cpu")
+        with tempfile.TemporaryDirectory() as folder:
+            options = [word for scheme in schemes for word in ("--weights", scheme)]
+            where = ["--targets", "20,22", "--sources", "0..19/4", "--size", "32x32", "--device", "cpu"]
+            done = run("evaluate", TOY, *where, *options, "-o", Path(folder) / "scores.csv")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            header, *lines = [line.split(",") for line in (Path(folder) / "scores.csv").read_text().splitlines()]
+        self.assertEqual(len(scores), len(lines))
+        for score, line in zip(scores, lines):
+            # Schemes with two parameters have a comma, but none of these.
+            own = dict(zip(header, line))
+            self.assertEqual((score.scheme, score.target, score.source_count), (own["scheme"], own["target"], 5))
+            for value, name in [(score.psnr, "psnr_db"), (score.ssim, "ssim"), (score.corrected_psnr, "psnr-corrected")]:
+                self.assertAlmostEqual(value, float(own[name]), places=5)
+            self.assertEqual(score.is_baseline, score.scheme not in schemes)
+
+    def test_a_function_is_a_row(self):
+        def mine(sources, target):
+            return np.ones(len(sources))
+
+        def fails(sources, target):
+            raise KeyError("mine")
+
+        scene = viewfuse.Scene(TOY)
+        small = {"targets": "20", "sources": "0..19/4", "size": (24, 24), "device": "cpu", "leave_out": 0}
+        scores = {score.scheme: score.psnr for score in scene.evaluate([mine, "mean"], **small)}
+        self.assertEqual(scores["mine"], scores["mean"])
+        self.assertEqual([score.scheme for score in scene.evaluate(mine, **small) if not score.is_baseline], ["mine"])
+        with self.assertRaisesRegex(KeyError, "mine"):
+            scene.evaluate(fails, **small)
+        for wrong in [[1, 2], b"mean", ["mean", 3]]:
+            with self.assertRaisesRegex(ValueError, "a scheme's name or a function"):
+                scene.evaluate(wrong, **small)
+
+    def test_ctrl_c(self):
+        scene = viewfuse.Scene(ROOM)
+        threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+        with self.assertRaises(KeyboardInterrupt):
+            scene.evaluate(device="cpu")
+
+
+class Gaussians(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+
+    def test_the_file_is_that_of_the_command(self):
+        scene, small = viewfuse.Scene(TOY), {"size": (32, 32), "device": "cpu", "iterations": 30}
+        for name, keywords, options in [
+            ("a.ply", {"left_out": "20"}, ["--left-out", "20"]),
+            ("a.html", {"seed": 3, "sources": "0..19/2"}, ["--seed", "3", "--sources", "0..19/2"]),
+            ("a.splat", {"towards": "20", "count": 300}, ["--towards", "20", "--count", "300"]),
+        ]:
+            made = scene.optimise(self.folder / name, **small, **keywords)
+            other = self.folder / f"other-{name}"
+            where = ["--size", "32x32", "--device", "cpu", "--iterations", "30"]
+            done = run("optimise", TOY, *where, *options, "-o", other)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual(made.path.read_bytes(), other.read_bytes(), name)
+            self.assertIn(f": {made.count} Gaussians after {made.iterations} of ", done.stdout)
+            self.assertEqual(bool(made.scores), "left_out" in keywords)
+            self.assertEqual(made.fit is None, "left_out" in keywords)
+        again = scene.optimise(self.folder / "b.ply", resume=self.folder / "a.ply", **small)
+        self.assertGreater(again.count, 100)
+
+    def test_ctrl_c_keeps_what_there_is(self):
+        scene, path = viewfuse.Scene(TOY), self.folder / "a.ply"
+
+        def interrupt():
+            while not path.exists():
+                time.sleep(0.01)
+            os.kill(os.getpid(), signal.SIGINT)
+
+        threading.Thread(target=interrupt).start()
+        with self.assertRaises(KeyboardInterrupt):
+            scene.optimise(path, size=(48, 48), device="cpu", iterations=50000)
+        self.assertTrue(path.read_bytes().startswith(b"ply\n"))
+        self.assertEqual([file.name for file in self.folder.iterdir()], ["a.ply"])
+
+    def test_what_it_refuses(self):
+        scene, path = viewfuse.Scene(TOY), self.folder / "a.ply"
+        (self.folder / "other.ply").write_text("ply")
+        for output, keywords, text in [
+            (self.folder / "a.png", {}, "scenes of Gaussians are written as .ply or .html"),
+            (path, {"left_out": "77"}, "77"),
+            (path, {"count": 0}, "count: 0 is not a whole number from 1"),
+            (path, {"resume": self.folder / "none.ply"}, "none.ply"),
+            (self.folder / "other.ply", {"resume": self.folder / "other.ply"}, "is the input"),
+            (TOY / "pose/000000.txt", {}, "written as"),
+        ]:
+            with self.assertRaisesRegex(ValueError, text):
+                scene.optimise(output, size=(24, 24), device="cpu", **keywords)
+        self.assertFalse(path.exists())
+        with self.assertRaises(OSError):
+            scene.optimise(self.folder / "other.ply" / "a.ply", device="cpu")
+
+
+class Poses(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+        self.photographs = self.folder / "bare"
+        self.photographs.mkdir()
+        for name in sorted(path.name for path in (ROOM / "images").iterdir())[:8]:
+            (self.photographs / name).write_bytes((ROOM / "images" / name).read_bytes())
+
+    def names(self):
+        return sorted(path.name for path in self.folder.iterdir())
+
+    def program(self, script):
+        """A program in the place of viewfuse-openmvg."""
+        path = self.folder / "openmvg"
+        path.write_text(f"#!/bin/sh\n{script}\n")
+        path.chmod(0o755)
+        return {"openmvg": path}
+
+    def test_the_scene_is_that_of_the_command(self):
+        program = Path(os.environ.get("VIEWFUSE_OPENMVG", Path(COMMAND).with_name("viewfuse-openmvg")))
+        if not program.exists():
+            self.skipTest("no viewfuse-openmvg: `cargo openmvg` builds it")
+        scene = viewfuse.pose(self.photographs, self.folder / "posed", focal=294.4, solvers={"openmvg": program})
+        done = run("pose", self.photographs, "--focal", "294.4", "-o", self.folder / "other")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for path in sorted((self.folder / "other").rglob("*")):
+            if path.is_file() and path.name != "pose.json":
+                own = self.folder / "posed" / path.relative_to(self.folder / "other")
+                self.assertEqual(own.read_bytes(), path.read_bytes(), path.name)
+        self.assertEqual((scene.path, scene.layout), (self.folder / "posed", "colmap"))
+        self.assertEqual(self.names(), ["bare", "other", "posed"])
+
+    def test_nothing_that_can_be_trusted(self):
+        nothing = self.program("cat > /dev/null; echo '{\"failed\":{\"reason\":\"nothing matches\"}}'")
+        with self.assertRaisesRegex(ValueError, r"bare: no poses that can be trusted \(.*nothing matches"):
+            viewfuse.pose(self.photographs, self.folder / "posed", solvers=nothing)
+        self.assertEqual(self.names(), ["bare", "openmvg"])
+
+    def test_ctrl_c_ends_the_program(self):
+        stays = self.program(f"echo $$ > {self.folder}/process; exec sleep 100")
+        process = self.folder / "process"
+
+        def interrupt():
+            while not process.exists() or not process.read_text().endswith("\n"):
+                time.sleep(0.01)
+            os.kill(os.getpid(), signal.SIGINT)
+
+        threading.Thread(target=interrupt).start()
+        start = time.monotonic()
+        with self.assertRaises(KeyboardInterrupt):
+            viewfuse.pose(self.photographs, self.folder / "posed", solvers=stays)
+        self.assertLess(time.monotonic() - start, 60)
+        with self.assertRaises(ProcessLookupError):
+            os.kill(int(process.read_text()), 0)
+        self.assertEqual(self.names(), ["bare", "openmvg", "process"])
+
+    def test_what_it_refuses(self):
+        posed = self.folder / "posed"
+        (self.folder / "full").mkdir()
+        (self.folder / "full" / "notes.txt").write_text("mine")
+        for photographs, output, keywords, text in [
+            (self.photographs, self.folder / "full", {}, "full: exists already and is not an empty folder"),
+            (self.folder / "none", posed, {}, "none"),
+            (self.photographs, posed, {"focal": 0}, "focal: 0 is not a number of pixels"),
+            (self.photographs, posed, {"every": 0}, "every: 0"),
+            (self.photographs, posed, {"layout": "srn"}, "colmap, colmap-binary or transforms"),
+            (self.photographs, posed, {"solvers": "abacus"}, "'abacus' is none of openmvg"),
+            (self.photographs, posed, {"solvers": {"openmvg": "/none/there"}}, "/none/there: the program is not there"),
+        ]:
+            with self.assertRaisesRegex(ValueError, text):
+                viewfuse.pose(photographs, output, **keywords)
+        self.assertEqual(self.names(), ["bare", "full"])
+
+
 class Scores(unittest.TestCase):
     def test_by_definition(self):
         noise = np.random.default_rng(0)
@@ -509,7 +686,7 @@ class Stubs(unittest.TestCase):
                 stated[node.name] = set()
         there = {name for name in vars(viewfuse) if not name.startswith("_") and name != "viewfuse"}
         self.assertEqual(set(stated), there)
-        for name in ["Scene", "Weights", "Frame"]:
+        for name in ["Scene", "Weights", "Frame", "Score", "Gaussians"]:
             own = vars(getattr(viewfuse, name))
             public = {item for item in own if not item.startswith("_")}
             self.assertEqual({item for item in stated[name] if not item.startswith("_")}, public, name)

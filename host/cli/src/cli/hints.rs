@@ -4,6 +4,7 @@ use std::error::Error;
 use viewfuse_evaluate::EvaluateError;
 use viewfuse_evaluate::protocol::ProtocolError;
 use viewfuse_evaluate::run_folder::FolderError;
+use viewfuse_field::optimise::OptimiseError;
 use viewfuse_field::render::RenderError;
 use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_output::folder::OutputError;
@@ -24,11 +25,12 @@ pub(crate) fn is_of_arguments(error: &anyhow::Error) -> bool {
 }
 
 /// The errors that may have hints, and that reach the command as they are.
-const HINTED: [fn(&(dyn Error + 'static)) -> Option<Hint>; 10] = [
+const HINTED: [fn(&(dyn Error + 'static)) -> Option<Hint>; 11] = [
     of::<SelectionError>,
     of::<PhotographsError>,
     of::<SceneError>,
     of::<RenderError>,
+    of::<OptimiseError>,
     of::<OutputError>,
     of::<FolderError>,
     of::<EvaluateError>,

@@ -1,0 +1,259 @@
+//! A scene's photographs to Gaussians: which views are sources, the surfaces that the Gaussians begin with, scores of
+//! views that are held out on the way.
+
+use crate::AnyField;
+use crate::gaussians::{GivenGaussians, Optimiser, Recipe, behind, scene_of};
+use crate::point_cloud::point_cloud;
+use crate::render::{RenderError, RenderOptions, Stage, open_album};
+use viewfuse_core::Vec3;
+use viewfuse_device::choice::AnyDevice;
+use viewfuse_device::cpu::Cpu;
+use viewfuse_device::{Device, Memory};
+use viewfuse_job::files::WriteError;
+use viewfuse_job::hint::{Hint, Hinted};
+use viewfuse_job::progress::{Progress, Silent};
+use viewfuse_kernels::rows::GaussianBlock;
+use viewfuse_scene::Scene;
+use viewfuse_scene::few_shot::{Selection, SelectionError, Target, target_of};
+use viewfuse_scene::gaussians::{GaussianFile, GaussianScene};
+use viewfuse_scene::photographs::Album;
+use viewfuse_scene::unit::RigUnit;
+use viewfuse_weighting::Weighting;
+use viewfuse_weighting::sources::SourcePoses;
+
+/// Iterations between two scores, and between two of what is kept on the way.
+const SCORED: u32 = 40;
+/// Sources that are scored where no view is held out.
+const FIT_SOURCES: usize = 3;
+/// Iterations with the weights of [`SceneOptimisation::towards`].
+pub const TOWARDS: u32 = 60;
+
+/// Why a scene has no Gaussians.
+#[derive(Debug, thiserror::Error)]
+pub enum OptimiseError {
+    /// The photographs, the surfaces or a step.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// There is too little to begin with.
+    #[error("{scene}: too few views agree on any surface to begin Gaussians with")]
+    Few {
+        /// The scene's path.
+        scene: String,
+    },
+    /// What is there so far could not be kept.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}
+
+impl Hinted for OptimiseError {
+    fn hint(&self) -> Option<Hint> {
+        match self {
+            OptimiseError::Render(error) => error.hint(),
+            OptimiseError::Few { .. } | OptimiseError::Write(_) => None,
+        }
+    }
+}
+
+/// An optimisation and what it is of.
+pub struct SceneOptimisation<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its views that are sources.
+    pub sources: Vec<usize>,
+    /// Photographs that are held out, and scored on the way.
+    pub held_out: Vec<usize>,
+    /// Views that it ends with the weights of: [`TOWARDS`] iterations more.
+    pub towards: Vec<Target>,
+    /// How photographs are read and scored.
+    pub options: RenderOptions,
+    /// The weighting of the surfaces, and for `towards`.
+    pub weighting: Weighting,
+    /// The iterations and the number of Gaussians.
+    pub recipe: Recipe,
+    /// The Gaussians that it goes on from, with the iterations of the finest size.
+    pub before: Option<GaussianFile>,
+}
+
+/// What an optimisation ends with.
+#[derive(Clone, Debug)]
+pub struct EndedOptimisation {
+    /// The Gaussians, in world coordinates.
+    pub gaussians: GaussianScene,
+    /// What lies behind them.
+    pub background: [f32; 3],
+    /// Iterations that are done; fewer than all if it was cancelled.
+    pub done: u32,
+    /// All iterations.
+    pub of: u32,
+    /// Iteration and mean PSNR of the views that are held out.
+    pub scores: Vec<(u32, f64)>,
+    /// Mean PSNR of the first sources, and how many they are, where no view is held out.
+    pub fit: Option<(f64, usize)>,
+}
+
+impl<'a> SceneOptimisation<'a> {
+    /// Of a scene, with the default recipe. `held_out` and `towards` are lists of views; neither is a source.
+    ///
+    /// # Errors
+    /// [`SelectionError`].
+    pub fn new(
+        scene: &'a Scene,
+        selection: &Selection,
+        held_out: Option<&str>,
+        towards: Option<&str>,
+    ) -> Result<SceneOptimisation<'a>, SelectionError> {
+        let least_sources = AnyField::default().about().least_sources;
+        let views = |list: Option<&str>| -> Result<Vec<Target>, SelectionError> {
+            match list {
+                None => Ok(Vec::new()),
+                Some(list) => {
+                    let selection = Selection { targets: Some(list.to_owned()), ..Selection::default() };
+                    Ok(selection.resolve(scene, least_sources)?.targets)
+                }
+            }
+        };
+        let (held_out, towards) = (views(held_out)?, views(towards)?);
+        let photographs = |targets: &[Target]| targets.iter().filter_map(|own| own.truth).collect::<Vec<usize>>();
+        let held_out = photographs(&held_out);
+        let excluded = [held_out.clone(), photographs(&towards)].concat();
+        Ok(SceneOptimisation {
+            scene,
+            sources: selection.sources_without(scene, &excluded, least_sources)?,
+            held_out,
+            towards,
+            options: RenderOptions::default(),
+            weighting: Weighting::default_scheme(),
+            recipe: Recipe::default(),
+            before: None,
+        })
+    }
+
+    /// All iterations; once it is cancelled, as many as there are so far. `keep` gets the Gaussians on the way, every
+    /// so many iterations.
+    ///
+    /// # Errors
+    /// [`OptimiseError`].
+    pub fn run(
+        &self,
+        device: &AnyDevice,
+        progress: &dyn Progress,
+        mut keep: impl FnMut(&GaussianScene) -> Result<(), WriteError>,
+    ) -> Result<EndedOptimisation, OptimiseError> {
+        match device {
+            AnyDevice::Cpu(own) => self.run_on(own, device, progress, &mut keep),
+            // A software driver takes longer than the CPU's own loops for the same steps; see `gaussians::optimised`.
+            AnyDevice::Vulkan(own) if own.is_software() => self.run_on(&Cpu, device, progress, &mut keep),
+            AnyDevice::Vulkan(own) => self.run_on(own.as_ref(), device, progress, &mut keep),
+        }
+    }
+
+    fn run_on<D: Device>(
+        &self,
+        device: &D,
+        any: &AnyDevice,
+        progress: &dyn Progress,
+        keep: &mut dyn FnMut(&GaussianScene) -> Result<(), WriteError>,
+    ) -> Result<EndedOptimisation, OptimiseError> {
+        let field = AnyField::default();
+        let renderer = field.on(any);
+        progress.stage("reading the photographs", 0..1, 10);
+        let shown = self.sources.iter().chain(&self.held_out).copied();
+        let album = open_album(self.scene, shown, renderer.as_ref(), &self.options, progress)?;
+        let mut stage = Stage::prepare(self.scene, &album, &self.sources, renderer.as_ref(), &self.options, progress)?;
+        progress.stage("finding surfaces", 1..3, 10);
+        let points = point_cloud(&mut stage, &self.weighting, Recipe::cloud(self.sources.len()), &Silent)?;
+        let begun = Optimiser::new(device, &stage.images, &points, self.recipe).map_err(RenderError::from)?;
+        let Some(mut optimiser) = begun else {
+            return Err(OptimiseError::Few { scene: self.scene.path.display().to_string() });
+        };
+        if let Some(before) = &self.before {
+            before.notes.iter().for_each(|note| progress.warn(note));
+            optimiser.resume(&before.scene.blocks(Vec3::ZERO));
+        }
+        progress.stage("optimising", 3..10, 10);
+        let more = if self.towards.is_empty() { 0 } else { TOWARDS };
+        progress.expect((optimiser.iteration_count() + more - optimiser.done()) as usize);
+        let mut scores = Vec::new();
+        self.advance(&mut optimiser, any, &album, progress, keep, &mut scores)?;
+        if more > 0 && !progress.is_cancelled() {
+            optimiser.extend(more);
+            optimiser.weigh(&self.weights()?);
+            self.advance(&mut optimiser, any, &album, progress, keep, &mut scores)?;
+        }
+        let gaussians = optimiser.optimised().gaussians;
+        let sources = &self.sources[..self.sources.len().min(FIT_SOURCES)];
+        let is_alone = self.held_out.is_empty() && !progress.is_cancelled();
+        let fit = is_alone.then(|| self.score(&gaussians, any, &album, sources)).transpose()?;
+        Ok(EndedOptimisation {
+            gaussians: scene_of(&gaussians),
+            background: behind(&stage.images),
+            done: optimiser.done(),
+            of: optimiser.iteration_count(),
+            scores,
+            fit: fit.map(|psnr| (psnr, sources.len())),
+        })
+    }
+
+    /// All iterations, with scores and what is kept on the way; fewer if it is cancelled.
+    fn advance<D: Device>(
+        &self,
+        optimiser: &mut Optimiser<'_, D>,
+        any: &AnyDevice,
+        album: &Album<'_>,
+        progress: &dyn Progress,
+        keep: &mut dyn FnMut(&GaussianScene) -> Result<(), WriteError>,
+        scores: &mut Vec<(u32, f64)>,
+    ) -> Result<(), OptimiseError> {
+        let of = optimiser.iteration_count();
+        while optimiser.done() < of && !progress.is_cancelled() {
+            optimiser.advance().map_err(RenderError::from)?;
+            progress.step();
+            let done = optimiser.done();
+            if !done.is_multiple_of(SCORED) && done != of {
+                continue;
+            }
+            let gaussians = optimiser.optimised().gaussians;
+            if done < of {
+                keep(&scene_of(&gaussians))?;
+            }
+            if !self.held_out.is_empty() {
+                let psnr = self.score(&gaussians, any, album, &self.held_out)?;
+                progress.note(&format!("iteration {done} of {of}: views left out have a PSNR of {psnr:.2} dB"));
+                scores.push((done, psnr));
+            }
+        }
+        Ok(())
+    }
+
+    /// The sources' weights for the views of `towards`: their sum over these.
+    fn weights(&self) -> Result<Vec<f32>, RenderError> {
+        let unit = RigUnit::of_scene(self.scene);
+        let poses: Vec<_> = self.sources.iter().map(|view| unit.pose(&self.scene.views[*view].camera.pose)).collect();
+        let sources = SourcePoses::new(&poses).map_err(RenderError::Sources)?;
+        let mut sums = vec![0.0; poses.len()];
+        for target in &self.towards {
+            let weights = self.weighting.weigh(&sources, &unit.pose(&target.camera.pose));
+            sums.iter_mut().zip(weights.values()).for_each(|(sum, weight)| *sum += weight);
+        }
+        Ok(sums)
+    }
+
+    /// Mean PSNR of these views.
+    fn score(
+        &self,
+        gaussians: &[GaussianBlock],
+        any: &AnyDevice,
+        album: &Album<'_>,
+        views: &[usize],
+    ) -> Result<f64, RenderError> {
+        let given = AnyField::new(GivenGaussians { scene: scene_of(gaussians), notes: Vec::new() });
+        let renderer = given.on(any);
+        let mut stage = Stage::prepare(self.scene, album, &self.sources, renderer.as_ref(), &self.options, &Silent)?;
+        let mut sum = 0.0;
+        for view in views {
+            let frame = stage.frame(&self.weighting, &target_of(self.scene, *view), &Silent)?;
+            sum += frame.truth.map_or(0.0, |truth| truth.psnr);
+        }
+        Ok(sum / views.len() as f64)
+    }
+}
