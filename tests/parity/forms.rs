@@ -47,6 +47,9 @@ pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> 
         let name = format!("{}::a_form_is_measured_and_remembered", adapter.name);
         let measured = (instance.clone(), adapter.clone());
         trials.push(ready(Trial::test(name, move || measured_and_remembered(&measured.0, &measured.1))));
+        let name = format!("{}::two_at_a_time_remember_both", adapter.name);
+        let both = (instance.clone(), adapter.clone());
+        trials.push(ready(Trial::test(name, move || two_at_a_time_remember_both(&both.0, &both.1))));
     }
     if has_subgroups && adapter.name.starts_with("llvmpipe") {
         trials.push(ready(Trial::test(format!("{}::of_wider_subgroups", adapter.name), of_wider_subgroups)));
@@ -119,23 +122,40 @@ impl<A: Device, B: Device> Visitor for SameBits<'_, A, B> {
     }
 }
 
-/// A linear layer that is large enough to be measured, on one device after another with a common memory.
-fn measured_and_remembered(instance: &Arc<Instance>, adapter: &Adapter) -> Result<(), Failed> {
-    let folder = tempfile::tempdir()?;
-    let block = LinearBlock { row_count: 300, inner_count: 130, column_count: 150, ..LinearBlock::default() };
+/// A linear layer of `row_count` rows that is large enough to be measured: its outputs, and how many submissions it took.
+fn linear(device: &Vulkan, row_count: u32) -> Result<(Vec<f32>, u64), Failed> {
+    let block = LinearBlock { row_count, inner_count: 130, column_count: 150, ..LinearBlock::default() };
     let shape = LayerShape { inner_count: 130, column_count: 150, has_wide_images: false };
     let number = |index: usize| (index * 7919 % 1000) as f32 / 1000.0 - 0.5;
     let numbers = |count: usize| (0..count).map(number).collect::<Vec<f32>>();
-    let run = |device: &Vulkan| -> Result<(Vec<f32>, u64), Failed> {
-        let layer = Layer::new(device, &shape, &numbers(130 * 150), &numbers(150))?;
-        let (inputs, mut outputs) = (device.upload(&numbers(300 * 130))?, device.zeros::<f32>(300 * 150)?);
-        device.finish()?;
-        let before = device.submission_count();
-        device.linear(&block, &inputs, &layer.weights, &layer.bias, None, &mut outputs)?;
-        device.finish()?;
-        let submissions = device.submission_count() - before;
-        Ok((device.download(&outputs)?, submissions))
-    };
+    let layer = Layer::new(device, &shape, &numbers(130 * 150), &numbers(150))?;
+    let row_count = row_count as usize;
+    let (inputs, mut outputs) = (device.upload(&numbers(row_count * 130))?, device.zeros::<f32>(row_count * 150)?);
+    device.finish()?;
+    let before = device.submission_count();
+    device.linear(&block, &inputs, &layer.weights, &layer.bias, None, &mut outputs)?;
+    device.finish()?;
+    let submissions = device.submission_count() - before;
+    Ok((device.download(&outputs)?, submissions))
+}
+
+/// What two open devices measure is all there for a third, whichever is closed first.
+fn two_at_a_time_remember_both(instance: &Arc<Instance>, adapter: &Adapter) -> Result<(), Failed> {
+    let folder = tempfile::tempdir()?;
+    let open = || Vulkan::open_with_memory(instance, adapter, &GpuOptions::default(), folder.path());
+    let (one, another) = (open()?, open()?);
+    let measuring = [linear(&one, 300)?.1, linear(&another, 1200)?.1];
+    drop((one, another));
+    let third = open()?;
+    let recalled = [linear(&third, 300)?.1, linear(&third, 1200)?.1];
+    assert!(measuring.iter().all(|count| *count > 1) && recalled == [1, 1], "{measuring:?}, then {recalled:?}");
+    Ok(())
+}
+
+/// A linear layer that is large enough to be measured, on one device after another with a common memory.
+fn measured_and_remembered(instance: &Arc<Instance>, adapter: &Adapter) -> Result<(), Failed> {
+    let folder = tempfile::tempdir()?;
+    let run = |device: &Vulkan| linear(device, 300);
     let usual = GpuOptions::default();
     let files =
         || std::fs::read_dir(folder.path()).map(|files| files.flatten().map(|file| file.path()).collect::<Vec<_>>());

@@ -70,6 +70,13 @@ impl Choices {
         self.has_new = true;
     }
 
+    /// Adds another process's choices for classes without one.
+    pub(crate) fn merge(&mut self, others: Choices) {
+        for (key, form) in others.forms {
+            self.forms.entry(key).or_insert(form);
+        }
+    }
+
     /// Whether one was measured since they were read.
     pub(crate) fn has_new(&self) -> bool {
         self.has_new
@@ -146,6 +153,10 @@ mod tests {
         assert_eq!(choices.get(&class(2000, 64, 128)), None);
         let parsed = Choices::parse(&choices.text()).expect("choices");
         assert_eq!((parsed.get(&class(600, 60, 100)), parsed.has_new()), (Some(Form::Subgroup), false));
+        let mut merged = Choices::parse("linear 10 6 7 single\nlinear 2 3 4 subgroup\n").expect("choices");
+        merged.merge(parsed);
+        assert_eq!(merged.get(&class(600, 60, 100)), Some(Form::Single), "what was measured here");
+        assert_eq!(merged.get(&class(600, 512, 512)), Some(Form::Single), "what was measured elsewhere");
         for broken in ["linear 1 2 3", "lines 1 2 3 single", "linear 1 2 3 triple", "linear 1 b 3 single", "\n"] {
             assert_eq!(Choices::parse(broken), None, "{broken}");
         }

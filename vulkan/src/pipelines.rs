@@ -57,23 +57,45 @@ impl Pipelines {
     /// Begins with the data of another process's cache, which is of this device and driver. A driver that does not take
     /// it goes on without.
     pub(crate) fn recall(&mut self, data: &[u8]) {
-        let info = vk::PipelineCacheCreateInfo::default().initial_data(data);
-        let Handle { device, .. } = &*self.handle;
-        // SAFETY: the data has the header that the specification demands, of this device.
-        if let Ok(cache) = unsafe { device.create_pipeline_cache(&info, None) } {
+        if let Some(cache) = self.cache_of(data) {
             // SAFETY: pipelines do not need the cache that they were created with.
-            unsafe { device.destroy_pipeline_cache(self.cache, None) };
+            unsafe { self.handle.device.destroy_pipeline_cache(self.cache, None) };
             self.cache = cache;
             self.recalled = data.to_vec();
         }
     }
 
-    /// The cache's data, and whether it is other than the data that it began with.
-    pub(crate) fn cached(&self) -> (Vec<u8>, bool) {
+    /// A cache with the data of another process's, which is of this device and driver.
+    fn cache_of(&self, data: &[u8]) -> Option<vk::PipelineCache> {
+        let info = vk::PipelineCacheCreateInfo::default().initial_data(data);
+        // SAFETY: the data has the header that the specification demands, of this device.
+        unsafe { self.handle.device.create_pipeline_cache(&info, None) }.ok()
+    }
+
+    /// Whether the cache's data is other than the data that it began with.
+    pub(crate) fn has_new(&self) -> bool {
+        !self.pipelines.is_empty() && self.cached() != self.recalled
+    }
+
+    /// The cache's data.
+    pub(crate) fn cached(&self) -> Vec<u8> {
         // SAFETY: the cache is the device's.
-        let data = unsafe { self.handle.device.get_pipeline_cache_data(self.cache) }.unwrap_or_default();
-        let has_new = !self.pipelines.is_empty() && data != self.recalled;
-        (data, has_new)
+        unsafe { self.handle.device.get_pipeline_cache_data(self.cache) }.unwrap_or_default()
+    }
+
+    /// Adds what another process's cache has, unless the cache began with that. A driver that does not take it goes on
+    /// without.
+    pub(crate) fn merge(&mut self, data: &[u8]) {
+        if data.is_empty() || data == self.recalled {
+            return;
+        }
+        let Some(cache) = self.cache_of(data) else { return };
+        let Handle { device, .. } = &*self.handle;
+        // SAFETY: two different caches of the device; nobody else uses this one, and all access to the other is exclusive.
+        unsafe {
+            let _ = device.merge_pipeline_caches(self.cache, &[cache]);
+            device.destroy_pipeline_cache(cache, None);
+        }
     }
 
     /// The pipeline of a kernel for pages of `2^page_shift` elements; 0 leaves the choice of pages out.

@@ -60,11 +60,21 @@ impl Gpu {
         true
     }
 
-    /// What the device remembers, if that is more than it recalled.
-    pub fn remembered(&self) -> Option<Vec<u8>> {
+    /// Whether the device remembers more than it recalled.
+    pub fn has_new_memories(&self) -> bool {
         let state = self.lock();
-        let (pipelines, has_new) = state.pipelines.cached();
-        (has_new || state.choices.has_new()).then(|| encode(&self.handle.identity(), &state.choices, &pipelines))
+        state.choices.has_new() || state.pipelines.has_new()
+    }
+
+    /// What the device remembers, and what others did that wrote `kept` in the meantime: [`Gpu::remembered`] of another
+    /// process, or anything else, which is ignored then.
+    pub fn remembered(&self, kept: &[u8]) -> Vec<u8> {
+        let (identity, state) = (self.handle.identity(), &mut *self.lock());
+        if let Some((choices, pipelines)) = decode(&identity, kept) {
+            state.choices.merge(choices);
+            state.pipelines.merge(pipelines);
+        }
+        encode(&identity, &state.choices, &state.pipelines.cached())
     }
 }
 
@@ -135,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn another_device_or_driver_recalls_nothing() {
+    fn another_device_driver_or_module_recalls_nothing() {
         let bytes = encode(&IDENTITY, &choices(), &pipelines());
         let others = [
             Identity { vendor: 1, ..IDENTITY },
@@ -146,6 +156,11 @@ mod tests {
         for other in others {
             assert_eq!(decode(&other, &bytes), None);
         }
+        // Other kernels: the modules' checksum stands behind the magic.
+        let mut other = bytes[..bytes.len() - CHECKSUM].to_vec();
+        other[MAGIC.len()] ^= 1;
+        other.extend(crc32fast::hash(&other).to_le_bytes());
+        assert_eq!(decode(&IDENTITY, &other), None);
         // A right frame around another device's pipelines.
         let mut foreign = pipelines();
         foreign[8] = 1;

@@ -7,7 +7,8 @@ use crate::argument;
 use bytemuck::bytes_of;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use viewfuse_job::files::{read_at_most, write_whole};
+use std::time::Duration;
+use viewfuse_job::files::{FolderLock, read_at_most, write_whole};
 use viewfuse_kernels::rows::*;
 use viewfuse_kernels::{elements, for_each_kernel};
 use viewfuse_vulkan::{Adapter, AdapterKind, Buffer, Gpu, GpuOptions, Instance, Tally, VulkanError};
@@ -26,6 +27,8 @@ pub struct Vulkan {
 const BUSY_ELEMENTS: usize = 1 << 16;
 /// Most bytes of what a device remembers: more is not its own.
 const MAX_REMEMBERED: u64 = 256 << 20;
+/// How long a device that is closed waits for others that write what they remember.
+const WRITING: Duration = Duration::from_secs(2);
 
 impl Vulkan {
     /// Opens a device.
@@ -39,8 +42,8 @@ impl Vulkan {
 
     /// As [`Vulkan::open`], with a folder where the device remembers compiled pipelines and which forms of its kernels
     /// were the fastest: they are read now, and written when the device is closed, if there are new ones. A file of
-    /// another driver or of other kernels, and a damaged one, is replaced. A folder that cannot be written costs only
-    /// time.
+    /// another driver or of other kernels, and a damaged one, is replaced; what other processes wrote in the meantime is
+    /// kept. A folder that cannot be written costs only time.
     ///
     /// # Errors
     /// [`VulkanError`].
@@ -81,10 +84,15 @@ impl Vulkan {
 
 impl Drop for Vulkan {
     fn drop(&mut self) {
-        if let (Some(file), Some(bytes)) = (&self.memory, self.gpu.remembered()) {
-            // What could not be kept is made anew.
-            let _ = write_whole(file, &bytes);
-        }
+        let Some(file) = self.memory.as_ref().filter(|_| self.gpu.has_new_memories()) else { return };
+        // One process after the other reads and writes. What could not be kept is made anew.
+        let lock = file.parent().map(|folder| {
+            let _ = std::fs::create_dir_all(folder);
+            FolderLock::wait(folder, WRITING)
+        });
+        let kept = read_at_most(file, MAX_REMEMBERED).unwrap_or_default();
+        let _ = write_whole(file, &self.gpu.remembered(&kept));
+        drop(lock);
     }
 }
 

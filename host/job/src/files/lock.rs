@@ -3,6 +3,8 @@
 use super::WriteError;
 use std::fs::{File, TryLockError};
 use std::path::Path;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
 
 /// A folder that no other process locks until this is dropped, or the process ends.
 #[derive(Debug)]
@@ -23,6 +25,20 @@ impl FolderLock {
         }
     }
 
+    /// As [`FolderLock::take`], but waits for other processes, at most so long.
+    ///
+    /// # Errors
+    /// [`WriteError::Busy`] if another process still has the lock then.
+    pub fn wait(folder: &Path, longest: Duration) -> Result<FolderLock, WriteError> {
+        let start = Instant::now();
+        loop {
+            match FolderLock::take(folder) {
+                Err(WriteError::Busy { .. }) if start.elapsed() < longest => sleep(Duration::from_millis(5)),
+                outcome => return outcome,
+            }
+        }
+    }
+
     /// Whether there is a lock.
     pub fn is_held(&self) -> bool {
         self.0.is_some()
@@ -31,14 +47,21 @@ impl FolderLock {
 
 #[cfg(all(test, unix))]
 mod tests {
-    use super::FolderLock;
+    use super::{Duration, FolderLock};
 
     #[test]
     fn one_at_a_time() {
         let folder = tempfile::tempdir().expect("a folder");
         let first = FolderLock::take(folder.path()).expect("free");
         assert!(first.is_held() && FolderLock::take(folder.path()).is_err());
-        drop(first);
+        let still = FolderLock::wait(folder.path(), Duration::from_millis(20));
+        assert!(still.is_err(), "another one has it for longer");
+        let waiting = std::thread::scope(|scope| {
+            let waiting = scope.spawn(|| FolderLock::wait(folder.path(), Duration::from_secs(60)));
+            drop(first);
+            waiting.join().expect("no panic")
+        });
+        assert!(waiting.expect("it became free").is_held());
         assert!(FolderLock::take(folder.path()).expect("free again").is_held());
         assert!(!FolderLock::take(&folder.path().join("missing")).expect("nothing to lock").is_held());
     }
