@@ -10,7 +10,7 @@ use viewfuse::device::argument;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::{Device, Element, KernelTime, LayerShape, Memory};
 use viewfuse_core::fetch::Fetch;
-use viewfuse_kernels::network::tile::{Shape, Tiles};
+use viewfuse_kernels::network::tile::{Left, Shape, Tiles};
 use viewfuse_kernels::pages::{Pages, PagesMut};
 use viewfuse_kernels::rows::*;
 use viewfuse_kernels::store::Store;
@@ -86,17 +86,18 @@ macro_rules! spoil {
 struct Whole;
 
 impl Tiles for Whole {
-    fn multiply(
+    fn multiply<L: Left>(
         self,
         _invocation: u32,
         shape: Shape,
-        left: impl Fn(u32, u32) -> f32 + Copy,
+        left: L,
         right: impl Fn(u32, u32) -> f32 + Copy,
         mut store: impl FnMut(u32, u32, f32),
     ) {
         for row in 0..shape.row_count {
             for column in 0..shape.column_count {
-                let products = (0..shape.inner_count).map(|inner| left(row, inner) * right(inner, column));
+                let number = |inner| left.number(left.row(row), left.inner(inner));
+                let products = (0..shape.inner_count).map(|inner| number(inner) * right(inner, column));
                 store(row, column, products.sum());
             }
         }

@@ -38,7 +38,7 @@ pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> 
     };
     let tiled = Kernel::ALL.into_iter().filter(|kernel| kernel.is_tiled());
     let has_subgroups = adapter.subgroup_size.is_some();
-    let is_there = move |form: &&Form| **form != Form::Single && (has_subgroups || !form.needs_subgroups());
+    let is_there = |form: &&Form| **form != Form::Single && adapter.runs(**form);
     let others = |kernel: Kernel| kernel.forms().iter().filter(is_there).map(move |form| (kernel, *form));
     let mut trials: Vec<Trial> = tiled.clone().map(in_pieces).collect();
     trials.extend(tiled.flat_map(others).map(|(kernel, form)| of_form(kernel, form)));
@@ -89,15 +89,20 @@ fn refused(instance: &Arc<Instance>, adapter: &Adapter) -> Result<(), Failed> {
     }
 }
 
-/// A device on which a dispatch has one workgroup, so that products are cut.
+/// A device on which a dispatch has one workgroup, so that products are cut: workgroups of both sizes.
 fn pieces_have_the_same_bits(instance: &Arc<Instance>, adapter: &Adapter, kernel: Kernel) -> Result<(), Failed> {
-    let usual = GpuOptions { form: Some(Form::Single), ..GpuOptions::default() };
-    let whole = Vulkan::open(instance, adapter, &usual)?;
-    let limits = Limits { workgroup_count: 1, ..usual.limits };
-    let cut = Vulkan::open(instance, adapter, &GpuOptions { limits, ..usual })?;
-    visit(kernel, SameBits { one: &whole, other: &cut, seeds: 3..=3 })?;
-    let [one, several] = [&whole, &cut].map(|device| device.tally(kernel).dispatches);
-    if several > one { Ok(()) } else { Err(format!("{several} dispatches instead of {one}").into()) }
+    for form in [Form::Single, Form::Large].into_iter().filter(|form| adapter.runs(*form)) {
+        let usual = GpuOptions { form: Some(form), ..GpuOptions::default() };
+        let whole = Vulkan::open(instance, adapter, &usual)?;
+        let limits = Limits { workgroup_count: 1, ..usual.limits };
+        let cut = Vulkan::open(instance, adapter, &GpuOptions { limits, ..usual })?;
+        visit(kernel, SameBits { one: &whole, other: &cut, seeds: 3..=3 })?;
+        let [one, several] = [&whole, &cut].map(|device| device.tally(kernel).dispatches);
+        if several <= one {
+            return Err(format!("{}: {several} dispatches instead of {one}", form.name()).into());
+        }
+    }
+    Ok(())
 }
 
 /// Two devices with the same bits.
@@ -122,7 +127,8 @@ impl<A: Device, B: Device> Visitor for SameBits<'_, A, B> {
     }
 }
 
-/// A linear layer of `row_count` rows that is large enough to be measured: its outputs, and how many submissions it took.
+/// A linear layer of `row_count` rows that is large enough to be measured: its outputs, and how many submissions it
+/// took.
 fn linear(device: &Vulkan, row_count: u32) -> Result<(Vec<f32>, u64), Failed> {
     let block = LinearBlock { row_count, inner_count: 130, column_count: 150, ..LinearBlock::default() };
     let shape = LayerShape { inner_count: 130, column_count: 150, has_wide_images: false };

@@ -7,7 +7,7 @@ use rspirv::spirv::{
     Op, Scope, StorageClass, Word,
 };
 use std::collections::{BTreeMap, BTreeSet};
-use viewfuse_vulkan::kernel::{Access, Array, Form, Kernel, Layout, SHARED_BYTES, WORKGROUP};
+use viewfuse_vulkan::kernel::{Access, Array, Form, Kernel, Layout};
 
 /// `Sqrt` of `GLSL.std.450`: the only function that is the device's.
 const SQUARE_ROOT: u32 = 31;
@@ -150,9 +150,10 @@ impl Breaches<'_> {
             .filter(|mode| mode.operands[0] == Operand::IdRef(entry))
             .map(|mode| &mode.operands[1..])
             .collect();
-        let size = [WORKGROUP, 1, 1].map(Operand::LiteralBit32);
+        let invocations = form.invocations();
+        let size = [invocations, 1, 1].map(Operand::LiteralBit32);
         let size = [&[Operand::ExecutionMode(ExecutionMode::LocalSize)], &size[..]].concat();
-        self.unless(sizes == [&size[..]], || format!("{name}: a workgroup is {sizes:?}, not {WORKGROUP}"));
+        self.unless(sizes == [&size[..]], || format!("{name}: a workgroup is {sizes:?}, not {invocations}"));
 
         let functions = self.declarations.functions(entry);
         let used = self.declarations.used(&functions);
@@ -176,7 +177,8 @@ impl Breaches<'_> {
         });
         self.look_at_buffers(kernel, name, &buffers);
         self.look_at_accesses(name, &functions);
-        self.look_at_sharing(kernel.has_barriers(form), name, &shared, &functions);
+        let most = if kernel.has_barriers(form) { form.shared_bytes() } else { 0 };
+        self.look_at_sharing(most, name, &shared, &functions);
         self.look_at_subgroups(name, &functions);
     }
 
@@ -252,9 +254,10 @@ impl Breaches<'_> {
 
     /// Tiles, and elements that a workgroup computes together, are computed in memory that the workgroup really shares;
     /// other kernels have none, and wait for nobody.
-    fn look_at_sharing(&mut self, is_sharing: bool, name: &str, shared: &[Word], functions: &[&Function]) {
+    fn look_at_sharing(&mut self, most: usize, name: &str, shared: &[Word], functions: &[&Function]) {
         let bytes: usize = shared.iter().map(|variable| self.declarations.variable_bytes(*variable)).sum();
-        self.unless((bytes > 0) == is_sharing && bytes <= SHARED_BYTES, || {
+        let is_sharing = most > 0;
+        self.unless((bytes > 0) == is_sharing && bytes <= most, || {
             format!("{name}: {bytes} bytes of a workgroup's memory")
         });
         let (mut private, mut barriers) = (0, 0);

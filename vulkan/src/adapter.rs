@@ -2,7 +2,7 @@
 
 use crate::error::{Missing, VulkanError, failed};
 use crate::instance::Instance;
-use crate::kernel::{Kernel, WORKGROUP};
+use crate::kernel::{Form, Kernel, WORKGROUP};
 use crate::subgroups::fitting_size;
 use ash::{ext, khr, vk};
 use std::ffi::{CStr, FromBytesUntilNulError};
@@ -89,6 +89,8 @@ pub struct Adapter {
     pub subgroup_size: Option<u32>,
     /// Missing requirements; if there are any, it cannot be opened.
     pub missing: Vec<Missing>,
+    /// Most invocations of a workgroup, and bytes of the memory that they share.
+    pub(crate) workgroup: [u32; 2],
     pub(crate) queue_family: u32,
     pub(crate) timestamp_bits: u32,
     pub(crate) timestamp_period: f32,
@@ -170,6 +172,10 @@ impl Adapter {
             },
             api_version: properties.api_version,
             memory,
+            workgroup: [
+                limits.max_compute_work_group_invocations.min(limits.max_compute_work_group_size[0]),
+                limits.max_compute_shared_memory_size,
+            ],
             limits: Limits {
                 buffer_range: limits.max_storage_buffer_range.into(),
                 // Devices may say 0 where they mean no limit.
@@ -200,6 +206,14 @@ impl Adapter {
                 cache: properties.pipeline_cache_uuid,
             },
         }
+    }
+
+    /// Whether it has what a form of tiled kernels needs.
+    pub fn runs(&self, form: Form) -> bool {
+        let [invocations, shared_bytes] = self.workgroup;
+        (!form.needs_subgroups() || self.subgroup_size.is_some())
+            && invocations >= form.invocations()
+            && shared_bytes as usize >= form.shared_bytes()
     }
 
     /// A name for what the device remembers: letters, digits and hyphens. Another driver has another one.

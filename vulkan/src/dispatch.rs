@@ -4,7 +4,7 @@ use crate::buffer::{Array, Bound, ranges};
 use crate::error::VulkanError;
 use crate::forms::Class;
 use crate::gpu::{Gpu, State, WIDEST_PAGED, barrier};
-use crate::kernel::{Access, Form, Kernel, Layout, Piece, WORKGROUP, tile_elements};
+use crate::kernel::{Access, Form, Kernel, Layout, Piece};
 use crate::pipelines::Pipeline;
 use crate::submissions::Submission;
 use ash::vk;
@@ -63,7 +63,7 @@ impl Gpu {
             let (form, of_form) = match kernel.shape(parameters) {
                 Some(shape) => {
                     let form = gpu.form(state, &job, &Class::new(kernel, shape))?;
-                    (form, 0..tile_elements(shape.row_count, shape.column_count))
+                    (form, 0..form.elements(shape.row_count, shape.column_count))
                 }
                 None => {
                     let invocations = kernel.invocations();
@@ -94,7 +94,7 @@ impl Gpu {
         let listed = kernel.arrays().iter().zip(arrays);
         let uses: Vec<_> = listed.clone().map(|(array, bound)| (bound.0, array.access)).collect();
         let pipeline = state.pipelines.get(kernel, form, page_shift)?;
-        let per_piece = self.handle.limits.workgroup_count.saturating_mul(WORKGROUP);
+        let per_piece = self.handle.limits.workgroup_count.saturating_mul(form.invocations());
         let expected = state.rates[kernel as usize].time_of(counted).unwrap_or(UNKNOWN);
         let mut dispatches = 0;
         self.record(state, &uses, |device, submission, submissions| {
@@ -115,7 +115,7 @@ impl Gpu {
                         barrier(device, commands);
                     }
                     device.cmd_push_constants(commands, pipeline.layout, stage, 0, &constants);
-                    device.cmd_dispatch(commands, piece.count.div_ceil(WORKGROUP), 1, 1);
+                    device.cmd_dispatch(commands, piece.count.div_ceil(form.invocations()), 1, 1);
                     dispatches += 1;
                 }
             }

@@ -3,7 +3,7 @@
 //! A form is measured at the first use of a kernel for products of a class, sizes to within a factor of two. All forms
 //! give the same bits, which is compared then, so a choice changes nothing but the time.
 
-use crate::kernel::{Form, Kernel, TILE, WORKGROUP, tile_elements};
+use crate::kernel::{Form, Kernel, TILE};
 use std::collections::BTreeMap;
 use viewfuse_kernels::network::tile::Shape;
 
@@ -11,6 +11,10 @@ use viewfuse_kernels::network::tile::Shape;
 pub(crate) const ROUNDS: u32 = 3;
 /// Multiply-adds of a product that is worth a measurement.
 const MIN_WORK: u64 = 1 << 22;
+/// The fewest large tiles that are worth a measurement: with fewer, most units of any GPU have none.
+const MIN_LARGE_TILES: u32 = 32;
+/// The most tiles with which small ones are measured, too: with more, every GPU has several for each unit.
+const MAX_TILES_WITH_SMALL: u32 = 512;
 /// Tiles that are measured: as many as keep a GPU busy, and few where a processor does their work.
 const MEASURED_TILES: u32 = 4096;
 const MEASURED_TILES_OF_SOFTWARE: u32 = 16;
@@ -35,23 +39,29 @@ impl Class {
         Class { shape, key: (kernel.name().to_owned(), sizes) }
     }
 
-    /// The forms that come into question, [`Form::Single`] first: one for little work, and none that the device cannot
-    /// run.
-    pub(crate) fn candidates(&self, has_subgroups: bool) -> &'static [Form] {
+    /// The forms that come into question, [`Form::Single`] first: one for little work. Sizes of tiles are a matter of
+    /// how many units a GPU has; a processor takes as long for each of them.
+    pub(crate) fn candidates(&self, is_software: bool) -> impl Iterator<Item = Form> {
         let Shape { row_count, inner_count, column_count } = self.shape;
         let work = u64::from(row_count) * u64::from(inner_count) * u64::from(column_count);
-        if work >= MIN_WORK && has_subgroups { &Form::ALL } else { &[Form::Single] }
+        let tiles = move |form: Form| form.elements(row_count, column_count) / form.invocations();
+        let fits = move |form: &Form| match form {
+            Form::Single => true,
+            Form::Large => !is_software && tiles(Form::Large) >= MIN_LARGE_TILES,
+            Form::Small => !is_software && tiles(Form::Single) <= MAX_TILES_WITH_SMALL,
+            Form::Subgroup => true,
+        };
+        Form::ALL.into_iter().filter(fits).take(if work >= MIN_WORK { Form::ALL.len() } else { 1 })
     }
 
-    /// Elements of a measurement: the first rows.
-    pub(crate) fn measured_elements(&self, is_software: bool) -> u32 {
+    /// Elements of a measurement in a form: the first rows, the same for each form.
+    pub(crate) fn measured_elements(&self, form: Form, is_software: bool) -> u32 {
+        let Shape { row_count, column_count, .. } = self.shape;
         let tiles = if is_software { MEASURED_TILES_OF_SOFTWARE } else { MEASURED_TILES };
-        let bands = tiles.div_ceil(self.shape.column_count.div_ceil(TILE)).max(1);
-        tile_elements(self.shape.row_count.min(TILE * bands), self.shape.column_count)
+        let rows = TILE * tiles.div_ceil(column_count.div_ceil(TILE)).max(1);
+        form.elements(row_count.min(rows.next_multiple_of(Form::Large.side())), column_count)
     }
 }
-
-const _: () = assert!(WORKGROUP == TILE);
 
 /// The fastest form of each class so far.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -129,18 +139,26 @@ mod tests {
     }
 
     #[test]
-    fn little_work_and_a_device_without_subgroups_have_one_candidate() {
-        assert_eq!(class(4096, 512, 512).candidates(true), Form::ALL);
-        assert_eq!(class(4096, 512, 512).candidates(false), [Form::Single]);
-        assert_eq!(class(128, 128, 128).candidates(true), [Form::Single]);
+    fn candidates_are_a_matter_of_the_work_the_outputs_and_the_kind_of_device() {
+        use Form::{Large, Single, Small, Subgroup};
+        let candidates = |class: Class, is_software| class.candidates(is_software).collect::<Vec<_>>();
+        for is_software in [true, false] {
+            assert_eq!(candidates(class(128, 128, 128), is_software), [Single], "little work");
+        }
+        assert_eq!(candidates(class(4096, 512, 512), true), [Single, Subgroup]);
+        assert_eq!(candidates(class(32_768, 512, 512), false), [Single, Large, Subgroup]);
+        assert_eq!(candidates(class(2046, 512, 512), false), [Single, Large, Small, Subgroup]);
+        // A convolution of 16x16 pixels with 512 channels.
+        assert_eq!(candidates(class(256, 4608, 512), false), [Single, Small, Subgroup]);
     }
 
     #[test]
     fn a_measurement_is_of_the_first_rows() {
-        // Five tiles of columns: four bands of tiles.
+        // Five tiles of columns: four bands of tiles, two of large ones, eight of small ones.
         let class = class(10_000, 64, 300);
-        assert_eq!(class.measured_elements(true) / WORKGROUP, 4 * 5);
-        assert_eq!(class.measured_elements(false), tile_elements(10_000, 300));
+        let tiles = |form: Form| class.measured_elements(form, true) / form.invocations();
+        assert_eq!([Form::Single, Form::Large, Form::Small].map(tiles), [4 * 5, 2 * 3, 8 * 10]);
+        assert_eq!(class.measured_elements(Form::Single, false), Form::Single.elements(10_000, 300));
     }
 
     #[test]

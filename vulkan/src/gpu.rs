@@ -6,7 +6,7 @@ use crate::error::{Missing, VulkanError};
 use crate::forms::Choices;
 use crate::handle::{Handle, Memory};
 use crate::instance::Instance;
-use crate::kernel::{Access, Form, Kernel, WORKGROUP};
+use crate::kernel::{Access, Form, Kernel};
 use crate::pipelines::Pipelines;
 use crate::submissions::{Done, Submission, Submissions};
 use ash::vk;
@@ -51,7 +51,7 @@ pub struct Faults {
 impl Faults {
     /// What is done of these elements of a form: whole workgroups.
     pub(crate) fn done(self, form: Form, elements: Range<u32>) -> Range<u32> {
-        let half = (elements.end - elements.start) / 2 / WORKGROUP * WORKGROUP;
+        let half = (elements.end - elements.start) / 2 / form.invocations() * form.invocations();
         if self.half_done == Some(form) { elements.start..elements.start + half } else { elements }
     }
 }
@@ -166,8 +166,11 @@ impl Gpu {
             workgroup_count: limits.workgroup_count.min(lower.workgroup_count).max(1),
             memory: limits.memory.min(lower.memory),
         };
-        if options.form.is_some_and(Form::needs_subgroups) && adapter.subgroup_size.is_none() {
-            let missing = vec![Missing::Feature("subgroups of 8 to 64 invocations")];
+        if let Some(form) = options.form.filter(|form| !adapter.runs(*form)) {
+            let missing = vec![Missing::Feature(match form.needs_subgroups() {
+                true => "subgroups of 8 to 64 invocations",
+                false => "workgroups of 256 invocations that share 32 KiB",
+            })];
             return Err(VulkanError::Missing { device: adapter.name.clone(), missing });
         }
         let handle = Arc::new(Handle::open(instance, adapter, limits)?);

@@ -3,6 +3,7 @@
 use crate::adapter::{Adapter, Identity, Limits};
 use crate::error::{VulkanError, failed};
 use crate::instance::Instance;
+use crate::kernel::Form;
 use ash::{khr, vk};
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
@@ -99,6 +100,11 @@ impl Handle {
     /// What is remembered depends on.
     pub(crate) fn identity(&self) -> Identity {
         self.adapter.identity
+    }
+
+    /// Whether it has what a form of tiled kernels needs.
+    pub(crate) fn runs(&self, form: Form) -> bool {
+        self.adapter.runs(form)
     }
 
     /// Invocations of a subgroup, where kernels may use them.

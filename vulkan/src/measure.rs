@@ -30,7 +30,7 @@ impl Gpu {
                 }),
             };
         }
-        let candidates = class.candidates(self.handle.subgroup_size().is_some());
+        let candidates: Vec<Form> = class.candidates(self.is_software).filter(|form| self.handle.runs(*form)).collect();
         if candidates.len() == 1 {
             return Ok(candidates[0]);
         }
@@ -48,7 +48,7 @@ impl Gpu {
             Err(VulkanError::OutOfMemory { .. }) => return Ok(Form::Single),
             before => before?,
         };
-        let form = self.fastest(state, job, class, candidates, &outputs)?;
+        let form = self.fastest(state, job, class, &candidates, &outputs)?;
         self.write_starts(state, &outputs, &before)?;
         state.choices.set(class, form);
         Ok(form)
@@ -75,6 +75,7 @@ impl Gpu {
         candidates: &[Form],
         outputs: &[&Arc<Array>],
     ) -> Result<Form, VulkanError> {
+        state.pipelines.prepare(job.kernel, candidates, job.page_shift)?;
         let (mut fastest, mut expected) = ((Form::Single, Duration::MAX), None);
         for &form in candidates {
             // A driver that compiled it for subgroups of another size would give other results.
@@ -83,7 +84,7 @@ impl Gpu {
                 continue;
             }
             self.spoil_starts(state, outputs)?;
-            let elements = class.measured_elements(self.is_software);
+            let elements = class.measured_elements(form, self.is_software);
             self.record_job(state, job, form, 0..elements, 0)?;
             let written = self.read_starts(state, outputs)?;
             if expected.is_none() && written.iter().all(|bytes| words(bytes).all(|word| word == SPOILT)) {

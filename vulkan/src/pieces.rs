@@ -10,7 +10,8 @@ use crate::kernel::{Form, WORKGROUP};
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-/// Elements of the first dispatch of a kernel: some hundred workgroups, which any GPU has the units for.
+/// Elements of the first dispatch of a kernel: some hundred workgroups (or a quarter, of large tiles), which any GPU
+/// has the units for.
 const FIRST: u32 = 256 * WORKGROUP;
 
 impl Gpu {
@@ -32,7 +33,7 @@ impl Gpu {
         while first < elements.end {
             let rest = elements.end - first;
             let time = state.rates[job.kernel as usize].time_of(counted(elements.end) - counted(first));
-            let len = time.map_or(FIRST, |time| within(longest, time, rest)).min(rest);
+            let len = time.map_or(FIRST, |time| within(longest, time, rest, form.invocations())).min(rest);
             let count = counted(first + len) - counted(first);
             dispatches += self.record_job(state, job, form, first..first + len, count)?;
             if time.is_none() && len < rest {
@@ -47,14 +48,14 @@ impl Gpu {
     }
 }
 
-/// How many of `rest` elements, which together take `time`, take at most `longest`: whole workgroups, at least those of
-/// a first dispatch.
-fn within(longest: Duration, time: Duration, rest: u32) -> u32 {
+/// How many of `rest` elements, which together take `time`, take at most `longest`: whole workgroups of so many
+/// invocations, at least those of a first dispatch.
+fn within(longest: Duration, time: Duration, rest: u32, workgroup: u32) -> u32 {
     if time <= longest {
         return rest;
     }
     let share = longest.as_secs_f64() / time.as_secs_f64();
-    ((f64::from(rest) * share) as u32 / WORKGROUP * WORKGROUP).max(FIRST)
+    ((f64::from(rest) * share) as u32 / workgroup * workgroup).max(FIRST)
 }
 
 #[cfg(test)]
@@ -64,9 +65,12 @@ mod tests {
     #[test]
     fn pieces_are_whole_workgroups_and_none_is_tiny() {
         let second = Duration::from_secs(1);
-        assert_eq!(within(second, second, 1_000_001), 1_000_001);
-        assert_eq!(within(second, 10 * second, 1_000_000), 100_000 / WORKGROUP * WORKGROUP);
-        assert_eq!(within(second, 1_000_000 * second, 1_000_000), FIRST);
-        assert_eq!(within(Duration::ZERO, second, 1_000_000), FIRST);
+        for workgroup in [WORKGROUP, 4 * WORKGROUP] {
+            assert_eq!(within(second, second, 1_000_001, workgroup), 1_000_001);
+            assert_eq!(within(second, 10 * second, 1_000_000, workgroup), 100_000 / workgroup * workgroup);
+            assert_eq!(within(second, 1_000_000 * second, 1_000_000, workgroup), FIRST);
+            assert_eq!(within(Duration::ZERO, second, 1_000_000, workgroup), FIRST);
+            assert_eq!(FIRST % workgroup, 0);
+        }
     }
 }

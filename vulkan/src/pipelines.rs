@@ -91,7 +91,8 @@ impl Pipelines {
         }
         let Some(cache) = self.cache_of(data) else { return };
         let Handle { device, .. } = &*self.handle;
-        // SAFETY: two different caches of the device; nobody else uses this one, and all access to the other is exclusive.
+        // SAFETY: two different caches of the device; nobody else uses this one, and all access to the other is
+        // exclusive.
         unsafe {
             let _ = device.merge_pipeline_caches(self.cache, &[cache]);
             device.destroy_pipeline_cache(cache, None);
@@ -101,11 +102,43 @@ impl Pipelines {
     /// The pipeline of a kernel for pages of `2^page_shift` elements; 0 leaves the choice of pages out.
     pub(crate) fn get(&mut self, kernel: Kernel, form: Form, page_shift: u32) -> Result<Pipeline, VulkanError> {
         let (set_layout, layout) = self.layouts(kernel)?;
-        let raw = match self.pipelines.get(&(kernel, form, page_shift)) {
-            Some(pipeline) => *pipeline,
-            None => self.create(kernel, form, layout, page_shift)?,
+        self.prepare(kernel, &[form], page_shift)?;
+        Ok(Pipeline { raw: self.pipelines[&(kernel, form, page_shift)], layout, set_layout })
+    }
+
+    /// Makes the pipelines of some forms of a kernel that are not there, side by side: a driver takes up to seconds for
+    /// each.
+    pub(crate) fn prepare(&mut self, kernel: Kernel, forms: &[Form], page_shift: u32) -> Result<(), VulkanError> {
+        let (_, layout) = self.layouts(kernel)?;
+        let is_missing = |form: &&Form| !self.pipelines.contains_key(&(kernel, **form, page_shift));
+        let missing: Vec<Form> = forms.iter().filter(is_missing).copied().collect();
+        let this = &*self;
+        let create = |form: Form| (form, this.create(kernel, form, layout, page_shift));
+        let created: Vec<_> = match missing[..] {
+            [form] => vec![create(form)],
+            _ => std::thread::scope(|scope| {
+                let threads: Vec<_> = missing.iter().map(|form| scope.spawn(move || create(*form))).collect();
+                threads.into_iter().filter_map(|thread| thread.join().ok()).collect()
+            }),
         };
-        Ok(Pipeline { raw, layout, set_layout })
+        // Of several that were made none is lost, also if one fails.
+        let mut outcome = Ok(());
+        for (form, pipeline) in created {
+            match pipeline {
+                Ok(pipeline) => self.keep(kernel, form, page_shift, pipeline),
+                Err(error) => outcome = Err(error),
+            }
+        }
+        outcome
+    }
+
+    fn keep(&mut self, kernel: Kernel, form: Form, page_shift: u32, pipeline: vk::Pipeline) {
+        self.pipelines.insert((kernel, form, page_shift), pipeline);
+        if form.needs_subgroups()
+            && let Some(size) = self.pretended.or_else(|| self.handle.reported_subgroup_size(pipeline))
+        {
+            self.reported.insert((kernel, form, page_shift), size);
+        }
     }
 
     /// Whether a form has the subgroups that it demands, as far as the driver reports it of the pipeline, which is made
@@ -161,7 +194,7 @@ impl Pipelines {
     }
 
     fn create(
-        &mut self,
+        &self,
         kernel: Kernel,
         form: Form,
         layout: vk::PipelineLayout,
@@ -195,21 +228,15 @@ impl Pipelines {
             stage = stage.flags(full).push_next(&mut required);
         }
         let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
-        // SAFETY: the module has an entry point of this name with these bindings: a test reads it back.
+        // SAFETY: the module has an entry point of this name with these bindings: a test reads it back. The cache may
+        // be used by several threads.
         let created = unsafe { self.handle.device.create_compute_pipelines(self.cache, &info, None) };
         // SAFETY: pipelines do not need the module that they were created with.
         unsafe { self.handle.device.destroy_shader_module(module, None) };
-        let pipeline = match created {
-            Ok(pipelines) => pipelines[0],
-            Err((_, result)) => return Err(self.handle.failure("vkCreateComputePipelines", result)),
-        };
-        self.pipelines.insert((kernel, form, page_shift), pipeline);
-        if form.needs_subgroups()
-            && let Some(size) = self.pretended.or_else(|| self.handle.reported_subgroup_size(pipeline))
-        {
-            self.reported.insert((kernel, form, page_shift), size);
+        match created {
+            Ok(pipelines) => Ok(pipelines[0]),
+            Err((_, result)) => Err(self.handle.failure("vkCreateComputePipelines", result)),
         }
-        Ok(pipeline)
     }
 
     /// A module of this entry point alone.

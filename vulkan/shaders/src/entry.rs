@@ -193,17 +193,50 @@ macro_rules! entry {
             #[spirv(global_invocation_id)] id: UVec3,
             #[spirv(push_constant)] push: &Push<$Block>,
             $($parameters)*
-            #[spirv(workgroup)] rows: &mut Shared,
-            #[spirv(workgroup)] columns: &mut Shared,
+            #[spirv(workgroup)] rows: &mut SharedOfSingle,
+            #[spirv(workgroup)] columns: &mut SharedOfSingle,
         ) {
             let $block = &push.parameters;
             let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
-            bodies::$method($block, shape, $($arguments)* Single { rows, columns }, push.piece.first + id.x);
+            let tiles = Staged { tile: PhantomData::<Single>, rows, columns };
+            bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
         }
 
-        /// The other form.
+        /// The other forms.
         pub mod $method {
             use super::*;
+
+            /// In large tiles.
+            #[spirv(compute(threads(256)))]
+            #[allow(clippy::too_many_arguments)]
+            pub fn large(
+                #[spirv(global_invocation_id)] id: UVec3,
+                #[spirv(push_constant)] push: &Push<$Block>,
+                $($parameters)*
+                #[spirv(workgroup)] rows: &mut SharedOfLarge,
+                #[spirv(workgroup)] columns: &mut SharedOfLarge,
+            ) {
+                let $block = &push.parameters;
+                let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
+                let tiles = Staged { tile: PhantomData::<Large>, rows, columns };
+                bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
+            }
+
+            /// In small tiles.
+            #[spirv(compute(threads(64)))]
+            #[allow(clippy::too_many_arguments)]
+            pub fn small(
+                #[spirv(global_invocation_id)] id: UVec3,
+                #[spirv(push_constant)] push: &Push<$Block>,
+                $($parameters)*
+                #[spirv(workgroup)] rows: &mut SharedOfSmall,
+                #[spirv(workgroup)] columns: &mut SharedOfSmall,
+            ) {
+                let $block = &push.parameters;
+                let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
+                let tiles = Staged { tile: PhantomData::<Small>, rows, columns };
+                bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
+            }
 
             /// By subgroups.
             #[spirv(compute(threads(64)))]

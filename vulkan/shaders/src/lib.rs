@@ -19,10 +19,11 @@ mod unchecked;
 
 pub use viewfuse_kernels::rows::Piece;
 
+use core::marker::PhantomData;
 use loads::{InVectors, Vectors, VectorsMut};
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
-use tile::{Shared, Single, Subgroup};
+use tile::{Large, SharedOfLarge, SharedOfSingle, SharedOfSmall, Single, Small, Staged, Subgroup};
 use unchecked::{Endless, Together, Unchecked};
 use viewfuse_kernels::bodies;
 use viewfuse_kernels::for_each_kernel;

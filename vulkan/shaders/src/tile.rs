@@ -1,7 +1,11 @@
 //! A matrix product by workgroups, each of which computes a tile of the outputs.
 //!
 //! The workgroup proceeds along the inner index in steps: it fetches its rows of the left matrix and its columns of the
-//! right one into workgroup memory, each number once, and sums the products from there.
+//! right one into workgroup memory, each number once, and sums the products from there, in registers. The memory holds
+//! two steps: while one is multiplied, the next is fetched, and a step takes one barrier.
+//!
+//! Beyond the inner index both matrices are 0, so that a step has a constant number of products, which drivers unroll.
+//! That changes no bit: a sum begins with 0, so it is never -0, and adding 0 leaves it.
 //!
 //! This code must not panic, see [`crate::unchecked`]. Closures capture by value: a module with logical addressing
 //! cannot hold references to references.
@@ -10,26 +14,77 @@ mod subgroup;
 
 pub(crate) use subgroup::Subgroup;
 
+use core::marker::PhantomData;
 use spirv_std::arch::{IndexUnchecked, control_barrier};
 use spirv_std::glam::Vec4;
 use spirv_std::memory::{Scope, Semantics};
-use viewfuse_kernels::network::tile::{Shape, Sums, TILE, Tiles};
+use viewfuse_kernels::network::tile::{EightSums, FourSums, Left, Shape, Sums, Tiles};
+use viewfuse_kernels::rows::Form;
 
-/// Inner indices of a step.
-const STEP: u32 = 16;
-/// Fours of a tile's rows or columns.
-const FOURS: u32 = TILE / 4;
-/// Fours from an inner index to the next: odd, so that neighbouring indices lie in different banks of the memory.
-const STRIDE: u32 = FOURS + 1;
+/// The sizes of a tile.
+pub(crate) trait Tile: Copy {
+    /// What an invocation sums.
+    type Sums: Sums;
+    const FORM: Form;
+    /// Inner indices of a step.
+    const STEP: u32;
 
-/// A step of a tile's rows or columns in a workgroup's memory: `[inner][row or column]`, in fours.
-pub(crate) type Shared = [Vec4; (STEP * STRIDE) as usize];
+    /// Rows and columns of a tile.
+    const SIDE: u32 = Self::FORM.side();
+    /// Invocations of a workgroup.
+    const INVOCATIONS: u32 = Self::FORM.invocations();
+    /// Invocations beside one another, and below.
+    const LINE: u32 = Self::SIDE / Self::Sums::SIDE;
+    /// Fours of a tile's rows or columns.
+    const FOURS: u32 = Self::SIDE / 4;
+    /// Fours of an inner index in the workgroup's memory: odd, so that neighbouring indices lie in different banks.
+    const STRIDE: u32 = Self::FOURS + 1;
+    /// Whether an invocation fetches two fours of each matrix for a step, and not one.
+    const HAS_TWO: bool = Self::STEP * Self::FOURS > Self::INVOCATIONS;
+}
+
+#[derive(Clone, Copy)]
+pub(crate) struct Single;
+
+impl Tile for Single {
+    type Sums = EightSums;
+    const FORM: Form = Form::Single;
+    const STEP: u32 = 8;
+}
+
+#[derive(Clone, Copy)]
+pub(crate) struct Large;
+
+impl Tile for Large {
+    type Sums = EightSums;
+    const FORM: Form = Form::Large;
+    const STEP: u32 = 8;
+}
+
+#[derive(Clone, Copy)]
+pub(crate) struct Small;
+
+impl Tile for Small {
+    type Sums = FourSums;
+    const FORM: Form = Form::Small;
+    const STEP: u32 = 16;
+}
+
+/// Fours of a matrix in a workgroup's memory: those of two steps.
+pub(crate) const fn shared_fours<T: Tile>() -> usize {
+    assert!(T::LINE * T::LINE == T::INVOCATIONS && T::INVOCATIONS.is_multiple_of(T::STEP));
+    assert!(T::STEP * T::FOURS == if T::HAS_TWO { 2 } else { 1 } * T::INVOCATIONS);
+    (2 * T::STEP * T::STRIDE) as usize
+}
+
+/// A matrix in a workgroup's memory: `[step][inner][row or column]`, in fours.
+pub(crate) type SharedOfSingle = [Vec4; shared_fours::<Single>()];
+pub(crate) type SharedOfLarge = [Vec4; shared_fours::<Large>()];
+pub(crate) type SharedOfSmall = [Vec4; shared_fours::<Small>()];
 
 /// What an invocation computes of its workgroup's tile.
 #[derive(Clone, Copy)]
 pub(crate) struct InvocationTile {
-    /// Its number in the workgroup.
-    pub(crate) invocation: u32,
     /// First row and column of the tile.
     pub(crate) first_row: u32,
     pub(crate) first_column: u32,
@@ -39,150 +94,228 @@ pub(crate) struct InvocationTile {
 }
 
 impl InvocationTile {
-    /// That of invocation `own` in a workgroup.
+    /// That of an invocation in a workgroup, whose tile has `side` rows, `line` invocations below one another.
     #[inline(always)]
-    pub(crate) fn of(group: u32, invocation: u32, shape: Shape) -> InvocationTile {
-        let group_columns = shape.column_count.div_ceil(TILE);
+    pub(crate) fn new(group: u32, invocation: u32, side: u32, line: u32, shape: Shape) -> InvocationTile {
+        let group_columns = shape.column_count.div_ceil(side);
         InvocationTile {
-            invocation,
-            first_row: group / group_columns * TILE,
-            first_column: group % group_columns * TILE,
-            own_row: invocation / Sums::SIDE,
-            own_column: invocation % Sums::SIDE,
+            first_row: group / group_columns * side,
+            first_column: group % group_columns * side,
+            own_row: invocation / line,
+            own_column: invocation % line,
         }
     }
 }
 
-/// The workgroup memory of [`Form::Single`](viewfuse_kernels::rows::Form::Single).
-pub(crate) struct Single<'a> {
-    pub(crate) rows: &'a mut Shared,
-    pub(crate) columns: &'a mut Shared,
+/// What an invocation fetches of its workgroup's tile.
+#[derive(Clone, Copy)]
+struct Share<R> {
+    /// Its inner index in a step, and the four, of the left and of the right matrix.
+    left: [u32; 2],
+    right: [u32; 2],
+    /// The rows of its one or two fours, and its columns.
+    near_rows: [R; 4],
+    far_rows: [R; 4],
+    columns: [u32; 4],
 }
 
-impl Tiles for Single<'_> {
+/// A step of an invocation's share: a four of rows and one of columns, twice.
+type Step = [[Vec4; 2]; 2];
+
+impl<R: Copy> Share<R> {
+    /// Inner indices from a four of columns to the second, and fours from one of rows to the second.
+    const fn next<T: Tile>() -> [u32; 2] {
+        [T::INVOCATIONS / T::FOURS, T::INVOCATIONS / T::STEP]
+    }
+
+    /// Neighbours fetch what lies next to one another: numbers of a row, and columns.
     #[inline(always)]
-    fn multiply(
+    fn new<T: Tile, L: Left<Row = R>>(own: u32, place: InvocationTile, shape: Shape, left: L) -> Share<R> {
+        let (left_four, right_four) = (own / T::STEP, own % T::FOURS);
+        let near_rows = four_rows(left, place.first_row + left_four * 4, shape);
+        let far_four = left_four + const { Self::next::<T>()[1] };
+        let far_rows = if T::HAS_TWO { four_rows(left, place.first_row + far_four * 4, shape) } else { near_rows };
+        let (first, last) = (place.first_column + right_four, shape.column_count - 1);
+        let columns = [
+            first.min(last),
+            (first + T::FOURS).min(last),
+            (first + 2 * T::FOURS).min(last),
+            (first + 3 * T::FOURS).min(last),
+        ];
+        Share { left: [own % T::STEP, left_four], right: [own / T::FOURS, right_four], near_rows, far_rows, columns }
+    }
+
+    #[inline(always)]
+    fn fetch<T: Tile, L: Left<Row = R>>(
+        self,
+        start: u32,
+        shape: Shape,
+        left: L,
+        right: impl Fn(u32, u32) -> f32 + Copy,
+    ) -> Step {
+        let (row_inner, column_inner) = (start + self.left[0], start + self.right[0]);
+        let near = [
+            fetch_rows(left, row_inner, self.near_rows, shape),
+            fetch_columns(right, column_inner, self.columns, shape),
+        ];
+        if !T::HAS_TWO {
+            return [near; 2];
+        }
+        let far_inner = column_inner + const { Self::next::<T>()[0] };
+        [
+            near,
+            [fetch_rows(left, row_inner, self.far_rows, shape), fetch_columns(right, far_inner, self.columns, shape)],
+        ]
+    }
+
+    /// Writes a step behind the first `half` inner indices of the workgroup's memory.
+    #[inline(always)]
+    fn write<T: Tile, const N: usize>(
+        self,
+        rows: &mut [Vec4; N],
+        columns: &mut [Vec4; N],
+        half: u32,
+        [near, far]: Step,
+    ) {
+        let row_place = (half + self.left[0]) * T::STRIDE + self.left[1];
+        let column_place = (half + self.right[0]) * T::STRIDE + self.right[1];
+        write(rows, row_place, near[0]);
+        write(columns, column_place, near[1]);
+        if T::HAS_TWO {
+            let [inner, four] = const { Self::next::<T>() };
+            write(rows, row_place + four, far[0]);
+            write(columns, column_place + inner * T::STRIDE, far[1]);
+        }
+    }
+}
+
+#[inline(always)]
+fn four_rows<L: Left>(left: L, first: u32, shape: Shape) -> [L::Row; 4] {
+    let last = shape.row_count - 1;
+    [
+        left.row(first.min(last)),
+        left.row((first + 1).min(last)),
+        left.row((first + 2).min(last)),
+        left.row((first + 3).min(last)),
+    ]
+}
+
+/// The numbers of an inner index in four rows, 0 beyond the matrix.
+#[inline(always)]
+fn fetch_rows<L: Left>(left: L, inner: u32, [a, b, c, d]: [L::Row; 4], shape: Shape) -> Vec4 {
+    let exists = inner < shape.inner_count;
+    let inner = left.inner(inner);
+    let four = Vec4::new(left.number(a, inner), left.number(b, inner), left.number(c, inner), left.number(d, inner));
+    if exists { four } else { Vec4::ZERO }
+}
+
+/// The numbers of an inner index in four columns, 0 beyond the matrix.
+#[inline(always)]
+fn fetch_columns(right: impl Fn(u32, u32) -> f32, inner: u32, [a, b, c, d]: [u32; 4], shape: Shape) -> Vec4 {
+    let four = Vec4::new(right(inner, a), right(inner, b), right(inner, c), right(inner, d));
+    if inner < shape.inner_count { four } else { Vec4::ZERO }
+}
+
+/// A tile that goes through the workgroup's memory.
+pub(crate) struct Staged<'a, T, const N: usize> {
+    pub(crate) tile: PhantomData<T>,
+    pub(crate) rows: &'a mut [Vec4; N],
+    pub(crate) columns: &'a mut [Vec4; N],
+}
+
+impl<T: Tile, const N: usize> Tiles for Staged<'_, T, N> {
+    #[inline(always)]
+    fn multiply<L: Left>(
         self,
         invocation: u32,
         shape: Shape,
-        left: impl Fn(u32, u32) -> f32 + Copy,
+        left: L,
         right: impl Fn(u32, u32) -> f32 + Copy,
         mut store: impl FnMut(u32, u32, f32),
     ) {
-        let Single { rows, columns } = self;
-        let place = InvocationTile::of(invocation / TILE, invocation % TILE, shape);
-        let mut sums = Sums::ZERO;
-        let mut start = 0;
+        let Staged { tile: _, rows, columns } = self;
+        let (group, own) = (invocation / T::INVOCATIONS, invocation % T::INVOCATIONS);
+        let place = InvocationTile::new(group, own, T::SIDE, T::LINE, shape);
+        let share = Share::new::<T, L>(own, place, shape, left);
+        let mut next = share.fetch::<T, L>(0, shape, left, right);
+        share.write::<T, N>(rows, columns, 0, next);
+        wait_for_all();
+        let mut sums = T::Sums::ZERO;
+        let (mut start, mut half) = (0, 0);
         while start < shape.inner_count {
-            fetch_rows(rows, place.invocation, start, place.first_row, shape, left);
-            fetch_columns(columns, place.invocation, start, place.first_column, shape, right);
-            wait_for_all();
-            let count = STEP.min(shape.inner_count - start);
+            let has_next = start + T::STEP < shape.inner_count;
+            if has_next {
+                next = share.fetch::<T, L>(start + T::STEP, shape, left, right);
+            }
+            let (row_place, column_place) = (half * T::STRIDE + place.own_row, half * T::STRIDE + place.own_column);
+            let (lent_rows, lent_columns) = (&*rows, &*columns);
             let mut inner = 0;
-            while inner < count {
-                sums.add(read_fours(rows, inner, place.own_row), read_fours(columns, inner, place.own_column));
+            while inner < T::STEP {
+                let at = inner * T::STRIDE;
+                let row_fours = T::Sums::fours(move |four| read(lent_rows, row_place + at + four * T::LINE));
+                let column_fours = T::Sums::fours(move |four| read(lent_columns, column_place + at + four * T::LINE));
+                sums.add(row_fours, column_fours);
                 inner += 1;
             }
-            wait_for_all();
-            start += STEP;
-        }
-        store_sums(sums, place, shape, &mut store);
-    }
-}
-
-/// Fetches a step of a tile's rows.
-#[inline(always)]
-fn fetch_rows(
-    rows: &mut Shared,
-    invocation: u32,
-    start: u32,
-    first_row: u32,
-    shape: Shape,
-    left: impl Fn(u32, u32) -> f32,
-) {
-    let left = move |row: u32, inner: u32| left(row.min(shape.row_count - 1), inner.min(shape.inner_count - 1));
-    let mut index = invocation;
-    while index < STEP * FOURS {
-        // Neighbours fetch what lies next to one another in the buffers.
-        let (inner, four) = (index % STEP, index / STEP);
-        let (at, row) = (start + inner, first_row + 4 * four);
-        let fetched = Vec4::new(left(row, at), left(row + 1, at), left(row + 2, at), left(row + 3, at));
-        write(rows, inner, four, fetched);
-        index += TILE;
-    }
-}
-
-/// Fetches a step of a tile's columns.
-#[inline(always)]
-fn fetch_columns(
-    columns: &mut Shared,
-    invocation: u32,
-    start: u32,
-    first_column: u32,
-    shape: Shape,
-    right: impl Fn(u32, u32) -> f32,
-) {
-    let right =
-        move |inner: u32, column: u32| right(inner.min(shape.inner_count - 1), column.min(shape.column_count - 1));
-    let mut index = invocation;
-    while index < STEP * FOURS {
-        let (inner, four) = (index / FOURS, index % FOURS);
-        let (at, column) = (start + inner, first_column + 4 * four);
-        let fetched = Vec4::new(right(at, column), right(at, column + 1), right(at, column + 2), right(at, column + 3));
-        write(columns, inner, four, fetched);
-        index += TILE;
-    }
-}
-
-/// Stores an invocation's sums of a tile, as far as the outputs go.
-#[inline(always)]
-pub(crate) fn store_sums(mut sums: Sums, place: InvocationTile, shape: Shape, store: &mut impl FnMut(u32, u32, f32)) {
-    let column = place.first_column + Sums::place(place.own_column, 0);
-    let mut index = 0;
-    while index < Sums::SIDE {
-        let row = place.first_row + Sums::place(place.own_row, index);
-        let [near, far] = sums.take_row();
-        let mut store_one = |column: u32, sum: f32| {
-            if row < shape.row_count && column < shape.column_count {
-                store(row, column, sum);
+            half = T::STEP - half;
+            if has_next {
+                share.write::<T, N>(rows, columns, half, next);
             }
-        };
-        let mut store_four = |column: u32, four: Vec4| {
-            store_one(column, four.x);
-            store_one(column + 1, four.y);
-            store_one(column + 2, four.z);
-            store_one(column + 3, four.w);
-        };
-        store_four(column, near);
-        store_four(column + Sums::place(0, 4), far);
+            wait_for_all();
+            start += T::STEP;
+        }
+        let column =
+            move |four: u32, index: u32| place.first_column + four * T::LINE + place.own_column + index * T::FOURS;
+        store_sums(sums, place, T::LINE, shape, column, &mut store);
+    }
+}
+
+/// Stores an invocation's sums of a tile, as far as the outputs go. `column` is that of a four and an index in it.
+#[inline(always)]
+pub(crate) fn store_sums<S: Sums>(
+    mut sums: S,
+    place: InvocationTile,
+    line: u32,
+    shape: Shape,
+    column: impl Fn(u32, u32) -> u32 + Copy,
+    store: &mut impl FnMut(u32, u32, f32),
+) {
+    let mut index = 0;
+    while index < S::SIDE {
+        let row = place.first_row + row_place(line, place.own_row, index);
+        sums.take_row(|four, sums| {
+            let mut store_one = |column: u32, sum: f32| {
+                if row < shape.row_count && column < shape.column_count {
+                    store(row, column, sum);
+                }
+            };
+            store_one(column(four, 0), sums.x);
+            store_one(column(four, 1), sums.y);
+            store_one(column(four, 2), sums.z);
+            store_one(column(four, 3), sums.w);
+        });
         index += 1;
     }
 }
 
-/// The place of a four of a step: within its array for all indices.
+/// Where in a tile the row number `index` of the invocation lies that is number `own` of `line` below one another.
 #[inline(always)]
-fn place(inner: u32, four: u32) -> usize {
-    (inner % STEP * STRIDE + four % FOURS) as usize
-}
-
-/// The numbers of an inner index that invocation `own` needs.
-#[inline(always)]
-fn read_fours(shared: &Shared, inner: u32, invocation: u32) -> [Vec4; 2] {
-    [read(shared, inner, Sums::place(invocation, 0) / 4), read(shared, inner, Sums::place(invocation, 4) / 4)]
+pub(crate) fn row_place(line: u32, own: u32, index: u32) -> u32 {
+    (index / 4 * line + own) * 4 + index % 4
 }
 
 #[inline(always)]
 #[allow(unsafe_code)]
-fn read(shared: &Shared, inner: u32, four: u32) -> Vec4 {
-    // SAFETY: a place is within the array.
-    unsafe { *shared.index_unchecked(place(inner, four)) }
+fn read<const N: usize>(shared: &[Vec4; N], place: u32) -> Vec4 {
+    // SAFETY: halves, inner indices and fours are below those that the array was made for (`shared_fours`).
+    unsafe { *shared.index_unchecked(place as usize) }
 }
 
 #[inline(always)]
 #[allow(unsafe_code)]
-fn write(shared: &mut Shared, inner: u32, four: u32, value: Vec4) {
-    // SAFETY: a place is within the array.
-    unsafe { *shared.index_unchecked_mut(place(inner, four)) = value };
+fn write<const N: usize>(shared: &mut [Vec4; N], place: u32, value: Vec4) {
+    // SAFETY: as in `read`.
+    unsafe { *shared.index_unchecked_mut(place as usize) = value };
 }
 
 /// A workgroup barrier: each invocation waits for all, and then sees the others' writes.

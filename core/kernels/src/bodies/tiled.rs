@@ -4,9 +4,9 @@
 //! logical addressing cannot.
 
 use crate::network::attend::MatrixBlock;
-use crate::network::convolve::{ConvolveBlock, convolved, patch_value};
-use crate::network::linear::{LinearBlock, first_of_sum, input_value, rectified};
-use crate::network::tile::{Shape, Tiles};
+use crate::network::convolve::{ConvolveBlock, Patches, convolved};
+use crate::network::linear::{LinearBlock, first_of_sum, rectified};
+use crate::network::tile::{Matrix, Shape, Tiles};
 use crate::network::transpose::TransposedBlock;
 use crate::store::Store;
 use viewfuse_core::fetch::Fetch;
@@ -29,7 +29,7 @@ pub fn convolve<A: Fetch<f32> + Copy>(
     tiles.multiply(
         invocation,
         shape,
-        move |pixel, inner| patch_value(&inputs, block, pixel, inner),
+        Patches { block, inputs },
         move |inner, channel| weights.fetch((inner * channels + channel) as usize),
         move |pixel, channel, sum| {
             let value = convolved(&bias, &residual, block, pixel, channel, sum);
@@ -55,7 +55,7 @@ pub fn convolve_transposed<A: Fetch<f32> + Copy>(
     tiles.multiply(
         invocation,
         shape,
-        move |pixel, inner| block.input(&inputs, pixel, inner),
+        Matrix { numbers: inputs, first: block.in_first, pitch: block.in_pitch, relu: 0 },
         move |inner, column| weights.fetch((inner * column_count + column) as usize),
         move |pixel, column, sum| outputs.store(block.place(pixel, column), block.output(&bias, column, sum)),
     );
@@ -79,7 +79,7 @@ pub fn linear<A: Fetch<f32> + Copy>(
     tiles.multiply(
         invocation,
         shape,
-        move |row, inner| input_value(&inputs, block, row as usize, inner as usize),
+        Matrix { numbers: inputs, first: 0, pitch: block.inner_count, relu: block.relu_inputs },
         move |inner, column| weights.fetch((inner * column_count + column) as usize),
         move |row, column, sum| {
             let element = (row * column_count + column) as usize;
@@ -105,7 +105,7 @@ pub fn matrix_product<A: Fetch<f32> + Copy>(
     tiles.multiply(
         invocation,
         shape,
-        move |row, inner| block.left(&left, row, inner),
+        Matrix { numbers: left, first: block.left_first, pitch: block.left_pitch, relu: 0 },
         move |inner, column| block.right(&right, inner, column),
         move |row, column, sum| outputs.store((row * column_count + column) as usize, sum * block.scale),
     );

@@ -7,6 +7,7 @@
 //! with the weights; [`patch_value`] is that matrix, which devices compute on the fly and do not store.
 
 use super::linear::{first_of_sum, rectified};
+use super::tile::Left;
 use bytemuck::{Pod, Zeroable};
 use viewfuse_core::fetch::Fetch;
 
@@ -88,6 +89,19 @@ impl ConvolveBlock {
         self.out_height * self.out_width
     }
 
+    /// First row and column of the window that output pixel `pixel` sees, in the enlarged image, plus the padding.
+    #[inline(always)]
+    pub fn window(&self, pixel: u32) -> [u32; 2] {
+        [pixel / self.out_width * self.stride, pixel % self.out_width * self.stride]
+    }
+
+    /// Row and column of the number `inner` of a patch in its window, in the enlarged image, and its channel.
+    #[inline(always)]
+    pub fn place_in_window(&self, inner: u32) -> [u32; 3] {
+        let (place, channel) = (inner / self.in_channels, inner % self.in_channels);
+        [place / self.size * self.dilation, place % self.size * self.dilation, channel]
+    }
+
     /// Where channel `channel` of output pixel `pixel` belongs.
     #[inline]
     pub fn place(&self, pixel: u32, channel: u32) -> usize {
@@ -102,23 +116,63 @@ pub fn window_pixel(size: [u32; 2], enlarge: u32, padding: u32, row: u32, column
     let [height, width] = size;
     // Left of or above the image the unsigned difference wraps and is too large as well.
     let (row, column) = (row.wrapping_sub(padding), column.wrapping_sub(padding));
-    if row < height * enlarge && column < width * enlarge { row / enlarge * width + column / enlarge } else { u32::MAX }
+    if row >= height * enlarge || column >= width * enlarge {
+        return u32::MAX;
+    }
+    // Few images are enlarged, and a GPU has no instruction for a division.
+    if enlarge == 1 { row * width + column } else { row / enlarge * width + column / enlarge }
 }
 
 /// Number `inner` of the patch that output pixel `pixel` sees: `[row of the window][column of the window][channel]` of
 /// `inputs[row][column][channel]`, 0 outside the image.
 #[inline]
 pub fn patch_value(inputs: &(impl Fetch<f32> + ?Sized), block: &ConvolveBlock, pixel: u32, inner: u32) -> f32 {
-    let (channel, place) = (inner % block.in_channels, inner / block.in_channels);
-    let (window_column, window_row) = (place % block.size, place / block.size);
-    let (out_column, out_row) = (pixel % block.out_width, pixel / block.out_width);
-    let row = out_row * block.stride + window_row * block.dilation;
-    let column = out_column * block.stride + window_column * block.dilation;
+    patch_number(inputs, block, block.window(pixel), block.place_in_window(inner))
+}
+
+/// The number of a [window](ConvolveBlock::window) at a [place](ConvolveBlock::place_in_window) in it.
+#[inline(always)]
+pub fn patch_number(
+    inputs: &(impl Fetch<f32> + ?Sized),
+    block: &ConvolveBlock,
+    [first_row, first_column]: [u32; 2],
+    [row, column, channel]: [u32; 3],
+) -> f32 {
+    let (row, column) = (first_row + row, first_column + column);
     let seen = window_pixel([block.in_height, block.in_width], block.enlarge, block.padding, row, column);
     if seen == u32::MAX {
         return 0.0;
     }
     inputs.fetch((block.in_first + seen * block.in_pitch + channel) as usize)
+}
+
+/// The matrix of the patches that the output pixels see.
+#[derive(Clone, Copy, Debug)]
+pub struct Patches<'a, A> {
+    /// The convolution.
+    pub block: &'a ConvolveBlock,
+    /// The input image.
+    pub inputs: A,
+}
+
+impl<A: Fetch<f32> + Copy> Left for Patches<'_, A> {
+    type Row = [u32; 2];
+    type Inner = [u32; 3];
+
+    #[inline(always)]
+    fn row(self, pixel: u32) -> [u32; 2] {
+        self.block.window(pixel)
+    }
+
+    #[inline(always)]
+    fn inner(self, inner: u32) -> [u32; 3] {
+        self.block.place_in_window(inner)
+    }
+
+    #[inline(always)]
+    fn number(self, window: [u32; 2], place: [u32; 3]) -> f32 {
+        patch_number(&self.inputs, self.block, window, place)
+    }
 }
 
 /// The output for channel `channel` of pixel `pixel` from the sum of the products: `bias[channel]` plus

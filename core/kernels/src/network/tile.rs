@@ -1,12 +1,14 @@
 //! A part of a matrix product that stays in registers, for devices that compute products in tiles.
 //!
-//! A tile is [`TILE`] rows times [`TILE`] columns of the outputs. It has 8 rows of 8 invocations, and each invocation
-//! has 8 rows and 8 columns of sums. Both come in fours that lie next to one another ([`Sums::place`]): four numbers
-//! are fetched together, neighbouring invocations fetch neighbouring fours, and each number is used eight times.
+//! A tile is a square of the outputs. An invocation has a square of its sums: as many rows as columns, in fours. Fours
+//! of neighbouring invocations lie next to one another, and each number that is fetched is used as often as the square
+//! has rows.
 
+use super::linear::rectified;
 use glam::Vec4;
+use viewfuse_core::fetch::Fetch;
 
-/// Rows and columns of a tile.
+/// Rows and columns of the tile that elements are counted in.
 pub const TILE: u32 = 64;
 
 /// The sizes of a matrix product.
@@ -20,41 +22,108 @@ pub struct Shape {
     pub column_count: u32,
 }
 
+/// The left matrix of a product. What many numbers have in common may take divisions: a device computes it once.
+pub trait Left: Copy {
+    /// What a row's numbers have in common.
+    type Row: Copy;
+    /// What the numbers of an inner index have in common.
+    type Inner: Copy;
+
+    /// That of a row.
+    fn row(self, row: u32) -> Self::Row;
+
+    /// That of an inner index.
+    fn inner(self, inner: u32) -> Self::Inner;
+
+    /// The number there. A device may ask for inner indices beyond the matrix, and does not use what it gets.
+    fn number(self, row: Self::Row, inner: Self::Inner) -> f32;
+}
+
+/// A matrix whose rows are some numbers that lie next to one another.
+#[derive(Clone, Copy, Debug)]
+pub struct Matrix<A> {
+    /// Where the numbers are.
+    pub numbers: A,
+    /// Where the first row starts.
+    pub first: u32,
+    /// Numbers from a row to the next.
+    pub pitch: u32,
+    /// Negative numbers count as 0 if this is not 0.
+    pub relu: u32,
+}
+
+impl<A: Fetch<f32> + Copy> Left for Matrix<A> {
+    type Row = u32;
+    type Inner = u32;
+
+    #[inline(always)]
+    fn row(self, row: u32) -> u32 {
+        self.first + row * self.pitch
+    }
+
+    #[inline(always)]
+    fn inner(self, inner: u32) -> u32 {
+        inner
+    }
+
+    #[inline(always)]
+    fn number(self, first: u32, inner: u32) -> f32 {
+        rectified(self.numbers.fetch((first + inner) as usize), self.relu)
+    }
+}
+
 /// How a device computes the tiles of a matrix product together.
 pub trait Tiles {
-    /// Computes an invocation's part of the matrix product of `left(row, inner)` and `right(inner, column)`, and calls
+    /// Computes an invocation's part of the matrix product of `left` and `right(inner, column)`, and calls
     /// `store(row, column, sum)`. All invocations of a workgroup take part, with outputs or without: beyond the
     /// matrices, the last row or column is read and the sum is not stored.
-    fn multiply(
+    fn multiply<L: Left>(
         self,
         invocation: u32,
         shape: Shape,
-        left: impl Fn(u32, u32) -> f32 + Copy,
+        left: L,
         right: impl Fn(u32, u32) -> f32 + Copy,
         store: impl FnMut(u32, u32, f32),
     );
 }
 
-/// Eight times eight sums, `[row][four of columns]`. Only constants are indices here: a device keeps an array in
+/// The sums of an invocation, `[row][four of columns]`. Only constants are indices here: a device keeps an array in
 /// registers only then.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sums([[Vec4; 2]; 8]);
-
-impl Sums {
-    /// Nothing added yet.
-    pub const ZERO: Sums = Sums([[Vec4::ZERO; 2]; 8]);
+pub trait Sums: Copy {
     /// How many rows and columns there are.
-    pub const SIDE: u32 = 8;
+    const SIDE: u32;
+    /// Nothing added yet.
+    const ZERO: Self;
+    /// As many numbers as there are rows, or columns.
+    type Fours: Copy;
 
-    /// Where in a tile row (or column) number `index` of the invocation lies that is number `own` in that direction.
-    #[inline(always)]
-    pub fn place(line: u32, index: u32) -> u32 {
-        index / 4 * (TILE / 2) + line * 4 + index % 4
-    }
+    /// The fours that a function gives for their numbers.
+    fn fours(four: impl Fn(u32) -> Vec4) -> Self::Fours;
 
     /// Adds the products of each row's number and each column's.
+    fn add(&mut self, rows: Self::Fours, columns: Self::Fours);
+
+    /// Calls a function with the number of each four of the first row and its sums; all other rows move up, and the
+    /// last one is 0.
+    fn take_row(&mut self, each: impl FnMut(u32, Vec4));
+}
+
+/// Eight times eight sums.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EightSums([[Vec4; 2]; 8]);
+
+impl Sums for EightSums {
+    const SIDE: u32 = 8;
+    const ZERO: EightSums = EightSums([[Vec4::ZERO; 2]; 8]);
+    type Fours = [Vec4; 2];
+
     #[inline(always)]
-    pub fn add(&mut self, rows: [Vec4; 2], columns: [Vec4; 2]) {
+    fn fours(four: impl Fn(u32) -> Vec4) -> [Vec4; 2] {
+        [four(0), four(1)]
+    }
+
+    #[inline(always)]
+    fn add(&mut self, rows: [Vec4; 2], columns: [Vec4; 2]) {
         self.add_row::<0>(rows[0].x, columns);
         self.add_row::<1>(rows[0].y, columns);
         self.add_row::<2>(rows[0].z, columns);
@@ -66,16 +135,48 @@ impl Sums {
     }
 
     #[inline(always)]
+    fn take_row(&mut self, mut each: impl FnMut(u32, Vec4)) {
+        let [[near, far], a, b, c, d, e, f, g] = self.0;
+        self.0 = [a, b, c, d, e, f, g, [Vec4::ZERO; 2]];
+        each(0, near);
+        each(1, far);
+    }
+}
+
+impl EightSums {
+    #[inline(always)]
     fn add_row<const ROW: usize>(&mut self, row: f32, columns: [Vec4; 2]) {
         self.0[ROW][0] += columns[0] * row;
         self.0[ROW][1] += columns[1] * row;
     }
+}
 
-    /// The sums of the first row; all others move up, and the last one is 0.
+/// Four times four sums.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FourSums([Vec4; 4]);
+
+impl Sums for FourSums {
+    const SIDE: u32 = 4;
+    const ZERO: FourSums = FourSums([Vec4::ZERO; 4]);
+    type Fours = Vec4;
+
     #[inline(always)]
-    pub fn take_row(&mut self) -> [Vec4; 2] {
-        let [first, a, b, c, d, e, f, g] = self.0;
-        self.0 = [a, b, c, d, e, f, g, [Vec4::ZERO; 2]];
-        first
+    fn fours(four: impl Fn(u32) -> Vec4) -> Vec4 {
+        four(0)
+    }
+
+    #[inline(always)]
+    fn add(&mut self, rows: Vec4, columns: Vec4) {
+        self.0[0] += columns * rows.x;
+        self.0[1] += columns * rows.y;
+        self.0[2] += columns * rows.z;
+        self.0[3] += columns * rows.w;
+    }
+
+    #[inline(always)]
+    fn take_row(&mut self, mut each: impl FnMut(u32, Vec4)) {
+        let [first, a, b, c] = self.0;
+        self.0 = [a, b, c, Vec4::ZERO];
+        each(0, first);
     }
 }

@@ -11,19 +11,27 @@ pub const WORKGROUP: u32 = 64;
 /// Bytes of memory that every device has for a workgroup.
 pub const SHARED_BYTES: usize = 16 << 10;
 
-/// Elements of a tiled kernel with so many outputs: whole tiles, each invocation 8 times 8 outputs.
+/// Elements of a tiled kernel with so many outputs, counted in [`Form::Single`]: whole tiles, each invocation 8 times 8
+/// outputs.
 pub const fn tile_elements(row_count: u32, column_count: u32) -> u32 {
-    row_count.div_ceil(TILE) * column_count.div_ceil(TILE) * WORKGROUP
+    Form::Single.elements(row_count, column_count)
 }
 
-/// How a workgroup computes a tile of a matrix product, 64 rows and 64 columns. The sums of an output run along the
-/// inner index in every form: the results are the same bits.
+/// How a workgroup computes a tile of a matrix product. The sums of an output run along the inner index in every form:
+/// the results are the same bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[repr(u32)]
 pub enum Form {
-    /// Rows and columns go through the workgroup's memory. The definition of the others, and what small products take.
+    /// Rows and columns go through the workgroup's memory, and 64 invocations sum 8 times 8 outputs each. The
+    /// definition of the others, and what small products take.
     #[default]
     Single,
+    /// The same for tiles of four times the size, by 256 invocations: each number that is fetched is used twice as
+    /// often.
+    Large,
+    /// The same for tiles of a quarter of the size, 4 times 4 outputs an invocation: more workgroups, where there are
+    /// few outputs.
+    Small,
     /// Rows pass between the invocations of a subgroup instead of through the workgroup's memory. There are no
     /// barriers. Only for devices with [subgroups that fit](Form::needs_subgroups).
     Subgroup,
@@ -31,7 +39,37 @@ pub enum Form {
 
 impl Form {
     /// Every form.
-    pub const ALL: [Form; 2] = [Form::Single, Form::Subgroup];
+    pub const ALL: [Form; 4] = [Form::Single, Form::Large, Form::Small, Form::Subgroup];
+
+    /// Rows and columns of its tiles.
+    pub const fn side(self) -> u32 {
+        match self {
+            Form::Single | Form::Subgroup => TILE,
+            Form::Large => 128,
+            Form::Small => 32,
+        }
+    }
+
+    /// Invocations of a workgroup.
+    pub const fn invocations(self) -> u32 {
+        match self {
+            Form::Large => 256,
+            _ => WORKGROUP,
+        }
+    }
+
+    /// Most bytes of memory that a workgroup shares.
+    pub const fn shared_bytes(self) -> usize {
+        match self {
+            Form::Large => 2 * SHARED_BYTES,
+            _ => SHARED_BYTES,
+        }
+    }
+
+    /// Invocations for so many outputs: whole tiles.
+    pub const fn elements(self, row_count: u32, column_count: u32) -> u32 {
+        row_count.div_ceil(self.side()) * column_count.div_ceil(self.side()) * self.invocations()
+    }
 
     /// Whether it passes numbers between the invocations of a subgroup. Its entry points are in a module of their own,
     /// which only devices with these operations take. A subgroup is full and has 8 to 64 invocations, a power of two.
@@ -43,6 +81,8 @@ impl Form {
     pub const fn name(self) -> &'static str {
         match self {
             Form::Single => "single",
+            Form::Large => "large",
+            Form::Small => "small",
             Form::Subgroup => "subgroup",
         }
     }
@@ -193,6 +233,12 @@ macro_rules! list {
             pub const fn entry_point(self, form: Form) -> &'static str {
                 match form {
                     Form::Single => self.name(),
+                    Form::Large => match self {
+                        $(Kernel::$Kernel => concat!(stringify!($method), "::large"),)+
+                    },
+                    Form::Small => match self {
+                        $(Kernel::$Kernel => concat!(stringify!($method), "::small"),)+
+                    },
                     Form::Subgroup => match self {
                         $(Kernel::$Kernel => concat!(stringify!($method), "::subgroup"),)+
                     },

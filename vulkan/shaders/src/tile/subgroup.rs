@@ -8,13 +8,13 @@
 //! A subgroup has 8, 16, 32 or 64 invocations, all of which take part: the pipeline demands full subgroups of the size
 //! that its specialisation constant says.
 
-use super::{InvocationTile, store_sums};
+use super::{InvocationTile, row_place, store_sums};
 use spirv_std::arch::{subgroup_broadcast_const, subgroup_shuffle};
 use spirv_std::glam::Vec4;
-use viewfuse_kernels::network::tile::{Shape, Sums, TILE, Tiles};
+use viewfuse_kernels::network::tile::{EightSums, Left, Shape, Sums, TILE, Tiles};
 
 /// Invocations that need the same rows, and inner indices that each of them loads at once.
-const CLUSTER: u32 = Sums::SIDE;
+const CLUSTER: u32 = EightSums::SIDE;
 
 /// Where an invocation is in its workgroup: what this form has in the place of memory.
 #[derive(Clone, Copy)]
@@ -29,20 +29,22 @@ pub(crate) struct Subgroup {
 
 impl Tiles for Subgroup {
     #[inline(always)]
-    fn multiply(
+    fn multiply<L: Left>(
         self,
         invocation: u32,
         shape: Shape,
-        left: impl Fn(u32, u32) -> f32 + Copy,
+        left: L,
         right: impl Fn(u32, u32) -> f32 + Copy,
         mut store: impl FnMut(u32, u32, f32),
     ) {
         // Which invocations are in a subgroup is the driver's choice: the number in the workgroup follows from that.
         let invocation_of_tile = (self.subgroup * self.size + self.lane) % TILE;
-        let place = InvocationTile::of(invocation / TILE, invocation_of_tile, shape);
-        let row = (place.first_row + Sums::place(place.own_row, place.own_column)).min(shape.row_count - 1);
-        let column = place.first_column + Sums::place(place.own_column, 0);
-        let left = move |inner: u32| left(row, inner.min(shape.inner_count - 1));
+        let place = InvocationTile::new(invocation / TILE, invocation_of_tile, TILE, CLUSTER, shape);
+        let row = (place.first_row + row_place(CLUSTER, place.own_row, place.own_column)).min(shape.row_count - 1);
+        let column =
+            move |four: u32, index: u32| place.first_column + row_place(CLUSTER, place.own_column, 4 * four + index);
+        let row = left.row(row);
+        let left = move |inner: u32| left.number(row, left.inner(inner.min(shape.inner_count - 1)));
         let right = move |inner: u32, column: u32| right(inner, column.min(shape.column_count - 1));
         let fetch_four = move |inner: u32, column: u32| {
             Vec4::new(
@@ -52,7 +54,7 @@ impl Tiles for Subgroup {
                 right(inner, column + 3),
             )
         };
-        let mut sums = Sums::ZERO;
+        let mut sums = EightSums::ZERO;
         let mut start = 0;
         while start < shape.inner_count {
             let mut near = Vec4::new(left(start), left(start + 1), left(start + 2), left(start + 3));
@@ -61,14 +63,14 @@ impl Tiles for Subgroup {
             let mut inner = start;
             while inner < end {
                 let rows = self.rows_of_all(near.x);
-                sums.add(rows, [fetch_four(inner, column), fetch_four(inner, column + Sums::place(0, 4))]);
+                sums.add(rows, [fetch_four(inner, column(0, 0)), fetch_four(inner, column(1, 0))]);
                 near = Vec4::new(near.y, near.z, near.w, far.x);
                 far = Vec4::new(far.y, far.z, far.w, 0.0);
                 inner += 1;
             }
             start += CLUSTER;
         }
-        store_sums(sums, place, shape, &mut store);
+        store_sums(sums, place, CLUSTER, shape, column, &mut store);
     }
 }
 
