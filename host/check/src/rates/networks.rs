@@ -16,7 +16,7 @@ use viewfuse_kernels::pixelnerf::GatherBlock;
 const F32: f64 = size_of::<f32>() as f64;
 
 pub(super) fn works<D: Device>(device: &D) -> Result<Vec<Work<'_>>, DeviceError> {
-    Ok(vec![
+    let mut works = vec![
         gather(device, 16_384, 64, 32)?,
         convolve(device, 64, 64)?,
         linear(device, [2046, 512, 512])?,
@@ -25,7 +25,15 @@ pub(super) fn works<D: Device>(device: &D) -> Result<Vec<Work<'_>>, DeviceError>
         matrix_product(device, [1024, 64, 1024])?,
         fuse(device, 3, 16_384, 64)?,
         composite(device, 8192, 96)?,
-    ])
+    ];
+    // What fills a GPU would take a processor seconds; and images of few pixels, which do not fill one.
+    if !device.is_software() {
+        works.push(linear(device, [32_768, 512, 512])?);
+        for [side, channels] in [[128, 128], [32, 256], [16, 512]] {
+            works.push(convolve(device, side, channels)?);
+        }
+    }
+    Ok(works)
 }
 
 fn values(seed: u64, count: usize) -> Vec<f32> {
