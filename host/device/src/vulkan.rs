@@ -23,8 +23,11 @@ pub struct Vulkan {
     memory: Option<PathBuf>,
 }
 
-/// Elements of a kernel that keep a GPU busy.
-const BUSY_ELEMENTS: usize = 1 << 16;
+/// Elements of a kernel that keep a small GPU busy, and the largest.
+const BUSY_ELEMENTS: [u64; 2] = [1 << 16, 1 << 20];
+/// Bytes of a GPU's memory for each element that keeps it busy: one with much memory has many units. Buffers for so
+/// many elements (some hundred numbers each) take a few hundredths of the memory.
+const BYTES_A_BUSY_ELEMENT: u64 = 1 << 16;
 /// Most bytes of what a device remembers: more is not its own.
 const MAX_REMEMBERED: u64 = 256 << 20;
 /// How long a device that is closed waits for others that write what they remember.
@@ -42,8 +45,8 @@ impl Vulkan {
 
     /// As [`Vulkan::open`], with a folder where the device remembers compiled pipelines and which forms of its kernels
     /// were the fastest: they are read now, and written when the device is closed, if there are new ones. A file of
-    /// another driver or of other kernels, and a damaged one, is replaced; what other processes wrote in the meantime is
-    /// kept. A folder that cannot be written costs only time.
+    /// another driver or of other kernels, and a damaged one, is replaced; what other processes wrote in the meantime
+    /// is kept. A folder that cannot be written costs only time.
     ///
     /// # Errors
     /// [`VulkanError`].
@@ -120,7 +123,11 @@ impl Memory for Vulkan {
     }
 
     fn busy_elements(&self) -> usize {
-        BUSY_ELEMENTS
+        let [least, most] = BUSY_ELEMENTS;
+        match self.is_software {
+            true => least as usize,
+            false => (self.gpu.limits().memory / BYTES_A_BUSY_ELEMENT).clamp(least, most) as usize,
+        }
     }
 
     fn is_software(&self) -> bool {
