@@ -8,8 +8,8 @@ use openmvg_sfm::model::{ImageMeta, IntrinsicPrior, PairGeometry};
 use openmvg_sfm::progress::{SfmProgressSink, SfmProgressStage};
 use openmvg_sfm::reports::ViewVerdictStatus;
 use openmvg_sfm::{
-    Camera as Model, Dataset, ExtractionMethod, Frontend, Incremental, IntrinsicId, Reconstruction, Result, SfmOutput,
-    ViewGraph, ViewId,
+    Camera as Model, Dataset, ExtractionMethod, Frontend, Incremental, IntrinsicId, Reconstruction, Result, SfmError,
+    SfmOutput, ViewGraph, ViewId,
 };
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -30,7 +30,13 @@ pub(crate) fn solve(job: &Job) -> Result<Solution> {
             Features::Sift => ExtractionMethod::Sift,
         });
     let (graph, _) = frontend.build_with_report(&dataset(job)?, &told)?;
-    let output = Incremental::default().runner().progress(&told).run_prepared(&graph)?;
+    // The library takes a photograph for misplaced whose rotation differs from the median over its pairs by 20 degrees.
+    // Of few photographs far apart more than half of the pairs may be matched by chance: it refused true poses.
+    let config = Incremental::default().config().clone().with_registration_max_rotation_edge_error(None);
+    let output = match Incremental::new(config).runner().progress(&told).run_prepared(&graph) {
+        Ok(output) => output,
+        Err(error) => return Ok(unposed(job, &graph, &error)),
+    };
     let found = output.reconstruction();
     Ok(Solution {
         solver: SOLVER,
@@ -39,6 +45,18 @@ pub(crate) fn solve(job: &Job) -> Result<Solution> {
         points: points(found),
         pairs: pairs(&graph),
     })
+}
+
+/// What is known without a pose: which photographs match.
+fn unposed(job: &Job, graph: &ViewGraph, error: &SfmError) -> Solution {
+    let photograph = |_| Photograph { camera_from_world: None, reason: Some(error.to_string()) };
+    Solution {
+        solver: SOLVER,
+        cameras: graph.camera_models().iter().map(camera).collect(),
+        photographs: job.photographs.iter().map(photograph).collect(),
+        points: Vec::new(),
+        pairs: pairs(graph),
+    }
 }
 
 /// The photographs with one camera for each group, its principal point in the middle.
