@@ -4,6 +4,7 @@
 //! it.
 
 mod colmap;
+mod diagnosis;
 mod helper;
 mod on_the_way;
 mod stopped;
@@ -61,6 +62,7 @@ pub(crate) fn trials() -> Vec<Trial> {
     ];
     own.into_iter()
         .chain(colmap::trials())
+        .chain(diagnosis::trials())
         .chain(helper::trials())
         .chain(on_the_way::trials())
         .chain(stopped::trials())
@@ -166,7 +168,13 @@ fn eight_photographs_to_a_picture() {
     let worst = worst_rotation(&scene);
     assert!(worst < 1.5, "{worst} degrees");
     let record = json(&folder.path().join("posed/pose.json"));
-    assert_eq!(record["accepted"].as_array().expect("a list").len(), 8);
+    let accepted = record["accepted"].as_array().expect("a list");
+    assert_eq!(accepted.iter().filter(|photo| photo["verdict"] == "sure").count(), 8, "{record}");
+    // Features are found in enlarged photographs; cameras are those of the photographs.
+    let camera = &scene.views[0].camera.pinhole;
+    assert!((camera.focal()[0] / 294.4 - 1.0).abs() < 0.05, "{camera:?}");
+    let [x, y] = camera.principal();
+    assert!(camera.width() == 320 && (x - 160.0).abs() < 1.0 && (y - 120.0).abs() < 1.0, "{camera:?}");
     assert!(record["attempts"][0]["solver"].as_str().is_some_and(|name| name.starts_with("openmvg-sfm ")), "{record}");
     assert!(image::open(folder.path().join("posed/cameras.png")).is_ok());
     // From nothing to a picture.

@@ -6,6 +6,7 @@
 //! png      pictures as files
 //! canvas   text, lines and small pictures on a picture
 //! camera_map  the cameras of a scene, seen from above
+//! match_graph  which photographs match which
 //! sheet    the contact sheet of a target
 //! record   the run record, as JSON
 //! exr      depth maps as OpenEXR (feature `exr`)
@@ -38,6 +39,7 @@ pub mod folder;
 pub mod gaussian_page;
 mod gif;
 pub mod journal;
+pub mod match_graph;
 pub mod ply;
 pub mod png;
 pub mod rate;

@@ -1,7 +1,7 @@
 //! The attempts: with other features, other draws, and where focal lengths are unknown other guesses of them.
 
 use crate::focal::Cameras;
-use crate::intake::{Intake, Photo, WORKING_SIDE};
+use crate::intake::Photo;
 use crate::solution::{Features, Job, JobPhotograph, Solution, Solver, SolverError};
 use crate::support::Support;
 use serde::Serialize;
@@ -27,6 +27,8 @@ pub struct Tried {
     pub solver: String,
     /// The kind of features.
     pub features: Features,
+    /// Longest side in pixels at which they were looked for.
+    pub side: u32,
     /// The seed.
     pub seed: u64,
     /// The guess of unknown focal lengths, in longest sides.
@@ -64,13 +66,14 @@ fn plans(solver: &dyn Solver, are_known: bool, seed: u64) -> Vec<Plan> {
     guesses.into_iter().flat_map(of).collect()
 }
 
-/// Makes the attempts with every solver.
+/// Makes the attempts with every solver. `at_size` are the photographs at the size at which features are looked for;
+/// what is found is in pixels of the working size of `photos`, which are the same.
 ///
 /// # Errors
 /// [`SolverError`] if a solver is missing or broken, or the work is stopped; that it finds nothing is no error.
 pub(crate) fn attempts(
     solvers: &[&dyn Solver],
-    intake: &Intake,
+    (photos, at_size): (&[Photo], &[Photo]),
     cameras: &Cameras,
     seed: u64,
     progress: &dyn Progress,
@@ -84,10 +87,11 @@ pub(crate) fn attempts(
         let name = format!("attempt {} of {}", index + 1, all.len());
         let part = Part::begin(progress, name, index..index + 1, all.len());
         let start = Instant::now();
-        let job = job(intake, cameras, plan);
+        let job = job(at_size, cameras, plan);
         let mut tried = Tried {
             solver: solver.name().to_owned(),
             features: plan.features,
+            side: job.max_side,
             seed: plan.seed,
             focal_guess: plan.guess,
             registered: 0,
@@ -99,10 +103,11 @@ pub(crate) fn attempts(
             refused: None,
         };
         let solution = match solver.solve(&job, &part) {
-            Ok(solution) => {
+            Ok(mut solution) => {
+                resize(&mut solution, cameras, at_size, photos);
                 tried.solver.clone_from(&solution.solver);
                 tried.registered = solution.registered().len();
-                tried.focal = focal(&solution, cameras, &intake.photos);
+                tried.focal = focal(&solution, cameras, photos);
                 tried.reprojection_error = solution.reprojection_error();
                 tried.points = solution.points.len();
                 tried.support = Some(Support::of(&solution, &part)?);
@@ -120,7 +125,27 @@ pub(crate) fn attempts(
     Ok(made)
 }
 
-fn job(intake: &Intake, cameras: &Cameras, plan: &Plan) -> Job {
+/// Moves a solution from pixels of photographs at one working size to those at another.
+fn resize(solution: &mut Solution, cameras: &Cameras, from: &[Photo], to: &[Photo]) {
+    let scale = |photo: usize| {
+        let (from, to) = (from[photo].working_size, to[photo].working_size);
+        [0, 1].map(|axis| f64::from(to[axis]) / f64::from(from[axis]))
+    };
+    for (camera, group) in solution.cameras.iter_mut().zip(&cameras.groups) {
+        let [x, y] = group.photos.first().map_or([1.0; 2], |photo| scale(*photo));
+        camera.focal *= x;
+        camera.principal = [x * camera.principal[0], y * camera.principal[1]];
+    }
+    for point in &mut solution.points {
+        point.error *= point.seen.first().map_or(1.0, |(photo, _)| scale(*photo)[0]);
+        for (photo, place) in &mut point.seen {
+            let [x, y] = scale(*photo);
+            *place = [x * place[0], y * place[1]];
+        }
+    }
+}
+
+fn job(photos: &[Photo], cameras: &Cameras, plan: &Plan) -> Job {
     let photograph = |(photo, camera): (&Photo, &usize)| JobPhotograph {
         path: photo.working.clone(),
         size: photo.working_size,
@@ -129,9 +154,9 @@ fn job(intake: &Intake, cameras: &Cameras, plan: &Plan) -> Job {
     Job {
         seed: plan.seed,
         features: plan.features,
-        max_side: WORKING_SIDE,
-        cameras: cameras.guesses(&intake.photos, plan.guess.unwrap_or(1.0)),
-        photographs: intake.photos.iter().zip(&cameras.of_photo).map(photograph).collect(),
+        max_side: photos.iter().flat_map(|photo| photo.working_size).max().unwrap_or(1),
+        cameras: cameras.guesses(photos, plan.guess.unwrap_or(1.0)),
+        photographs: photos.iter().zip(&cameras.of_photo).map(photograph).collect(),
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::attempt::{Attempt, attempts};
 use crate::focal::Cameras;
 use crate::intake::{Intake, IntakeError};
+use crate::matches::Matches;
 use crate::solution::{Solver, SolverError};
 use crate::verdict::{Refusal, Verdict, VerdictError, verdict};
 use std::path::Path;
@@ -37,6 +38,8 @@ pub struct Found {
     pub cameras: Cameras,
     /// The attempts.
     pub attempts: Vec<Attempt>,
+    /// Which photographs match which.
+    pub matches: Matches,
     /// The verdict.
     pub verdict: Result<Verdict, Refusal>,
 }
@@ -105,9 +108,26 @@ pub fn find(
         return Err(PoseError::Few { folder, count, unusable });
     }
     let cameras = Cameras::of(&intake.photos, options.focal);
-    let part = Part::begin(progress, "", 1..7, 10);
-    let mut attempts = attempts(solvers, &intake, &cameras, options.seed, &part)?;
-    let part = Part::begin(progress, "", 7..9, 10);
-    let verdict = verdict(folder, &intake.photos, &cameras, &mut attempts, &part)?;
-    Ok(Found { intake, cameras, attempts, verdict })
+    let photos = &intake.photos;
+    let part = Part::begin(progress, "", 1..4, 10);
+    let mut made = attempts(solvers, (photos, photos), &cameras, options.seed, &part)?;
+    let part = Part::begin(progress, "", 4..5, 10);
+    let mut found = verdict(folder, photos, &cameras, &mut made, &part)?;
+    let accepted = |found: &Result<Verdict, Refusal>| found.as_ref().map_or(Vec::new(), |found| found.photos.clone());
+    if Matches::of(photos, &made).tie_more_than(&accepted(&found)) {
+        let part = Part::begin(progress, "finer features", 5..8, 10);
+        if let Some(finer) = intake.finer(&part)? {
+            made.extend(attempts(solvers, (photos, &finer), &cameras, options.seed, &part)?);
+            let part = Part::begin(progress, "", 8..9, 10);
+            let second = verdict(folder, photos, &cameras, &mut made, &part)?;
+            if found.is_err() || accepted(&second).len() > accepted(&found).len() {
+                found = second;
+            }
+            if let Ok(found) = &found {
+                made[found.attempt].tried.refused = None;
+            }
+        }
+    }
+    let matches = Matches::of(photos, &made);
+    Ok(Found { intake, cameras, attempts: made, matches, verdict: found })
 }

@@ -1,11 +1,12 @@
-//! The photographs of a folder: read, turned upright as their EXIF orientation says, reduced to working size; and those
+//! The photographs of a folder: read, turned upright as their EXIF orientation says, brought to working size; and those
 //! that cannot be used, by name with the reason.
 
 mod checks;
+mod working;
 
 use crate::exif::Exif;
 use checks::{cut_short, is_same, sharpness, unread};
-use image::imageops::{self, FilterType};
+use image::imageops;
 use image::metadata::Orientation;
 use image::{DynamicImage, RgbImage};
 use rayon::prelude::*;
@@ -18,12 +19,10 @@ use viewfuse_job::progress::{Interrupted, Progress};
 use viewfuse_scene::reader::{ImageFile, folders, list};
 use viewfuse_scene::write::{Layout, check_name};
 use viewfuse_scene::{SceneError, encode_png, read_picture};
+use working::{FINE_SIDE, MAX_ENLARGEMENT, WORKING_SIDE, resized, scaled};
 
 /// Most photographs of a folder: every pair of them is matched.
 pub const MAX_PHOTOGRAPHS: usize = 100;
-
-/// Longest side in pixels at which solvers look for features.
-pub(crate) const WORKING_SIDE: u32 = 1200;
 
 /// Longest side in pixels of the coloured copies.
 const COPY_SIDE: u32 = 512;
@@ -87,7 +86,7 @@ pub struct Intake {
     /// Files that were not taken for photographs of this folder, a line for each reason.
     pub passed_over: Vec<Unusable>,
     /// Copies at working size, which go with it.
-    _scratch: Scratch,
+    scratch: Scratch,
 }
 
 /// Why a folder's photographs could not be taken in.
@@ -203,7 +202,32 @@ impl Intake {
         }
         unusable.extend(blurred(&mut photos));
         let files = lengths(&root, &files)?;
-        Ok(Intake { folder: folder.to_path_buf(), files, photos, unusable, passed_over, _scratch: scratch })
+        Ok(Intake { folder: folder.to_path_buf(), files, photos, unusable, passed_over, scratch })
+    }
+
+    /// The photographs at a finer working size, decoded again; `None` if none of them is larger then.
+    ///
+    /// # Errors
+    /// [`IntakeError`].
+    pub(crate) fn finer(&self, progress: &dyn Progress) -> Result<Option<Vec<Photo>>, IntakeError> {
+        let size = |photo: &Photo| scaled(photo.size, FINE_SIDE, MAX_ENLARGEMENT);
+        if self.photos.iter().all(|photo| size(photo) == photo.working_size) {
+            return Ok(None);
+        }
+        let folder = self.scratch.path().join("finer");
+        let failed = |path: &Path| {
+            let path = path.to_path_buf();
+            move |cause| IntakeError::Io { path, cause }
+        };
+        fs::create_dir_all(&folder).map_err(failed(&folder))?;
+        let one = |photo: &Photo| {
+            progress.check()?;
+            let grey = resized(&read_picture(&photo.path)?.to_luma8(), size(photo));
+            let working = folder.join(format!("{}.png", photo.name));
+            put(&working, &DynamicImage::ImageLuma8(grey)).map_err(failed(&working))?;
+            Ok(Photo { working, working_size: size(photo), ..photo.clone() })
+        };
+        self.photos.iter().map(one).collect::<Result<_, IntakeError>>().map(Some)
     }
 }
 
@@ -369,19 +393,17 @@ fn photo(path: &Path, root: &Path, scratch: &Path) -> Result<Photo, Refused> {
         put(&upright, &picture).map_err(failed(&upright))?;
     }
     let size = [picture.width(), picture.height()];
-    let working_size = reduced(size, WORKING_SIDE);
     let grey = picture.to_luma8();
-    let grey = match working_size == size {
-        true => grey,
-        false => imageops::resize(&grey, working_size[0], working_size[1], FilterType::Triangle),
-    };
-    let [width, height] = reduced(size, COPY_SIDE);
+    let working_size = scaled(size, WORKING_SIDE, MAX_ENLARGEMENT);
+    let resized = resized(&grey, working_size);
+    // Enlarging adds no detail: how sharp a photograph is, its own pixels tell.
+    let sharpness = sharpness(if working_size > size { &grey } else { &resized });
+    let [width, height] = scaled(size, COPY_SIDE, 1.0);
     let copy = imageops::thumbnail(&picture.into_rgb8(), width, height);
-    let sharpness = sharpness(&grey);
     let folder = scratch.join("grey");
     fs::create_dir_all(&folder).map_err(failed(&folder))?;
     let working = folder.join(format!("{name}.png"));
-    put(&working, &DynamicImage::ImageLuma8(grey)).map_err(failed(&working))?;
+    put(&working, &DynamicImage::ImageLuma8(resized)).map_err(failed(&working))?;
     Ok(Photo { name, path: path.to_path_buf(), file, upright, size, exif, working, working_size, copy, sharpness })
 }
 
@@ -393,12 +415,6 @@ fn put(path: &Path, picture: &DynamicImage) -> std::io::Result<()> {
 fn in_words(path: &Path, error: &SceneError) -> String {
     let (text, path) = (error.to_string(), path.display().to_string());
     text.strip_prefix(&path).map_or(text.as_str(), |rest| rest.trim_start_matches([':', ' '])).to_owned()
-}
-
-/// The size with a longest side of at most `side`.
-fn reduced([width, height]: [u32; 2], side: u32) -> [u32; 2] {
-    let scale = (f64::from(side) / f64::from(width.max(height))).min(1.0);
-    [width, height].map(|own| ((f64::from(own) * scale).round() as u32).max(1))
 }
 
 #[cfg(test)]
@@ -452,6 +468,23 @@ mod tests {
         let parts = ["._1.png and 1 more: hidden", "clip.mp4: no photograph by its name", "edited/1.png: in a folder"];
         assert_eq!(told.len(), 3, "{told:?}");
         assert!(told.iter().zip(parts).all(|(line, part)| line.starts_with(part)), "{told:?}");
+    }
+
+    #[test]
+    fn small_photographs_are_enlarged_to_working_size() {
+        let scratch = tempfile::tempdir().expect("a folder");
+        for (name, size) in [("1.png", (24, 16)), ("2.png", (600, 450)), ("3.png", (1500, 2400)), ("4.png", (1200, 7))]
+        {
+            let level = |x: u32, y: u32| image::Rgb([((x * 7 + y * 13 + size.0) % 256) as u8; 3]);
+            let picture = DynamicImage::ImageRgb8(RgbImage::from_fn(size.0, size.1, level));
+            put(&scratch.path().join(name), &picture).expect("a picture");
+        }
+        let mut photos = Intake::read(scratch.path(), 1, &Silent).expect("photographs").photos;
+        let sizes: Vec<_> = photos.iter().map(|photo| photo.working_size).collect();
+        assert_eq!(sizes, [[96, 64], [1200, 900], [750, 1200], [1200, 7]], "four times as large at most");
+        assert_eq!(photos[1].size, [600, 450], "cameras are those of the photograph");
+        // Enlarged photographs are not taken for blurred ones.
+        assert!(blurred(&mut photos).is_empty());
     }
 
     #[cfg(unix)]

@@ -23,7 +23,10 @@
 //! agreement      rotations of two solutions between the same photographs
 //! support        parallax and the shape of the points: Support
 //! held_out       photographs rendered from the others: HeldOutScores
+//! ties           points that photographs share, and how far apart they are: Ties
 //! attempt        the attempts that are made: Attempt
+//! trust          how far a pose is to be trusted: Trust
+//! matches        which photographs match which, and where they fall apart: Matches
 //! verdict        the attempt that is accepted, with the photographs that are: Verdict
 //! advice         where more photographs help: Neighbours
 //! find           from a folder to a verdict: find
@@ -42,12 +45,15 @@ mod focal;
 mod held_out;
 mod intake;
 mod kept;
+mod matches;
 mod openmvg;
 mod posed;
 mod process;
 mod pycolmap;
 mod solution;
 mod support;
+mod ties;
+mod trust;
 mod verdict;
 mod write;
 
@@ -60,6 +66,7 @@ pub use focal::{CameraGroup, Cameras, FocalSource};
 pub use held_out::HeldOutScores;
 pub use intake::{Intake, IntakeError, MAX_PHOTOGRAPHS, Photo, Unusable, is_photograph};
 pub use kept::Kept;
+pub use matches::Matches;
 pub use openmvg::OpenMvg;
 pub use pycolmap::PyColmap;
 pub use solution::{
@@ -67,7 +74,9 @@ pub use solution::{
     Solver, SolverError,
 };
 pub use support::Support;
-pub use verdict::{Refusal, Verdict, Verified};
+pub use ties::Ties;
+pub use trust::{Trust, Verified};
+pub use verdict::{Refusal, Verdict};
 pub use write::{CameraRecord, Record, has_record, is_current, write};
 
 /// The examples of the README, compiled and run.

@@ -3,7 +3,9 @@
 //! ```text
 //! candidates   at least three photographs; a plausible focal length; parallax
 //! agreement    an attempt with other features, or another guess of the focal length, has the same rotations
-//! held out     each photograph, rendered from the others, is met at its pose and nowhere else
+//! held out     each photograph, rendered from the others, is met at its pose and nowhere else: it is sure
+//! ties         one whose neighbours are too far away for that shares many points with others, and the attempts agree
+//!              closely: it is doubtful, and at least one photograph beside it must be sure
 //! ```
 //!
 //! Photographs that fail are taken out and the rest is looked at again, until none fails. The first candidate that
@@ -12,10 +14,12 @@
 use crate::agreement::{differences, median};
 use crate::attempt::Attempt;
 use crate::focal::Cameras;
-use crate::held_out::{HeldOutScores, hold_out_all};
+use crate::held_out::hold_out_all;
 use crate::intake::Photo;
 use crate::posed;
 use crate::solution::Solution;
+use crate::ties::Ties;
+use crate::trust::{MAX_TOLD, Trust, Verified, trust};
 use std::path::Path;
 use viewfuse_field::render::RenderError;
 use viewfuse_job::progress::{Part, Progress};
@@ -35,10 +39,7 @@ const MIN_PARALLAX: f64 = 1.0;
 const MIN_THICKNESS: f64 = 0.03;
 /// Most degrees between the relative rotations of two attempts.
 const MAX_ROTATION_DIFFERENCE: f64 = 1.5;
-/// Least decibels by which a held-out photograph is met better at its pose than at disturbed ones.
-const MIN_SHARPNESS: f64 = 0.5;
-/// Least decibels by which held-out photographs are met better than their copies: each, and the median.
-const MIN_GAIN: f64 = 0.5;
+/// Least decibels by which held-out photographs are met better than their copies, in the median.
 const MIN_MEDIAN_GAIN: f64 = 1.0;
 
 /// Of so many photographs that fail, one is taken out at once.
@@ -61,14 +62,12 @@ pub struct Verdict {
     pub taken_out: Vec<(usize, String)>,
 }
 
-/// What a photograph passed.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct Verified {
-    /// Degrees between its relative rotations and those of the attempt that agrees best.
-    pub rotation_difference: f64,
-    /// The scores when it was held out.
-    #[serde(flatten)]
-    pub held_out: HeldOutScores,
+impl Verdict {
+    /// The accepted photographs whose poses are doubtful, by name.
+    pub fn doubtful(&self) -> Vec<&str> {
+        let doubtful = self.verified.iter().filter(|passed| passed.trust == Trust::Doubtful);
+        doubtful.map(|passed| passed.held_out.photograph.as_str()).collect()
+    }
 }
 
 /// Why nothing was accepted.
@@ -83,7 +82,7 @@ impl Refusal {
     pub fn main(&self) -> &str {
         let all = || self.reasons.iter().map(String::as_str);
         let stage = |reason: &&str| {
-            let later = ["left out", "no other attempt", "lie in a plane", "hardly moved", "focal length"];
+            let later = ["left out", "held-out", "no other attempt", "lie in a plane", "hardly moved", "focal length"];
             later.iter().position(|words| reason.contains(words)).map_or(0, |place| later.len() - place)
         };
         all().max_by_key(stage).unwrap_or("no attempt was made")
@@ -107,6 +106,8 @@ pub(crate) fn verdict(
     attempts: &mut [Attempt],
     progress: &dyn Progress,
 ) -> Result<Result<Verdict, Refusal>, VerdictError> {
+    // Beside more attempts than before, each is judged anew.
+    attempts.iter_mut().filter(|attempt| attempt.solution.is_some()).for_each(|attempt| attempt.tried.refused = None);
     let candidates = candidates(cameras, attempts);
     let count = candidates.len();
     for (index, (attempt, confirmed)) in candidates.into_iter().enumerate() {
@@ -245,24 +246,35 @@ impl Trial<'_> {
             }
             let taken: Vec<usize> = kept.iter().map(|(photo, _)| *photo).collect();
             let scene = posed::scene(self.folder, self.photos, self.cameras, self.solution, &taken)?;
-            let scores = hold_out_all(&scene, progress)?;
-            let mut failed: Vec<(f64, usize, String)> = taken
-                .iter()
-                .zip(&scores)
-                .filter_map(|(photo, scores)| Some((scores.sharpness().min(scores.gain()), *photo, failure(scores)?)))
-                .collect();
+            let (scores, ties) = (hold_out_all(&scene, progress)?, Ties::of_all(self.solution, &taken, &scene));
+            let (mut verified, mut failed) = (Vec::new(), Vec::new());
+            for (((photo, rotation_difference), held_out), ties) in kept.iter().zip(scores).zip(ties) {
+                let mut passed =
+                    Verified { trust: Trust::Sure, rotation_difference: *rotation_difference, ties, held_out };
+                match trust(&passed, self.cameras) {
+                    Ok(trust) => {
+                        passed.trust = trust;
+                        verified.push((*photo, passed));
+                    }
+                    Err(reason) => {
+                        let worst = passed.held_out.sharpness().min(passed.held_out.gain());
+                        failed.push((worst, *photo, reason));
+                    }
+                }
+            }
             if failed.is_empty() {
-                let gain = median(scores.iter().map(HeldOutScores::gain).collect());
-                if gain < MIN_MEDIAN_GAIN {
+                let told = verified.iter().filter(|(_, passed)| passed.ties.nearest <= MAX_TOLD);
+                let gains: Vec<f64> = told.map(|(_, passed)| passed.held_out.gain()).collect();
+                let gain = median(gains.clone());
+                if !gains.is_empty() && gain < MIN_MEDIAN_GAIN {
                     return Ok(Err(format!(
                         "photographs that were left out are met {gain:.1} dB better than by copies of their neighbours, {MIN_MEDIAN_GAIN} are needed"
                     )));
                 }
-                let verified = kept.into_iter().zip(scores);
-                let verified = verified.map(|((photo, rotation_difference), held_out)| {
-                    (photo, Verified { rotation_difference, held_out })
-                });
-                return Ok(Ok((scene, verified.collect())));
+                if verified.iter().all(|(_, passed)| passed.trust == Trust::Doubtful) {
+                    return Ok(Err("all photographs are too far apart for held-out pictures to tell".to_owned()));
+                }
+                return Ok(Ok((scene, verified)));
             }
             // The worst first: what is wrong with it may be what is wrong with its neighbours.
             failed.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -271,22 +283,4 @@ impl Trial<'_> {
             self.taken_out.extend(failed.into_iter().map(|(_, photo, reason)| (photo, reason)));
         }
     }
-}
-
-/// Why a photograph fails.
-fn failure(scores: &HeldOutScores) -> Option<String> {
-    if scores.sharpness() < MIN_SHARPNESS {
-        return Some(format!(
-            "left out and rendered from the others, it is met no better at its pose ({:.1} dB) than two degrees beside it ({:.1} dB)",
-            scores.score, scores.disturbed
-        ));
-    }
-    if scores.gain() < MIN_GAIN {
-        return Some(format!(
-            "left out and rendered from the others, it is met hardly better ({:.1} dB) than by a copy of its neighbour ({:.1} dB)",
-            scores.score,
-            scores.copy.max(scores.warp)
-        ));
-    }
-    None
 }

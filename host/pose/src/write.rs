@@ -5,7 +5,8 @@ use crate::attempt::Tried;
 use crate::find::{Found, Options};
 use crate::focal::FocalSource;
 use crate::intake::{IntakeError, listed};
-use crate::verdict::{Verdict, Verified};
+use crate::trust::Verified;
+use crate::verdict::Verdict;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use viewfuse_job::progress::Progress;
@@ -39,6 +40,8 @@ pub struct Record<'a> {
     pub accepted: &'a [Verified],
     /// Photographs that were left out, each with the reason.
     pub left_out: Vec<(String, String)>,
+    /// Which photographs match which, and how often.
+    pub matches: Vec<(&'a str, &'a str, usize)>,
     /// The accepted ones as neighbours.
     pub neighbours: Neighbours,
 }
@@ -70,7 +73,8 @@ impl Found {
                 continue;
             }
             let taken_out = verdict.taken_out.iter().find(|(own, _)| *own == index).map(|(_, reason)| reason.clone());
-            let reason = taken_out.unwrap_or_else(|| "matches too little of the other photographs".to_owned());
+            let matched = || format!("matches too little of the other photographs ({})", self.matches.told(index));
+            let reason = taken_out.unwrap_or_else(matched);
             all.push((photo.file.clone(), reason));
         }
         all.sort();
@@ -101,6 +105,7 @@ impl Found {
             attempts: self.attempts.iter().map(|attempt| &attempt.tried).collect(),
             accepted: &verdict.verified,
             left_out: self.left_out(Some(verdict)),
+            matches: self.matches.named().collect(),
             neighbours: Neighbours::of(&verdict.scene),
         }
     }

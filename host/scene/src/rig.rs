@@ -53,15 +53,20 @@ impl Rig {
     /// The angle between a camera and the nearest other one, seen from the focus, in degrees: of all cameras,
     /// ascending; none of fewer than two.
     pub fn gaps(&self, cameras: &[Camera]) -> Vec<f32> {
+        let mut gaps = self.nearest(cameras);
+        gaps.sort_by(f32::total_cmp);
+        gaps
+    }
+
+    /// For each camera the angle to the nearest other one, in degrees, seen from the focus; none for fewer than two.
+    pub fn nearest(&self, cameras: &[Camera]) -> Vec<f32> {
         let directions: Vec<Vec3> =
             cameras.iter().map(|c| (c.pose.centre_world() - self.focus).normalize_or_zero()).collect();
         let nearest = |own: usize| {
             let others = directions.iter().enumerate().filter(|(other, _)| *other != own);
             others.map(|(_, other)| other.dot(directions[own]).clamp(-1.0, 1.0).acos().to_degrees()).reduce(f32::min)
         };
-        let mut gaps: Vec<f32> = (0..cameras.len()).filter_map(nearest).collect();
-        gaps.sort_by(f32::total_cmp);
-        gaps
+        (0..cameras.len()).filter_map(nearest).collect()
     }
 
     /// The median of [`Rig::gaps`]; `None` for fewer than two cameras.

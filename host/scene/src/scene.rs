@@ -23,6 +23,7 @@ mod colmap;
 mod error;
 mod fault;
 pub(crate) mod files;
+mod found_poses;
 pub(crate) mod frame;
 mod images;
 pub(crate) mod json;
@@ -244,6 +245,7 @@ impl Scene {
             }
             let Checked { views, points, mut warnings, conventions, mut unused, lists, frame } = checked;
             warnings.extend(unlisted::photographs(&views));
+            warnings.extend(found_poses::warnings(path, &views));
             unused.extend(unlisted::files(&found, &views, &lists));
             let (path, layout) = (path.to_path_buf(), reader.name());
             return Ok(Scene { path, layout, views, points, warnings, conventions, unused, masks, mask_choice, frame });

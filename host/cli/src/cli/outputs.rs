@@ -11,7 +11,7 @@ use viewfuse_output::video::VideoFormat;
 use viewfuse_scene::Scene;
 
 /// The options that name what a command writes, by identifier. All others may name what it reads.
-const WRITTEN: [&str; 2] = ["output", "npy"];
+const WRITTEN: [&str; 3] = ["output", "npy", "matches"];
 
 /// Refuses a command whose output is a file that another of its options names, whichever that is: alone, or within a
 /// value such as `attention:FILE` or `alex=FILE,heads=FILE`.

@@ -3,23 +3,32 @@
 mod solvers;
 
 use super::outputs::keep_folder_apart;
-use super::printing::say;
+use super::printing::{complain, say};
 use super::terminal::Terminal;
 use super::threads::on_threads;
+use super::wrong::wrong;
 use anyhow::{Context, bail};
 use clap::Args;
-use image::DynamicImage;
+use image::{DynamicImage, RgbImage};
 use solvers::{From, solvers};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use viewfuse_job::files::check_writable;
 use viewfuse_job::progress::{Interrupted, Progress};
 use viewfuse_job::shell::quoted;
 use viewfuse_output::camera_map::camera_map;
-use viewfuse_pose::{FocalSource, Found, Kept, Options, Record, Refusal, Solver, Verdict, find, has_record, write};
+use viewfuse_output::match_graph::match_graph;
+use viewfuse_output::png::write_png;
+use viewfuse_pose::{
+    FocalSource, Found, Kept, Matches, Options, Record, Refusal, Solver, Verdict, find, has_record, write,
+};
 use viewfuse_scene::encode_png;
 use viewfuse_scene::inspect::inspect;
 use viewfuse_scene::photographs::BackgroundChoice;
 use viewfuse_scene::write::Layout;
+
+/// Most photographs of which a refusal tells which others they match.
+const MAX_ROWS: usize = 24;
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
@@ -28,7 +37,9 @@ use viewfuse_scene::write::Layout;
     viewfuse pose photos/ --from openmvg,colmap -o posed\n      with your own COLMAP as a second opinion\n\n\
     Poses are found several times, with other features and, where the focal length is unknown, other guesses of it. What is\n\
     written is what two attempts agree on, and what passes this: each photograph, left out and rendered from the others, is met\n\
-    at its pose, better than by copies of its neighbours, and not two degrees beside it. If nothing passes, nothing is written.\n\n\
+    at its pose, better than by copies of its neighbours, and not two degrees beside it. Where neighbours are too far away for\n\
+    that, attempts must agree more closely and over many points, and the pose is doubtful: pose.json and every command that opens\n\
+    the scene say so. If nothing passes, no scene is written, and it is said which photographs match which.\n\n\
     The same command goes on with a run that was stopped or killed: attempts that were finished lie in a hidden folder beside the\n\
     output (.posed.attempts) until the command ends by itself.")]
 pub(crate) struct Arguments {
@@ -52,6 +63,9 @@ pub(crate) struct Arguments {
     /// Work on this many threads [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
+    /// Draw which photographs match which (PNG), whether poses are found or not
+    #[arg(long, value_name = "FILE")]
+    matches: Option<PathBuf>,
     /// Folder to write; must not be there yet, or be empty
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
@@ -78,9 +92,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         remove_kept_for(output);
         bail!("{}: exists already and is not an empty folder; give another name", output.display());
     }
+    if let Some(file) = &arguments.matches {
+        keep_picture_apart(file, photographs, output)?;
+        check_writable(file)?;
+    }
     let options = Options { focal: arguments.focal, seed: arguments.seed, every: arguments.every.into() };
     let (from, to) = (solvers(&arguments.from), (arguments.layout, output.as_path()));
-    let work = || found(photographs, &from, &options, to);
+    let work = || found(photographs, &from, &options, to, arguments.matches.as_deref());
     let found = on_threads(arguments.threads, work)??;
     let Ok(verdict) = &found.verdict else { bail!("{}: no verdict", photographs.display()) };
     print(&found, verdict, &found.record(verdict, &options))?;
@@ -100,26 +118,43 @@ fn remove_kept_for(scene: &Path) {
 
 /// What `viewfuse pose PHOTOGRAPHS -o OUTPUT` does, told in one line.
 pub(crate) fn find_with_defaults(photographs: &Path, output: &Path) -> anyhow::Result<String> {
-    let found = found(photographs, &solvers(&[From::Openmvg]), &Options::default(), (Layout::Colmap, output))?;
+    let (from, to) = (solvers(&[From::Openmvg]), (Layout::Colmap, output));
+    let found = found(photographs, &from, &Options::default(), to, None)?;
     let all = found.intake.photos.len() + found.intake.unusable.len();
     let registered = found.verdict.map_or(0, |verdict| verdict.photos.len());
     Ok(format!("{}: written, {registered} of {all} photographs with poses", output.display()))
 }
 
-/// Finds poses and writes the scene; the verdict is an accepted one. Finished attempts of a run that is stopped are
-/// kept beside the output for the next one.
+/// Refuses a picture in the folder of the photographs, where it would be one of them, or of the scene, which must be
+/// empty.
+fn keep_picture_apart(file: &Path, photographs: &Path, output: &Path) -> anyhow::Result<()> {
+    let whole = |path: &Path| std::fs::canonicalize(path).or_else(|_| std::path::absolute(path));
+    let folder = file.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
+    let folder = whole(folder)?;
+    for other in [photographs, output] {
+        if folder.starts_with(whole(other)?) {
+            let (file, other) = (file.display(), other.display());
+            return Err(wrong(format_args!("--matches {file}: lies in {other}; give a file elsewhere")));
+        }
+    }
+    Ok(())
+}
+
+/// Finds poses and writes the scene, and a picture of what matches to `matches`; the verdict is an accepted one.
+/// Finished attempts of a run that is stopped are kept beside the output for the next one.
 fn found(
     photographs: &Path,
     from: &[Box<dyn Solver>],
     options: &Options,
     to: (Layout, &Path),
+    matches: Option<&Path>,
 ) -> anyhow::Result<Found> {
     let from: Vec<&dyn Solver> = from.iter().map(AsRef::as_ref).collect();
-    let Some(folder) = Kept::folder_beside(to.1) else { return written(photographs, &from, options, to) };
+    let Some(folder) = Kept::folder_beside(to.1) else { return written(photographs, &from, options, to, matches) };
     Kept::check(&folder).with_context(|| folder.display().to_string())?;
     let kept: Vec<Kept<'_>> = from.iter().map(|solver| Kept::new(*solver, &folder)).collect();
     let from: Vec<&dyn Solver> = kept.iter().map(|own| own as &dyn Solver).collect();
-    let found = written(photographs, &from, options, to);
+    let found = written(photographs, &from, options, to, matches);
     let is_stopped = |error: &anyhow::Error| error.chain().any(|cause| cause.is::<Interrupted>());
     // Before the first question there is nothing of this run; what is there is of one that was stopped.
     if kept.iter().any(Kept::was_asked) && !found.as_ref().is_err_and(is_stopped) {
@@ -134,20 +169,25 @@ fn written(
     from: &[&dyn Solver],
     options: &Options,
     (layout, output): (Layout, &Path),
+    matches: Option<&Path>,
 ) -> anyhow::Result<Found> {
     let progress = Terminal::new("reading the photographs");
     let found = find(photographs, from, options, &progress)?;
+    if let Some(file) = matches {
+        write_png(file, &DynamicImage::ImageRgb8(picture_of_matches(&found)))?;
+    }
     let verdict = match &found.verdict {
         Ok(verdict) => verdict,
         Err(refusal) => {
             told(&found, refusal, &progress);
             drop(progress);
+            table_of_matches(&found, matches.is_some());
             bail!(
-                "{}: no poses that can be trusted ({}); photograph with textured surfaces in view, neighbouring views not more \
-                 than 15 degrees apart and the camera moved, not only turned{}",
+                "{}: no poses that can be trusted ({}); {}{}",
                 photographs.display(),
                 refusal.main(),
-                if found.cameras.are_known() { "" } else { ", or give the focal length with --focal" }
+                found.matches.diagnosis(),
+                if found.cameras.are_known() { "" } else { "; or give the focal length with --focal" }
             );
         }
     };
@@ -159,23 +199,59 @@ fn written(
     Ok(found)
 }
 
-/// Why each attempt was refused, and which photographs cannot be used.
+/// Which photographs cannot be used, and why attempts were refused: each reason once.
 fn told(found: &Found, refusal: &Refusal, progress: &Terminal) {
     for (name, reason) in found.left_out(None) {
         progress.warn(&format!("{name}: {reason}"));
     }
+    let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
     for (attempt, reason) in found.attempts.iter().zip(&refusal.reasons) {
         let tried = &attempt.tried;
         let guess =
             tried.focal_guess.map_or(String::new(), |guess| format!(", focal length from {guess} longest sides"));
-        progress.warn(&format!("{} ({}{guess}): {reason}", tried.solver, tried.features));
+        let name = format!("{} ({} at {} pixels{guess})", tried.solver, tried.features, tried.side);
+        match reasons.iter_mut().find(|(earlier, _)| earlier == reason) {
+            Some((_, names)) => names.push(name),
+            None => reasons.push((reason, vec![name])),
+        }
     }
+    for (reason, names) in reasons {
+        progress.warn(&format!("{}: {reason}", names.join(", ")));
+    }
+}
+
+/// Tells of each photograph which others it matches.
+fn table_of_matches(found: &Found, has_picture: bool) {
+    let Matches { names, .. } = &found.matches;
+    for (photo, name) in names.iter().enumerate().take(MAX_ROWS) {
+        complain(format_args!("matches of {name}: {}", found.matches.told(photo)));
+    }
+    if names.len() > MAX_ROWS {
+        complain(format_args!("matches of {} more photographs are not shown", names.len() - MAX_ROWS));
+    }
+    if !has_picture {
+        complain("--matches FILE.png draws which photographs match which");
+    }
+}
+
+fn picture_of_matches(found: &Found) -> RgbImage {
+    let Matches { names, pairs } = &found.matches;
+    let accepted = found.verdict.as_ref().map_or(&[][..], |verdict| verdict.photos.as_slice());
+    let has_pose: Vec<bool> = (0..names.len()).map(|photo| accepted.contains(&photo)).collect();
+    match_graph(names, pairs, Matches::MIN_TIE, &has_pose)
 }
 
 fn print(found: &Found, verdict: &Verdict, record: &Record<'_>) -> std::io::Result<()> {
     let all = found.intake.photos.len() + found.intake.unusable.len();
     say(format_args!("registered {} of {all} photographs", verdict.photos.len()))?;
     record.left_out.iter().try_for_each(|(name, reason)| say(format_args!("left out   {name}: {reason}")))?;
+    let doubtful = verdict.doubtful();
+    if !doubtful.is_empty() {
+        say(format_args!(
+            "doubtful   {}: too far from the nearest photograph for a held-out picture to tell",
+            doubtful.join(", ")
+        ))?;
+    }
     for camera in &record.cameras {
         let [width, height] = camera.size;
         let from = match camera.focal_from {
