@@ -3,11 +3,11 @@
 
 use super::bare;
 use super::colmap::executable;
-use crate::BINARY;
+use crate::{BINARY, done};
 use libtest_mimic::Trial;
 use serde_json::json;
 use std::process::Command;
-use viewfuse_tests::command::{Outcome, assert_command_refused, command, done, names_in, run, toy};
+use viewfuse_tests::command::{Outcome, assert_command_refused, command, names_in, run, toy};
 use viewfuse_tests::scenes::Folder;
 use viewfuse_tests::trials::trial;
 
