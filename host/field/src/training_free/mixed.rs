@@ -58,10 +58,13 @@ pub(super) struct Mixed<'a, D: Device> {
     /// The Gaussians of the current weighting by each recipe, once they are needed; none where the sources have too few
     /// surfaces.
     splats: Vec<(Recipe, Option<Splats<D>>)>,
-    /// The hull's last picture under the current weighting and options, with what was asked for: camera, weights of the
-    /// views, early termination. It is filled, and carved, by the Gaussians of each recipe.
-    last: Option<((CameraBlock, Vec<f32>, f32), Rendered)>,
+    /// The hull's last picture under the current weighting and options, with what was asked for: it is filled, and carved,
+    /// by the Gaussians of each recipe.
+    last: Option<(Asked, Rendered)>,
 }
+
+/// A target's camera, the weights of its views, and where rays end early.
+type Asked = (CameraBlock, Vec<f32>, f32);
 
 impl<'a, D: Device> Mixed<'a, D> {
     pub(super) fn new(depths: SourceDepths<'a, D>, options: &TrainingFree) -> Mixed<'a, D> {
