@@ -114,7 +114,8 @@ pub fn find(
     let part = Part::begin(progress, "", 4..5, 10);
     let mut found = verdict(folder, photos, &cameras, &mut made, &part)?;
     let accepted = |found: &Result<Verdict, Refusal>| found.as_ref().map_or(Vec::new(), |found| found.photos.clone());
-    if Matches::of(photos, &made).tie_more_than(&accepted(&found)) {
+    // With unknown focal lengths more attempts were not seen to be as safe.
+    if cameras.are_known() && Matches::of(photos, &made).tie_more_than(&accepted(&found)) {
         let part = Part::begin(progress, "finer features", 5..8, 10);
         if let Some(finer) = intake.finer(&part)? {
             made.extend(attempts(solvers, (photos, &finer), &cameras, options.seed, &part)?);

@@ -4,6 +4,7 @@
 //! poses, too: then attempts must agree more closely and over many points, with a focal length that is known, as a wrong
 //! one turns photographs in all attempts alike.
 
+use crate::agreement::median;
 use crate::focal::Cameras;
 use crate::held_out::HeldOutScores;
 use crate::ties::Ties;
@@ -12,12 +13,14 @@ use crate::ties::Ties;
 const MIN_SHARPNESS: f64 = 0.5;
 /// Least decibels by which one is met better than its copies.
 const MIN_GAIN: f64 = 0.5;
+/// Least decibels by which held-out photographs are met better than their copies, in the median.
+const MIN_MEDIAN_GAIN: f64 = 1.0;
 
 /// Degrees to the nearest photograph from which on a held-out picture does not tell: at true poses, too, it may be met
 /// no better than copies.
-pub(crate) const MAX_TOLD: f32 = 20.0;
+const MAX_TOLD: f32 = 20.0;
 /// Most degrees between attempts, and fewest points, of a photograph whose held-out picture does not tell.
-const MAX_FAR_DIFFERENCE: f64 = 1.0;
+pub(crate) const MAX_FAR_DIFFERENCE: f64 = 1.0;
 const MIN_POINTS_OF_THREE: usize = 30;
 const MIN_SECOND_SHARED: usize = 20;
 
@@ -51,14 +54,11 @@ pub struct Verified {
 pub(crate) fn trust(passed: &Verified, cameras: &Cameras) -> Result<Trust, String> {
     let Verified { rotation_difference, ties, held_out, .. } = passed;
     let Some(failure) = failure(held_out) else { return Ok(Trust::Sure) };
-    if ties.nearest <= MAX_TOLD {
+    if tells(passed, cameras) {
         return Err(failure);
     }
     let far =
         format!("the nearest photograph is {:.0} degrees away, too far for a held-out picture to tell", ties.nearest);
-    if !cameras.are_known() {
-        return Err(format!("{far}, and the focal length is not known"));
-    }
     if *rotation_difference > MAX_FAR_DIFFERENCE {
         return Err(format!("{far}, and attempts differ by {rotation_difference:.1} degrees"));
     }
@@ -69,6 +69,34 @@ pub(crate) fn trust(passed: &Verified, cameras: &Cameras) -> Result<Trust, Strin
         ));
     }
     Ok(Trust::Doubtful)
+}
+
+/// Whether a photograph's held-out picture tells. With an unknown focal length nothing else does: a wrong one turns
+/// photographs in all attempts alike.
+fn tells(passed: &Verified, cameras: &Cameras) -> bool {
+    passed.ties.nearest <= MAX_TOLD || !cameras.are_known()
+}
+
+/// Why photographs that are trusted one by one are not together. `is_confirmed` says whether one other attempt has the
+/// rotations of all of them to [`MAX_FAR_DIFFERENCE`].
+pub(crate) fn doubt(all: &[&Verified], cameras: &Cameras, is_confirmed: impl FnOnce() -> bool) -> Option<String> {
+    let told = all.iter().filter(|passed| tells(passed, cameras));
+    let gains: Vec<f64> = told.map(|passed| passed.held_out.gain()).collect();
+    if gains.is_empty() && !is_confirmed() {
+        return Some(format!(
+            "all photographs are more than {MAX_TOLD} degrees apart, too far for held-out pictures to tell, and no other attempt has all their rotations to {MAX_FAR_DIFFERENCE} degree"
+        ));
+    }
+    if all.iter().all(|passed| passed.trust == Trust::Doubtful) {
+        return Some("all photographs are too far apart for held-out pictures to tell".to_owned());
+    }
+    let has_told = !gains.is_empty();
+    let gain = median(gains);
+    (has_told && gain < MIN_MEDIAN_GAIN).then(|| {
+        format!(
+            "photographs that were left out are met {gain:.1} dB better than by copies of their neighbours, {MIN_MEDIAN_GAIN} are needed"
+        )
+    })
 }
 
 /// Why a held-out photograph fails.
@@ -122,6 +150,24 @@ mod tests {
             assert!(reason(&Verified { ties, ..far.clone() }).contains("shares few points"));
         }
         let unknown = trust(&far, &cameras(None)).expect_err("a reason");
-        assert!(unknown.contains("focal length is not known"), "{unknown}");
+        assert!(unknown.contains("hardly better"), "with an unknown focal length its picture counts: {unknown}");
+    }
+
+    #[test]
+    fn photographs_are_trusted_together() {
+        let reason = |all: &[&Verified], focal, is_confirmed| doubt(all, &cameras(focal), || is_confirmed);
+        let doubtful = |gain| Verified { trust: Trust::Doubtful, ..passed(40.0, gain) };
+        let (near, far, unsure) = (passed(12.0, 2.0), passed(40.0, 2.0), doubtful(0.1));
+        let low = passed(12.0, 0.6);
+        assert_eq!(reason(&[&near, &near, &unsure], Some(4.0), false), None);
+        assert!(reason(&[&low, &low, &far, &far, &far], Some(4.0), true).expect("a reason").contains("0.6 dB better"));
+        // All far apart: one other attempt has all of them, and one picture is met.
+        assert_eq!(reason(&[&far, &unsure, &unsure], Some(4.0), true), None);
+        assert!(reason(&[&far, &far, &far], Some(4.0), false).expect("a reason").contains("no other attempt"));
+        assert!(reason(&[&unsure, &unsure, &unsure], Some(4.0), true).expect("a reason").contains("too far apart"));
+        // With an unknown focal length every picture counts, however far.
+        assert_eq!(reason(&[&far, &far, &far], None, false), None);
+        let low = passed(40.0, 0.6);
+        assert!(reason(&[&low, &low, &near], None, true).expect("a reason").contains("0.6 dB better"));
     }
 }

@@ -5,13 +5,14 @@
 //! agreement    an attempt with other features, or another guess of the focal length, has the same rotations
 //! held out     each photograph, rendered from the others, is met at its pose and nowhere else: it is sure
 //! ties         one whose neighbours are too far away for that shares many points with others, and the attempts agree
-//!              closely: it is doubtful, and at least one photograph beside it must be sure
+//!              closely: it is doubtful, and at least one photograph beside it must be sure; where all are too far
+//!              away, one other attempt must have all rotations as closely
 //! ```
 //!
 //! Photographs that fail are taken out and the rest is looked at again, until none fails. The first candidate that
 //! keeps at least three is accepted. The limits were set on scenes with known poses (`host/results/poses.md`).
 
-use crate::agreement::{differences, median};
+use crate::agreement::differences;
 use crate::attempt::Attempt;
 use crate::focal::Cameras;
 use crate::held_out::hold_out_all;
@@ -19,7 +20,7 @@ use crate::intake::Photo;
 use crate::posed;
 use crate::solution::Solution;
 use crate::ties::Ties;
-use crate::trust::{MAX_TOLD, Trust, Verified, trust};
+use crate::trust::{MAX_FAR_DIFFERENCE, Trust, Verified, doubt, trust};
 use std::path::Path;
 use viewfuse_field::render::RenderError;
 use viewfuse_job::progress::{Part, Progress};
@@ -39,8 +40,6 @@ const MIN_PARALLAX: f64 = 1.0;
 const MIN_THICKNESS: f64 = 0.03;
 /// Most degrees between the relative rotations of two attempts.
 const MAX_ROTATION_DIFFERENCE: f64 = 1.5;
-/// Least decibels by which held-out photographs are met better than their copies, in the median.
-const MIN_MEDIAN_GAIN: f64 = 1.0;
 
 /// Of so many photographs that fail, one is taken out at once.
 const WORST: usize = 4;
@@ -113,7 +112,9 @@ pub(crate) fn verdict(
     for (index, (attempt, confirmed)) in candidates.into_iter().enumerate() {
         let part = Part::begin(progress, "leaving photographs out", index..index + 1, count);
         let Some(solution) = &attempts[attempt].solution else { continue };
-        let mut trial = Trial { folder, photos, cameras, solution, taken_out: Vec::new() };
+        let others = attempts.iter().filter(|other| is_independent(&attempts[attempt].tried, &other.tried));
+        let others = others.filter_map(|other| other.solution.as_ref()).collect();
+        let mut trial = Trial { folder, photos, cameras, solution, others, taken_out: Vec::new() };
         trial.taken_out.extend(trial.unconfirmed(&confirmed));
         match trial.run(confirmed, &part)? {
             Ok((scene, kept)) => {
@@ -218,10 +219,20 @@ struct Trial<'a> {
     photos: &'a [Photo],
     cameras: &'a Cameras,
     solution: &'a Solution,
+    /// What attempts found that could be wrong in other ways.
+    others: Vec<&'a Solution>,
     taken_out: Vec<(usize, String)>,
 }
 
 impl Trial<'_> {
+    /// Whether one other attempt has the rotations of all of these.
+    fn is_confirmed(&self, taken: &[usize]) -> bool {
+        self.others.iter().any(|other| {
+            taken.iter().all(|photo| other.photographs[*photo].camera_from_world.is_some())
+                && differences(self.solution, other, taken).iter().all(|degrees| *degrees <= MAX_FAR_DIFFERENCE)
+        })
+    }
+
     fn unconfirmed(&self, confirmed: &[(usize, f64)]) -> Vec<(usize, String)> {
         let is_confirmed = |photo: &usize| confirmed.iter().any(|(own, _)| own == photo);
         let reason = format!("no other attempt has its rotation to {MAX_ROTATION_DIFFERENCE} degrees");
@@ -263,16 +274,9 @@ impl Trial<'_> {
                 }
             }
             if failed.is_empty() {
-                let told = verified.iter().filter(|(_, passed)| passed.ties.nearest <= MAX_TOLD);
-                let gains: Vec<f64> = told.map(|(_, passed)| passed.held_out.gain()).collect();
-                let gain = median(gains.clone());
-                if !gains.is_empty() && gain < MIN_MEDIAN_GAIN {
-                    return Ok(Err(format!(
-                        "photographs that were left out are met {gain:.1} dB better than by copies of their neighbours, {MIN_MEDIAN_GAIN} are needed"
-                    )));
-                }
-                if verified.iter().all(|(_, passed)| passed.trust == Trust::Doubtful) {
-                    return Ok(Err("all photographs are too far apart for held-out pictures to tell".to_owned()));
+                let all: Vec<&Verified> = verified.iter().map(|(_, passed)| passed).collect();
+                if let Some(reason) = doubt(&all, self.cameras, || self.is_confirmed(&taken)) {
+                    return Ok(Err(reason));
                 }
                 return Ok(Ok((scene, verified)));
             }

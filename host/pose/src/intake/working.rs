@@ -17,8 +17,8 @@ pub(super) const MAX_ENLARGEMENT: f64 = 4.0;
 pub(super) fn resized(picture: &GrayImage, size: [u32; 2]) -> GrayImage {
     let [width, height] = size;
     match picture.dimensions() {
-        own if own == (width, height) => picture.clone(),
-        own if own < (width, height) => imageops::resize(picture, width, height, FilterType::CatmullRom),
+        found if found == (width, height) => picture.clone(),
+        found if found < (width, height) => imageops::resize(picture, width, height, FilterType::CatmullRom),
         _ => imageops::resize(picture, width, height, FilterType::Triangle),
     }
 }
@@ -26,5 +26,5 @@ pub(super) fn resized(picture: &GrayImage, size: [u32; 2]) -> GrayImage {
 /// The size with a longest side of `side`, as far as that enlarges it at most by a factor.
 pub(super) fn scaled([width, height]: [u32; 2], side: u32, max_enlargement: f64) -> [u32; 2] {
     let scale = (f64::from(side) / f64::from(width.max(height))).min(max_enlargement);
-    [width, height].map(|own| ((f64::from(own) * scale).round() as u32).max(1))
+    [width, height].map(|side| ((f64::from(side) * scale).round() as u32).max(1))
 }
