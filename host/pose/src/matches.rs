@@ -117,10 +117,15 @@ impl Matches {
             let more = photos.len().saturating_sub(MAX_NAMES);
             names.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
         };
-        let mut parts: Vec<String> = tied.iter().map(|group| list(group)).collect();
+        let tied: Vec<String> = tied.iter().map(|group| list(group)).collect();
         let alone: Vec<usize> = alone.into_iter().flatten().copied().collect();
+        let mut parts = Vec::new();
+        if !tied.is_empty() {
+            let word = if tied.len() == 1 { "group" } else { "groups" };
+            parts.push(format!("{} {word} ({})", tied.len(), tied.join("; ")));
+        }
         if !alone.is_empty() {
-            parts.push(format!("alone {}", list(&alone)));
+            parts.push(format!("{} alone ({})", alone.len(), list(&alone)));
         }
         let group_of = |photo: usize| groups.iter().position(|group| group.contains(&photo));
         let across = self.pairs.iter().filter(|(a, b, _)| group_of(*a) != group_of(*b));
@@ -128,7 +133,7 @@ impl Matches {
             Some((a, b, _)) => format!("between {} and {} first", self.names[*a], self.names[*b]),
             None => "between them".to_owned(),
         };
-        format!("they fall apart into {}: take photographs {between}, {steps}", parts.join("; "))
+        format!("the photographs fall apart into {}: take some {between}, {steps}", parts.join(" and "))
     }
 }
 
@@ -149,7 +154,12 @@ mod tests {
         parts(&[], &["no two photographs match", "textured", "15 degrees"]);
         parts(&[(0, 1, 300), (1, 2, 90), (2, 3, 60), (3, 4, 50)], &["all photographs are tied"]);
         let torn = [(0, 3, 49), (0, 4, 200), (1, 2, 90), (2, 4, 17)];
-        parts(&torn, &["0.jpg, 4.jpg; 1.jpg, 2.jpg; alone 3.jpg: take photographs between 0.jpg and 3.jpg first"]);
+        parts(
+            &torn,
+            &[
+                "into 2 groups (0.jpg, 4.jpg; 1.jpg, 2.jpg) and 1 alone (3.jpg): take some between 0.jpg and 3.jpg first",
+            ],
+        );
     }
 
     #[test]

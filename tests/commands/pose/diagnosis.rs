@@ -62,7 +62,7 @@ fn where_it_broke() {
     }
     let last = lines.last().unwrap_or(&"");
     assert!(
-        last.contains("fall apart into 000, 001, 002; 003, 004: take photographs between 002 and 003 first"),
+        last.contains("fall apart into 2 groups (000, 001, 002; 003, 004): take some between 002 and 003 first"),
         "{last}"
     );
     assert_eq!(names_in(folder.path()), ["answer.json", "bare", "graph.png", "openmvg"]);
@@ -80,7 +80,11 @@ fn the_picture_replaces_nothing() {
         assert!(outcome.stderr.contains(part), "{}", outcome.stderr);
         assert_eq!(names_in(&folder.path().join("bare")), before);
     }
-    assert_command_refused(pose(&folder, " --matches nowhere/graph.png"), folder.path(), &["nowhere"]);
+    assert_command_refused(
+        pose(&folder, " --matches answer.json/graph.png"),
+        folder.path(),
+        &["answer.json is not a folder"],
+    );
 }
 
 fn later_commands_say_it() {
