@@ -14,6 +14,7 @@ mod layouts;
 mod lenses;
 mod made;
 mod masks;
+mod match_graph;
 mod pages;
 mod paths;
 mod photographs;
