@@ -86,7 +86,8 @@ fn model(folder: &Folder, name: &str, turn: impl Fn(usize) -> f64) {
         writeln!(points, "{number} {} {} {} 9 9 9 0.3 {}", p.x, p.y, p.z, track.join(" ")).expect("a string");
     }
     folder.write(&format!("bin/{name}/images.txt"), images).write(&format!("bin/{name}/points3D.txt"), points);
-    folder.write(&format!("bin/{name}/cameras.txt"), "1 SIMPLE_RADIAL 320 240 294.4 160 120 0\n");
+    // Features are looked for in photographs that are enlarged to 1200 pixels.
+    folder.write(&format!("bin/{name}/cameras.txt"), "1 SIMPLE_RADIAL 1200 900 1104 600 450 0\n");
 }
 
 /// Puts the script at `bin/colmap` beside photographs of the room.
@@ -134,7 +135,7 @@ fn in_place_of_openmvg() {
     assert_eq!(steps, ["feature_extractor", "exhaustive_matcher", "mapper"].repeat(2));
     let focal = calls.lines().next().and_then(|call| call.split("--ImageReader.camera_params ").nth(1));
     let focal: f64 = focal.and_then(|text| text.split(',').next()?.parse().ok()).expect("a camera");
-    assert!((focal / 294.4 - 1.0).abs() < 0.02 && calls.contains("--random_seed 5"), "{calls}");
+    assert!((focal / 1104.0 - 1.0).abs() < 0.02 && calls.contains("--random_seed 5"), "{calls}");
     assert!(!calls.contains("use_gpu"), "an option that it does not have: {calls}");
 }
 
