@@ -48,15 +48,18 @@ impl<F: Fn(Features, usize) -> f64 + Sync> Solver for Oracle<F> {
             let row = |row: usize| [rotation.x_axis[row], rotation.y_axis[row], rotation.z_axis[row], translation[row]];
             SolvedPhotograph { camera_from_world: Some([row(0), row(1), row(2)]), reason: None }
         };
+        // What is found is in pixels of the job's photographs, which are enlarged.
+        let scale = job.photographs.first().map_or(1.0, |photograph| f64::from(photograph.size[0]) / 320.0);
+        let middle = [160.0 * scale, 120.0 * scale];
         // Around what the cameras look at: they bound the depths, and have parallax.
         let away = focus.distance(first);
         let point = |number: usize| {
             let angle = 2.0 * PI * number as f64 / 40.0;
             let offset = DVec3::new(angle.cos(), (3.0 * angle).sin(), angle.sin());
-            let seen = (0..COUNT).map(|photo| (photo, [160.0, 120.0])).collect();
+            let seen = (0..COUNT).map(|photo| (photo, middle)).collect();
             SolvedPoint { position: (focus + 0.4 * away * offset).to_array(), error: 0.3, seen }
         };
-        let camera = |_| SolvedCamera { focal: 294.4, principal: [160.0, 120.0], k1: 0.0 };
+        let camera = |_| SolvedCamera { focal: 294.4 * scale, principal: middle, k1: 0.0 };
         Ok(Solution {
             solver: "oracle 1".to_owned(),
             cameras: job.cameras.iter().map(camera).collect(),
