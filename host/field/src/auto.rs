@@ -126,7 +126,7 @@ pub struct Chosen {
     /// The errors that pixels of a confidence have; `None` if nothing could be held out, and for fields without
     /// confidences.
     pub calibration: Option<Calibration>,
-    /// What two sources are good for; `None` for more.
+    /// What two sources are good for of which none could be held out; `None` otherwise.
     pub pair: Option<Pair>,
     measure: Measure,
     poses: Vec<Pose>,
@@ -247,11 +247,12 @@ fn choose_of(
         held_out: Vec::new(),
         basis: None,
         calibration: None,
-        pair: Pair::of(&cameras, stage.images.has_silhouettes),
+        pair: None,
         measure: Measure::of(&cameras),
         poses: cameras.iter().map(|camera| camera.pose).collect(),
     };
     if held_out.is_empty() {
+        chosen.pair = Pair::of(&cameras, stage.images.has_silhouettes);
         return Ok(chosen);
     }
     chosen.weighting = first;

@@ -119,7 +119,7 @@ pub struct ChosenRecord {
     /// have in those pictures; null for fields without confidences. In a frame it is this times
     /// `expected.pixels.scale`.
     pub calibration: Option<Calibration>,
-    /// What two sources are good for, of which none can be left out; null for more.
+    /// What two sources are good for, of which none could be left out; null otherwise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pair: Option<Pair>,
 }

@@ -15,10 +15,10 @@ pub(crate) fn in_words(psnr: f64) -> &'static str {
 pub(crate) fn of_two(pair: &Pair) -> String {
     let Pair { degrees, has_silhouettes, measured } = pair;
     let [least, greatest] = measured.psnr;
-    let of = if *has_silhouettes { "two silhouettes" } else { "two photographs" };
+    let shown = if *has_silhouettes { "two silhouettes" } else { "two photographs" };
     let verdict = in_words(0.5 * (least + greatest));
     format!(
-        "{of} {degrees:.0} degrees apart: pictures from between {} such pairs of other scenes had {least:.0} to \
+        "{shown} {degrees:.0} degrees apart: pictures from between {} such pairs of other scenes had {least:.0} to \
          {greatest:.0} dB ({verdict}); with a third photograph it can be measured here",
         measured.pairs
     )
