@@ -109,7 +109,7 @@ fn failure(scores: &HeldOutScores) -> Option<String> {
     }
     if scores.gain() < MIN_GAIN {
         return Some(format!(
-            "left out and rendered from the others, it is met hardly better ({:.1} dB) than by a copy of its neighbour ({:.1} dB)",
+            "left out and rendered from the others, it is met no better or hardly better ({:.1} dB) than by a copy of its neighbour ({:.1} dB)",
             scores.score,
             scores.copy.max(scores.warp)
         ));

@@ -15,20 +15,23 @@ mod tables;
 use super::metrics_options::MetricOptions;
 use super::model::ModelOptions;
 use super::options::{BoundOptions, DeviceOptions, PictureOptions, SourceOptions};
-use super::outputs::keep_file_apart;
+use super::outputs::{keep_file_apart, refuse_extension};
 use super::printing::{say, warn_of};
 use super::terminal::Terminal;
 use super::threads::on_threads;
 use super::weighting::{many_choices_help, or_every_scheme};
+use super::wrong::wrong;
 use clap::Args;
 use files::{csv_of, json_of};
 use protocol::ProtocolOptions;
 use serde_json::json;
 use std::collections::{BTreeMap, HashSet};
-use std::path::PathBuf;
+use std::fs::canonicalize;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use tables::{counted, print_table};
 use viewfuse_device::choice::Chosen;
+use viewfuse_evaluate::baseline::Baseline;
 use viewfuse_evaluate::summary::{Observation, Table, table};
 use viewfuse_evaluate::{Evaluator, Score};
 use viewfuse_job::files::{check_writable, write_whole};
@@ -94,11 +97,30 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    /// Where the scenes are.
-    fn paths(&self) -> Result<Vec<PathBuf>, DatasetError> {
-        let Some(split) = self.split else { return Ok(self.scenes.clone()) };
-        let sets: Vec<Dataset> = self.scenes.iter().map(|path| Dataset::open(path, split)).collect::<Result<_, _>>()?;
-        Ok(sets.into_iter().flat_map(|set| set.scenes).collect())
+    /// Where the scenes are. None of them twice: it would count as two in means and intervals.
+    fn paths(&self) -> anyhow::Result<Vec<PathBuf>> {
+        let paths = match self.split {
+            None => self.scenes.clone(),
+            Some(split) => {
+                let sets = self.scenes.iter().map(|path| Dataset::open(path, split));
+                let sets: Vec<Dataset> = sets.collect::<Result<_, DatasetError>>()?;
+                sets.into_iter().flat_map(|set| set.scenes).collect()
+            }
+        };
+        let mut seen = HashSet::new();
+        match paths.iter().find(|path| !seen.insert(canonicalize(path).unwrap_or_else(|_| path.to_path_buf()))) {
+            Some(path) => Err(wrong(format_args!("{}: the scene is given twice", path.display()))),
+            None => Ok(paths),
+        }
+    }
+}
+
+/// Refuses schemes whose rows would have the name of another row.
+fn refuse_equal_rows(choices: &[WeightingChoice]) -> anyhow::Result<()> {
+    let mut seen: HashSet<String> = Baseline::ALL.iter().map(|baseline| baseline.name().to_owned()).collect();
+    match choices.iter().map(WeightingChoice::to_string).find(|name| !seen.insert(name.clone())) {
+        Some(name) => Err(wrong(format_args!("--weights: two rows of the table would be called '{name}'"))),
+        None => Ok(()),
     }
 }
 
@@ -106,16 +128,17 @@ impl Arguments {
 pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> anyhow::Result<ExitCode> {
     arguments.metrics.refuse_sets()?;
     let mut choices: Vec<WeightingChoice> = or_every_scheme(&arguments.weights)?;
-    if arguments.protocol.protocol.is_some() {
-        // Once in a table is enough.
-        let mut seen = HashSet::new();
-        choices.retain(|choice| seen.insert(choice.to_string()));
-    }
+    // Once in a table is enough.
+    let mut seen = HashSet::new();
+    choices.retain(|choice| seen.insert(format!("{choice:?}")));
+    refuse_equal_rows(&choices)?;
     let weightings: Vec<OpenedChoice> = choices.iter().map(WeightingChoice::open).collect::<Result<_, _>>()?;
     if let Some(protocol) = &arguments.protocol.protocol {
         return protocol::run(arguments, protocol, &weightings, values);
     }
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);
+    let csv = |path: &Path| refuse_extension(path, "a table as CSV", &["csv", "txt"]);
+    arguments.output.as_deref().map_or(Ok(()), csv)?;
     arguments.output.as_deref().map_or(Ok(()), check_writable)?;
     let field = arguments.model.open(arguments.seed, None)?;
     let about = field.about();

@@ -57,6 +57,18 @@ pub(crate) fn shortened(mut commands: Command) -> Command {
 /// Commands of the laboratory, which a person may look for here.
 const IN_THE_LABORATORY: [&str; 3] = ["train", "scenes", "report"];
 
+/// What is said of an option that other commands have.
+fn of_another_command(error: &Error, commands: &Command) -> Option<String> {
+    let Some(ContextValue::String(given)) = error.get(ContextKind::InvalidArg) else { return None };
+    let has = |command: &&Command| {
+        let mut long = command.get_arguments().filter_map(|argument| argument.get_long());
+        given.strip_prefix("--").is_some_and(|given| long.any(|long| long == given))
+    };
+    let names: Vec<&str> = commands.get_subcommands().filter(has).map(Command::get_name).collect();
+    let is_unknown = error.kind() == ErrorKind::UnknownArgument && !names.is_empty();
+    is_unknown.then(|| format!("unexpected argument '{given}': it is an option of {}", names.join(", ")))
+}
+
 /// An error of arguments, in words where an option of a network was given without one, and where a command is the
 /// laboratory's.
 pub(crate) fn explained(error: Error, arguments: impl Iterator<Item = OsString>, command: &mut Command) -> Error {
@@ -67,6 +79,9 @@ pub(crate) fn explained(error: Error, arguments: impl Iterator<Item = OsString>,
             "`{name}` is a command of the laboratory: in the repository, `cargo run --release -p viewfuse-lab -- {name}`"
         );
         return command.error(ErrorKind::InvalidSubcommand, message);
+    }
+    if let Some(message) = of_another_command(&error, command) {
+        return command.error(ErrorKind::UnknownArgument, message);
     }
     let is_model = |value: &ContextValue| match value {
         ContextValue::Strings(missing) => missing.len() == 1 && missing[0].starts_with("--model "),

@@ -3,7 +3,7 @@
 mod quality;
 
 use super::options::MaskOption;
-use super::outputs::keep_file_apart;
+use super::outputs::{keep_file_apart, refuse_extension};
 use super::posed::PoseOption;
 use super::printing::say;
 use super::table::table;
@@ -55,6 +55,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    arguments.output.as_deref().map_or(Ok(()), |path| refuse_extension(path, "a picture as PNG", &["png"]))?;
     let (_, scene) = arguments.pose.open(&arguments.scene, &arguments.masks)?;
     if arguments.views {
         return print_views(&list_views(&scene), arguments.json);

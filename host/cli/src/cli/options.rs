@@ -87,11 +87,11 @@ pub(crate) struct BoundOptions {
     /// Choose the effort: leave out what the pictures do not need for this root mean square difference from the exact
     /// ones, in decibels (40dB) or with colours from 0 to 1 (0.01) [default with a network: 45dB, unless options say
     /// what is omitted]
-    #[arg(long, value_name = "ERROR", value_parser = parse_error, conflicts_with_all = CHOSEN_BY_A_BOUND, help_heading = EFFORTS)]
+    #[arg(long, value_name = "ERROR", value_parser = parse_error, allow_hyphen_values = true, conflicts_with_all = CHOSEN_BY_A_BOUND, help_heading = EFFORTS)]
     max_error: Option<f32>,
     /// Choose the effort: leave out what does not fit into this time for each picture: seconds, or milliseconds as
     /// 250ms
-    #[arg(long, value_name = "TIME", value_parser = parse_seconds, conflicts_with_all = CHOSEN_BY_A_BOUND, conflicts_with = "max_error", help_heading = EFFORTS)]
+    #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, conflicts_with_all = CHOSEN_BY_A_BOUND, conflicts_with = "max_error", help_heading = EFFORTS)]
     max_time: Option<Duration>,
 }
 

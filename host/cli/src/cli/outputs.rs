@@ -74,6 +74,17 @@ pub(super) fn refuse_file(folder: &Path) -> anyhow::Result<()> {
     Err(wrong(format_args!("--output {path}: is the name of a file, and pictures go to a folder; {way}")))
 }
 
+/// Refuses a file whose name says that it holds something else than what is written: `what`, whose names end in one of
+/// `extensions`. A name without an extension says nothing.
+pub(super) fn refuse_extension(file: &Path, what: &str, extensions: &[&str]) -> anyhow::Result<()> {
+    let Some(given) = file.extension() else { return Ok(()) };
+    if extensions.iter().any(|extension| given.eq_ignore_ascii_case(extension)) {
+        return Ok(());
+    }
+    let better = file.with_extension(extensions[0]);
+    Err(wrong(format_args!("--output {}: {what} is written; give a name as {}", file.display(), quoted(&better))))
+}
+
 /// Refuses a file that one of the scenes is read from, or would be.
 pub(super) fn keep_file_apart<'a>(scenes: impl IntoIterator<Item = &'a Scene>, file: &Path) -> anyhow::Result<()> {
     match scenes.into_iter().find(|scene| scene.reads_file(file)) {

@@ -23,6 +23,9 @@ const OTHER_PICTURES: f64 = 1.3;
 /// The most work of two pictures that are compared, as a share of the exact one's: where the comparison fails, it was
 /// for nothing, unless both render from the same encodings.
 const MAX_COMPARED: f32 = 0.7;
+/// The least error of a single pixel that checks must see. Where one that is off by less may have all of the error that
+/// is allowed, few exact pixels tell nothing, and the picture is exact (`host/results/bounds.md`).
+const MIN_SINGLE: f64 = 0.134;
 /// A picture whose error is below the bound by this factor lets the next one begin with less effort.
 const FAR_LESS: f64 = 1.6;
 /// After an exact picture, only one of so many tries less.
@@ -130,7 +133,12 @@ impl Controller {
         if self.check == Check::Comparison {
             return self.by_comparison(search, most, termination, progress);
         }
-        let mut effort = self.begin(most);
+        let (width, height) = (search.view.camera.pinhole.width(), search.view.camera.pinhole.height());
+        let single = most * (f64::from(width) * f64::from(height)).sqrt();
+        let mut effort = match self.check == Check::Pixels && single < MIN_SINGLE {
+            true => self.expected.efforts.len() - 1,
+            false => self.begin(most),
+        };
         loop {
             let rendered = self.picture(search, effort, termination, progress)?;
             if self.expected.is_exact(effort) {

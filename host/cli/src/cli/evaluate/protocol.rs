@@ -164,7 +164,8 @@ fn digests(arguments: &Arguments, weightings: &[OpenedChoice]) -> anyhow::Result
 /// Says how many jobs this process did, how many are in the folder, and how many there are.
 fn print_done(shard: Shard, [done, there, all]: [usize; 3], folder: &Path) -> anyhow::Result<()> {
     let part = if shard == Shard::ALL { String::new() } else { format!("shard {shard}: ") };
-    Ok(say(format_args!("{part}{done} jobs done; {there} of {all} are in {}", folder.display()))?)
+    let done = counted(done, "job");
+    Ok(say(format_args!("{part}{done} done; {there} of {all} are in {}", folder.display()))?)
 }
 
 /// Says which jobs are missing, if any are.

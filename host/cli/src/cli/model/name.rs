@@ -54,7 +54,13 @@ impl FromStr for Model {
         }
         let mut networks = ROWS.into_iter().flat_map(Row::test_networks);
         let Some(network) = networks.find(|network| network.name == name) else {
-            return Ok(Model::File(PathBuf::from(text)));
+            let path = PathBuf::from(text);
+            if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ply")) {
+                return Err(format!(
+                    "'{text}': a .ply holds no network; `viewfuse render --gaussians FILE` shows Gaussians"
+                ));
+            }
+            return Ok(Model::File(path));
         };
         let size = match (network.small, size) {
             (_, None) => None,
