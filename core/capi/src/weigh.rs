@@ -168,7 +168,7 @@ unsafe fn weigh<const S: usize>(
     // SAFETY: the caller's promise; every bit pattern is a scheme.
     let scheme = unsafe { read(scheme) }?;
     // SAFETY: the caller's promise.
-    let views = unsafe { Views::<S>::new(source_poses, source_count, target_pose, weights) }?;
+    let views = unsafe { SchemeInputs::<S>::new(source_poses, source_count, target_pose, weights) }?;
     let scheme = scheme.checked()?;
     views.weigh(|sources, target| weighting::weigh(scheme, sources, target))
 }
@@ -184,7 +184,7 @@ unsafe fn attend<const S: usize>(
 ) -> Result<(), Status> {
     checked(parameters, FourierEmbedding::PARAMETERS)?;
     // SAFETY: the caller's promise.
-    let views = unsafe { Views::<S>::new(source_poses, source_count, target_pose, weights) }?;
+    let views = unsafe { SchemeInputs::<S>::new(source_poses, source_count, target_pose, weights) }?;
     views.weigh(|sources, target| {
         // SAFETY: aligned, and of that many floats, which is all that the struct is made of (C's layout, no padding);
         // it is not used any more when the weights are written.
@@ -194,14 +194,14 @@ unsafe fn attend<const S: usize>(
 }
 
 /// The cameras of a call and the destination of their weights.
-struct Views<const S: usize> {
+struct SchemeInputs<const S: usize> {
     sources: Input,
     count: u32,
     target: Input,
     weights: Output,
 }
 
-impl<const S: usize> Views<S> {
+impl<const S: usize> SchemeInputs<S> {
     /// # Safety
     /// Pointers are null or valid for as many poses and weights as there are sources.
     unsafe fn new(
@@ -209,7 +209,7 @@ impl<const S: usize> Views<S> {
         source_count: u32,
         target_pose: *const f32,
         weights: *mut f32,
-    ) -> Result<Views<S>, Status> {
+    ) -> Result<SchemeInputs<S>, Status> {
         if source_count == 0 || source_count as usize > S {
             return Err(Status::Count);
         }
@@ -218,7 +218,7 @@ impl<const S: usize> Views<S> {
         let (sources, target, weights) = unsafe {
             (Input::new(source_poses, 16 * count)?, Input::new(target_pose, 16)?, Output::new(weights, count)?)
         };
-        Ok(Views { sources, count: source_count, target, weights })
+        Ok(SchemeInputs { sources, count: source_count, target, weights })
     }
 
     #[inline(always)]

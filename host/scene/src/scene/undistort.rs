@@ -33,14 +33,23 @@ pub(super) fn undistorted(photograph: &Photograph, lens: &Lens, pinhole: &Pinhol
     let stored = photograph.seen.as_ref().map(|stored| stored.as_raw().as_slice());
     lines.enumerate().for_each(|(row, (line, seen))| {
         let (mapping, pixels, has_alpha) = (&mapping, line.as_chunks_mut().0, photograph.has_alpha);
-        arch.dispatch(Line { texels, stored, has_alpha, mapping, is_fisheye, row: row as u32, pixels, seen });
+        arch.dispatch(UndistortedLine {
+            texels,
+            stored,
+            has_alpha,
+            mapping,
+            is_fisheye,
+            row: row as u32,
+            pixels,
+            seen,
+        });
     });
     let all_seen = seen.as_raw().iter().all(|seen| *seen > 0);
     Photograph { pixels, has_alpha: photograph.has_alpha, seen: (!all_seen).then_some(seen) }
 }
 
 /// A line of the result.
-struct Line<'a> {
+struct UndistortedLine<'a> {
     texels: &'a [[u8; 4]],
     /// What counts of them; `None` for all.
     stored: Option<&'a [u8]>,
@@ -52,12 +61,12 @@ struct Line<'a> {
     seen: &'a mut [u8],
 }
 
-impl WithSimd for Line<'_> {
+impl WithSimd for UndistortedLine<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let Line { texels, stored, has_alpha, mapping, is_fisheye, row, pixels, seen } = self;
+        let UndistortedLine { texels, stored, has_alpha, mapping, is_fisheye, row, pixels, seen } = self;
         let mut corners = Corners::NONE;
         for (part, (pixels, seen)) in (0_u32..).zip(pixels.chunks_mut(PART).zip(seen.chunks_mut(PART))) {
             let first = part * PART as u32;
@@ -95,7 +104,7 @@ struct Mapping {
     focal: [f64; 2],
     principal: [f64; 2],
     size: [u32; 2],
-    coefficients: Coefficients<f64>,
+    coefficients: Coefficients,
     /// Where the lens's polynomials fold the image over, from the centre.
     reach: f64,
 }
