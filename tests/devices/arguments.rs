@@ -21,7 +21,7 @@ const BLOCK: FuseBlock = FuseBlock { view_count: 2, stride: 3, channel_count: 1,
 
 fn detail(outcome: Result<(), VulkanError>) -> Result<String, Failed> {
     match outcome {
-        Err(VulkanError::Arguments { kernel: "fuse_views" | "hull_entry" | "linear", detail }) => Ok(detail),
+        Err(VulkanError::Arguments("fuse_views" | "hull_entry" | "linear", detail)) => Ok(detail),
         other => Err(format!("{other:?}").into()),
     }
 }
@@ -86,7 +86,7 @@ fn arrays_of_another_device_are_refused(candidate: &Candidate) -> Result<(), Fai
     let (downloaded, arrays) = (gpu.download(&foreign), [own.bind(), foreign.bind(), own.bind()]);
     let dispatched = gpu.dispatch(Kernel::FuseViews, bytes_of(&BLOCK), 0..3, &arrays);
     for outcome in [downloaded.map(|_| ()), dispatched] {
-        let is_refused = matches!(&outcome, Err(VulkanError::OtherDevice { owner, .. }) if *owner == other.name());
+        let is_refused = matches!(&outcome, Err(VulkanError::OtherDevice(_, owner)) if *owner == other.name());
         assert!(is_refused, "{outcome:?}");
     }
     assert_works(&gpu)?;
@@ -129,7 +129,7 @@ fn lacking(candidate: &Candidate) -> Adapter {
 
 fn a_device_that_lacks_something_is_not_opened(candidate: &Candidate) -> Result<(), Failed> {
     let lacking = lacking(candidate);
-    let expected = VulkanError::Missing { device: lacking.name.clone(), missing: lacking.missing.clone() };
+    let expected = VulkanError::Missing(lacking.name.clone(), lacking.missing.clone());
     let opened = Gpu::open(&candidate.instance, &lacking, &GpuOptions::default()).err();
     assert_eq!(opened.as_ref(), Some(&expected));
     let text = expected.to_string();

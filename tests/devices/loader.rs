@@ -28,7 +28,7 @@ fn load(loader: &str) -> Option<VulkanError> {
 
 fn a_missing_loader_is_named() -> Result<(), Failed> {
     match load(NO_LOADER) {
-        Some(VulkanError::NoLoader { detail }) if detail.contains(NO_LOADER) => Ok(()),
+        Some(VulkanError::NoLoader(detail)) if detail.contains(NO_LOADER) => Ok(()),
         other => Err(format!("{other:?}").into()),
     }
 }
@@ -38,7 +38,7 @@ fn a_file_that_is_no_loader_is_named() -> Result<(), Failed> {
     let text = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
     for file in [text, "libc.so.6"] {
         match load(file) {
-            Some(VulkanError::NoLoader { detail }) if file != text || detail.contains(text) => {}
+            Some(VulkanError::NoLoader(detail)) if file != text || detail.contains(text) => {}
             other => return Err(format!("{file}: {other:?}").into()),
         }
     }

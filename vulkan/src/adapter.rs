@@ -120,7 +120,7 @@ impl Instance {
         // SAFETY: no requirements.
         let devices = unsafe { self.raw.enumerate_physical_devices() }.map_err(failed("vkEnumeratePhysicalDevices"))?;
         if devices.is_empty() {
-            return Err(VulkanError::NoDevice { detail: "the installed drivers have no device".to_owned() });
+            return Err(VulkanError::NoDevice("the installed drivers have no device".to_owned()));
         }
         let mut adapters: Vec<Adapter> = devices.into_iter().map(|raw| Adapter::new(self, raw)).collect();
         adapters.sort_by_key(|adapter| (adapter.kind, std::cmp::Reverse(adapter.memory)));
@@ -239,11 +239,11 @@ impl Adapter {
         let Some(adapter) = fitting().find(|adapter| adapter.missing.is_empty()).or(fitting().next()) else {
             let wanted = if is_number { wanted.to_owned() } else { format!("'{wanted}'") };
             let there = adapters.iter().map(|adapter| format!("{} {}", adapter.index, adapter.name)).collect();
-            return Err(VulkanError::NoSuchDevice { wanted, there });
+            return Err(VulkanError::NoSuchDevice(wanted, there));
         };
         match adapter.missing.is_empty() {
             true => Ok(adapter),
-            false => Err(VulkanError::Missing { device: adapter.name.clone(), missing: adapter.missing.clone() }),
+            false => Err(VulkanError::Missing(adapter.name.clone(), adapter.missing.clone())),
         }
     }
 }
@@ -287,29 +287,21 @@ fn extensions(
 
 /// Whether a device with the extension reports on its pipelines.
 fn reports_pipelines(instance: &Instance, raw: vk::PhysicalDevice) -> bool {
-    let mut executables = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default();
-    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut executables);
-    // SAFETY: the device knows the chained struct.
-    unsafe { instance.raw.get_physical_device_features2(raw, &mut features) };
-    executables.pipeline_executable_info == vk::TRUE
+    let features: vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR<'_> = instance.features(raw);
+    features.pipeline_executable_info == vk::TRUE
 }
 
 fn memory_model(instance: &Instance, raw: vk::PhysicalDevice, api_version: u32, has_extension: bool) -> bool {
-    if api_version < vk::API_VERSION_1_1 || (api_version < vk::API_VERSION_1_2 && !has_extension) {
-        return false;
-    }
-    let mut model = vk::PhysicalDeviceVulkanMemoryModelFeatures::default();
-    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut model);
-    // SAFETY: the device knows the chained struct.
-    unsafe { instance.raw.get_physical_device_features2(raw, &mut features) };
-    model.vulkan_memory_model == vk::TRUE
+    let is_known = api_version >= vk::API_VERSION_1_2 || (api_version >= vk::API_VERSION_1_1 && has_extension);
+    let features = || instance.features::<vk::PhysicalDeviceVulkanMemoryModelFeatures<'_>>(raw);
+    is_known && features().vulkan_memory_model == vk::TRUE
 }
 
 fn missing(properties: &vk::PhysicalDeviceProperties, has_memory_model: bool, has_queue: bool) -> Vec<Missing> {
     let limits = &properties.limits;
     let mut missing = Vec::new();
     if properties.api_version < vk::API_VERSION_1_1 {
-        missing.push(Missing::Version { found: properties.api_version });
+        missing.push(Missing::Version(properties.api_version));
     }
     if !has_queue {
         missing.push(Missing::ComputeQueue);
@@ -317,7 +309,7 @@ fn missing(properties: &vk::PhysicalDeviceProperties, has_memory_model: bool, ha
     if !has_memory_model {
         missing.push(Missing::Feature("vulkanMemoryModel"));
     }
-    let most = |of: fn(Kernel) -> usize| Kernel::ALL.into_iter().map(of).max().unwrap_or(0) as u64;
+    let most = |count: fn(Kernel) -> usize| Kernel::ALL.into_iter().map(count).max().unwrap_or(0) as u64;
     let bindings = most(|kernel| kernel.binding_count());
     let mut need = |name, needed: u64, found: u32| {
         if u64::from(found) < needed {

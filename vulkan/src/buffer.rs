@@ -63,7 +63,7 @@ impl Array {
         let owner = self.chunks[0].owner();
         match std::ptr::eq(owner, handle) {
             true => Ok(()),
-            false => Err(VulkanError::OtherDevice { device: handle.name.clone(), owner: owner.name.clone() }),
+            false => Err(VulkanError::OtherDevice(handle.name.clone(), owner.name.clone())),
         }
     }
 

@@ -17,14 +17,14 @@ use viewfuse_kernels::pages::MAX_PAGES;
 const UNKNOWN: Duration = Duration::from_millis(20);
 
 /// A dispatch whose arguments are right.
-pub(crate) struct Job<'a> {
+pub(crate) struct DispatchJob<'a> {
     pub(crate) kernel: Kernel,
     parameters: &'a [u8],
     arrays: &'a [Bound<'a>],
     pub(crate) page_shift: u32,
 }
 
-impl<'a> Job<'a> {
+impl<'a> DispatchJob<'a> {
     /// The arrays that it writes.
     pub(crate) fn outputs(&self) -> Vec<&'a Arc<Array>> {
         let listed = self.kernel.arrays().iter().zip(self.arrays);
@@ -58,7 +58,7 @@ impl Gpu {
             .zip(arrays)
             .any(|(array, bound)| array.layout == Layout::Pages && bound.0.len > page_len);
         let page_shift = if needs_pages { self.page_shift } else { 0 };
-        let job = Job { kernel, parameters, arrays, page_shift };
+        let job = DispatchJob { kernel, parameters, arrays, page_shift };
         self.with_state(|gpu, state| {
             let (form, of_form) = match kernel.shape(parameters) {
                 Some(shape) => {
@@ -84,12 +84,12 @@ impl Gpu {
     pub(crate) fn record_job(
         &self,
         state: &mut State,
-        job: &Job<'_>,
+        job: &DispatchJob<'_>,
         form: Form,
         elements: Range<u32>,
         counted: u64,
     ) -> Result<u64, VulkanError> {
-        let Job { kernel, parameters, arrays, page_shift } = *job;
+        let DispatchJob { kernel, parameters, arrays, page_shift } = *job;
         let elements = self.faults.done(form, elements);
         let listed = kernel.arrays().iter().zip(arrays);
         let uses: Vec<_> = listed.clone().map(|(array, bound)| (bound.0, array.access)).collect();
@@ -158,7 +158,7 @@ impl Gpu {
     }
 
     fn check_arguments(&self, kernel: Kernel, parameters: &[u8], arrays: &[Bound<'_>]) -> Result<(), VulkanError> {
-        let refuse = |detail| Err(VulkanError::Arguments { kernel: kernel.name(), detail });
+        let refuse = |detail| Err(VulkanError::Arguments(kernel.name(), detail));
         if parameters.len() != kernel.parameter_bytes() {
             return refuse(format!("{} bytes of parameters instead of {}", parameters.len(), kernel.parameter_bytes()));
         }

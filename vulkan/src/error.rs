@@ -7,40 +7,21 @@ use std::time::Duration;
 /// Why work on a Vulkan device failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum VulkanError {
-    /// There is no Vulkan loader on this machine.
-    #[error("no Vulkan loader: {detail}; on Debian it is the package libvulkan1")]
-    NoLoader {
-        /// The error of the system's linker.
-        detail: String,
-    },
-    /// The loader is older than Vulkan 1.1.
-    #[error("the Vulkan loader is of version {}; 1.1 is needed", version(*.found))]
-    LoaderTooOld {
-        /// Its version, packed.
-        found: u32,
-    },
-    /// No driver, or none with a device.
-    #[error("no Vulkan device: {detail}")]
-    NoDevice {
-        /// The request, and the devices that exist.
-        detail: String,
-    },
-    /// No device has this number, or these words in its name.
-    #[error("no Vulkan device {wanted}; {}", counted(.there))]
-    NoSuchDevice {
-        /// The number, or the name between quotes.
-        wanted: String,
-        /// Number and name of each device.
-        there: Vec<String>,
-    },
-    /// The device lacks a requirement.
-    #[error("{device} lacks what viewfuse needs: {}", list(.missing))]
-    Missing {
-        /// The device.
-        device: String,
-        /// The missing requirements.
-        missing: Vec<Missing>,
-    },
+    /// There is no Vulkan loader on this machine: the error of the system's linker.
+    #[error("no Vulkan loader: {0}; on Debian it is the package libvulkan1")]
+    NoLoader(String),
+    /// The loader is older than Vulkan 1.1: its version, packed.
+    #[error("the Vulkan loader is of version {}; 1.1 is needed", version(*.0))]
+    LoaderTooOld(u32),
+    /// No driver, or none with a device: the request, and the devices that exist.
+    #[error("no Vulkan device: {0}")]
+    NoDevice(String),
+    /// No device has this number, or these words in its name, between quotes; and number and name of each device.
+    #[error("no Vulkan device {}; {}", .0, counted(.1))]
+    NoSuchDevice(String, Vec<String>),
+    /// The device lacks requirements.
+    #[error("{} lacks what viewfuse needs: {}", .0, list(.1))]
+    Missing(String, Vec<Missing>),
     /// The work exceeds a limit of the device, and cannot be split any finer.
     #[error("{device}: {what} needs {needed} bytes, but {limit} is {available}")]
     Limit {
@@ -67,22 +48,12 @@ pub enum VulkanError {
         /// All bytes.
         total: u64,
     },
-    /// The memory allocator failed for another reason than lack of memory.
-    #[error("{device}: {detail}")]
-    Memory {
-        /// The device.
-        device: String,
-        /// Its message.
-        detail: String,
-    },
-    /// The device was lost: a fault of the driver, a reset, or a removed card.
-    #[error("{device} was lost in {call}")]
-    DeviceLost {
-        /// The device.
-        device: String,
-        /// The call that reported it.
-        call: &'static str,
-    },
+    /// The device's memory allocator failed for another reason than lack of memory.
+    #[error("{0}: {1}")]
+    Memory(String, String),
+    /// The device was lost: a fault of the driver, a reset, or a removed card; and the call that reported it.
+    #[error("{0} was lost in {1}")]
+    DeviceLost(String, &'static str),
     /// A submission exceeded its time limit.
     #[error("{device}: {work} did not finish within {} s", .limit.as_secs_f64())]
     TimeLimit {
@@ -93,52 +64,28 @@ pub enum VulkanError {
         /// The time limit.
         limit: Duration,
     },
-    /// The validation layers reported an error.
-    #[error("validation: {message}")]
-    Validation {
-        /// The first message.
-        message: String,
-    },
+    /// The validation layers reported an error: the first message.
+    #[error("validation: {0}")]
+    Validation(String),
     /// The requested validation layer is not installed.
-    #[error("the layer {layer} is not installed; on Debian it is the package vulkan-validationlayers")]
-    NoValidation {
-        /// Its name.
-        layer: &'static str,
-    },
-    /// A kernel's arguments do not match its row.
-    #[error("kernel {kernel}: {detail}")]
-    Arguments {
-        /// The kernel.
-        kernel: &'static str,
-        /// The difference.
-        detail: String,
-    },
-    /// An array is in the memory of another device.
-    #[error("the array is in the memory of {owner}, not of {device}")]
-    OtherDevice {
-        /// The device of the kernel.
-        device: String,
-        /// The device of the array.
-        owner: String,
-    },
-    /// Any other call that failed.
-    #[error("{call}: {result}")]
-    Call {
-        /// The call.
-        call: &'static str,
-        /// Vulkan's result code.
-        result: vk::Result,
-    },
+    #[error("the layer {0} is not installed; on Debian it is the package vulkan-validationlayers")]
+    NoValidation(&'static str),
+    /// A kernel's arguments do not match its row: the kernel, and the difference.
+    #[error("kernel {0}: {1}")]
+    Arguments(&'static str, String),
+    /// An array is not in the memory of the kernel's device, but of another one.
+    #[error("the array is in the memory of {1}, not of {0}")]
+    OtherDevice(String, String),
+    /// Any other call that failed, with Vulkan's result code.
+    #[error("{0}: {1}")]
+    Call(&'static str, vk::Result),
 }
 
 /// A missing requirement of a device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Missing {
-    /// The version of Vulkan, packed.
-    Version {
-        /// The device's value.
-        found: u32,
-    },
+    /// A version of Vulkan: the device's, packed.
+    Version(u32),
     /// A feature, by Vulkan's name.
     Feature(&'static str),
     /// A limit that is too low.
@@ -157,7 +104,7 @@ pub enum Missing {
 impl fmt::Display for Missing {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Missing::Version { found } => write!(f, "Vulkan 1.1 (it has {})", version(*found)),
+            Missing::Version(found) => write!(f, "Vulkan 1.1 (it has {})", version(*found)),
             Missing::Feature(name) => write!(f, "the feature {name}"),
             Missing::Limit { name, needed, found } => write!(f, "{name} of {needed} (it has {found})"),
             Missing::ComputeQueue => write!(f, "a compute queue"),
@@ -185,5 +132,5 @@ pub fn version(packed: u32) -> String {
 
 /// Adds the call's name to Vulkan's result code.
 pub(crate) fn failed(call: &'static str) -> impl Fn(vk::Result) -> VulkanError {
-    move |result| VulkanError::Call { call, result }
+    move |result| VulkanError::Call(call, result)
 }

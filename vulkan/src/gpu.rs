@@ -79,26 +79,16 @@ impl GpuOptions {
     /// The default of a GPU is two minutes. A software driver has no limit: its kernels share the processor with all
     /// other processes of the machine, and a busy machine is not a failure.
     pub fn time_limit_on(&self, kind: AdapterKind) -> Option<Duration> {
-        let of_kind = match kind {
-            AdapterKind::Software => None,
-            _ => Some(Duration::from_secs(120)),
-        };
-        self.time_limit.or(of_kind)
+        self.time_limit.or((kind != AdapterKind::Software).then_some(Duration::from_secs(120)))
     }
-}
 
-impl GpuOptions {
     /// The longest time that a piece of a dispatch may be expected to take on a device of this kind; `None` where work
     /// is cut by the device's limits alone.
     ///
     /// The default of a GPU is 0.2 s: systems end what takes seconds (two on Windows). Nobody watches a software
     /// driver.
     pub fn longest_piece_on(&self, kind: AdapterKind) -> Option<Duration> {
-        let of_kind = match kind {
-            AdapterKind::Software => None,
-            _ => Some(Duration::from_millis(200)),
-        };
-        self.longest_piece.or(of_kind)
+        self.longest_piece.or((kind != AdapterKind::Software).then_some(Duration::from_millis(200)))
     }
 }
 
@@ -152,12 +142,10 @@ impl Gpu {
     /// [`VulkanError::Missing`] if it lacks a requirement, also of [`GpuOptions::form`], and others if Vulkan fails.
     pub fn open(instance: &Arc<Instance>, adapter: &Adapter, options: &GpuOptions) -> Result<Gpu, VulkanError> {
         if adapter.instance_number != instance.number {
-            let detail = format!("{} was found by another instance of Vulkan", adapter.name);
-            return Err(VulkanError::NoDevice { detail });
+            return Err(VulkanError::NoDevice(format!("{} was found by another instance of Vulkan", adapter.name)));
         }
         if !adapter.missing.is_empty() {
-            let (device, missing) = (adapter.name.clone(), adapter.missing.clone());
-            return Err(VulkanError::Missing { device, missing });
+            return Err(VulkanError::Missing(adapter.name.clone(), adapter.missing.clone()));
         }
         let (limits, lower) = (adapter.limits, options.limits);
         let limits = Limits {
@@ -171,7 +159,7 @@ impl Gpu {
                 true => "subgroups of 8 to 64 invocations",
                 false => "workgroups of 256 invocations that share 32 KiB",
             })];
-            return Err(VulkanError::Missing { device: adapter.name.clone(), missing });
+            return Err(VulkanError::Missing(adapter.name.clone(), missing));
         }
         let handle = Arc::new(Handle::open(instance, adapter, limits)?);
         let timestamps = (adapter.timestamp_bits > 0).then_some((adapter.timestamp_period, adapter.timestamp_bits));

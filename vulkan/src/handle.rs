@@ -1,7 +1,7 @@
 //! An opened device: its functions, its queue, its memory.
 
 use crate::adapter::{Adapter, Identity, Limits};
-use crate::error::{VulkanError, failed};
+use crate::error::VulkanError;
 use crate::instance::Instance;
 use crate::kernel::Form;
 use ash::{khr, vk};
@@ -57,13 +57,8 @@ impl Handle {
             info = info.push_next(&mut executable);
         }
         // SAFETY: everything that `info` points to lives until the call returns; the adapter has what is enabled.
-        let device =
-            unsafe { instance.raw.create_device(adapter.raw, &info, None) }.map_err(|result| match result {
-                vk::Result::ERROR_DEVICE_LOST => {
-                    VulkanError::DeviceLost { device: adapter.name.clone(), call: "vkCreateDevice" }
-                }
-                result => VulkanError::Call { call: "vkCreateDevice", result },
-            })?;
+        let device = unsafe { instance.raw.create_device(adapter.raw, &info, None) }
+            .map_err(|result| failure(&adapter.name, "vkCreateDevice", result))?;
         // SAFETY: one queue of this family was created.
         let queue = unsafe { device.get_device_queue(adapter.queue_family, 0) };
         let allocator = Allocator::new(&AllocatorCreateDesc {
@@ -192,16 +187,13 @@ impl Handle {
     /// A failed call as an error; a lost device has its own. After each of them the content of the device's memory is
     /// undefined, also after lack of memory: recorded commands that never ran may be dependencies of others.
     pub(crate) fn failure(&self, call: &'static str, result: vk::Result) -> VulkanError {
-        match result {
-            vk::Result::ERROR_DEVICE_LOST => VulkanError::DeviceLost { device: self.name.clone(), call },
-            result => failed(call)(result),
-        }
+        failure(&self.name, call, result)
     }
 
     /// The oldest message of the validation layers, as an error.
     pub(crate) fn check_messages(&self) -> Result<(), VulkanError> {
         match self.instance.messages().first() {
-            Some(message) => Err(VulkanError::Validation { message }),
+            Some(message) => Err(VulkanError::Validation(message)),
             None => Ok(()),
         }
     }
@@ -229,8 +221,15 @@ impl Drop for Handle {
     }
 }
 
+fn failure(device: &str, call: &'static str, result: vk::Result) -> VulkanError {
+    match result {
+        vk::Result::ERROR_DEVICE_LOST => VulkanError::DeviceLost(device.to_owned(), call),
+        result => VulkanError::Call(call, result),
+    }
+}
+
 fn unexpected(device: &str, error: &AllocationError) -> VulkanError {
-    VulkanError::Memory { device: device.to_owned(), detail: error.to_string() }
+    VulkanError::Memory(device.to_owned(), error.to_string())
 }
 
 /// A buffer with its memory.

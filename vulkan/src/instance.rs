@@ -46,13 +46,13 @@ impl Instance {
                 None => ash::Entry::load(),
             }
         };
-        let entry = entry.map_err(|error| VulkanError::NoLoader { detail: error.to_string() })?;
+        let entry = entry.map_err(|error| VulkanError::NoLoader(error.to_string()))?;
         // SAFETY: no requirements.
         let found = unsafe { entry.try_enumerate_instance_version() }.map_err(failed("vkEnumerateInstanceVersion"))?;
         // A loader of Vulkan 1.0 does not have this function.
         let found = found.unwrap_or(vk::API_VERSION_1_0);
         if found < vk::API_VERSION_1_1 {
-            return Err(VulkanError::LoaderTooOld { found });
+            return Err(VulkanError::LoaderTooOld(found));
         }
         let messages = Messages::default();
         let raw = create(&entry, options, &messages)?;
@@ -71,6 +71,15 @@ impl Instance {
             instance.messenger = Some((functions, messenger));
         }
         Ok(Arc::new(instance))
+    }
+
+    /// What a device says of the features in a struct that it knows.
+    pub(crate) fn features<T: vk::ExtendsPhysicalDeviceFeatures2 + Default>(&self, device: vk::PhysicalDevice) -> T {
+        let mut asked = T::default();
+        let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut asked);
+        // SAFETY: the device is the instance's, and knows the chained struct.
+        unsafe { self.raw.get_physical_device_features2(device, &mut features) };
+        asked
     }
 
     /// The messages of the validation layers.
@@ -133,8 +142,8 @@ fn create(entry: &ash::Entry, options: &InstanceOptions, messages: &Messages) ->
     let info = info.enabled_layer_names(&layers).enabled_extension_names(&extensions).flags(flags);
     // SAFETY: everything that `info` points to lives until the call returns.
     unsafe { entry.create_instance(&info, None) }.map_err(|result| match result {
-        vk::Result::ERROR_INCOMPATIBLE_DRIVER => VulkanError::NoDevice { detail: no_driver() },
-        result => VulkanError::Call { call: "vkCreateInstance", result },
+        vk::Result::ERROR_INCOMPATIBLE_DRIVER => VulkanError::NoDevice(no_driver()),
+        result => VulkanError::Call("vkCreateInstance", result),
     })
 }
 
@@ -154,7 +163,7 @@ fn layer_extensions(entry: &ash::Entry) -> Result<Vec<vk::ExtensionProperties>, 
     let layers =
         unsafe { entry.enumerate_instance_layer_properties() }.map_err(failed("vkEnumerateInstanceLayerProperties"))?;
     if !layers.iter().any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
-        return Err(VulkanError::NoValidation { layer: "VK_LAYER_KHRONOS_validation" });
+        return Err(VulkanError::NoValidation("VK_LAYER_KHRONOS_validation"));
     }
     // SAFETY: no requirements.
     unsafe { entry.enumerate_instance_extension_properties(Some(VALIDATION_LAYER)) }

@@ -7,7 +7,7 @@
 //! restored at the end.
 
 use crate::buffer::Array;
-use crate::dispatch::Job;
+use crate::dispatch::DispatchJob;
 use crate::error::{Missing, VulkanError};
 use crate::forms::{self, Class};
 use crate::gpu::{Gpu, State};
@@ -20,14 +20,14 @@ const SPOILT: u32 = u32::MAX;
 
 impl Gpu {
     /// The form for a class of products.
-    pub(crate) fn form(&self, state: &mut State, job: &Job<'_>, class: &Class) -> Result<Form, VulkanError> {
+    pub(crate) fn form(&self, state: &mut State, job: &DispatchJob<'_>, class: &Class) -> Result<Form, VulkanError> {
         if let Some(form) = self.form {
             return match state.pipelines.fits(job.kernel, form, job.page_shift)? {
                 true => Ok(form),
-                false => Err(VulkanError::Missing {
-                    device: self.handle.name.clone(),
-                    missing: vec![Missing::Feature("subgroups of the size that was asked for")],
-                }),
+                false => {
+                    let missing = vec![Missing::Feature("subgroups of the size that was asked for")];
+                    Err(VulkanError::Missing(self.handle.name.clone(), missing))
+                }
             };
         }
         let candidates: Vec<Form> = class.candidates(self.is_software).filter(|form| self.handle.runs(*form)).collect();
@@ -70,7 +70,7 @@ impl Gpu {
     fn fastest(
         &self,
         state: &mut State,
-        job: &Job<'_>,
+        job: &DispatchJob<'_>,
         class: &Class,
         candidates: &[Form],
         outputs: &[&Arc<Array>],
@@ -104,7 +104,13 @@ impl Gpu {
     }
 
     /// The least time of a few dispatches of some tiles, whose pipeline is there.
-    fn time_form(&self, state: &mut State, job: &Job<'_>, form: Form, elements: u32) -> Result<Duration, VulkanError> {
+    fn time_form(
+        &self,
+        state: &mut State,
+        job: &DispatchJob<'_>,
+        form: Form,
+        elements: u32,
+    ) -> Result<Duration, VulkanError> {
         let mut least = Duration::MAX;
         for _ in 0..forms::ROUNDS {
             state.wait()?;

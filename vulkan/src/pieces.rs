@@ -3,7 +3,7 @@
 //! Of a kernel that this device has not run yet nobody knows how long it takes, so its first dispatch is small, and is
 //! waited for. From its time follows how many elements a piece may have.
 
-use crate::dispatch::Job;
+use crate::dispatch::DispatchJob;
 use crate::error::VulkanError;
 use crate::gpu::{Gpu, State};
 use crate::kernel::{Form, WORKGROUP};
@@ -20,7 +20,7 @@ impl Gpu {
     pub(crate) fn record_in_pieces(
         &self,
         state: &mut State,
-        job: &Job<'_>,
+        job: &DispatchJob<'_>,
         form: Form,
         elements: Range<u32>,
         count: u64,

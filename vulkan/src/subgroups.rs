@@ -13,10 +13,7 @@ const MIN_SIZE: u32 = 8;
 ///
 /// A size that fits is a power of two from 8 to the invocations of a workgroup; the device's usual size, if that fits.
 pub(crate) fn fitting_size(instance: &Instance, raw: vk::PhysicalDevice) -> Option<u32> {
-    let mut control = vk::PhysicalDeviceSubgroupSizeControlFeaturesEXT::default();
-    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut control);
-    // SAFETY: the device knows the chained struct.
-    unsafe { instance.raw.get_physical_device_features2(raw, &mut features) };
+    let control: vk::PhysicalDeviceSubgroupSizeControlFeaturesEXT<'_> = instance.features(raw);
     let mut usual = vk::PhysicalDeviceSubgroupProperties::default();
     let mut sizes = vk::PhysicalDeviceSubgroupSizeControlPropertiesEXT::default();
     let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut usual).push_next(&mut sizes);

@@ -225,10 +225,8 @@ impl Gpu {
     /// The staging buffer and its mapping on the host.
     fn mapped<'a>(&self, staging: &'a mut Option<Memory>) -> Result<(vk::Buffer, &'a mut [u8]), VulkanError> {
         let mapped = staging.as_mut().and_then(|memory| Some((memory.buffer, memory.mapped()?)));
-        mapped.ok_or_else(|| VulkanError::Memory {
-            device: self.handle.name.clone(),
-            detail: "staging memory is not visible to the host".to_owned(),
-        })
+        let hidden = || "staging memory is not visible to the host".to_owned();
+        mapped.ok_or_else(|| VulkanError::Memory(self.handle.name.clone(), hidden()))
     }
 
     fn staging(&self, staging: &mut Option<Memory>, location: MemoryLocation) -> Result<(), VulkanError> {

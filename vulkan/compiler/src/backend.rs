@@ -27,32 +27,17 @@ const ADVICE: &str = "install the official toolchain, `rustup toolchain install 
 #[derive(Debug, thiserror::Error)]
 pub enum BackendError {
     /// The named folder has no compiler.
-    #[error("{HOME_VARIABLE} names {}, where {} is missing", home.display(), missing.display())]
-    Incomplete {
-        /// The folder.
-        home: PathBuf,
-        /// The missing file.
-        missing: PathBuf,
-    },
+    #[error("{HOME_VARIABLE} names {}, where {} is missing", .0.display(), .1.display())]
+    Incomplete(PathBuf, PathBuf),
     /// None of the places has one.
     #[error("no compiler of rust-gpu {VERSION}: {ADVICE}")]
     None,
-    /// A program that should provide one failed.
-    #[error("{program} failed: {reason}")]
-    Failed {
-        /// The program.
-        program: String,
-        /// Its last message.
-        reason: String,
-    },
-    /// A folder of our own could not be written.
-    #[error("{}: {source}", path.display())]
-    Write {
-        /// The file or folder.
-        path: PathBuf,
-        /// The cause.
-        source: std::io::Error,
-    },
+    /// A program that should provide one failed: its last message.
+    #[error("{0} failed: {1}")]
+    Failed(String, String),
+    /// A file or folder of our own could not be written.
+    #[error("{0}: {1}")]
+    Write(PathBuf, #[source] std::io::Error),
 }
 
 /// An installed compiler.
@@ -93,7 +78,7 @@ impl Backend {
     /// [`BackendError`], with what to install.
     pub fn find() -> Result<Backend, BackendError> {
         if let Some(home) = env::var_os(HOME_VARIABLE).filter(|home| !home.is_empty()).map(PathBuf::from) {
-            return Backend::in_folder(&home).map_err(|missing| BackendError::Incomplete { home, missing });
+            return Backend::in_folder(&home).map_err(|missing| BackendError::Incomplete(home, missing));
         }
         if let Some(backend) = cached() {
             return Ok(backend);
@@ -158,7 +143,7 @@ fn official() -> Result<Backend, BackendError> {
     if !code_generator.is_file() {
         let write = |path: PathBuf, text: String| {
             let made = path.parent().map_or(Ok(()), fs::create_dir_all).and_then(|()| fs::write(&path, text));
-            made.map_err(|source| BackendError::Write { path, source })
+            made.map_err(|cause| BackendError::Write(path, cause))
         };
         // A library of cargo's kind is built only as a dependency of a package.
         write(folder.join("src").join("lib.rs"), String::new())?;
@@ -181,7 +166,7 @@ fn official() -> Result<Backend, BackendError> {
         output_of(&mut cargo)?;
         if !code_generator.is_file() {
             let reason = format!("it did not build {}", code_generator.display());
-            return Err(BackendError::Failed { program: format!("{cargo:?}"), reason });
+            return Err(BackendError::Failed(format!("{cargo:?}"), reason));
         }
     }
     Ok(Backend { code_generator, toolchain: Toolchain::Rustup(NIGHTLY.to_owned()) })
@@ -190,8 +175,7 @@ fn official() -> Result<Backend, BackendError> {
 /// The output of a program.
 fn output_of(command: &mut Command) -> Result<String, BackendError> {
     let failed = |command: &Command, reason: String| {
-        let program = command.get_program().to_string_lossy().into_owned();
-        BackendError::Failed { program, reason }
+        BackendError::Failed(command.get_program().to_string_lossy().into_owned(), reason)
     };
     let output = command.output().map_err(|error| failed(command, error.to_string()))?;
     if !output.status.success() {

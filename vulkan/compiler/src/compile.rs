@@ -1,6 +1,6 @@
 //! Compiles the sources to modules.
 //!
-//! rust-gpu's optimiser (SPIRV-Tools) is left out: it may rewrite float arithmetic that is not marked against
+//! rust-gpu's optimiser (SPIRV-Tools) is not used: it may rewrite float arithmetic that is not marked against
 //! contraction, such as `(a - b) + b` to `a`, and the marks come after it. rust-gpu's own passes (inlining, memory to
 //! registers, dead code) stay.
 
@@ -21,24 +21,14 @@ pub enum CompileError {
     #[error("the kernels do not compile: {0}")]
     Compiler(#[from] SpirvBuilderError),
     /// The module could not be read.
-    #[error("{}: {source}", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The cause.
-        source: std::io::Error,
-    },
+    #[error("{0}: {1}")]
+    Read(PathBuf, #[source] std::io::Error),
     /// The module is invalid.
     #[error(transparent)]
     Refine(#[from] RefineError),
-    /// The validator rejected the module.
-    #[error("spirv-val, for {environment}: {said}")]
-    Invalid {
-        /// The version of Vulkan.
-        environment: String,
-        /// Its message.
-        said: String,
-    },
+    /// The validator rejected the module for a version of Vulkan: its message.
+    #[error("spirv-val, for {0}: {1}")]
+    Invalid(&'static str, String),
 }
 
 /// The modules of the sources in the repository `root`, built in `target`.
@@ -58,7 +48,7 @@ pub fn compile(backend: &Backend, root: &Path, target: &Path) -> Result<Modules,
     }
     let compiled = builder.build()?;
     let path = compiled.module.unwrap_single();
-    let bytes = std::fs::read(path).map_err(|source| CompileError::Read { path: path.to_path_buf(), source })?;
+    let bytes = std::fs::read(path).map_err(|cause| CompileError::Read(path.to_path_buf(), cause))?;
     let Modules { kernels, subgroups } = split(&bytes)?;
     Ok(Modules { kernels: refine(&kernels)?, subgroups: refine(&subgroups)? })
 }
@@ -70,14 +60,14 @@ pub fn compile(backend: &Backend, root: &Path, target: &Path) -> Result<Modules,
 /// [`CompileError::Invalid`], or [`CompileError::Read`] for a file that could not be written.
 pub fn validate(module: &[u8], target: &Path) -> Result<bool, CompileError> {
     let path = target.join("refined.spv");
-    std::fs::write(&path, module).map_err(|source| CompileError::Read { path: path.clone(), source })?;
+    std::fs::write(&path, module).map_err(|cause| CompileError::Read(path.clone(), cause))?;
     for environment in ["vulkan1.1", "vulkan1.2", "vulkan1.3"] {
         let Ok(output) = Command::new("spirv-val").args(["--target-env", environment]).arg(&path).output() else {
             return Ok(false);
         };
         if !output.status.success() {
             let said = String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
-            return Err(CompileError::Invalid { environment: environment.to_owned(), said });
+            return Err(CompileError::Invalid(environment, said));
         }
     }
     Ok(true)

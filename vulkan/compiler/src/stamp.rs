@@ -43,37 +43,17 @@ pub const LIBRARIES: [&str; 6] = ["bytemuck", "bytemuck_derive", "glam", "libm",
 #[derive(Debug, thiserror::Error)]
 pub enum StampError {
     /// A file cannot be read or written.
-    #[error("{}: {source}", path.display())]
-    File {
-        /// Its path.
-        path: PathBuf,
-        /// The cause.
-        source: std::io::Error,
-    },
-    /// A file has invalid content.
-    #[error("{}: {source}", path.display())]
-    Format {
-        /// Its path.
-        path: PathBuf,
-        /// The place and the problem.
-        source: toml::de::Error,
-    },
+    #[error("{0}: {1}")]
+    File(PathBuf, #[source] std::io::Error),
+    /// A file has invalid content: the place and the problem.
+    #[error("{0}: {1}")]
+    Format(PathBuf, #[source] toml::de::Error),
     /// A source is not Rust.
-    #[error("{}: {problem}", path.display())]
-    Source {
-        /// Its path.
-        path: PathBuf,
-        /// The problem.
-        problem: String,
-    },
-    /// A library is not locked.
-    #[error("{}: has no package {library}", path.display())]
-    Unlocked {
-        /// Cargo.lock.
-        path: PathBuf,
-        /// The library.
-        library: &'static str,
-    },
+    #[error("{0}: {1}")]
+    Source(PathBuf, String),
+    /// Cargo.lock has not this library.
+    #[error("{0}: has no package {1}")]
+    Unlocked(PathBuf, &'static str),
 }
 
 /// The inputs that determine the modules' bytes.
@@ -120,7 +100,7 @@ impl Modules {
     pub fn read(root: &Path) -> Result<Modules, StampError> {
         let bytes = |name| {
             let path = root.join(name);
-            fs::read(&path).map_err(|source| StampError::File { path, source })
+            fs::read(&path).map_err(|cause| StampError::File(path, cause))
         };
         Ok(Modules { kernels: bytes(MODULE)?, subgroups: bytes(SUBGROUPS)? })
     }
@@ -143,8 +123,7 @@ impl Inputs {
         read_core(root, &mut read)?;
         sources.extend(read.into_iter().map(|(file, tokens)| (file, sha256(tokens.join("\n").as_bytes()))));
         let path = root.join("Cargo.lock");
-        let lock: Lock =
-            toml::from_str(&read_text(&path)?).map_err(|source| StampError::Format { path: path.clone(), source })?;
+        let lock: Lock = toml::from_str(&read_text(&path)?).map_err(|cause| StampError::Format(path.clone(), cause))?;
         let mut libraries = BTreeMap::new();
         for library in LIBRARIES {
             let locked: Vec<String> = lock
@@ -154,7 +133,7 @@ impl Inputs {
                 .map(|package| format!("{} {}", package.version, package.checksum))
                 .collect();
             if locked.is_empty() {
-                return Err(StampError::Unlocked { path, library });
+                return Err(StampError::Unlocked(path, library));
             }
             libraries.insert(library.to_owned(), locked.join(", "));
         }
@@ -169,7 +148,7 @@ impl Stamp {
     /// [`StampError`], with the file.
     pub fn read(root: &Path) -> Result<Stamp, StampError> {
         let path = root.join(STAMP);
-        toml::from_str(&read_text(&path)?).map_err(|source| StampError::Format { path, source })
+        toml::from_str(&read_text(&path)?).map_err(|cause| StampError::Format(path, cause))
     }
 
     /// The file's text.
@@ -228,12 +207,11 @@ type Sources = BTreeMap<String, Vec<String>>;
 fn read_all(root: &Path, relative: &str, sources: &mut Sources) -> Result<(), StampError> {
     let path = root.join(relative);
     if !path.is_dir() {
-        let tokens =
-            tokens(&read_text(&path)?).map_err(|error| StampError::Source { path, problem: error.to_string() })?;
+        let tokens = tokens(&read_text(&path)?).map_err(|error| StampError::Source(path, error.to_string()))?;
         sources.insert(relative.to_owned(), tokens);
         return Ok(());
     }
-    let failed = |source| StampError::File { path: path.clone(), source };
+    let failed = |cause| StampError::File(path.clone(), cause);
     for entry in fs::read_dir(&path).map_err(failed)? {
         let entry = entry.map_err(failed)?;
         let name = entry.file_name().to_string_lossy().into_owned();
@@ -274,11 +252,11 @@ fn read_core(root: &Path, sources: &mut Sources) -> Result<(), StampError> {
 /// What a manifest says about the code: not its description, nor its lints.
 fn manifest_of(path: &Path) -> Result<String, StampError> {
     let mut manifest: toml::Table =
-        toml::from_str(&read_text(path)?).map_err(|source| StampError::Format { path: path.to_path_buf(), source })?;
+        toml::from_str(&read_text(path)?).map_err(|cause| StampError::Format(path.to_path_buf(), cause))?;
     manifest.retain(|section, _| section != "package" && section != "lints");
     Ok(manifest.to_string())
 }
 
 fn read_text(path: &Path) -> Result<String, StampError> {
-    fs::read_to_string(path).map_err(|source| StampError::File { path: path.to_path_buf(), source })
+    fs::read_to_string(path).map_err(|cause| StampError::File(path.to_path_buf(), cause))
 }
