@@ -38,8 +38,8 @@ pub fn sealed(name: &str, bytes: &[u8]) -> Vec<u8> {
 /// The bytes that [`sealed`] was given with this name; `None` if these are not what it made of them, or were kept under
 /// another name.
 pub fn unsealed<'a>(name: &str, kept: &'a [u8]) -> Option<&'a [u8]> {
-    let (own, bytes) = kept.split_at_checked(SEAL)?;
-    (seal(name, bytes).as_bytes() == own).then_some(bytes)
+    let (stated, bytes) = kept.split_at_checked(SEAL)?;
+    (seal(name, bytes).as_bytes() == stated).then_some(bytes)
 }
 
 fn seal(name: &str, bytes: &[u8]) -> String {

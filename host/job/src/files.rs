@@ -20,7 +20,7 @@ use std::io::ErrorKind::{NotADirectory, NotFound, PermissionDenied};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
-use unfinished::{Own, PREFIX, clean};
+use unfinished::{PREFIX, Unfinished, clean};
 
 /// Why an output could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -42,17 +42,11 @@ pub enum WriteError {
         cause: Box<dyn std::error::Error + Send + Sync>,
     },
     /// Another process writes to the folder.
-    #[error("{}: another process is writing to this folder", path.display())]
-    Busy {
-        /// The folder.
-        path: PathBuf,
-    },
+    #[error("{0}: another process is writing to this folder")]
+    Busy(PathBuf),
     /// A file of this name is a person's own: it is neither continued nor removed.
-    #[error("{}: is not what this program keeps under this name; move it, or give another folder", path.display())]
-    NotOwn {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error("{0}: is not what this program keeps under this name; move it, or give another folder")]
+    Foreign(PathBuf),
 }
 
 /// A file that is written in pieces and appears when it is finished. Dropped before that, it leaves no file.
@@ -60,7 +54,7 @@ pub enum WriteError {
 pub struct WholeFile {
     path: PathBuf,
     writer: BufWriter<NamedTempFile>,
-    unfinished: Own,
+    unfinished: Unfinished,
 }
 
 impl WholeFile {
@@ -86,7 +80,7 @@ impl WholeFile {
             builder.tempfile_in(folder)
         };
         clean(folder);
-        let (file, unfinished) = Own::make(PREFIX, make, |file| file.path().to_path_buf()).map_err(failed)?;
+        let (file, unfinished) = Unfinished::make(PREFIX, make, |file| file.path().to_path_buf()).map_err(failed)?;
         Ok(WholeFile { path: path.to_path_buf(), writer: BufWriter::new(file), unfinished })
     }
 
@@ -147,7 +141,7 @@ pub fn check_writable(path: &Path) -> Result<(), WriteError> {
     let Some(nearest) = above().find(|folder| folder.exists()) else { return Ok(()) };
     // Names that the file system does not take, each alone: of those in folders that are missing nothing is said.
     let missing = path.strip_prefix(nearest).unwrap_or(path);
-    for name in missing.components().map(|own| nearest.join(own)) {
+    for name in missing.components().map(|part| nearest.join(part)) {
         match std::fs::symlink_metadata(&name) {
             Err(cause) if !matches!(cause.kind(), NotFound | NotADirectory | PermissionDenied) => {
                 return Err(failed(cause));

@@ -16,6 +16,15 @@ pub fn in_line(text: impl Display) -> String {
     line
 }
 
+/// Names in a line, at most `most` of them: `a, b and 3 more`.
+pub fn listed(names: &[impl AsRef<str>], most: usize) -> String {
+    let shown: Vec<&str> = names.iter().take(most).map(AsRef::as_ref).collect();
+    match names.len() - shown.len() {
+        0 => shown.join(", "),
+        more => format!("{} and {more} more", shown.join(", ")),
+    }
+}
+
 /// Of the names that are known, those that a text most likely meant, the nearest first, at most `most`: at most half of
 /// its characters have to be changed, inserted, removed or swapped.
 pub fn nearest<'a>(text: &str, known: impl IntoIterator<Item = &'a str>, most: usize) -> Vec<&'a str> {

@@ -73,7 +73,7 @@ impl Reading {
         };
         match head {
             Some(head) => Ok(Some(Reading { path, lines, head: Some(head) })),
-            None => Err(WriteError::NotOwn { path }),
+            None => Err(WriteError::Foreign(path)),
         }
     }
 
@@ -89,7 +89,7 @@ impl FrameJournal {
     /// written yet.
     ///
     /// # Errors
-    /// [`WriteError::Io`] if there is a journal that cannot be read, [`WriteError::NotOwn`] if what has its name is
+    /// [`WriteError::Io`] if there is a journal that cannot be read, [`WriteError::Foreign`] if what has its name is
     /// none.
     pub fn open(folder: &Path, run: &str) -> Result<(FrameJournal, Vec<FinishedFrame>), WriteError> {
         let mut journal = FrameJournal { path: folder.join(JOURNAL), run: run.to_owned(), whole: 0, lines: None };
@@ -130,7 +130,7 @@ impl FrameJournal {
     /// Removes the journal of whichever run from a folder.
     ///
     /// # Errors
-    /// [`WriteError`]: above all [`WriteError::NotOwn`] if what has its name is none.
+    /// [`WriteError`]: above all [`WriteError::Foreign`] if what has its name is none.
     pub(crate) fn remove_any(folder: &Path) -> Result<(), WriteError> {
         match Reading::open(folder)? {
             Some(reading) => remove_if_there(&reading.path),

@@ -1,6 +1,6 @@
 //! Output folders that appear completely or not at all.
 
-use super::unfinished::{Own, PREFIX, clean};
+use super::unfinished::{PREFIX, Unfinished, clean};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use tempfile::TempDir;
 pub struct WholeFolder {
     path: PathBuf,
     temporary: TempDir,
-    unfinished: Own,
+    unfinished: Unfinished,
 }
 
 impl WholeFolder {
@@ -29,7 +29,7 @@ impl WholeFolder {
         fs::create_dir_all(parent)?;
         clean(parent);
         let make = |builder: &mut tempfile::Builder<'_, '_>| builder.tempdir_in(parent);
-        let (temporary, unfinished) = Own::make(PREFIX, make, |made: &TempDir| made.path().to_path_buf())?;
+        let (temporary, unfinished) = Unfinished::make(PREFIX, make, |made: &TempDir| made.path().to_path_buf())?;
         // A temporary folder is closed to others; the result, a folder inside it, has the ordinary permissions.
         fs::create_dir(temporary.path().join(name))?;
         Ok(WholeFolder { path: path.to_path_buf(), temporary, unfinished })

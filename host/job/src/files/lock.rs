@@ -19,7 +19,7 @@ impl FolderLock {
     pub fn take(folder: &Path) -> Result<FolderLock, WriteError> {
         let Ok(file) = File::open(folder) else { return Ok(FolderLock(None)) };
         match file.try_lock() {
-            Err(TryLockError::WouldBlock) => Err(WriteError::Busy { path: folder.to_path_buf() }),
+            Err(TryLockError::WouldBlock) => Err(WriteError::Busy(folder.to_path_buf())),
             Err(TryLockError::Error(_)) => Ok(FolderLock(None)),
             Ok(()) => Ok(FolderLock(Some(file))),
         }
@@ -38,11 +38,6 @@ impl FolderLock {
             }
         }
     }
-
-    /// Whether there is a lock.
-    pub fn is_held(&self) -> bool {
-        self.0.is_some()
-    }
 }
 
 #[cfg(all(test, unix))]
@@ -53,7 +48,7 @@ mod tests {
     fn one_at_a_time() {
         let folder = tempfile::tempdir().expect("a folder");
         let first = FolderLock::take(folder.path()).expect("free");
-        assert!(first.is_held() && FolderLock::take(folder.path()).is_err());
+        assert!(first.0.is_some() && FolderLock::take(folder.path()).is_err());
         let still = FolderLock::wait(folder.path(), Duration::from_millis(20));
         assert!(still.is_err(), "another one has it for longer");
         let waiting = std::thread::scope(|scope| {
@@ -61,8 +56,8 @@ mod tests {
             drop(first);
             waiting.join().expect("no panic")
         });
-        assert!(waiting.expect("it became free").is_held());
-        assert!(FolderLock::take(folder.path()).expect("free again").is_held());
-        assert!(!FolderLock::take(&folder.path().join("missing")).expect("nothing to lock").is_held());
+        assert!(waiting.expect("it became free").0.is_some());
+        assert!(FolderLock::take(folder.path()).expect("free again").0.is_some());
+        assert!(!FolderLock::take(&folder.path().join("missing")).expect("nothing to lock").0.is_some());
     }
 }

@@ -1,6 +1,6 @@
 //! Folders for what work needs on its way, where the system keeps such: nobody finds anything there later.
 
-use super::unfinished::{Own, remove_left};
+use super::unfinished::{Unfinished, remove_left};
 use std::fs;
 use std::io;
 use std::path::Path;
@@ -17,7 +17,7 @@ const MARK: (&str, &str) = ("scratch.txt", "A scratch folder of viewfuse: it goe
 #[derive(Debug)]
 pub struct Scratch {
     folder: TempDir,
-    _unfinished: Own,
+    _unfinished: Unfinished,
 }
 
 impl Scratch {
@@ -27,9 +27,9 @@ impl Scratch {
     /// What the system says.
     pub fn new() -> io::Result<Scratch> {
         let make = |builder: &mut Builder<'_, '_>| builder.tempdir();
-        let (folder, unfinished) = Own::make(PREFIX, make, |made: &TempDir| made.path().to_path_buf())?;
+        let (folder, unfinished) = Unfinished::make(PREFIX, make, |made: &TempDir| made.path().to_path_buf())?;
         fs::write(folder.path().join(MARK.0), MARK.1)?;
-        remove_left(folder.path().parent().unwrap_or(Path::new("/")), PREFIX, is_own);
+        remove_left(folder.path().parent().unwrap_or(Path::new("/")), PREFIX, is_scratch);
         Ok(Scratch { folder, _unfinished: unfinished })
     }
 
@@ -40,7 +40,7 @@ impl Scratch {
 }
 
 /// Whether a folder is marked, or empty: a kill may have come before the mark.
-fn is_own(folder: &Path) -> bool {
+fn is_scratch(folder: &Path) -> bool {
     let is_marked = || fs::read(folder.join(MARK.0)).is_ok_and(|text| text == MARK.1.as_bytes());
     let is_empty = || fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none());
     folder.is_dir() && (is_marked() || is_empty())

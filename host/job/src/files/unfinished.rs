@@ -19,7 +19,7 @@ const RANDOM: usize = 6;
 const ATTEMPTS: usize = 8;
 
 /// Temporary files and folders of this process.
-static OWN: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+static OF_THIS_PROCESS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 /// Folders in which this process has already looked for what a kill left.
 static CLEANED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
@@ -30,7 +30,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 /// Removes the temporary files and folders of this process, which must end next: from here on every output waits
 /// forever instead of being finished or begun.
 pub fn remove_all() {
-    let paths = lock(&OWN);
+    let paths = lock(&OF_THIS_PROCESS);
     for path in paths.iter() {
         // A folder is no file. What cannot be removed stays, as after a kill.
         if fs::remove_file(path).is_err() {
@@ -42,26 +42,26 @@ pub fn remove_all() {
 
 /// A temporary file or folder of this process, until it is finished.
 #[derive(Debug)]
-pub(super) struct Own {
+pub(super) struct Unfinished {
     path: PathBuf,
     /// Keeps the lock.
     _locked: Option<File>,
 }
 
-impl Own {
+impl Unfinished {
     /// Makes a temporary file or folder with a name that begins with `prefix` by `make`, locks it and lists it.
     /// Callers look before it for what a kill left ([`clean`]).
     pub(super) fn make<T>(
         prefix: &str,
         make: impl Fn(&mut Builder<'_, '_>) -> io::Result<T>,
         place: impl Fn(&T) -> PathBuf,
-    ) -> io::Result<(T, Own)> {
+    ) -> io::Result<(T, Unfinished)> {
         let mut builder = Builder::new();
         builder.prefix(prefix).rand_bytes(RANDOM);
         let mut attempt = 0;
         loop {
             // Nothing is begun while the process ends.
-            let mut paths = lock(&OWN);
+            let mut paths = lock(&OF_THIS_PROCESS);
             let made = make(&mut builder)?;
             let path = place(&made);
             // A folder cannot be opened on every system: it is then not recognised after a kill.
@@ -72,23 +72,23 @@ impl Own {
             if !is_taken || attempt == ATTEMPTS {
                 paths.insert(path.clone());
                 let locked = locked.and_then(|(outcome, file)| outcome.is_ok().then_some(file));
-                return Ok((made, Own { path, _locked: locked }));
+                return Ok((made, Unfinished { path, _locked: locked }));
             }
         }
     }
 
     /// Renames it to its final name by `rename`; while the process ends, this waits forever.
     pub(super) fn finish<T>(self, rename: impl FnOnce() -> io::Result<T>) -> io::Result<T> {
-        let paths = lock(&OWN);
+        let paths = lock(&OF_THIS_PROCESS);
         let renamed = rename();
         drop(paths);
         renamed
     }
 }
 
-impl Drop for Own {
+impl Drop for Unfinished {
     fn drop(&mut self) {
-        lock(&OWN).remove(&self.path);
+        lock(&OF_THIS_PROCESS).remove(&self.path);
     }
 }
 
@@ -105,17 +105,17 @@ pub fn remove_unfinished(folder: &Path) {
     remove_left(folder, PREFIX, |_| true);
 }
 
-/// Removes what killed processes left in a folder under names with this prefix, where `is_own` says so, too.
-pub(super) fn remove_left(folder: &Path, prefix: &str, is_own: impl Fn(&Path) -> bool) {
+/// Removes what killed processes left in a folder under names with this prefix, where `is_removable` says so, too.
+pub(super) fn remove_left(folder: &Path, prefix: &str, is_removable: impl Fn(&Path) -> bool) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let path = entry.path();
         // No links, and nothing that waits for a writer when it is opened.
         let is_of_kind = entry.file_type().is_ok_and(|kind| kind.is_file() || kind.is_dir());
         let is_named_so = is_temporary(&entry.file_name().to_string_lossy(), prefix);
-        if is_of_kind && is_named_so && !lock(&OWN).contains(&path) {
+        if is_of_kind && is_named_so && !lock(&OF_THIS_PROCESS).contains(&path) {
             // Only of what nobody has locked.
             let Ok(file) = File::open(&path) else { continue };
-            if file.try_lock().is_ok() && is_own(&path) && fs::remove_file(&path).is_err() {
+            if file.try_lock().is_ok() && is_removable(&path) && fs::remove_file(&path).is_err() {
                 let _ = fs::remove_dir_all(&path);
             }
         }
