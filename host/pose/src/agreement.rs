@@ -7,17 +7,17 @@ use glam::DMat3;
 /// For each of these photographs, which both solutions must have registered, the median over the others of the angle in
 /// degrees between the two solutions' relative rotations; 0 for a photograph without others.
 pub(crate) fn differences(a: &Solution, b: &Solution, photos: &[usize]) -> Vec<f64> {
-    let of = |solution: &Solution| -> Vec<DMat3> {
+    let rotations = |solution: &Solution| -> Vec<DMat3> {
         photos.iter().map(|photo| solution.photographs[*photo].rotation().unwrap_or(DMat3::IDENTITY)).collect()
     };
-    let (a, b) = (of(a), of(b));
-    let own = |first: usize| {
+    let (a, b) = (rotations(a), rotations(b));
+    let difference = |first: usize| {
         let others = (0..photos.len()).filter(|other| *other != first);
         // (A_first A_other^T) (B_first B_other^T)^T
         let angles = others.map(|other| degrees(a[first] * a[other].transpose() * b[other] * b[first].transpose()));
         median(angles.collect())
     };
-    (0..photos.len()).map(own).collect()
+    (0..photos.len()).map(difference).collect()
 }
 
 /// The angle of a rotation.
@@ -61,13 +61,13 @@ mod tests {
     #[test]
     fn a_turn_of_the_world_is_no_difference() {
         let turn = |degrees: f64| DMat3::from_rotation_y(degrees.to_radians());
-        let own = [turn(0.0), turn(10.0), turn(20.0), turn(30.0)];
+        let turns = [turn(0.0), turn(10.0), turn(20.0), turn(30.0)];
         let world = DMat3::from_rotation_x(1.0);
-        let same = solution(&own.map(|rotation| rotation * world));
+        let same = solution(&turns.map(|rotation| rotation * world));
         let photos = [0, 1, 2, 3];
-        assert!(differences(&solution(&own), &same, &photos).iter().all(|own| *own < 1.0e-9));
-        let one = solution(&[own[0], own[1], turn(25.0), own[3]]);
-        let found = differences(&solution(&own), &one, &photos);
+        assert!(differences(&solution(&turns), &same, &photos).iter().all(|difference| *difference < 1.0e-9));
+        let one = solution(&[turns[0], turns[1], turn(25.0), turns[3]]);
+        let found = differences(&solution(&turns), &one, &photos);
         assert!((found[2] - 5.0).abs() < 1.0e-9 && found[0] < 1.0e-9, "{found:?}");
     }
 

@@ -2,7 +2,7 @@
 
 use crate::focal::Cameras;
 use crate::intake::Photo;
-use crate::solution::{Features, Job, JobPhotograph, Solution, Solver, SolverError};
+use crate::solution::{Features, JobPhotograph, PoseJob, Solution, Solver, SolverError};
 use crate::support::Support;
 use serde::Serialize;
 use std::time::Instant;
@@ -59,11 +59,11 @@ struct Plan {
 /// What is tried with a solver.
 fn plans(solver: &dyn Solver, are_known: bool, seed: u64) -> Vec<Plan> {
     let guesses: Vec<Option<f64>> = if are_known { vec![None] } else { GUESSES.map(Some).to_vec() };
-    let of = |guess| {
+    let with_guess = |guess| {
         let plan = move |features: &Features| Plan { features: *features, seed, guess };
         solver.features().iter().map(plan)
     };
-    guesses.into_iter().flat_map(of).collect()
+    guesses.into_iter().flat_map(with_guess).collect()
 }
 
 /// Makes the attempts with every solver. `at_size` are the photographs at the size at which features are looked for;
@@ -88,38 +88,29 @@ pub(crate) fn attempts(
         let part = Part::begin(progress, name, index..index + 1, all.len());
         let start = Instant::now();
         let job = job(at_size, cameras, plan);
-        let mut tried = Tried {
-            solver: solver.name().to_owned(),
+        let (solution, refused) = match solver.solve(&job, &part) {
+            Ok(mut solution) => {
+                resize(&mut solution, cameras, at_size, photos);
+                (Some(solution), None)
+            }
+            Err(SolverError::Nothing(reason)) => (None, Some(reason)),
+            Err(error) => return Err(error),
+        };
+        let found = solution.as_ref();
+        let tried = Tried {
+            solver: found.map_or_else(|| solver.name().to_owned(), |solution| solution.solver.clone()),
             features: plan.features,
             side: job.max_side,
             seed: plan.seed,
             focal_guess: plan.guess,
-            registered: 0,
-            focal: Vec::new(),
-            reprojection_error: 0.0,
-            points: 0,
-            support: None,
-            seconds: 0.0,
-            refused: None,
+            registered: found.map_or(0, |solution| solution.registered().len()),
+            focal: found.map_or(Vec::new(), |solution| focal(solution, cameras, photos)),
+            reprojection_error: found.map_or(0.0, Solution::reprojection_error),
+            points: found.map_or(0, |solution| solution.points.len()),
+            support: found.map(|solution| Support::of(solution, &part)).transpose()?,
+            seconds: start.elapsed().as_secs_f64(),
+            refused,
         };
-        let solution = match solver.solve(&job, &part) {
-            Ok(mut solution) => {
-                resize(&mut solution, cameras, at_size, photos);
-                tried.solver.clone_from(&solution.solver);
-                tried.registered = solution.registered().len();
-                tried.focal = focal(&solution, cameras, photos);
-                tried.reprojection_error = solution.reprojection_error();
-                tried.points = solution.points.len();
-                tried.support = Some(Support::of(&solution, &part)?);
-                Some(solution)
-            }
-            Err(SolverError::Nothing(reason)) => {
-                tried.refused = Some(reason);
-                None
-            }
-            Err(error) => return Err(error),
-        };
-        tried.seconds = start.elapsed().as_secs_f64();
         made.push(Attempt { tried, solution });
     }
     Ok(made)
@@ -145,13 +136,13 @@ fn resize(solution: &mut Solution, cameras: &Cameras, from: &[Photo], to: &[Phot
     }
 }
 
-fn job(photos: &[Photo], cameras: &Cameras, plan: &Plan) -> Job {
+fn job(photos: &[Photo], cameras: &Cameras, plan: &Plan) -> PoseJob {
     let photograph = |(photo, camera): (&Photo, &usize)| JobPhotograph {
         path: photo.working.clone(),
         size: photo.working_size,
         camera: *camera,
     };
-    Job {
+    PoseJob {
         seed: plan.seed,
         features: plan.features,
         max_side: photos.iter().flat_map(|photo| photo.working_size).max().unwrap_or(1),
@@ -162,9 +153,9 @@ fn job(photos: &[Photo], cameras: &Cameras, plan: &Plan) -> Job {
 
 /// The cameras' focal lengths in pixels of their photographs.
 fn focal(solution: &Solution, cameras: &Cameras, photos: &[Photo]) -> Vec<f64> {
-    let of = |(camera, group): (&crate::solution::SolvedCamera, &crate::focal::CameraGroup)| {
+    let length = |(camera, group): (&crate::solution::SolvedCamera, &crate::focal::CameraGroup)| {
         let working = group.photos.first().map_or(group.size, |photo| photos[*photo].working_size);
         camera.focal * f64::from(group.size[0]) / f64::from(working[0])
     };
-    solution.cameras.iter().zip(&cameras.groups).map(of).collect()
+    solution.cameras.iter().zip(&cameras.groups).map(length).collect()
 }

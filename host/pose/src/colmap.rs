@@ -8,7 +8,7 @@
 
 use crate::colmap_folder::{ColmapFolder, FolderCamera};
 use crate::process::{Ended, run};
-use crate::solution::{Features, Job, Solution, Solver, SolverError};
+use crate::solution::{Features, PoseJob, Solution, Solver, SolverError};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -44,7 +44,7 @@ impl Solver for Colmap {
         self.version(Scratch::new().ok()?.path(), progress).ok()
     }
 
-    fn solve(&self, job: &Job, progress: &dyn Progress) -> Result<Solution, SolverError> {
+    fn solve(&self, job: &PoseJob, progress: &dyn Progress) -> Result<Solution, SolverError> {
         let folder = ColmapFolder::of(job).map_err(|error| self.broken(error.to_string()))?;
         let version = self.version(folder.path(), progress)?;
         let at = |name: &str| folder.path().join(name).display().to_string();
@@ -77,7 +77,7 @@ impl Solver for Colmap {
         ];
         match self.step(&folder, "mapper", options, progress) {
             // Without a model it fails with words of its own.
-            Err(SolverError::Broken { problem, .. }) if problem.contains("failed to create") => {
+            Err(SolverError::Broken(_, problem)) if problem.contains("failed to create") => {
                 return Err(SolverError::Nothing(problem));
             }
             ended => ended?,
@@ -86,11 +86,11 @@ impl Solver for Colmap {
     }
 }
 
-fn seed(job: &Job) -> String {
+fn seed(job: &PoseJob) -> String {
     (job.seed & MAX_SEED).to_string()
 }
 
-fn extraction(job: &Job, camera: &FolderCamera, database: &str, images: &str) -> Vec<StepOption> {
+fn extraction(job: &PoseJob, camera: &FolderCamera, database: &str, images: &str) -> Vec<StepOption> {
     let dsp = u8::from(job.features == Features::DspSift).to_string();
     let mut options: Vec<StepOption> = vec![
         (&["database_path"], database.to_owned()),
@@ -114,7 +114,7 @@ fn extraction(job: &Job, camera: &FolderCamera, database: &str, images: &str) ->
 
 impl Colmap {
     fn broken(&self, problem: String) -> SolverError {
-        SolverError::Broken { program: self.program.clone(), problem }
+        SolverError::Broken(self.program.clone(), problem)
     }
 
     /// Runs it with these words.

@@ -7,7 +7,7 @@
 //! sparse/0 ...           models: parts of the scene that were not joined
 //! ```
 
-use crate::solution::{Job, Solution, SolvedCamera, SolvedPhotograph, SolvedPoint, SolverError};
+use crate::solution::{PoseJob, Solution, SolvedCamera, SolvedPhotograph, SolvedPoint, SolverError};
 use serde::Serialize;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -28,7 +28,6 @@ pub(crate) struct FolderCamera {
     pub(crate) factor: f64,
 }
 
-/// The folder.
 pub(crate) struct ColmapFolder {
     scratch: Scratch,
     pub(crate) cameras: Vec<FolderCamera>,
@@ -40,10 +39,7 @@ fn image_name(photograph: usize) -> String {
 
 impl ColmapFolder {
     /// Lays a job out.
-    ///
-    /// # Errors
-    /// What the system says.
-    pub(crate) fn of(job: &Job) -> std::io::Result<ColmapFolder> {
+    pub(crate) fn of(job: &PoseJob) -> std::io::Result<ColmapFolder> {
         let scratch = Scratch::new()?;
         let folder = scratch.path();
         fs::create_dir(folder.join("images"))?;
@@ -76,8 +72,8 @@ impl ColmapFolder {
     /// # Errors
     /// [`SolverError::Nothing`] without a model, [`SolverError::Broken`] if none can be read or it does not fit the
     /// job.
-    pub(crate) fn solution(&self, job: &Job, solver: String, program: &Path) -> Result<Solution, SolverError> {
-        let broken = |problem: String| SolverError::Broken { program: program.to_path_buf(), problem };
+    pub(crate) fn solution(&self, job: &PoseJob, solver: String, program: &Path) -> Result<Solution, SolverError> {
+        let broken = |problem: String| SolverError::Broken(program.to_path_buf(), problem);
         let reader = READERS.iter().find(|reader| reader.name() == "colmap");
         let Some(reader) = reader else { return Err(broken("there is no reader of its models".to_owned())) };
         let entries = fs::read_dir(self.path().join("sparse")).map_err(|error| broken(error.to_string()))?;
@@ -102,16 +98,15 @@ fn read(reader: &dyn Reader, folder: &Path) -> Result<RawScene, String> {
 }
 
 /// `None` if an image is none of the job's, or a camera has no intrinsics.
-fn solution_of(job: &Job, model: &RawScene, solver: String) -> Option<Solution> {
+fn solution_of(job: &PoseJob, model: &RawScene, solver: String) -> Option<Solution> {
     let unregistered = SolvedPhotograph { camera_from_world: None, reason: Some("not registered".to_owned()) };
     let mut photographs = vec![unregistered; job.photographs.len()];
     let mut cameras: Vec<SolvedCamera> = (0..job.cameras.len()).map(|camera| unsolved(job, camera)).collect();
     let mut photograph_of = Vec::with_capacity(model.views.len());
     for view in &model.views {
-        let photograph: usize = view.name.parse().ok().filter(|own| *own < job.photographs.len())?;
-        let matrix = Some(view.pose.matrix).filter(|_| view.pose.form == PoseForm::OpenCvFromWorld)?;
-        let row = |row: usize| std::array::from_fn(|column| matrix[4 * row + column]);
-        photographs[photograph] = SolvedPhotograph { camera_from_world: Some([row(0), row(1), row(2)]), reason: None };
+        let photograph: usize = view.name.parse().ok().filter(|index| *index < job.photographs.len())?;
+        let [x, y, z, _] = Some(view.pose.matrix).filter(|_| view.pose.form == PoseForm::OpenCvFromWorld)?;
+        photographs[photograph] = SolvedPhotograph { camera_from_world: Some([x, y, z]), reason: None };
         cameras[job.photographs[photograph].camera] = solved(view)?;
         photograph_of.push(photograph);
     }
@@ -128,8 +123,12 @@ fn solution_of(job: &Job, model: &RawScene, solver: String) -> Option<Solution> 
 }
 
 /// A camera none of whose photographs has a pose: as it was before.
-fn unsolved(job: &Job, camera: usize) -> SolvedCamera {
-    let size = job.photographs.iter().find(|own| own.camera == camera).map_or([1, 1], |own| own.size);
+fn unsolved(job: &PoseJob, camera: usize) -> SolvedCamera {
+    let size = job
+        .photographs
+        .iter()
+        .find(|photograph| photograph.camera == camera)
+        .map_or([1, 1], |photograph| photograph.size);
     SolvedCamera { focal: job.cameras[camera].focal, principal: size.map(|side| 0.5 * f64::from(side)), k1: 0.0 }
 }
 
@@ -143,6 +142,6 @@ fn solved(view: &RawView) -> Option<SolvedCamera> {
 fn project(camera: &SolvedCamera, pose: [[f64; 4]; 3], point: [f64; 3]) -> Option<[f64; 2]> {
     let [x, y, z] = pose.map(|row| row[0] * point[0] + row[1] * point[1] + row[2] * point[2] + row[3]);
     let radial = 1.0 + camera.k1 * (x * x + y * y) / (z * z);
-    let place = |axis: usize, own: f64| camera.principal[axis] + camera.focal * radial * own / z;
+    let place = |axis: usize, across: f64| camera.principal[axis] + camera.focal * radial * across / z;
     (z > 0.0).then(|| [place(0, x), place(1, y)])
 }

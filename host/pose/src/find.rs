@@ -5,12 +5,11 @@ use crate::focal::Cameras;
 use crate::intake::{Intake, IntakeError};
 use crate::matches::Matches;
 use crate::solution::{Solver, SolverError};
-use crate::verdict::{Refusal, Verdict, VerdictError, verdict};
+use crate::verdict::{Refusal, Verdict, verdict};
 use std::path::Path;
 use viewfuse_field::render::RenderError;
 use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_job::progress::{Part, Progress};
-use viewfuse_scene::SceneError;
 
 /// What a person may choose.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,20 +52,11 @@ pub enum PoseError {
     /// A solver.
     #[error(transparent)]
     Solver(#[from] SolverError),
-    /// Too few photographs.
-    #[error("{folder}: {count} photographs can be used, three are needed{unusable}")]
-    Few {
-        /// The folder.
-        folder: String,
-        /// How many can be used.
-        count: usize,
-        /// Those that cannot, with reasons.
-        unusable: String,
-    },
-    /// A photograph changed while the work went on, or a pose is none.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// A photograph that was left out could not be rendered.
+    /// So many photographs of a folder can be used, too few; and those that cannot, with reasons.
+    #[error("{0}: {1} photographs can be used, three are needed{2}")]
+    Few(String, usize, String),
+    /// A photograph changed while the work went on, a pose is none, or a photograph that was held out could not be
+    /// rendered.
     #[error(transparent)]
     Render(#[from] RenderError),
 }
@@ -77,15 +67,6 @@ impl Hinted for PoseError {
             PoseError::Intake(error) => error.hint(),
             PoseError::Solver(error) => error.hint(),
             _ => None,
-        }
-    }
-}
-
-impl From<VerdictError> for PoseError {
-    fn from(error: VerdictError) -> PoseError {
-        match error {
-            VerdictError::Scene(error) => PoseError::Scene(error),
-            VerdictError::Render(error) => PoseError::Render(error),
         }
     }
 }
@@ -103,9 +84,8 @@ pub fn find(
     let part = Part::begin(progress, "reading the photographs", 0..1, 10);
     let intake = Intake::read(folder, options.every, &part)?;
     if intake.photos.len() < 3 {
-        let unusable = intake.unusable.iter().map(|own| format!("; {}: {}", own.name, own.reason)).collect();
-        let (folder, count) = (folder.display().to_string(), intake.photos.len());
-        return Err(PoseError::Few { folder, count, unusable });
+        let unusable = intake.unusable.iter().map(|photo| format!("; {}: {}", photo.name, photo.reason)).collect();
+        return Err(PoseError::Few(folder.display().to_string(), intake.photos.len(), unusable));
     }
     let cameras = Cameras::of(&intake.photos, options.focal);
     let photos = &intake.photos;

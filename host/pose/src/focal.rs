@@ -52,13 +52,13 @@ impl Cameras {
                     (Some(focal), FocalSource::Given, String::new())
                 }
                 (None, Some(focal)) => {
-                    let own = format!("{:?} {:?}", photo.exif.camera, photo.exif.millimetres);
-                    (Some(focal), FocalSource::Exif, own)
+                    let camera = format!("{:?} {:?}", photo.exif.camera, photo.exif.millimetres);
+                    (Some(focal), FocalSource::Exif, camera)
                 }
                 (None, None) => (None, FocalSource::Unknown, "unknown".to_owned()),
             };
             let key = format!("{:?} {key}", photo.size);
-            let place = groups.iter().position(|(own, _)| *own == key).unwrap_or(groups.len());
+            let place = groups.iter().position(|(known, _)| *known == key).unwrap_or(groups.len());
             if place == groups.len() {
                 groups.push((key, CameraGroup { focal, source, size: photo.size, photos: Vec::new() }));
             }
@@ -75,12 +75,12 @@ impl Cameras {
 
     /// The cameras of a job whose photographs are at working size; unknown focal lengths are `guess` longest sides.
     pub(crate) fn guesses(&self, photos: &[Photo], guess: f64) -> Vec<CameraGuess> {
-        let of = |group: &CameraGroup| {
-            let own = group.photos.first().map_or([1, 1], |photo| photos[*photo].working_size);
-            let scale = f64::from(own[0]) / f64::from(group.size[0]);
+        let guessed = |group: &CameraGroup| {
+            let working = group.photos.first().map_or([1, 1], |photo| photos[*photo].working_size);
+            let scale = f64::from(working[0]) / f64::from(group.size[0]);
             let longest = f64::from(group.size[0].max(group.size[1]));
             CameraGuess { focal: scale * group.focal.unwrap_or(guess * longest), is_guess: group.focal.is_none() }
         };
-        self.groups.iter().map(of).collect()
+        self.groups.iter().map(guessed).collect()
     }
 }

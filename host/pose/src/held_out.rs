@@ -61,57 +61,31 @@ impl HeldOutScores {
 }
 
 /// Holds out every view of a scene with at least three, which all have photographs.
-///
-/// # Errors
-/// [`RenderError`].
 pub(crate) fn hold_out_all(scene: &Scene, progress: &dyn Progress) -> Result<Vec<HeldOutScores>, RenderError> {
     let quiet = Quiet(progress);
-    let album = open_album(scene, &quiet)?;
-    let photographs = Photographs::of(scene, &album, &quiet)?;
-    photographs.each(progress, |view, rendered| photographs.scores(view, rendered))
-}
-
-/// The photographs of a scene at the size at which they are compared.
-///
-/// # Errors
-/// [`RenderError`].
-fn open_album<'a>(scene: &'a Scene, progress: &dyn Progress) -> Result<Album<'a>, RenderError> {
-    Ok(Album::open_at(scene, 0..scene.views.len(), HOLD_OUT.side, progress)?)
+    let views: Vec<usize> = (0..scene.views.len()).collect();
+    let album = Album::open_at(scene, views.iter().copied(), HOLD_OUT.side, &quiet)?;
+    let all = album.sources(&views, HOLD_OUT.side, BackgroundChoice::None, &quiet)?;
+    let photographs = HeldOutPhotographs { scene, album: &album, all };
+    photographs.each(progress)
 }
 
 /// Photographs with their cameras, each of which is rendered from the others.
-struct Photographs<'a> {
-    scene: Scene,
+struct HeldOutPhotographs<'a> {
+    scene: &'a Scene,
     album: &'a Album<'a>,
     all: SourceImages,
 }
 
-impl<'a> Photographs<'a> {
-    /// Of a scene whose views all have photographs, in an album of it.
-    ///
-    /// # Errors
-    /// [`RenderError`].
-    fn of(scene: &Scene, album: &'a Album<'a>, progress: &dyn Progress) -> Result<Photographs<'a>, RenderError> {
-        let views: Vec<usize> = (0..scene.views.len()).collect();
-        let all = album.sources(&views, HOLD_OUT.side, BackgroundChoice::None, progress)?;
-        Ok(Photographs { scene: scene.clone(), album, all })
-    }
-
-    /// Does something with each view, rendered from the others, on all cores.
-    ///
-    /// # Errors
-    /// [`RenderError`].
-    fn each<T: Send>(
-        &self,
-        progress: &dyn Progress,
-        work: impl Fn(usize, &mut Rendered<'_>) -> Result<T, RenderError> + Sync,
-    ) -> Result<Vec<T>, RenderError> {
+impl HeldOutPhotographs<'_> {
+    /// The scores of each view, rendered from the others, on all cores.
+    fn each(&self, progress: &dyn Progress) -> Result<Vec<HeldOutScores>, RenderError> {
         let (field, options) =
             (field(), RenderOptions { background: BackgroundChoice::None, ..RenderOptions::default() });
         let renderer = On { device: &Cpu, field: &field };
         let surfaces = Surfaces { points: self.all.points.clone(), near_far: self.all.near_far };
         let views: Vec<usize> = (0..self.scene.views.len()).collect();
-        let scene = (&self.scene, self.album);
+        let scene = (self.scene, self.album);
         let photographs = held_out::Photographs::new(scene, views, &self.all, surfaces, HOLD_OUT, &field.about())?;
         let poses: Vec<Pose> = self.scene.views.iter().map(|view| view.camera.pose).collect();
         let weighting = Weighting::default_scheme();
@@ -125,17 +99,17 @@ impl<'a> Photographs<'a> {
             let (width, height) = held_out.truth.picture.dimensions();
             let size = scaled_size(&camera, HOLD_OUT.side.min(width.max(height))).into();
             let truth = Truth::of(&held_out.truth);
-            let done =
-                work(view, &mut Rendered { held_out, weighting: &weighting, camera, size, truth, progress: quiet })?;
+            let rendered = Rendered { held_out, weighting: &weighting, camera, size, truth, progress: quiet };
+            let scores = self.scores(view, rendered)?;
             progress.step();
-            Ok(done)
+            Ok(scores)
         };
         let views = HOLD_OUT.views(&poses);
         progress.expect(views.len());
         views.par_iter().map(one).collect::<Vec<_>>().into_iter().collect()
     }
 
-    fn scores(&self, view: usize, rendered: &mut Rendered<'_>) -> Result<HeldOutScores, RenderError> {
+    fn scores(&self, view: usize, mut rendered: Rendered<'_>) -> Result<HeldOutScores, RenderError> {
         let pose = rendered.camera.pose;
         let score = rendered.score(pose)?;
         let mut disturbed = f64::NEG_INFINITY;

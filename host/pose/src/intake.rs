@@ -16,6 +16,7 @@ use std::path::{Path, PathBuf};
 use viewfuse_job::files::Scratch;
 use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_job::progress::{Interrupted, Progress};
+use viewfuse_job::text::listed;
 use viewfuse_scene::reader::{ImageFile, folders, list};
 use viewfuse_scene::write::{Layout, check_name};
 use viewfuse_scene::{SceneError, encode_png, read_picture};
@@ -96,55 +97,23 @@ pub enum IntakeError {
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// There are no photographs.
-    #[error("{}: no photographs here (JPEG, PNG, WebP)", folder.display())]
-    None {
-        /// The folder.
-        folder: PathBuf,
-    },
-    /// A format that is not read.
-    #[error("{}: {format} is not read; convert it to JPEG first, for example `{way}`", path.display())]
-    Format {
-        /// The photograph.
-        path: PathBuf,
-        /// The format's name.
-        format: &'static str,
-        /// A command that converts it.
-        way: String,
-    },
-    /// More than are matched.
-    #[error("{}: {count} photographs, more than {MAX_PHOTOGRAPHS}: every pair is matched, so take one in {step}", folder.display())]
-    Many {
-        /// The folder.
-        folder: PathBuf,
-        /// How many.
-        count: usize,
-        /// A step that leaves few enough.
-        step: usize,
-    },
-    /// A name that the layouts of scenes do not hold.
-    #[error("{}: {reason}; rename it", path.display())]
-    Name {
-        /// The photograph.
-        path: PathBuf,
-        /// What they do not hold of it.
-        reason: String,
-    },
-    /// Two files of one name.
-    #[error("{}: two photographs have the name {name}; rename one", folder.display())]
-    Names {
-        /// The folder.
-        folder: PathBuf,
-        /// The name.
-        name: String,
-    },
-    /// The operating system reported an error.
-    #[error("{}: {cause}", path.display())]
-    Io {
-        /// The file or folder.
-        path: PathBuf,
-        /// What the system said.
-        cause: std::io::Error,
-    },
+    #[error("{}: no photographs here (JPEG, PNG, WebP)", .0.display())]
+    None(PathBuf),
+    /// A photograph's format that is not read, and a command that converts it.
+    #[error("{0}: {1} is not read; convert it to JPEG first, for example `{2}`")]
+    Format(PathBuf, &'static str, String),
+    /// In a folder, so many are more than are matched; and a step that leaves few enough.
+    #[error("{0}: {1} photographs, more than {MAX_PHOTOGRAPHS}: every pair is matched, so take one in {2}")]
+    Many(PathBuf, usize, usize),
+    /// A photograph whose name the layouts of scenes do not hold, and why.
+    #[error("{0}: {1}; rename it")]
+    Name(PathBuf, String),
+    /// In a folder, two files of one name.
+    #[error("{0}: two photographs have the name {1}; rename one")]
+    Names(PathBuf, String),
+    /// The operating system reported an error for a file or folder.
+    #[error("{0}: {1}")]
+    Io(PathBuf, std::io::Error),
     /// The person stopped the work.
     #[error("interrupted")]
     Interrupted(#[from] Interrupted),
@@ -176,7 +145,7 @@ impl Intake {
     /// [`IntakeError`].
     pub fn read(folder: &Path, every: usize, progress: &dyn Progress) -> Result<Intake, IntakeError> {
         let Listed { root, files, passed_over } = files(folder, every)?;
-        let scratch = Scratch::new().map_err(|cause| IntakeError::Io { path: folder.to_path_buf(), cause })?;
+        let scratch = Scratch::new().map_err(|cause| IntakeError::Io(folder.to_path_buf(), cause))?;
         progress.expect(files.len());
         let mut read = Vec::with_capacity(files.len());
         for some in files.chunks(AT_ONCE) {
@@ -206,25 +175,18 @@ impl Intake {
     }
 
     /// The photographs at a finer working size, decoded again; `None` if none of them is larger then.
-    ///
-    /// # Errors
-    /// [`IntakeError`].
     pub(crate) fn finer(&self, progress: &dyn Progress) -> Result<Option<Vec<Photo>>, IntakeError> {
         let size = |photo: &Photo| scaled(photo.size, FINE_SIDE, MAX_ENLARGEMENT);
         if self.photos.iter().all(|photo| size(photo) == photo.working_size) {
             return Ok(None);
         }
         let folder = self.scratch.path().join("finer");
-        let failed = |path: &Path| {
-            let path = path.to_path_buf();
-            move |cause| IntakeError::Io { path, cause }
-        };
-        fs::create_dir_all(&folder).map_err(failed(&folder))?;
+        fs::create_dir_all(&folder).map_err(|cause| IntakeError::Io(folder.clone(), cause))?;
         let one = |photo: &Photo| {
             progress.check()?;
             let grey = resized(&read_picture(&photo.path)?.to_luma8(), size(photo));
             let working = folder.join(format!("{}.png", photo.name));
-            put(&working, &DynamicImage::ImageLuma8(grey)).map_err(failed(&working))?;
+            put(&working, &DynamicImage::ImageLuma8(grey))?;
             Ok(Photo { working, working_size: size(photo), ..photo.clone() })
         };
         self.photos.iter().map(one).collect::<Result<_, IntakeError>>().map(Some)
@@ -232,17 +194,17 @@ impl Intake {
 }
 
 /// Names and lengths of the photographs of a folder, of every one, as [`Intake::files`].
-pub(crate) fn listed(folder: &Path) -> Result<Vec<(String, u64)>, IntakeError> {
+pub(crate) fn files_in(folder: &Path) -> Result<Vec<(String, u64)>, IntakeError> {
     let Listed { root, files, .. } = files(folder, 1)?;
     lengths(&root, &files)
 }
 
 fn lengths(root: &Path, files: &[PathBuf]) -> Result<Vec<(String, u64)>, IntakeError> {
-    let of = |path: &PathBuf| match fs::metadata(path) {
+    let length = |path: &PathBuf| match fs::metadata(path) {
         Ok(about) => Ok((place_in(root, path), about.len())),
-        Err(cause) => Err(IntakeError::Io { path: path.clone(), cause }),
+        Err(cause) => Err(IntakeError::Io(path.clone(), cause)),
     };
-    files.iter().map(of).collect()
+    files.iter().map(length).collect()
 }
 
 /// Takes the blurred ones out.
@@ -251,11 +213,11 @@ fn blurred(photos: &mut Vec<Photo>) -> Vec<Unusable> {
     all.sort_by(f64::total_cmp);
     let Some(&median) = all.get(all.len() / 2).filter(|_| all.len() > 2) else { return Vec::new() };
     let is_sharp = |photo: &Photo| photo.sharpness >= MIN_SHARPNESS * median;
-    let of = |photo: &Photo| Unusable {
+    let refused = |photo: &Photo| Unusable {
         name: photo.file.clone(),
         reason: format!("blurred: {:.0} times less detail than the others", median / photo.sharpness.max(1.0e-9)),
     };
-    let found = photos.iter().filter(|photo| !is_sharp(photo)).map(of).collect();
+    let found = photos.iter().filter(|photo| !is_sharp(photo)).map(refused).collect();
     photos.retain(is_sharp);
     found
 }
@@ -275,19 +237,19 @@ fn files(folder: &Path, every: usize) -> Result<Listed, IntakeError> {
     let inner = folder.join("images");
     let inner = inner.as_path();
     let (mut root, mut all) = (folder, Vec::new());
-    for (own, is_deep) in [(folder, false), (inner, false), (inner, true), (folder, true)] {
-        if all.is_empty() && (own == folder || own.is_dir()) {
-            (root, all) = (own, if is_deep { below(own, MAX_DEPTH)? } else { list(own, is_photograph)? });
+    for (place, is_deep) in [(folder, false), (inner, false), (inner, true), (folder, true)] {
+        if all.is_empty() && (place == folder || place.is_dir()) {
+            (root, all) = (place, if is_deep { below(place, MAX_DEPTH)? } else { list(place, is_photograph)? });
         }
     }
     if all.is_empty() {
-        return Err(IntakeError::None { folder: folder.to_path_buf() });
+        return Err(IntakeError::None(folder.to_path_buf()));
     }
     let root = root.to_path_buf();
     for path in &all {
         if let Some((format, way)) = unread(&extension(path)) {
             let way = way.replace("FILE", &place_in(&root, path));
-            return Err(IntakeError::Format { path: path.clone(), format, way });
+            return Err(IntakeError::Format(path.clone(), format, way));
         }
     }
     let is_flat = all.iter().any(|path| path.parent() == Some(&root));
@@ -296,17 +258,17 @@ fn files(folder: &Path, every: usize) -> Result<Listed, IntakeError> {
     let files: Vec<PathBuf> = all.into_iter().step_by(every.max(1)).collect();
     if files.len() > MAX_PHOTOGRAPHS {
         let (count, step) = (files.len(), every.max(1) * files.len().div_ceil(MAX_PHOTOGRAPHS));
-        return Err(IntakeError::Many { folder: folder.to_path_buf(), count, step });
+        return Err(IntakeError::Many(folder.to_path_buf(), count, step));
     }
     let mut names = HashSet::new();
     for path in &files {
         let name = name_in(&root, path);
         // Those of every layout that a scene is written in.
         for layout in [Layout::Colmap, Layout::Transforms] {
-            check_name(layout, &name).map_err(|reason| IntakeError::Name { path: path.clone(), reason })?;
+            check_name(layout, &name).map_err(|reason| IntakeError::Name(path.clone(), reason))?;
         }
         if !names.insert(name.clone()) {
-            return Err(IntakeError::Names { folder: folder.to_path_buf(), name });
+            return Err(IntakeError::Names(folder.to_path_buf(), name));
         }
     }
     Ok(Listed { root, files, passed_over })
@@ -326,21 +288,20 @@ fn below(folder: &Path, depth: usize) -> Result<Vec<PathBuf>, SceneError> {
 
 /// Whether a folder is, by its name, one of masks.
 fn is_of_masks(folder: &Path) -> bool {
-    ["mask", "masks"].iter().any(|name| folder.file_name().is_some_and(|own| own.eq_ignore_ascii_case(name)))
+    ["mask", "masks"].iter().any(|name| folder.file_name().is_some_and(|found| found.eq_ignore_ascii_case(name)))
 }
 
 /// What lies beside the photographs and is not taken, by its name: a line a reason.
 fn passed_over(root: &Path, deeper: &[PathBuf]) -> Result<Vec<Unusable>, IntakeError> {
     let other = list(root, |path| !is_photograph(path))?;
-    let failed = |cause| IntakeError::Io { path: root.to_path_buf(), cause };
+    let failed = |cause| IntakeError::Io(root.to_path_buf(), cause);
     let entries = fs::read_dir(root).and_then(Iterator::collect::<Result<Vec<_>, _>>).map_err(failed)?;
     let mut hidden: Vec<PathBuf> = entries.iter().map(fs::DirEntry::path).collect();
     hidden.retain(|path| file_name(path).starts_with('.') && is_photograph(path) && path.is_file());
     hidden.sort();
     let line = |files: &[PathBuf], reason: &str| {
-        let (first, more) = files.split_first()?;
-        let more = if more.is_empty() { String::new() } else { format!(" and {} more", more.len()) };
-        Some(Unusable { name: place_in(root, first) + &more, reason: reason.to_owned() })
+        let names: Vec<String> = files.iter().map(|file| place_in(root, file)).collect();
+        (!names.is_empty()).then(|| Unusable { name: listed(&names, 1), reason: reason.to_owned() })
     };
     let lines = [
         line(&hidden, "hidden, by a name that begins with a dot"),
@@ -353,14 +314,14 @@ fn passed_over(root: &Path, deeper: &[PathBuf]) -> Result<Vec<Unusable>, IntakeE
 /// The name of a photograph: its place in the folder without the extension, its folders before it as in `card1_001`.
 fn name_in(root: &Path, path: &Path) -> String {
     let folders = path.strip_prefix(root).ok().and_then(Path::parent).into_iter().flat_map(Path::components);
-    let folders: String = folders.map(|own| own.as_os_str().to_string_lossy().into_owned() + "_").collect();
+    let folders: String = folders.map(|part| part.as_os_str().to_string_lossy().into_owned() + "_").collect();
     folders + &path.file_stem().unwrap_or_default().to_string_lossy()
 }
 
 /// Where a file lies in a folder, with `/`.
 fn place_in(root: &Path, path: &Path) -> String {
     let inside = path.strip_prefix(root).unwrap_or(path).components();
-    inside.map(|own| own.as_os_str().to_string_lossy()).collect::<Vec<_>>().join("/")
+    inside.map(|part| part.as_os_str().to_string_lossy()).collect::<Vec<_>>().join("/")
 }
 
 fn file_name(path: &Path) -> String {
@@ -373,15 +334,17 @@ enum Refused {
     Work(IntakeError),
 }
 
+impl From<IntakeError> for Refused {
+    fn from(error: IntakeError) -> Refused {
+        Refused::Work(error)
+    }
+}
+
 /// Reads one, and writes its copies.
 fn photo(path: &Path, root: &Path, scratch: &Path) -> Result<Photo, Refused> {
-    let unreadable = |error: SceneError| Refused::Photograph(in_words(path, &error));
-    let failed = |path: &Path| {
-        let path = path.to_path_buf();
-        move |cause| Refused::Work(IntakeError::Io { path, cause })
-    };
+    let unreadable = |error: SceneError| Refused::Photograph(error.fault.to_string());
     let header = ImageFile::open(path).map_err(unreadable)?;
-    if cut_short(path).map_err(failed(path))? {
+    if cut_short(path).map_err(|cause| IntakeError::Io(path.to_path_buf(), cause))? {
         return Err(Refused::Photograph("the file ends before the picture does".to_owned()));
     }
     let exif = Exif::read(path, header.size());
@@ -390,7 +353,7 @@ fn photo(path: &Path, root: &Path, scratch: &Path) -> Result<Photo, Refused> {
     let mut upright = path.to_path_buf();
     if header.orientation() != Orientation::NoTransforms {
         upright = scratch.join(format!("{name}.png"));
-        put(&upright, &picture).map_err(failed(&upright))?;
+        put(&upright, &picture)?;
     }
     let size = [picture.width(), picture.height()];
     let grey = picture.to_luma8();
@@ -401,20 +364,15 @@ fn photo(path: &Path, root: &Path, scratch: &Path) -> Result<Photo, Refused> {
     let [width, height] = scaled(size, COPY_SIDE, 1.0);
     let copy = imageops::thumbnail(&picture.into_rgb8(), width, height);
     let folder = scratch.join("grey");
-    fs::create_dir_all(&folder).map_err(failed(&folder))?;
+    fs::create_dir_all(&folder).map_err(|cause| IntakeError::Io(folder.clone(), cause))?;
     let working = folder.join(format!("{name}.png"));
-    put(&working, &DynamicImage::ImageLuma8(resized)).map_err(failed(&working))?;
+    put(&working, &DynamicImage::ImageLuma8(resized))?;
     Ok(Photo { name, path: path.to_path_buf(), file, upright, size, exif, working, working_size, copy, sharpness })
 }
 
-fn put(path: &Path, picture: &DynamicImage) -> std::io::Result<()> {
-    fs::write(path, encode_png(picture).map_err(std::io::Error::other)?)
-}
-
-/// The error without the path, which stands before it.
-fn in_words(path: &Path, error: &SceneError) -> String {
-    let (text, path) = (error.to_string(), path.display().to_string());
-    text.strip_prefix(&path).map_or(text.as_str(), |rest| rest.trim_start_matches([':', ' '])).to_owned()
+fn put(path: &Path, picture: &DynamicImage) -> Result<(), IntakeError> {
+    let written = encode_png(picture).map_err(std::io::Error::other).and_then(|bytes| fs::write(path, bytes));
+    written.map_err(|cause| IntakeError::Io(path.to_path_buf(), cause))
 }
 
 #[cfg(test)]
@@ -458,13 +416,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_out_by_its_name_is_said() {
+    fn what_is_passed_over_by_its_name_is_said() {
         let scratch = tempfile::tempdir().expect("a folder");
         put_all(scratch.path(), &["1.png", "2.png", "._1.png", "._2.png", "edited/1.png"]);
         fs::write(scratch.path().join("clip.mp4"), "a video").expect("a file");
         assert_eq!(names(scratch.path()), expected(&[("1", "1.png"), ("2", "2.png")]));
         let passed = Intake::read(scratch.path(), 1, &Silent).expect("photographs").passed_over;
-        let told: Vec<String> = passed.into_iter().map(|own| format!("{}: {}", own.name, own.reason)).collect();
+        let told: Vec<String> = passed.into_iter().map(|file| format!("{}: {}", file.name, file.reason)).collect();
         let parts = ["._1.png and 1 more: hidden", "clip.mp4: no photograph by its name", "edited/1.png: in a folder"];
         assert_eq!(told.len(), 3, "{told:?}");
         assert!(told.iter().zip(parts).all(|(line, part)| line.starts_with(part)), "{told:?}");

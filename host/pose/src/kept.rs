@@ -4,7 +4,7 @@
 //! An answer is kept under a digest of all that it depends on: the photographs' pixels, the cameras, the features, the
 //! seed, the program that is asked, and this crate's version.
 
-use crate::solution::{Features, Job, MAX_ANSWER, Solution, Solver, SolverError};
+use crate::solution::{Features, MAX_ANSWER, PoseJob, Solution, Solver, SolverError};
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::io::{self, ErrorKind};
@@ -36,7 +36,7 @@ enum Answer {
 
 impl Answer {
     /// Whether it may be one to this job: somebody may have changed the file.
-    fn fits(&self, job: &Job) -> bool {
+    fn fits(&self, job: &PoseJob) -> bool {
         match self {
             Answer::Solution(solution) => solution.fits(job),
             Answer::Nothing(_) => true,
@@ -99,14 +99,14 @@ impl<'a> Kept<'a> {
     }
 
     /// The file of a job's answer; `None` if a photograph cannot be read or the solver does not say what it is.
-    fn file(&self, job: &Job, progress: &dyn Progress) -> Option<PathBuf> {
+    fn file(&self, job: &PoseJob, progress: &dyn Progress) -> Option<PathBuf> {
         let identity = self.identity.get_or_init(|| self.solver.identity(progress)).as_ref()?;
         let mut job = job.clone();
         for photograph in &mut job.photographs {
             photograph.path = sha256_of(&photograph.path).ok()?.into();
         }
-        let own = (env!("CARGO_PKG_VERSION"), self.solver.name(), identity, job);
-        let digest = sha256(&serde_json::to_vec(&own).ok()?);
+        let question = (env!("CARGO_PKG_VERSION"), self.solver.name(), identity, job);
+        let digest = sha256(&serde_json::to_vec(&question).ok()?);
         Some(self.folder.join(digest + SUFFIX))
     }
 
@@ -118,7 +118,7 @@ impl<'a> Kept<'a> {
     }
 
     /// The answer that is kept in a file, if it may be one to this job.
-    fn earlier(&self, file: &Path, job: &Job, progress: &dyn Progress) -> Option<Answer> {
+    fn earlier(&self, file: &Path, job: &PoseJob, progress: &dyn Progress) -> Option<Answer> {
         if Kept::check(self.folder).is_err() || fs::symlink_metadata(file).is_err() {
             return None;
         }
@@ -160,7 +160,7 @@ impl Solver for Kept<'_> {
         self.solver.identity(progress)
     }
 
-    fn solve(&self, job: &Job, progress: &dyn Progress) -> Result<Solution, SolverError> {
+    fn solve(&self, job: &PoseJob, progress: &dyn Progress) -> Result<Solution, SolverError> {
         self.was_asked.store(true, Ordering::Relaxed);
         let Some(file) = self.file(job, progress) else { return self.solver.solve(job, progress) };
         if let Some(answer) = self.earlier(&file, job, progress) {
@@ -211,11 +211,11 @@ mod tests {
             Some("1".to_owned())
         }
 
-        fn solve(&self, job: &Job, _: &dyn Progress) -> Result<Solution, SolverError> {
+        fn solve(&self, job: &PoseJob, _: &dyn Progress) -> Result<Solution, SolverError> {
             let count = self.0.fetch_add(1, Ordering::Relaxed) + 1;
             match job.seed {
                 7 => Err(SolverError::Nothing("nothing".to_owned())),
-                8 => Err(SolverError::Broken { program: PathBuf::new(), problem: "broken".to_owned() }),
+                8 => Err(SolverError::Broken(PathBuf::new(), "broken".to_owned())),
                 _ => Ok(Solution {
                     cameras: vec![SolvedCamera { focal: count as f64, principal: [0.1; 2], k1: 0.0 }],
                     photographs: vec![SolvedPhotograph { camera_from_world: None, reason: None }],
@@ -225,8 +225,8 @@ mod tests {
         }
     }
 
-    fn job(path: &Path, seed: u64) -> Job {
-        Job {
+    fn job(path: &Path, seed: u64) -> PoseJob {
+        PoseJob {
             seed,
             features: Features::Sift,
             max_side: 100,
@@ -247,7 +247,7 @@ mod tests {
             let kept = Kept::new(&solver, &folder);
             kept.solve(&job(path, seed), &Silent)
                 .map(|solution| solution.cameras[0].focal)
-                .map_err(|own| own.to_string())
+                .map_err(|error| error.to_string())
         };
         assert_eq!((focal(&photograph, 0), focal(&photograph, 0)), (Ok(1.0), Ok(1.0)));
         assert_eq!(focal(&moved, 0), Ok(1.0), "the pixels count, not the place");
@@ -259,7 +259,7 @@ mod tests {
         assert!(focal(&moved, 8).is_err() && focal(&moved, 8).is_err());
         assert_eq!(solver.0.load(Ordering::Relaxed), 6, "what broke is tried again");
         // An answer to another question, whole, under this one's name.
-        let answers = || fs::read_dir(&folder).expect("the folder").map(|own| own.expect("an entry").path());
+        let answers = || fs::read_dir(&folder).expect("the folder").map(|entry| entry.expect("an entry").path());
         let file = answers().find(|path| fs::read_to_string(path).expect("text").contains("\"focal\":1.0"));
         let other = answers().find(|path| fs::read_to_string(path).expect("text").contains("\"focal\":2.0"));
         let (file, other) = (file.expect("the first answer"), other.expect("the second one"));
@@ -311,7 +311,9 @@ mod tests {
         assert!(Kept::new(&solver, &target).solve(&job(&photograph, 0), &Silent).is_ok());
         std::os::unix::fs::symlink(&target, &folder).expect("a link");
         assert!(Kept::check(&folder).is_err() && Kept::check(&target).is_ok());
-        let focal = || Kept::new(&solver, &folder).solve(&job(&photograph, 0), &Silent).map(|own| own.cameras[0].focal);
+        let focal = || {
+            Kept::new(&solver, &folder).solve(&job(&photograph, 0), &Silent).map(|solution| solution.cameras[0].focal)
+        };
         assert_eq!((focal().ok(), focal().ok()), (Some(2.0), Some(3.0)), "asked each time");
         Kept::remove(&folder).expect("left alone");
         assert_eq!((fs::read_dir(&target).expect("a folder").count(), folder.is_symlink()), (1, true));
@@ -323,7 +325,9 @@ mod tests {
         let photograph = scratch.path().join("a.png");
         fs::write(&photograph, "pixels").expect("a file");
         let (solver, folder) = (Counting::default(), scratch.path().join("not/there/.posed.attempts"));
-        let focal = || Kept::new(&solver, &folder).solve(&job(&photograph, 0), &Silent).map(|own| own.cameras[0].focal);
+        let focal = || {
+            Kept::new(&solver, &folder).solve(&job(&photograph, 0), &Silent).map(|solution| solution.cameras[0].focal)
+        };
         assert_eq!((focal().ok(), focal().ok()), (Some(1.0), Some(2.0)));
         assert!(!scratch.path().join("not").exists());
         assert_eq!(Kept::folder_beside(Path::new("..")), None);

@@ -11,7 +11,7 @@
 //! ```text
 //! exif           what a photograph states of its camera: Exif
 //! intake         the photographs of a folder, and those that cannot be used: Intake
-//! solution       a job for a solver and its answer: Job, Solution, Solver
+//! solution       a job for a solver and its answer: PoseJob, Solution, Solver
 //! focal          cameras before the work, with where their focal lengths come from: Cameras
 //! process        programs that end with their owner
 //! openmvg        OpenMVG's crates, as a process: OpenMvg
@@ -70,7 +70,7 @@ pub use matches::Matches;
 pub use openmvg::OpenMvg;
 pub use pycolmap::PyColmap;
 pub use solution::{
-    CameraGuess, Features, Job, JobPhotograph, Solution, SolvedCamera, SolvedPair, SolvedPhotograph, SolvedPoint,
+    CameraGuess, Features, JobPhotograph, PoseJob, Solution, SolvedCamera, SolvedPair, SolvedPhotograph, SolvedPoint,
     Solver, SolverError,
 };
 pub use support::Support;

@@ -2,6 +2,7 @@
 
 use crate::attempt::Attempt;
 use crate::intake::Photo;
+use viewfuse_job::text::listed;
 
 /// Most names of a group that are told.
 const MAX_NAMES: usize = 8;
@@ -78,14 +79,9 @@ impl Matches {
 
     /// What one matches, in words.
     pub fn told(&self, photo: usize) -> String {
-        let partners = self.partners(photo);
-        let told = partners.iter().take(MAX_PARTNERS).map(|(photo, count)| format!("{} {count}", self.names[*photo]));
-        let more = partners.len().saturating_sub(MAX_PARTNERS);
-        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-        match partners.is_empty() {
-            true => "none".to_owned(),
-            false => told.collect::<Vec<_>>().join(", ") + &more,
-        }
+        let partner = |(photo, count): (usize, usize)| format!("{} {count}", self.names[photo]);
+        let partners: Vec<String> = self.partners(photo).into_iter().map(partner).collect();
+        if partners.is_empty() { "none".to_owned() } else { listed(&partners, MAX_PARTNERS) }
     }
 
     /// The photographs that are tied to one another, over others if need be: the largest group first.
@@ -113,9 +109,8 @@ impl Matches {
         }
         let (tied, alone): (Vec<_>, Vec<_>) = groups.iter().partition(|group| group.len() > 1);
         let list = |photos: &[usize]| {
-            let names: Vec<&str> = photos.iter().take(MAX_NAMES).map(|photo| self.names[*photo].as_str()).collect();
-            let more = photos.len().saturating_sub(MAX_NAMES);
-            names.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
+            let names: Vec<&String> = photos.iter().map(|photo| &self.names[*photo]).collect();
+            listed(&names, MAX_NAMES)
         };
         let tied: Vec<String> = tied.iter().map(|group| list(group)).collect();
         let alone: Vec<usize> = alone.into_iter().flatten().copied().collect();

@@ -1,7 +1,7 @@
 //! OpenMVG's crates, as a process of their own: `viewfuse-openmvg`, which is built from this crate's folder `openmvg`.
 
 use crate::process::{GRACE, LOOK, end_of};
-use crate::solution::{Features, Job, MAX_ANSWER, Solution, Solver, SolverError};
+use crate::solution::{Features, MAX_ANSWER, PoseJob, Solution, Solver, SolverError};
 use serde::Deserialize;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::PathBuf;
@@ -54,8 +54,8 @@ impl Solver for OpenMvg {
         sha256_of(&self.program).ok()
     }
 
-    fn solve(&self, job: &Job, progress: &dyn Progress) -> Result<Solution, SolverError> {
-        let broken = |problem: String| SolverError::Broken { program: self.program.clone(), problem };
+    fn solve(&self, job: &PoseJob, progress: &dyn Progress) -> Result<Solution, SolverError> {
+        let broken = |problem: String| SolverError::Broken(self.program.clone(), problem);
         let unread = |error: &dyn std::fmt::Display| broken(format!("its answer cannot be read: {error}"));
         let Started { process, lines, complaint } = self.start(job)?;
         let (mut begun, mut told, mut has_ended) = (0, 0, None);
@@ -153,7 +153,7 @@ struct Started {
 
 impl OpenMvg {
     /// Starts the process and gives it the job.
-    fn start(&self, job: &Job) -> Result<Started, SolverError> {
+    fn start(&self, job: &PoseJob) -> Result<Started, SolverError> {
         let mut command = Command::new(&self.program);
         command.env("RAYON_NUM_THREADS", rayon::current_num_threads().to_string());
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -161,7 +161,7 @@ impl OpenMvg {
         let process = process.map_err(|cause| SolverError::not_started(self.name(), &self.program, &cause))?;
         let (Some(mut input), Some(said), Some(complained)) = process.pipes() else {
             let problem = "has no input or output".to_owned();
-            return Err(SolverError::Broken { program: self.program.clone(), problem });
+            return Err(SolverError::Broken(self.program.clone(), problem));
         };
         let text = serde_json::to_vec(job).unwrap_or_default();
         // A process that does not take it, or has ended already, is noticed by its missing answer.

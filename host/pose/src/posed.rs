@@ -6,9 +6,9 @@ use crate::solution::{Solution, SolvedPoint};
 use std::path::{Path, PathBuf};
 use viewfuse_core::lens::{Lens, Projection};
 use viewfuse_scene::reader::{ImageFile, PoseForm, RawIntrinsics, RawPoint, RawPose, RawScene, RawView, Reader};
-use viewfuse_scene::{FaultLocation, Scene, SceneError};
+use viewfuse_scene::{FaultLocation, FilePlace, Scene, SceneError};
 
-/// Points with a larger mean reprojection error, in pixels at working size, are left out.
+/// Points with a larger mean reprojection error, in pixels at working size, are dropped.
 const MAX_POINT_ERROR: f64 = 4.0;
 
 /// Reads a solution.
@@ -44,22 +44,19 @@ impl Posed<'_> {
     fn view(&self, index: usize) -> Result<RawView, SceneError> {
         let photo = &self.photos[index];
         let camera = &self.solution.cameras[self.cameras.of_photo[index]];
-        let rows = self.solution.photographs[index].camera_from_world.unwrap_or_default();
-        let mut matrix = [0.0; 16];
-        matrix[15] = 1.0;
-        matrix[..12].iter_mut().zip(rows.as_flattened()).for_each(|(own, found)| *own = *found);
-        let (scale, place) = (self.scale(index), FaultLocation::File);
+        let [x, y, z] = self.solution.photographs[index].camera_from_world.unwrap_or_default();
+        let matrix = [x, y, z, [0.0, 0.0, 0.0, 1.0]];
+        let (scale, place) = (self.scale(index), FilePlace::file(&photo.path));
         let lens = Lens::new(Projection::Perspective, [camera.k1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
         let intrinsics = RawIntrinsics {
             focal: scale.map(|scale| scale * camera.focal),
             principal: [0, 1].map(|axis| scale[axis] * camera.principal[axis]),
             size: Some(photo.size),
             lens: lens.ok().filter(|lens| !lens.is_pinhole()),
-            path: photo.path.clone(),
             place: place.clone(),
             size_place: place.clone(),
         };
-        let pose = RawPose { matrix, form: PoseForm::OpenCvFromWorld, path: photo.path.clone(), place };
+        let pose = RawPose { matrix, form: PoseForm::OpenCvFromWorld, place };
         Ok(RawView::new(photo.name.clone(), Some(ImageFile::open(&photo.upright)?), pose, Some(intrinsics)))
     }
 
@@ -79,7 +76,7 @@ impl Posed<'_> {
         };
         let colour = copy.get_pixel(pixel(0, copy.width()), pixel(1, copy.height())).0;
         let error = point.error * self.scale(*photo)[0];
-        Some(RawPoint { position: point.position, error, colour, views, place: FaultLocation::File })
+        Some(RawPoint { position: point.position, error, colour, views, location: FaultLocation::File })
     }
 }
 

@@ -43,7 +43,7 @@ pub(crate) fn run(
     progress: &dyn Progress,
 ) -> Result<Ended, SolverError> {
     let program = Path::new(command.get_program()).to_path_buf();
-    let broken = |problem: String| SolverError::Broken { program: program.clone(), problem };
+    let broken = |problem: String| SolverError::Broken(program.clone(), problem);
     let of_log = |error: std::io::Error| broken(format!("{}: {error}", log.display()));
     let output = File::create(log).map_err(of_log)?;
     let errors = output.try_clone().map_err(of_log)?;

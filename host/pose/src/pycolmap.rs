@@ -3,7 +3,7 @@
 use crate::colmap::MAX_SEED;
 use crate::colmap_folder::{ColmapFolder, FolderCamera};
 use crate::process::run;
-use crate::solution::{Features, Job, Solution, Solver, SolverError};
+use crate::solution::{Features, PoseJob, Solution, Solver, SolverError};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::Command;
@@ -55,8 +55,8 @@ impl Solver for PyColmap {
         ended.status.success().then(|| ended.last_line().to_owned())
     }
 
-    fn solve(&self, job: &Job, progress: &dyn Progress) -> Result<Solution, SolverError> {
-        let broken = |problem: String| SolverError::Broken { program: self.python.clone(), problem };
+    fn solve(&self, job: &PoseJob, progress: &dyn Progress) -> Result<Solution, SolverError> {
+        let broken = |problem: String| SolverError::Broken(self.python.clone(), problem);
         let folder = ColmapFolder::of(job).map_err(|error| broken(error.to_string()))?;
         let at = |name: &str| folder.path().join(name);
         let task = Task {
@@ -76,7 +76,7 @@ impl Solver for PyColmap {
         let ended = run(&mut command, NAME, &at("log.txt"), progress)?;
         if ended.status.code() == Some(NO_MODULE) {
             let problem = format!("cannot import pycolmap: {}", ended.last_line());
-            return Err(SolverError::Missing { solver: NAME, program: self.python.clone(), problem });
+            return Err(SolverError::Missing(self.python.clone(), problem, NAME));
         }
         if !ended.status.success() {
             return Err(broken(format!("pycolmap failed ({}): {}", ended.status, ended.last_line())));

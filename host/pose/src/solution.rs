@@ -38,7 +38,7 @@ impl Display for Features {
 
 /// What a solver is asked.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Job {
+pub struct PoseJob {
     /// Seed of every random draw.
     pub seed: u64,
     /// The kind of features; a solver that has one kind ignores it.
@@ -157,21 +157,20 @@ impl Solution {
 
     /// Whether every number is finite, every index is that of a photograph or camera of the job, focal lengths are
     /// positive, and nothing is more than a job can have: a process answered.
-    pub(crate) fn fits(&self, job: &Job) -> bool {
+    pub(crate) fn fits(&self, job: &PoseJob) -> bool {
         let count = job.photographs.len();
         let poses = self.photographs.iter().filter_map(|photograph| photograph.camera_from_world);
         let finite = |numbers: &[f64]| numbers.iter().all(|number| number.is_finite());
         let is_rotation = |photograph: &SolvedPhotograph| {
-            photograph.rotation().is_none_or(|own| (own.determinant() - 1.0).abs() < 1.0e-3)
+            photograph.rotation().is_none_or(|rotation| (rotation.determinant() - 1.0).abs() < 1.0e-3)
         };
         self.photographs.len() == count
             && self.cameras.len() == job.cameras.len()
             && poses.flatten().all(|row| finite(&row))
             && self.photographs.iter().all(is_rotation)
-            && self
-                .cameras
-                .iter()
-                .all(|own| own.focal > 0.0 && finite(&[own.focal, own.k1, own.principal[0], own.principal[1]]))
+            && self.cameras.iter().all(|camera| {
+                camera.focal > 0.0 && finite(&[camera.focal, camera.k1, camera.principal[0], camera.principal[1]])
+            })
             && self.points.iter().all(|point| {
                 finite(&point.position)
                     && point.error.is_finite()
@@ -179,31 +178,19 @@ impl Solution {
                     && point.seen.iter().all(|(photograph, place)| *photograph < count && finite(place))
             })
             && self.pairs.len() <= count * count
-            && self.pairs.iter().all(|pair| pair.photographs.iter().all(|own| *own < count))
+            && self.pairs.iter().all(|pair| pair.photographs.iter().all(|photograph| *photograph < count))
     }
 }
 
 /// Why a solver has no answer.
 #[derive(Debug, thiserror::Error)]
 pub enum SolverError {
-    /// The program is not there, or lacks what it works with.
-    #[error("{}: {problem}", program.display())]
-    Missing {
-        /// The solver's name.
-        solver: &'static str,
-        /// The program.
-        program: PathBuf,
-        /// What is missing.
-        problem: String,
-    },
-    /// The program broke.
-    #[error("{}: {problem}", program.display())]
-    Broken {
-        /// The program.
-        program: PathBuf,
-        /// What happened.
-        problem: String,
-    },
+    /// The program is not there, or lacks what it works with: the solver's name last.
+    #[error("{0}: {1}")]
+    Missing(PathBuf, String, &'static str),
+    /// The program broke, and what happened.
+    #[error("{0}: {1}")]
+    Broken(PathBuf, String),
     /// It found nothing; the words are the solver's.
     #[error("{0}")]
     Nothing(String),
@@ -215,7 +202,7 @@ pub enum SolverError {
 impl Hinted for SolverError {
     fn hint(&self) -> Option<Hint> {
         match self {
-            SolverError::Missing { solver, .. } => Some(Hint::Solver(solver)),
+            SolverError::Missing(.., solver) => Some(Hint::Solver(solver)),
             _ => None,
         }
     }
@@ -225,7 +212,7 @@ impl SolverError {
     /// That a solver's program could not be started.
     pub(crate) fn not_started(solver: &'static str, program: &Path, cause: &std::io::Error) -> SolverError {
         let problem = format!("the program is not there or cannot be started: {cause}");
-        SolverError::Missing { solver, program: program.to_path_buf(), problem }
+        SolverError::Missing(program.to_path_buf(), problem, solver)
     }
 }
 
@@ -248,5 +235,5 @@ pub trait Solver: Sync {
     ///
     /// # Errors
     /// [`SolverError`].
-    fn solve(&self, job: &Job, progress: &dyn Progress) -> Result<Solution, SolverError>;
+    fn solve(&self, job: &PoseJob, progress: &dyn Progress) -> Result<Solution, SolverError>;
 }

@@ -17,12 +17,8 @@ pub struct Support {
 }
 
 impl Support {
-    /// Of a solution.
-    ///
-    /// # Errors
-    /// [`Interrupted`].
     pub(crate) fn of(solution: &Solution, progress: &dyn Progress) -> Result<Support, Interrupted> {
-        let centres: Vec<Option<DVec3>> = solution.photographs.iter().map(|own| own.centre()).collect();
+        let centres: Vec<Option<DVec3>> = solution.photographs.iter().map(|photograph| photograph.centre()).collect();
         let mut seen = vec![0_usize; solution.photographs.len()];
         let mut angles = Vec::new();
         for point in &solution.points {
@@ -37,7 +33,7 @@ impl Support {
             angles.extend(pairs.map(|(a, b)| towards[a].angle_between(towards[b]).to_degrees()).reduce(f64::max));
             point.seen.iter().for_each(|(photograph, _)| seen[*photograph] += 1);
         }
-        let fewest_points = solution.registered().into_iter().map(|own| seen[own]).min().unwrap_or(0);
+        let fewest_points = solution.registered().into_iter().map(|photograph| seen[photograph]).min().unwrap_or(0);
         Ok(Support { parallax: median(angles), thickness: thickness(solution), fewest_points })
     }
 }
@@ -46,8 +42,8 @@ impl Support {
 /// than three median distances: single points far away do not count.
 fn thickness(solution: &Solution) -> f64 {
     let points: Vec<DVec3> = solution.points.iter().map(|point| DVec3::from_array(point.position)).collect();
-    let of = |axis: usize| median(points.iter().map(|point| point[axis]).collect());
-    let middle = DVec3::new(of(0), of(1), of(2));
+    let median_of = |axis: usize| median(points.iter().map(|point| point[axis]).collect());
+    let middle = DVec3::new(median_of(0), median_of(1), median_of(2));
     let reach = 3.0 * median(points.iter().map(|point| point.distance(middle)).collect());
     let near: Vec<DVec3> = points.into_iter().filter(|point| point.distance(middle) <= reach).collect();
     let mean = near.iter().sum::<DVec3>() / near.len().max(1) as f64;
@@ -64,7 +60,7 @@ fn thickness(solution: &Solution) -> f64 {
 fn eigenvalues(m: DMat3) -> [f64; 3] {
     let mean = (m.x_axis.x + m.y_axis.y + m.z_axis.z) / 3.0;
     let shifted = m - DMat3::from_diagonal(DVec3::splat(mean));
-    let squares = shifted.to_cols_array().iter().map(|own| own * own).sum::<f64>();
+    let squares = shifted.to_cols_array().iter().map(|entry| entry * entry).sum::<f64>();
     let radius = (squares / 6.0).sqrt();
     if radius <= 0.0 {
         return [mean; 3];

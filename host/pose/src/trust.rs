@@ -1,8 +1,8 @@
 //! How far a photograph's pose is to be trusted, by what it passed.
 //!
-//! Held-out pictures tell where neighbours are near. From some 20 degrees on they may be no better than copies at true
-//! poses, too: then attempts must agree more closely and over many points, with a focal length that is known, as a wrong
-//! one turns photographs in all attempts alike.
+//! Held-out pictures tell where neighbours are near. From some 20 degrees on they may be no better than copies at
+//! true poses, too: then attempts must agree more closely and over many points, with a focal length that is known, as a
+//! wrong one turns photographs in all attempts alike.
 
 use crate::agreement::median;
 use crate::focal::Cameras;
@@ -65,7 +65,8 @@ pub(crate) fn trust(passed: &Verified, cameras: &Cameras) -> Result<Trust, Strin
     if ties.points_of_three < MIN_POINTS_OF_THREE || ties.second_shared < MIN_SECOND_SHARED {
         let Ties { points_of_three, second_shared, .. } = ties;
         return Err(format!(
-            "{far}, and it shares few points with others ({points_of_three} with at least two, {second_shared} with its second neighbour)"
+            "{far}, and it shares few points with others ({points_of_three} with at least two, {second_shared} with its \
+             second neighbour)"
         ));
     }
     Ok(Trust::Doubtful)
@@ -84,7 +85,8 @@ pub(crate) fn doubt(all: &[&Verified], cameras: &Cameras, is_confirmed: impl FnO
     let gains: Vec<f64> = told.map(|passed| passed.held_out.gain()).collect();
     if gains.is_empty() && !is_confirmed() {
         return Some(format!(
-            "all photographs are more than {MAX_TOLD} degrees apart, too far for held-out pictures to tell, and no other attempt has all their rotations to {MAX_FAR_DIFFERENCE} degree"
+            "all photographs are more than {MAX_TOLD} degrees apart, too far for held-out pictures to tell, and no other \
+             attempt has all their rotations to {MAX_FAR_DIFFERENCE} degree"
         ));
     }
     if all.iter().all(|passed| passed.trust == Trust::Doubtful) {
@@ -94,7 +96,8 @@ pub(crate) fn doubt(all: &[&Verified], cameras: &Cameras, is_confirmed: impl FnO
     let gain = median(gains);
     (has_told && gain < MIN_MEDIAN_GAIN).then(|| {
         format!(
-            "photographs that were left out are met {gain:.1} dB better than by copies of their neighbours, {MIN_MEDIAN_GAIN} are needed"
+            "photographs that were left out are met {gain:.1} dB better than by copies of their neighbours, \
+             {MIN_MEDIAN_GAIN} are needed"
         )
     })
 }
@@ -103,13 +106,15 @@ pub(crate) fn doubt(all: &[&Verified], cameras: &Cameras, is_confirmed: impl FnO
 fn failure(scores: &HeldOutScores) -> Option<String> {
     if scores.sharpness() < MIN_SHARPNESS {
         return Some(format!(
-            "left out and rendered from the others, it is met no better at its pose ({:.1} dB) than two degrees beside it ({:.1} dB)",
+            "left out and rendered from the others, it is met no better at its pose ({:.1} dB) than two degrees beside it \
+             ({:.1} dB)",
             scores.score, scores.disturbed
         ));
     }
     if scores.gain() < MIN_GAIN {
         return Some(format!(
-            "left out and rendered from the others, it is met no better or hardly better ({:.1} dB) than by a copy of its neighbour ({:.1} dB)",
+            "left out and rendered from the others, it is met no better or hardly better ({:.1} dB) than by a copy of its \
+             neighbour ({:.1} dB)",
             scores.score,
             scores.copy.max(scores.warp)
         ));

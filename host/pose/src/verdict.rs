@@ -24,7 +24,7 @@ use crate::trust::{MAX_FAR_DIFFERENCE, Trust, Verified, doubt, trust};
 use std::path::Path;
 use viewfuse_field::render::RenderError;
 use viewfuse_job::progress::{Part, Progress};
-use viewfuse_scene::{Scene, SceneError};
+use viewfuse_scene::Scene;
 
 /// Fewest photographs: each must be seen again by two others.
 const MIN_PHOTOGRAPHS: usize = 3;
@@ -88,15 +88,6 @@ impl Refusal {
     }
 }
 
-/// Why there is no verdict.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum VerdictError {
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    #[error(transparent)]
-    Render(#[from] RenderError),
-}
-
 /// The verdict on attempts; each that is no candidate is told why.
 pub(crate) fn verdict(
     folder: &Path,
@@ -104,7 +95,7 @@ pub(crate) fn verdict(
     cameras: &Cameras,
     attempts: &mut [Attempt],
     progress: &dyn Progress,
-) -> Result<Result<Verdict, Refusal>, VerdictError> {
+) -> Result<Result<Verdict, Refusal>, RenderError> {
     // Beside more attempts than before, each is judged anew.
     attempts.iter_mut().filter(|attempt| attempt.solution.is_some()).for_each(|attempt| attempt.tried.refused = None);
     let candidates = candidates(cameras, attempts);
@@ -138,21 +129,21 @@ fn candidates(cameras: &Cameras, attempts: &mut [Attempt]) -> Vec<(usize, Vec<(u
         attempt.tried.refused = implausible(cameras, attempt);
     }
     let mut found: Vec<(usize, Vec<(usize, f64)>)> = Vec::new();
-    for own in 0..attempts.len() {
-        if attempts[own].tried.refused.is_some() {
+    for index in 0..attempts.len() {
+        if attempts[index].tried.refused.is_some() {
             continue;
         }
-        let confirmed = confirmed(cameras, attempts, own);
+        let confirmed = confirmed(cameras, attempts, index);
         if confirmed.len() < MIN_PHOTOGRAPHS {
-            attempts[own].tried.refused = Some(format!(
+            attempts[index].tried.refused = Some(format!(
                 "no other attempt has the same rotations, to {MAX_ROTATION_DIFFERENCE} degrees, for {MIN_PHOTOGRAPHS} photographs"
             ));
         } else {
-            found.push((own, confirmed));
+            found.push((index, confirmed));
         }
     }
-    found.sort_by_key(|(own, confirmed)| {
-        (std::cmp::Reverse(confirmed.len()), std::cmp::Reverse(attempts[*own].tried.points))
+    found.sort_by_key(|(index, confirmed)| {
+        (std::cmp::Reverse(confirmed.len()), std::cmp::Reverse(attempts[*index].tried.points))
     });
     found
 }
@@ -185,17 +176,19 @@ fn implausible(cameras: &Cameras, attempt: &Attempt) -> Option<String> {
 
 /// The photographs of an attempt whose relative rotations another one confirms, each with the least difference in
 /// degrees.
-fn confirmed(cameras: &Cameras, attempts: &[Attempt], own: usize) -> Vec<(usize, f64)> {
-    let Some(solution) = &attempts[own].solution else { return Vec::new() };
+fn confirmed(cameras: &Cameras, attempts: &[Attempt], judged: usize) -> Vec<(usize, f64)> {
+    let Some(solution) = &attempts[judged].solution else { return Vec::new() };
     let mut least = vec![f64::INFINITY; solution.photographs.len()];
     for (index, other) in attempts.iter().enumerate() {
-        let (a, b) = (&attempts[own].tried, &other.tried);
-        let Some(others) = other.solution.as_ref().filter(|_| index != own && is_independent(a, b)) else { continue };
+        let (a, b) = (&attempts[judged].tried, &other.tried);
+        let Some(others) = other.solution.as_ref().filter(|_| index != judged && is_independent(a, b)) else {
+            continue;
+        };
         let near = a.focal.iter().zip(&b.focal).all(|(a, b)| (a / b - 1.0).abs() <= MAX_FOCAL_DIFFERENCE);
         let common: Vec<usize> = solution
             .registered()
             .into_iter()
-            .filter(|own| others.photographs[*own].camera_from_world.is_some())
+            .filter(|photo| others.photographs[*photo].camera_from_world.is_some())
             .collect();
         if common.len() < MIN_PHOTOGRAPHS || !near && !cameras.are_known() {
             continue;
@@ -234,7 +227,7 @@ impl Trial<'_> {
     }
 
     fn unconfirmed(&self, confirmed: &[(usize, f64)]) -> Vec<(usize, String)> {
-        let is_confirmed = |photo: &usize| confirmed.iter().any(|(own, _)| own == photo);
+        let is_confirmed = |photo: &usize| confirmed.iter().any(|(known, _)| known == photo);
         let reason = format!("no other attempt has its rotation to {MAX_ROTATION_DIFFERENCE} degrees");
         let all = self.solution.registered().into_iter().filter(|photo| !is_confirmed(photo));
         all.map(|photo| (photo, reason.clone())).collect()
@@ -246,7 +239,7 @@ impl Trial<'_> {
         &mut self,
         mut kept: Vec<(usize, f64)>,
         progress: &dyn Progress,
-    ) -> Result<Result<(Scene, Vec<(usize, Verified)>), String>, VerdictError> {
+    ) -> Result<Result<(Scene, Vec<(usize, Verified)>), String>, RenderError> {
         loop {
             if kept.len() < MIN_PHOTOGRAPHS {
                 let first = self
@@ -283,7 +276,7 @@ impl Trial<'_> {
             // The worst first: what is wrong with it may be what is wrong with its neighbours.
             failed.sort_by(|a, b| a.0.total_cmp(&b.0));
             failed.truncate(failed.len().div_ceil(WORST));
-            kept.retain(|(photo, _)| failed.iter().all(|(_, own, _)| own != photo));
+            kept.retain(|(photo, _)| failed.iter().all(|(_, failing, _)| failing != photo));
             self.taken_out.extend(failed.into_iter().map(|(_, photo, reason)| (photo, reason)));
         }
     }

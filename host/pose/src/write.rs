@@ -4,7 +4,7 @@ use crate::advice::Neighbours;
 use crate::attempt::Tried;
 use crate::find::{Found, Options};
 use crate::focal::FocalSource;
-use crate::intake::{IntakeError, listed};
+use crate::intake::{IntakeError, Unusable, files_in};
 use crate::trust::Verified;
 use crate::verdict::Verdict;
 use serde::{Deserialize, Serialize};
@@ -38,8 +38,9 @@ pub struct Record<'a> {
     pub attempts: Vec<&'a Tried>,
     /// The accepted photographs with what they passed.
     pub accepted: &'a [Verified],
-    /// Photographs that were left out, each with the reason.
-    pub left_out: Vec<(String, String)>,
+    /// Photographs that were excluded, each with the reason.
+    #[serde(rename = "left_out")]
+    pub excluded: Vec<(String, String)>,
     /// Which photographs match which, and how often.
     pub matches: Vec<(&'a str, &'a str, usize)>,
     /// The accepted ones as neighbours.
@@ -63,16 +64,17 @@ pub struct CameraRecord {
 
 impl Found {
     /// The photographs of the folder that a verdict does not accept, by file, each with the reason.
-    pub fn left_out(&self, verdict: Option<&Verdict>) -> Vec<(String, String)> {
-        let mut all: Vec<(String, String)> =
-            self.intake.unusable.iter().map(|own| (own.name.clone(), own.reason.clone())).collect();
-        let passed_over = self.intake.passed_over.iter().map(|own| (own.name.clone(), own.reason.clone()));
+    pub fn excluded(&self, verdict: Option<&Verdict>) -> Vec<(String, String)> {
+        let said = |file: &Unusable| (file.name.clone(), file.reason.clone());
+        let mut all: Vec<(String, String)> = self.intake.unusable.iter().map(said).collect();
+        let passed_over = self.intake.passed_over.iter().map(said);
         let Some(verdict) = verdict else { return all.into_iter().chain(passed_over).collect() };
         for (index, photo) in self.intake.photos.iter().enumerate() {
             if verdict.photos.contains(&index) {
                 continue;
             }
-            let taken_out = verdict.taken_out.iter().find(|(own, _)| *own == index).map(|(_, reason)| reason.clone());
+            let taken_out =
+                verdict.taken_out.iter().find(|(photo, _)| *photo == index).map(|(_, reason)| reason.clone());
             let matched = || format!("matches too little of the other photographs ({})", self.matches.told(index));
             let reason = taken_out.unwrap_or_else(matched);
             all.push((photo.file.clone(), reason));
@@ -85,7 +87,7 @@ impl Found {
     /// The record of an accepted verdict.
     pub fn record<'a>(&'a self, verdict: &'a Verdict, options: &Options) -> Record<'a> {
         let attempt = &self.attempts[verdict.attempt];
-        let k1 = |index: usize| verdict.solution.cameras.get(index).map_or(0.0, |own| own.k1);
+        let k1 = |index: usize| verdict.solution.cameras.get(index).map_or(0.0, |camera| camera.k1);
         let cameras = self.cameras.groups.iter().enumerate().map(|(index, group)| CameraRecord {
             size: group.size,
             photographs: group.photos.iter().filter(|photo| verdict.photos.contains(photo)).count(),
@@ -104,7 +106,7 @@ impl Found {
             attempt: verdict.attempt,
             attempts: self.attempts.iter().map(|attempt| &attempt.tried).collect(),
             accepted: &verdict.verified,
-            left_out: self.left_out(Some(verdict)),
+            excluded: self.excluded(Some(verdict)),
             matches: self.matches.named().collect(),
             neighbours: Neighbours::of(&verdict.scene),
         }
@@ -124,7 +126,7 @@ pub fn write(
     beside: &[(&str, Vec<u8>)],
     progress: &dyn Progress,
 ) -> Result<Written, WriteSceneError> {
-    let failed = |cause: serde_json::Error| WriteSceneError::Io { path: folder.join(RECORD), cause: cause.into() };
+    let failed = |cause: serde_json::Error| WriteSceneError::Io(folder.join(RECORD), cause.into());
     let mut record = serde_json::to_vec_pretty(&found.record(verdict, options)).map_err(failed)?;
     record.push(b'\n');
     let mut files = vec![(RECORD, record)];
@@ -150,7 +152,7 @@ struct Earlier {
 /// # Errors
 /// [`IntakeError`] if the folder's photographs cannot be listed.
 pub fn is_current(posed: &Path, photographs: &Path) -> Result<bool, IntakeError> {
-    let now = listed(photographs)?;
+    let now = files_in(photographs)?;
     let record = std::fs::read(posed.join(RECORD)).unwrap_or_default();
     Ok(serde_json::from_slice::<Earlier>(&record).is_ok_and(|earlier| earlier.files == now))
 }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 /// What is to be done.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Job {
+pub(crate) struct PoseJob {
     /// Seed of every random draw.
     pub(crate) seed: u64,
     /// The kind of features.
@@ -16,7 +16,7 @@ pub(crate) struct Job {
     /// The cameras: photographs of one camera share its focal length and its lens.
     pub(crate) cameras: Vec<CameraGuess>,
     /// The photographs, upright, as PNG or JPEG.
-    pub(crate) photographs: Vec<Photograph>,
+    pub(crate) photographs: Vec<JobPhotograph>,
 }
 
 /// A kind of features.
@@ -42,7 +42,7 @@ pub(crate) struct CameraGuess {
 /// A photograph.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Photograph {
+pub(crate) struct JobPhotograph {
     /// Its file.
     pub(crate) path: PathBuf,
     /// Width and height in pixels.

@@ -1,7 +1,7 @@
 //! OpenMVG's front end and its incremental engine.
 
 use crate::answer::{Camera, Line, Pair, Photograph, Point, Solution};
-use crate::job::{Features, Job};
+use crate::job::{Features, JobPhotograph, PoseJob};
 use crate::say;
 use openmvg_core::camera::{RadialDistortion, TangentialDistortion};
 use openmvg_sfm::model::{ImageMeta, IntrinsicPrior, PairGeometry};
@@ -22,7 +22,7 @@ pub(crate) const SOLVER: &str = "openmvg-sfm 0.1.0";
 const CENTRE: f64 = 0.5;
 
 /// Poses for a job's photographs.
-pub(crate) fn solve(job: &Job) -> Result<Solution> {
+pub(crate) fn solve(job: &PoseJob) -> Result<Solution> {
     let told = Told::default();
     let frontend =
         Frontend::default().with_max_dimension(Some(job.max_side)).with_extraction_method(match job.features {
@@ -52,7 +52,7 @@ pub(crate) fn solve(job: &Job) -> Result<Solution> {
 }
 
 /// What is known without a pose: which photographs match.
-fn unposed(job: &Job, graph: &ViewGraph, error: &SfmError) -> Solution {
+fn unposed(job: &PoseJob, graph: &ViewGraph, error: &SfmError) -> Solution {
     let photograph = |_| Photograph { camera_from_world: None, reason: Some(error.to_string()) };
     Solution {
         solver: SOLVER,
@@ -64,32 +64,36 @@ fn unposed(job: &Job, graph: &ViewGraph, error: &SfmError) -> Solution {
 }
 
 /// The photographs with one camera for each group, its principal point in the middle.
-fn dataset(job: &Job) -> Result<Dataset> {
+fn dataset(job: &PoseJob) -> Result<Dataset> {
     let mut models = Vec::new();
     for (index, guess) in job.cameras.iter().enumerate() {
-        let size = job.photographs.iter().find(|photograph| photograph.camera == index).map_or([2, 2], |own| own.size);
+        let size = job
+            .photographs
+            .iter()
+            .find(|photograph| photograph.camera == index)
+            .map_or([2, 2], |photograph| photograph.size);
         let [x, y] = size.map(|side| f64::from(side) / 2.0 - CENTRE);
         let (radial, tangential) = (RadialDistortion::K1(0.0), TangentialDistortion::None);
         models.push(Model::try_brown_conrady(guess.focal, guess.focal, x, y, radial, tangential)?);
     }
-    let meta = |own: &crate::job::Photograph| ImageMeta::path(&own.path, own.size[0], own.size[1]);
+    let meta = |photograph: &JobPhotograph| ImageMeta::path(&photograph.path, photograph.size[0], photograph.size[1]);
     let prior = |is_guess: bool| if is_guess { IntrinsicPrior::Guess } else { IntrinsicPrior::Trusted };
     Dataset::builder()
         .root_seed(job.seed)
         .image_meta(job.photographs.iter().map(meta))
         .camera_models(models)
         .intrinsic_priors(job.cameras.iter().map(|guess| prior(guess.is_guess)))
-        .view_intrinsics(job.photographs.iter().map(|own| IntrinsicId::new(own.camera)))
+        .view_intrinsics(job.photographs.iter().map(|photograph| IntrinsicId::new(photograph.camera)))
         .one_pose_per_view()
         .build()
 }
 
 fn camera(model: &Model) -> Camera {
     match model {
-        Model::BrownConrady(own) => Camera {
-            focal: 0.5 * (own.focal_x() + own.focal_y()),
-            principal: [own.principal_x() + CENTRE, own.principal_y() + CENTRE],
-            k1: own.radial_distortion().k1(),
+        Model::BrownConrady(lens) => Camera {
+            focal: 0.5 * (lens.focal_x() + lens.focal_y()),
+            principal: [lens.principal_x() + CENTRE, lens.principal_y() + CENTRE],
+            k1: lens.radial_distortion().k1(),
         },
         // No other model was given.
         _ => Camera { focal: 0.0, principal: [0.0; 2], k1: 0.0 },

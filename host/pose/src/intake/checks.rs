@@ -55,7 +55,7 @@ fn has_pair(mut reader: impl BufRead, pair: [u8; 2]) -> io::Result<bool> {
     loop {
         let part = reader.fill_buf()?;
         let (Some(first), length) = (part.first(), part.len()) else { return Ok(false) };
-        if last == Some(pair[0]) && *first == pair[1] || part.windows(2).any(|own| own == pair) {
+        if last == Some(pair[0]) && *first == pair[1] || part.windows(2).any(|found| found == pair) {
             return Ok(true);
         }
         last = part.last().copied();
