@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use std::path::Path;
 use viewfuse::job::progress::{Progress, Silent};
 use viewfuse::pose::{
-    Features, Found, Job, Options, Solution, SolvedCamera, SolvedPhotograph, SolvedPoint, Solver, SolverError, find,
+    Features, Found, Options, PoseJob, Solution, SolvedCamera, SolvedPhotograph, SolvedPoint, Solver, SolverError, find,
 };
 use viewfuse::scene::Scene;
 use viewfuse::scene::rig::Rig;
@@ -32,7 +32,7 @@ impl<F: Fn(Features, usize) -> f64 + Sync> Solver for Oracle<F> {
         &[Features::Alp, Features::Sift]
     }
 
-    fn solve(&self, job: &Job, _progress: &dyn Progress) -> Result<Solution, SolverError> {
+    fn solve(&self, job: &PoseJob, _progress: &dyn Progress) -> Result<Solution, SolverError> {
         let scene = Scene::open(data("room")).expect("the room");
         let cameras: Vec<_> = scene.views.iter().map(|view| view.camera).collect();
         let focus = Rig::of(&cameras).focus.as_dvec3();
@@ -108,7 +108,7 @@ fn one_wrong_pose_is_left_out_by_name() {
     let found = found(1.0, |_, photo| if photo == 2 { 5.0 } else { 0.0 });
     let verdict = found.verdict.as_ref().expect("the others are true");
     assert!(!verdict.photos.contains(&2) && verdict.photos.len() >= 3, "{:?}", verdict.photos);
-    let left_out = found.left_out(Some(verdict));
+    let left_out = found.excluded(Some(verdict));
     assert!(
         left_out.iter().any(|(name, why)| name == "002.jpg" && why.contains("left out and rendered")),
         "{left_out:?}"

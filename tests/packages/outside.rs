@@ -14,7 +14,7 @@ use viewfuse::job::progress::Silent;
 use viewfuse::output::run::{Circumstances, RunWriter};
 use viewfuse::scene::few_shot::{FewShot, Selection};
 use viewfuse::scene::photographs::{Album, BackgroundChoice};
-use viewfuse::scene::{FaultLocation, READERS, Scene, SceneError};
+use viewfuse::scene::{FileFault, FilePlace, READERS, Scene, SceneError, SceneFault};
 use viewfuse::weighting::Weighting;
 use viewfuse::weighting::sources::{MAX_SOURCES, SourceWeights};
 use viewfuse_outside::{LIST, Lines, Nearest, Plane};
@@ -161,10 +161,15 @@ fn what_a_reader_gives_is_checked() {
         words[index] = word;
         list.replacen(first, &words.join(" "), 1)
     };
-    assert!(matches!(refused(with(1, "5")), SceneError::Pose { place: FaultLocation::Line(1), .. }));
-    assert!(matches!(refused(with(0, "-1")), SceneError::Intrinsics { place: FaultLocation::Line(1), .. }));
-    assert!(matches!(refused(with(4, "NaN")), SceneError::NotFinite { place: FaultLocation::Line(1), .. }));
-    assert!(matches!(refused(String::new()), SceneError::NoViews { .. }));
+    let fault_of_line = |changed: String| {
+        let SceneError { place, fault } = refused(changed);
+        assert_eq!(place, FilePlace::line(&path, 1));
+        fault
+    };
+    assert!(matches!(fault_of_line(with(1, "5")), SceneFault::Pose(_)));
+    assert!(matches!(fault_of_line(with(0, "-1")), SceneFault::Intrinsics(_)));
+    assert!(matches!(fault_of_line(with(4, "NaN")), SceneFault::File(FileFault::NotFinite(_))));
+    assert!(matches!(refused(String::new()).fault, SceneFault::NoViews(_)));
 }
 
 #[test]

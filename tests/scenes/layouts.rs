@@ -3,7 +3,7 @@
 //! The camera sees the point at (0.5, -0.25, 2): the pixel is `focal * (0.25, -0.125) + principal`.
 
 use serde_json::json;
-use viewfuse::scene::{Scene, SceneError, Split};
+use viewfuse::scene::{ImageFault, Scene, SceneFault, Split};
 use viewfuse_core::Vec3;
 use viewfuse_tests::scenes::{self, Folder, POINT_WORLD};
 
@@ -223,10 +223,11 @@ fn photographs_of_every_kind_become_rgba8() {
 fn pixels_that_are_not_there() {
     let folder = scenes::srn();
     let scene = open(&folder);
-    assert!(matches!(scene.photograph(2), Err(SceneError::NoPhotograph { name, .. }) if name == "target_1"));
-    assert!(matches!(scene.photograph(3), Err(SceneError::NoSuchView { view: 3, view_count: 3, .. })));
+    let fault = |view| scene.photograph(view).expect_err("no picture").fault;
+    assert!(matches!(fault(2), SceneFault::NoPhotograph(name) if name == "target_1"));
+    assert!(matches!(fault(3), SceneFault::NoSuchView(3, 3)));
     folder.image("rgb/2.png", 12, 16);
-    assert!(matches!(scene.photograph(0), Err(SceneError::SizeMismatch { width: 12, height: 16, .. })));
+    assert!(matches!(fault(0), SceneFault::Image(ImageFault::SizeMismatch { size: [12, 16], .. })));
 }
 
 #[test]

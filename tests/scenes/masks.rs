@@ -262,7 +262,7 @@ fn layouts_without_ignore_masks_hold_them_as_transparency_or_not_at_all() {
     let out = Folder::new();
     let written = write(&scene, Layout::Srn, &out.path().join("srn"), &Silent).expect("written");
     assert!(
-        written.left_out.contains(&"the ignore masks of 11 photographs: what does not count is transparent".to_owned())
+        written.lost.contains(&"the ignore masks of 11 photographs: what does not count is transparent".to_owned())
     );
     let read = Scene::open(out.path().join("srn")).expect("a scene");
     let photograph = read.photograph(5).expect("a photograph");

@@ -100,7 +100,7 @@ fn every_layout_that_can_hold_a_scene_gives_it_back() {
         assert_eq!(written.photograph_count, 2);
         let kept = read.views[1].near_far == Some([0.5, 9.5]);
         assert_eq!(kept, layout == Layout::Llff);
-        assert_eq!(written.left_out.iter().any(|line| line.contains("near and far depths of 2 views")), !kept);
+        assert_eq!(written.lost.iter().any(|line| line.contains("near and far depths of 2 views")), !kept);
     }
 }
 
@@ -111,13 +111,13 @@ fn points_and_poses_without_photographs() {
     for layout in [Layout::Colmap, Layout::ColmapBinary] {
         let (folder, read, written) = self::written(&scene, layout);
         assert_same(layout, &scene, &read);
-        assert_eq!((&read.points, written.left_out), (&scene.points, vec![]));
+        assert_eq!((&read.points, written.lost), (&scene.points, vec![]));
         let is_binary = folder.path().join("out/sparse/0/cameras.bin").exists();
         assert_eq!(is_binary, layout == Layout::ColmapBinary);
     }
     let (_folder, read, written) = self::written(&scene, Layout::Transforms);
     assert_same(Layout::Transforms, &scene, &read);
-    assert_eq!((read.points.len(), written.left_out), (0, vec!["2 reconstructed points".to_owned()]));
+    assert_eq!((read.points.len(), written.lost), (0, vec!["2 reconstructed points".to_owned()]));
 
     let folder = scenes::srn();
     let scene = open(&folder);
@@ -159,7 +159,7 @@ fn lenses_and_masks() {
             assert_same(layout, &scene, &read);
             assert_eq!(read.views[0].lens, scene.views[0].lens);
             let split = (layout == Layout::Transforms).then_some(Split::Train);
-            assert_eq!((read.views[0].split, written.left_out.is_empty()), (split, split.is_some()));
+            assert_eq!((read.views[0].split, written.lost.is_empty()), (split, split.is_some()));
         }
         // Others hold the pinhole's picture.
         let (_folder, read, written) = written(&scene, Layout::Srn);
@@ -171,7 +171,7 @@ fn lenses_and_masks() {
         let after = read.photograph(0).expect("the other");
         assert!(before.pixels == after.pixels && after.has_alpha && read.views[0].lens.is_none());
         assert_eq!(read.views[0].mask, Some(folder.path().join("out/mask/1.png")));
-        assert!(written.left_out.iter().any(|line| line.contains("the lens of 1 photographs")));
+        assert!(written.lost.iter().any(|line| line.contains("the lens of 1 photographs")));
     }
 }
 
@@ -185,19 +185,19 @@ fn a_lens_that_a_layout_has_not_is_undone() {
     assert_eq!(fourth, 0.01);
     let (_folder, read, given) = written(&scene, Layout::Transforms);
     assert_same(Layout::Transforms, &scene, &read);
-    assert_eq!((read.views[0].lens, given.left_out.is_empty()), (scene.views[0].lens, true));
+    assert_eq!((read.views[0].lens, given.lost.is_empty()), (scene.views[0].lens, true));
     for layout in [Layout::Colmap, Layout::ColmapBinary] {
         let (_folder, read, given) = written(&scene, layout);
         let (before, after) = (scene.photograph(0).expect("one"), read.photograph(0).expect("the other"));
         assert!(before.pixels == after.pixels && read.views[0].lens.is_none() && read.views[0].mask.is_some());
-        assert!(given.left_out.iter().any(|line| line.contains("the lens of 1 photographs")), "{:?}", given.left_out);
+        assert!(given.lost.iter().any(|line| line.contains("the lens of 1 photographs")), "{:?}", given.lost);
     }
     // No layout has both OpenCV's denominator and the polynomial's fourth coefficient.
     let mut both = scene.clone();
     let coefficients = [-0.1, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.0, 0.01];
     both.views[0].lens = Lens::new(Projection::Perspective, coefficients).ok();
     let (_folder, read, given) = written(&both, Layout::Transforms);
-    assert_eq!((read.views[0].lens, given.left_out.len()), (None, 1));
+    assert_eq!((read.views[0].lens, given.lost.len()), (None, 1));
 }
 
 #[test]

@@ -16,7 +16,7 @@ use viewfuse_field::held_out::nearest;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, open_album};
 use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_job::progress::{Part, Progress};
-use viewfuse_scene::few_shot::{Selection, SelectionError, target_of, view_list};
+use viewfuse_scene::few_shot::{Selection, SelectionError, SelectionFault, target_of, view_list};
 use viewfuse_scene::photographs::{Album, GroundTruth, PhotographsError, SourceImages};
 use viewfuse_scene::{MaskMeaning, Scene};
 use viewfuse_weighting::OpenedChoice;
@@ -319,13 +319,13 @@ fn source_groups(scene: &Scene, selection: &Selection, least_sources: usize) -> 
         let sources = selection.sources_without(scene, &excluded, least_sources)?;
         let targets = requested.unwrap_or_else(|| photographed().filter(|view| !sources.contains(view)).collect());
         if targets.is_empty() {
-            return Err(SelectionError::NoTargets { scene: scene.path.display().to_string() }.into());
+            return Err(SelectionFault::NoTargets.in_scene(scene).into());
         }
         return Ok(vec![(sources, targets)]);
     }
     let targets = requested.unwrap_or_else(|| photographed().collect());
     if targets.is_empty() {
-        return Err(SelectionError::NoTargets { scene: scene.path.display().to_string() }.into());
+        return Err(SelectionFault::NoTargets.in_scene(scene).into());
     }
     targets
         .into_iter()

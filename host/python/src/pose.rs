@@ -141,7 +141,7 @@ impl Order {
             let text = format!("{output}: the scene {scene} is read from this folder; give another folder");
             return Err(Failure::Input(text));
         }
-        for (name, reason) in found.left_out(Some(verdict)) {
+        for (name, reason) in found.excluded(Some(verdict)) {
             progress.warn(&format!("{name}: {reason}"));
         }
         let picture = camera_map(&verdict.scene, &inspect(&verdict.scene, BackgroundChoice::None, progress)?);

@@ -9,7 +9,7 @@ use pyo3::types::PyDict;
 use std::path::PathBuf;
 use viewfuse::core::camera::Camera;
 use viewfuse::core::pose::{Pose, PoseError};
-use viewfuse::scene::few_shot::{FewShot, PathChoice, Selection, SelectionError, Target};
+use viewfuse::scene::few_shot::{FewShot, PathChoice, Selection, SelectionFault, Target};
 use viewfuse::scene::photographs::BackgroundChoice;
 use viewfuse::scene::{Scene, SceneFrame};
 
@@ -78,7 +78,7 @@ impl Request {
             let pose =
                 world_pose(matrix, &scene.frame).map_err(|error| Failure::Input(format!("poses[{index}]: {error}")))?;
             if job.targets.iter().any(|target| target.name == name) {
-                return Err(SelectionError::SameName { scene: scene.path.display().to_string(), name }.into());
+                return Err(SelectionFault::SameName(name).in_scene(scene).into());
             }
             job.targets.push(Target { name, camera: Camera { pose, pinhole }, truth: None });
         }

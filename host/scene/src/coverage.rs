@@ -66,8 +66,8 @@ impl Coverage {
     pub fn warning<'a>(&self, pictures: impl IntoIterator<Item = (&'a str, &'a Camera)>) -> Option<String> {
         let shares: Vec<(&str, f32)> = pictures.into_iter().map(|(name, camera)| (name, self.seen(camera))).collect();
         let leaves = |(_, seen): &(&str, f32)| *seen < MIN_SEEN;
-        let count = shares.iter().filter(|own| leaves(own)).count();
-        let (worst, least) = shares.iter().min_by(|a, b| a.1.total_cmp(&b.1)).filter(|own| leaves(own))?;
+        let count = shares.iter().filter(|share| leaves(share)).count();
+        let (worst, least) = shares.iter().min_by(|a, b| a.1.total_cmp(&b.1)).filter(|share| leaves(share))?;
         let mut ranges: Vec<String> = Vec::new();
         for run in shares.chunk_by(|a, b| leaves(a) == leaves(b)).filter(|run| run.iter().all(leaves)) {
             ranges.push(match run {
@@ -107,10 +107,10 @@ impl Coverage {
     /// Whether a photograph shows the point from nearly the side of `centre`.
     fn was_seen(&self, point: Vec3, centre: Vec3) -> bool {
         let least = REACH_DEGREES.to_radians().cos();
-        let Some(own) = (centre - point).try_normalize() else { return false };
+        let Some(direction) = (centre - point).try_normalize() else { return false };
         self.sources.iter().any(|source| {
             let towards = (source.centre_world() - point).normalize_or_zero();
-            towards.dot(own) >= least && source.project(point).in_image
+            towards.dot(direction) >= least && source.project(point).in_image
         })
     }
 }

@@ -31,41 +31,20 @@ pub struct Dataset {
 /// Why a data set was not found.
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
-    /// No data set was found at the path.
+    /// No data set of a split was found at the path, which would abbreviate the folder.
     #[error(
-        "{}: no data set: looked for a folder {}, for one folder *_{split} inside, and for folders with intrinsics.txt inside",
-        path.display(), beside.display()
+        "{0}: no data set: looked for a folder {2}, for one folder *_{1} inside, and for folders with intrinsics.txt inside"
     )]
-    NotFound {
-        /// The requested path.
-        path: PathBuf,
-        /// The requested split.
-        split: Split,
-        /// The folder that the path would abbreviate.
-        beside: PathBuf,
-    },
-    /// There is more than one data set.
-    #[error("{}: holds several data sets ({}); name one of them", path.display(), names.join(", "))]
-    Several {
-        /// The requested path.
-        path: PathBuf,
-        /// The folders found.
-        names: Vec<String>,
-    },
+    NotFound(PathBuf, Split, PathBuf),
+    /// There is more than one data set: the folders found.
+    #[error("{}: holds several data sets ({}); name one of them", .0.display(), .1.join(", "))]
+    Several(PathBuf, Vec<String>),
     /// The folder of the split exists, but holds no scene.
-    #[error("{}: no scenes: looked for folders with intrinsics.txt inside", path.display())]
-    NoScenes {
-        /// The folder of the split.
-        path: PathBuf,
-    },
-    /// The file system reported an error.
-    #[error("{}: cannot be read", path.display())]
-    Io {
-        /// The folder.
-        path: PathBuf,
-        /// The cause.
-        source: io::Error,
-    },
+    #[error("{}: no scenes: looked for folders with intrinsics.txt inside", .0.display())]
+    NoScenes(PathBuf),
+    /// The file system reported an error for a folder.
+    #[error("{}: cannot be read", .0.display())]
+    Io(PathBuf, #[source] io::Error),
 }
 
 impl Dataset {
@@ -82,7 +61,7 @@ impl Dataset {
         if beside.is_dir() {
             return Ok(Dataset { name: name_of(path), scenes: scenes_of_split(&beside, &ending)? });
         }
-        let not_found = || DatasetError::NotFound { path: path.to_owned(), split, beside: beside.clone() };
+        let not_found = || DatasetError::NotFound(path.to_owned(), split, beside.clone());
         if !path.is_dir() {
             return Err(not_found());
         }
@@ -98,7 +77,7 @@ impl Dataset {
             }
             _ => {
                 let names = of_split.iter().map(|folder| name_of(folder)).collect();
-                return Err(DatasetError::Several { path: path.to_owned(), names });
+                return Err(DatasetError::Several(path.to_owned(), names));
             }
         }
         let scenes: Vec<PathBuf> = inside.into_iter().filter(|folder| is_scene(folder)).collect();
@@ -116,7 +95,7 @@ fn scenes_of_split(folder: &Path, ending: &str) -> Result<Vec<PathBuf>, DatasetE
     let extra = others.into_iter().find(|folder| name_of(folder).ends_with(ending));
     let deeper = extra.map_or(Ok(Vec::new()), |extra| folders(&extra))?;
     let scenes: Vec<PathBuf> = deeper.into_iter().filter(|folder| is_scene(folder)).collect();
-    if scenes.is_empty() { Err(DatasetError::NoScenes { path: folder.to_owned() }) } else { Ok(scenes) }
+    if scenes.is_empty() { Err(DatasetError::NoScenes(folder.to_owned())) } else { Ok(scenes) }
 }
 
 fn is_scene(folder: &Path) -> bool {
@@ -125,7 +104,7 @@ fn is_scene(folder: &Path) -> bool {
 
 /// The folders in a folder, sorted by name, without hidden ones, which may be unfinished.
 fn folders(folder: &Path) -> Result<Vec<PathBuf>, DatasetError> {
-    let failed = |source| DatasetError::Io { path: folder.to_owned(), source };
+    let failed = |cause| DatasetError::Io(folder.to_owned(), cause);
     let mut all = Vec::new();
     for entry in fs::read_dir(folder).map_err(failed)? {
         let path = entry.map_err(failed)?.path();

@@ -22,11 +22,26 @@ use viewfuse_job::text::nearest;
 /// Why a selection of views is invalid.
 #[derive(Debug, thiserror::Error)]
 pub enum SelectionError {
+    /// In an item of a list, a step is not a positive whole number.
+    #[error("view list '{0}': the step behind '/' must be a whole number of at least 1")]
+    BadStep(String),
+    /// In an item of a list, a range ends before it starts, or has no start or end.
+    #[error("view list '{0}': a range is FIRST..LAST, both ends included and FIRST not after LAST")]
+    BadRange(String),
+    /// A camera path could not be read.
+    #[error(transparent)]
+    Path(#[from] SceneError),
+    /// It does not fit the scene of this path.
+    #[error("{0}: {1}")]
+    Scene(String, SelectionFault),
+}
+
+/// Why a selection of views does not fit a scene.
+#[derive(Debug, thiserror::Error)]
+pub enum SelectionFault {
     /// A name in a list is no view of the scene.
-    #[error("{scene}: has no view '{name}'{nearest}; its {views}")]
+    #[error("has no view '{name}'{nearest}; its {views}")]
     NoSuchView {
-        /// The scene's path.
-        scene: String,
         /// The given name.
         name: String,
         /// The names that it may have meant, in words.
@@ -34,138 +49,71 @@ pub enum SelectionError {
         /// The scene's views, in words.
         views: String,
     },
-    /// A number in a list is the number that one view's name ends in and another's index, or ends several names.
-    #[error("{scene}: '{text}' may be the view {views}: write the name, or the index as {index}")]
-    AmbiguousView {
-        /// The scene's path.
-        scene: String,
-        /// The given number.
-        text: String,
-        /// The names of the views.
-        views: String,
-        /// The first one's index, as it is written.
-        index: String,
-    },
-    /// A step is not a positive whole number.
-    #[error("view list '{item}': the step behind '/' must be a whole number of at least 1")]
-    BadStep {
-        /// The item of the list.
-        item: String,
-    },
-    /// A range ends before it starts, or has no start or end.
-    #[error("view list '{item}': a range is FIRST..LAST, both ends included and FIRST not after LAST")]
-    BadRange {
-        /// The item of the list.
-        item: String,
-    },
+    /// A number in a list is the number that one view's name ends in and another's index, or ends several names: the
+    /// names of the views, and the first one's index.
+    #[error("'{0}' may be the view {1}: write the name, or the index as '#{2}'")]
+    AmbiguousView(String, String, usize),
     /// A source view has no photograph.
-    #[error("{scene}: view '{name}' has no photograph and cannot be a source")]
-    NoPhotograph {
-        /// The scene's path.
-        scene: String,
-        /// The view.
-        name: String,
-    },
+    #[error("view '{0}' has no photograph and cannot be a source")]
+    NoPhotograph(String),
     /// A view is a target and a source at once.
-    #[error("{scene}: view '{name}' is a target and a source at once")]
-    TargetIsSource {
-        /// The scene's path.
-        scene: String,
-        /// The view.
-        name: String,
-    },
-    /// There are not enough sources.
-    #[error("{scene}: too few source views: {count}, at least {least} are needed (a target is never a source)")]
-    TooFewSources {
-        /// The scene's path.
-        scene: String,
-        /// How many there are.
-        count: usize,
-        /// How many are needed.
-        least: usize,
-    },
-    /// There are more sources than the program supports.
-    #[error("{scene}: {count} source views; at most {MAX_SOURCES} fit")]
-    TooManySources {
-        /// The scene's path.
-        scene: String,
-        /// How many there are.
-        count: usize,
-    },
+    #[error("view '{0}' is a target and a source at once")]
+    TargetIsSource(String),
+    /// There are so many sources, fewer than are needed.
+    #[error("too few source views: {0}, at least {1} are needed (a target is never a source)")]
+    TooFewSources(usize, usize),
+    /// There are so many sources, more than the program supports.
+    #[error("{0} source views; at most {MAX_SOURCES} fit")]
+    TooManySources(usize),
     /// No target was requested and the scene has no target poses.
-    #[error("{scene}: no targets were chosen, and the scene has no poses without photographs")]
-    NoTargets {
-        /// The scene's path.
-        scene: String,
-    },
-    /// The cameras do not span an orbit.
-    #[error("{scene}: its cameras span no circle: they stand at, or straight above, what they look at")]
-    NoOrbit {
-        /// The scene's path.
-        scene: String,
-        /// What was wrong with an orbit camera.
-        error: PoseError,
-    },
-    /// The way between two views is no path of cameras.
-    #[error("{scene}: there is no way between '{first}' and '{last}': {error}")]
-    NoWay {
-        /// The scene's path.
-        scene: String,
-        /// Name of a view.
-        first: String,
-        /// Name of another.
-        last: String,
-        /// What was wrong with a camera between them.
-        error: PoseError,
-    },
+    #[error("no targets were chosen, and the scene has no poses without photographs")]
+    NoTargets,
+    /// The cameras do not span an orbit: what was wrong with a camera of it.
+    #[error("its cameras span no circle: they stand at, or straight above, what they look at")]
+    NoOrbit(PoseError),
+    /// The way between two views is no path of cameras: what was wrong with a camera between them.
+    #[error("there is no way between '{0}' and '{1}': {2}")]
+    NoWay(String, String, PoseError),
     /// The cameras do not look the same way, or are all in one place.
-    #[error("{scene}: its cameras span no spiral, which is for cameras side by side that look the same way")]
-    NoSpiral {
-        /// The scene's path.
-        scene: String,
-    },
-    /// A camera path could not be read.
-    #[error(transparent)]
-    Path(#[from] SceneError),
+    #[error("its cameras span no spiral, which is for cameras side by side that look the same way")]
+    NoSpiral,
     /// Files of two targets would be one file on some systems.
     #[error(
-        "{scene}: targets '{first}' and '{second}' would have the same files where file names ignore case or the forms of \
+        "targets '{0}' and '{1}' would have the same files where file names ignore case or the forms of \
          accented letters; render them one after the other"
     )]
-    AlikeNames {
-        /// The scene's path.
-        scene: String,
-        /// The name of one.
-        first: String,
-        /// The name of the other.
-        second: String,
-    },
+    AlikeNames(String, String),
     /// A camera of a path has the name of a chosen target.
-    #[error("{scene}: two targets are called '{name}'")]
-    SameName {
-        /// The scene's path.
-        scene: String,
-        /// The name.
-        name: String,
-    },
+    #[error("two targets are called '{0}'")]
+    SameName(String),
+}
+
+impl SelectionFault {
+    /// The error of a selection from this scene.
+    pub fn in_scene(self, scene: &Scene) -> SelectionError {
+        SelectionError::Scene(scene.path.display().to_string(), self)
+    }
 }
 
 impl Hinted for SelectionError {
     fn hint(&self) -> Option<Hint> {
         match self {
-            SelectionError::BadStep { .. } | SelectionError::BadRange { .. } => Some(Hint::ViewList),
-            SelectionError::TargetIsSource { .. } => Some(Hint::SourceOrTarget),
-            SelectionError::TooManySources { .. } => Some(Hint::FewerSources),
-            SelectionError::NoTargets { .. } => Some(Hint::Targets),
-            SelectionError::NoOrbit { .. } => Some(Hint::NoOrbit),
-            SelectionError::NoSpiral { .. } => Some(Hint::NoSpiral),
-            _ => None,
+            SelectionError::BadStep(_) | SelectionError::BadRange(_) => Some(Hint::ViewList),
+            SelectionError::Path(_) => None,
+            SelectionError::Scene(_, fault) => match fault {
+                SelectionFault::TargetIsSource(_) => Some(Hint::SourceOrTarget),
+                SelectionFault::TooManySources(_) => Some(Hint::FewerSources),
+                SelectionFault::NoTargets => Some(Hint::Targets),
+                SelectionFault::NoOrbit(_) => Some(Hint::NoOrbit),
+                SelectionFault::NoSpiral => Some(Hint::NoSpiral),
+                _ => None,
+            },
         }
     }
 }
 
 /// Names that an error suggests at most.
-const NEAREST: usize = 3;
+const MAX_NEAREST: usize = 3;
 
 /// A camera to render, with its truth if the scene has it.
 #[derive(Clone, Debug, PartialEq)]
@@ -242,11 +190,11 @@ impl Selection {
         if let Some(choice) = &self.path {
             let path = along(choice, scene, &sources)?;
             frames_per_second = path.frames_per_second;
-            let target = |own: NamedCamera| Target { name: own.name, camera: own.camera, truth: None };
+            let target = |NamedCamera { name, camera }| Target { name, camera, truth: None };
             targets.extend(path.cameras.into_iter().map(target));
         }
         if targets.is_empty() {
-            return Err(SelectionError::NoTargets { scene: scene.path.display().to_string() });
+            return Err(SelectionFault::NoTargets.in_scene(scene));
         }
         targets::check_names(scene, &targets)?;
         Ok(FewShot { sources, targets, frames_per_second })
@@ -262,17 +210,15 @@ impl Selection {
         targets: &[usize],
         least_sources: usize,
     ) -> Result<Vec<usize>, SelectionError> {
-        let scene_name = || scene.path.display().to_string();
+        let name = |view: &usize| scene.views[*view].name.clone();
         let mut sources = match &self.sources {
             Some(list) => {
                 let sources = view_list(scene, list)?;
-                if let Some(&view) = sources.iter().find(|view| targets.contains(view)) {
-                    let name = scene.views[view].name.clone();
-                    return Err(SelectionError::TargetIsSource { scene: scene_name(), name });
+                if let Some(view) = sources.iter().find(|view| targets.contains(view)) {
+                    return Err(SelectionFault::TargetIsSource(name(view)).in_scene(scene));
                 }
-                if let Some(&view) = sources.iter().find(|&&view| scene.views[view].image.is_none()) {
-                    let name = scene.views[view].name.clone();
-                    return Err(SelectionError::NoPhotograph { scene: scene_name(), name });
+                if let Some(view) = sources.iter().find(|&&view| scene.views[view].image.is_none()) {
+                    return Err(SelectionFault::NoPhotograph(name(view)).in_scene(scene));
                 }
                 sources
             }
@@ -285,16 +231,7 @@ impl Selection {
             sources = spread(&centres, count).into_iter().map(|at| sources[at]).collect();
             sources.sort_unstable();
         }
-        if sources.len() < least_sources {
-            return Err(SelectionError::TooFewSources {
-                scene: scene_name(),
-                count: sources.len(),
-                least: least_sources,
-            });
-        }
-        if sources.len() > MAX_SOURCES {
-            return Err(SelectionError::TooManySources { scene: scene_name(), count: sources.len() });
-        }
+        check_count(scene, sources.len(), least_sources)?;
         Ok(sources)
     }
 }
@@ -303,6 +240,18 @@ impl FewShot {
     /// The cameras of the sources.
     pub fn source_cameras(&self, scene: &Scene) -> Vec<Camera> {
         self.sources.iter().map(|&view| scene.views[view].camera).collect()
+    }
+}
+
+/// Checks a number of sources.
+///
+/// # Errors
+/// [`SelectionFault::TooFewSources`] or [`SelectionFault::TooManySources`].
+pub fn check_count(scene: &Scene, count: usize, least: usize) -> Result<(), SelectionError> {
+    match count {
+        _ if count < least => Err(SelectionFault::TooFewSources(count, least).in_scene(scene)),
+        _ if count > MAX_SOURCES => Err(SelectionFault::TooManySources(count).in_scene(scene)),
+        _ => Ok(()),
     }
 }
 
@@ -318,33 +267,24 @@ fn view_of(scene: &Scene, name: &str) -> Result<usize, SelectionError> {
     if let [view] = meant[..] {
         return Ok(view);
     }
-    let (path, text) = (scene.path.display().to_string(), name.to_owned());
     if let [first, ..] = meant[..] {
         let views: Vec<String> =
             meant.iter().map(|&view| format!("'{}' (index {view})", scene.views[view].name)).collect();
-        return Err(SelectionError::AmbiguousView {
-            scene: path,
-            text,
-            views: views.join(" or "),
-            index: format!("'#{first}'"),
-        });
+        return Err(SelectionFault::AmbiguousView(name.to_owned(), views.join(" or "), first).in_scene(scene));
     }
     let names = || scene.views.iter().map(|view| view.name.as_str());
-    let near: Vec<String> = nearest(name, names(), NEAREST).iter().map(|near| format!("'{near}'")).collect();
+    let near: Vec<String> = nearest(name, names(), MAX_NEAREST).iter().map(|near| format!("'{near}'")).collect();
+    let nearest = if near.is_empty() { String::new() } else { format!(", the nearest names are {}", near.join(", ")) };
     let (first, last) = (names().next().unwrap_or_default(), names().next_back().unwrap_or_default());
     let count = scene.views.len();
-    Err(SelectionError::NoSuchView {
-        scene: path,
-        name: text,
-        nearest: if near.is_empty() { String::new() } else { format!(", the nearest names are {}", near.join(", ")) },
-        views: format!("{count} views are {first} .. {last}, or by index #0 .. #{}", count.saturating_sub(1)),
-    })
+    let views = format!("{count} views are {first} .. {last}, or by index #0 .. #{}", count.saturating_sub(1));
+    Err(SelectionFault::NoSuchView { name: name.to_owned(), nearest, views }.in_scene(scene))
 }
 
 /// The views that a list names, in the order of the scene, each once.
 ///
 /// # Errors
-/// [`SelectionError::NoSuchView`], [`SelectionError::BadStep`] or [`SelectionError::BadRange`].
+/// [`SelectionFault::NoSuchView`], [`SelectionError::BadStep`] or [`SelectionError::BadRange`].
 pub fn view_list(scene: &Scene, list: &str) -> Result<Vec<usize>, SelectionError> {
     let find = |name: &str| view_of(scene, name);
     let mut chosen = Vec::new();
@@ -358,7 +298,7 @@ pub fn view_list(scene: &Scene, list: &str) -> Result<Vec<usize>, SelectionError
             Some((range, step)) => {
                 let step: usize = step.parse().unwrap_or(0);
                 if step == 0 {
-                    return Err(SelectionError::BadStep { item: item.to_owned() });
+                    return Err(SelectionError::BadStep(item.to_owned()));
                 }
                 (range, step)
             }
@@ -369,7 +309,7 @@ pub fn view_list(scene: &Scene, list: &str) -> Result<Vec<usize>, SelectionError
         } else if let Some(part) = part_named(scene, range) {
             chosen.extend(part.into_iter().step_by(step));
         } else if let Some((first, last)) = range.split_once("..") {
-            let bad_range = || SelectionError::BadRange { item: item.to_owned() };
+            let bad_range = || SelectionError::BadRange(item.to_owned());
             if first.is_empty() || last.is_empty() {
                 return Err(bad_range());
             }
@@ -397,7 +337,6 @@ fn part_named(scene: &Scene, text: &str) -> Option<Vec<usize>> {
 
 /// The cameras of a path for these sources.
 fn along(choice: &PathChoice, scene: &Scene, sources: &[usize]) -> Result<CameraPath, SelectionError> {
-    let scene_name = || scene.path.display().to_string();
     let cameras: Vec<Camera> = sources.iter().map(|&view| scene.views[view].camera).collect();
     let pinhole = cameras[0].pinhole;
     let (what, cameras) = match choice {
@@ -406,24 +345,19 @@ fn along(choice: &PathChoice, scene: &Scene, sources: &[usize]) -> Result<Camera
             let is_full = matches!(choice, PathChoice::FullOrbit(_));
             let arc = if is_full { Arc::full(&cameras) } else { Arc::covered(&cameras) };
             let orbit = generated::orbit(&cameras, &arc, pinhole, *count);
-            ("orbit", orbit.map_err(|error| SelectionError::NoOrbit { scene: scene_name(), error })?)
+            ("orbit", orbit.map_err(|error| SelectionFault::NoOrbit(error).in_scene(scene))?)
         }
         PathChoice::Between { first, last, count } => {
             let [first, last] = [view_of(scene, first)?, view_of(scene, last)?].map(|view| &scene.views[view]);
             let up = Rig::of(&cameras).up;
             let between = generated::between(&first.camera, &last.camera, up, *count);
-            let failed = |error| SelectionError::NoWay {
-                scene: scene_name(),
-                first: first.name.clone(),
-                last: last.name.clone(),
-                error,
-            };
+            let failed = |error| SelectionFault::NoWay(first.name.clone(), last.name.clone(), error).in_scene(scene);
             ("between", between.map_err(failed)?)
         }
         PathChoice::Spiral(count) => {
             let bounds: Vec<[f32; 2]> = sources.iter().filter_map(|&view| scene.views[view].near_far).collect();
             let spiral = generated::spiral(&cameras, pinhole, &bounds, *count);
-            ("spiral", spiral.ok_or_else(|| SelectionError::NoSpiral { scene: scene_name() })?)
+            ("spiral", spiral.ok_or_else(|| SelectionFault::NoSpiral.in_scene(scene))?)
         }
     };
     let named = |(index, camera)| NamedCamera { name: numbered(what, index), camera };

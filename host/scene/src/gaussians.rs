@@ -32,10 +32,8 @@ use std::path::Path;
 
 use viewfuse_core::Vec3;
 use viewfuse_core::gaussian::{GaussianBlock, REST_COUNTS, colour_along};
-use viewfuse_job::files::WriteError;
 
-use crate::scene::FaultLocation;
-use crate::{SceneError, SceneFrame};
+use crate::{FilePlace, SceneError, SceneFault, SceneFrame};
 
 pub use file::GaussianFile;
 
@@ -87,25 +85,6 @@ impl GaussianScene {
         Ok(GaussianFile::read(path, frame)?.scene)
     }
 
-    /// Writes a file in the coordinates of the scene's files, completely or not at all: a `.splat` or a `.spz` if it is
-    /// called so, otherwise a PLY file as the strictest readers want it, of `float`, with normals (0) and all
-    /// coefficients of degree 3. Where the scene was moved when it was opened, `float` would not hold the coordinates:
-    /// they are about the origin that a comment states, and are read back with it.
-    ///
-    /// # Errors
-    /// [`WriteError`]; also where a `.splat` or a `.spz` cannot hold the coordinates.
-    pub fn write(&self, path: &Path, frame: &SceneFrame) -> Result<(), WriteError> {
-        write::write(self, path, frame)
-    }
-
-    /// Whether a file of this name can hold the coordinates of a scene's files: before there are Gaussians to write.
-    ///
-    /// # Errors
-    /// [`WriteError`] for a `.splat` or a `.spz` where the scene was moved when it was opened.
-    pub fn check_place(path: &Path, frame: &SceneFrame) -> Result<(), WriteError> {
-        write::check_place(path, frame)
-    }
-
     /// The Gaussians as a kernel reads them, with their colours from a camera at `centre_world`.
     pub fn blocks(&self, centre_world: Vec3) -> Vec<GaussianBlock> {
         let rest_count = 3 * REST_COUNTS[self.degree.min(MAX_DEGREE) as usize] as usize;
@@ -128,5 +107,5 @@ impl GaussianScene {
 
 /// The error of a file that is none of Gaussians, or none that is read.
 fn refused(path: &Path, problem: &str) -> SceneError {
-    SceneError::Gaussians { path: path.to_path_buf(), place: FaultLocation::File, problem: problem.to_owned() }
+    FilePlace::file(path).fault(SceneFault::Gaussians(problem.to_owned()))
 }

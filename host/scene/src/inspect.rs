@@ -156,7 +156,7 @@ fn elevations(rig: &Rig, cameras: &[Camera]) -> [f32; 2] {
     };
     let mut all = cameras.iter().map(above);
     let first = all.next().unwrap_or_default();
-    all.fold([first; 2], |[least, most], own| [least.min(own), most.max(own)])
+    all.fold([first; 2], |[least, most], angle| [least.min(angle), most.max(angle)])
 }
 
 /// Warnings about the cameras.

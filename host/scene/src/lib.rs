@@ -39,9 +39,9 @@ pub mod unit;
 pub mod write;
 
 pub use scene::{
-    FaultLocation, FileFault, IntrinsicsFault, MAX_SIDE, MaskChoice, MaskMeaning, NumpyFault, Photograph, PlyFault,
-    READERS, Scene, SceneError, SceneFrame, ScenePoint, Split, UnknownMasks, View, encode_png, looked_for,
-    picture_size, read_picture, reader,
+    FaultLocation, FileFault, FilePlace, ImageFault, IntrinsicsFault, MAX_SIDE, MaskChoice, MaskMeaning, NumpyFault,
+    Photograph, PlyFault, READERS, Scene, SceneError, SceneFault, SceneFrame, ScenePoint, Split, UnknownMasks, View,
+    encode_png, looked_for, picture_size, read_picture, reader,
 };
 
 /// The examples of the README, compiled and run.

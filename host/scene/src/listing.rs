@@ -42,15 +42,15 @@ pub fn list_views(scene: &Scene) -> Vec<ListedView> {
     let focus = Rig::of(&cameras).focus;
     let centres: Vec<Vec3> = cameras.iter().map(|camera| camera.pose.centre_world()).collect();
     let directions: Vec<Vec3> = centres.iter().map(|centre| (*centre - focus).normalize_or_zero()).collect();
-    let neighbours = |own: usize| -> Vec<Neighbour> {
+    let neighbours = |view: usize| -> Vec<Neighbour> {
         let to = |other: usize| {
             // Of nearly equal directions the cosine has lost the angle, the sine has not.
             let (sine, cosine) =
-                (directions[own].cross(directions[other]).length(), directions[own].dot(directions[other]));
-            let distance = centres[own].distance(centres[other]);
+                (directions[view].cross(directions[other]).length(), directions[view].dot(directions[other]));
+            let distance = centres[view].distance(centres[other]);
             Neighbour { index: other, degrees: sine.atan2(cosine).to_degrees(), distance }
         };
-        let mut others: Vec<Neighbour> = (0..cameras.len()).filter(|other| *other != own).map(to).collect();
+        let mut others: Vec<Neighbour> = (0..cameras.len()).filter(|other| *other != view).map(to).collect();
         let order =
             |a: &Neighbour, b: &Neighbour| a.degrees.total_cmp(&b.degrees).then(a.distance.total_cmp(&b.distance));
         others.sort_by(order);

@@ -5,12 +5,11 @@
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
-use serde_json::Value;
 
 use crate::Scene;
-use crate::scene::SceneError;
 use crate::scene::files::read_text;
 use crate::scene::json::{self, Object};
+use crate::scene::{FilePlace, SceneError, SceneFault};
 
 /// What nerfstudio's data parser did to the scene.
 pub(crate) const PARSER: &str = "dataparser_transforms.json";
@@ -33,28 +32,23 @@ impl ParserWorld {
         let value = json::parse(&file, &read_text(&file)?)?;
         let top = Object::new(&file, "", &value)?;
         let (rotation, offset) = affine(&top.rows::<3>("transform")?);
-        let missing = || SceneError::MissingKey { path: file.clone(), key: "scale".to_owned() };
-        let scale = top.number("scale")?.ok_or_else(missing)?;
+        let scale = top.required_number("scale")?;
         let (applied_rotation, applied_offset, applied_scale) = applied(scene)?;
         // The parser's transform begins at the coordinates before the scene's own transform was applied.
         let rotation = rotation * applied_rotation.inverse();
         let world = ParserWorld { rotation, offset: offset - rotation * applied_offset, scale: scale / applied_scale };
         let is_usable =
             (world.rotation.determinant() - 1.0).abs() < 1.0e-3 && world.scale > 0.0 && world.scale.is_finite();
-        if is_usable { Ok(Some(world)) } else { Err(SceneError::NoSimilarity { path: file }) }
+        if is_usable { Ok(Some(world)) } else { Err(FilePlace::file(file).fault(SceneFault::NoSimilarity)) }
     }
 
     /// A camera-to-world matrix of the parser's world in the coordinates of the scene's files.
-    pub(crate) fn undo(&self, matrix: &mut [f64; 16]) {
+    pub(crate) fn undo(&self, matrix: &[[f64; 4]; 4]) -> [[f64; 4]; 4] {
         let inverse = self.file_from_parser();
-        let column = |at: usize| DVec3::new(matrix[at], matrix[4 + at], matrix[8 + at]);
-        let axes = [0, 1, 2].map(|at| inverse * column(at));
-        let centre = self.point(column(3));
-        for (at, values) in axes.into_iter().chain([centre]).enumerate() {
-            for (row, value) in values.to_array().into_iter().enumerate() {
-                matrix[4 * row + at] = value;
-            }
-        }
+        let column = |at: usize| DVec3::new(matrix[0][at], matrix[1][at], matrix[2][at]);
+        let columns = [inverse * column(0), inverse * column(1), inverse * column(2), self.point(column(3))];
+        let row = |row: usize| columns.map(|column| column[row]);
+        [row(0), row(1), row(2), matrix[3]]
     }
 
     /// A point of the parser's world in the coordinates of the scene's files.
@@ -86,7 +80,7 @@ fn applied(scene: &Scene) -> Result<(DMat3, DVec3, f64), SceneError> {
     if scene.layout != "transforms" || !file.is_file() {
         return Ok(none);
     }
-    let value: Value = json::parse(&file, &read_text(&file)?)?;
+    let value = json::parse(&file, &read_text(&file)?)?;
     let top = Object::new(&file, "", &value)?;
     let (rotation, offset) = match top.get("applied_transform") {
         Some(_) => affine(&top.rows::<3>("applied_transform")?),

@@ -28,7 +28,7 @@ use crate::scene::check::{camera_in, is_name};
 use crate::scene::files::{has_extension, read_text};
 use crate::scene::json::{self, Object};
 use crate::scene::reader::RawView;
-use crate::scene::{SceneError, files};
+use crate::scene::{FilePlace, SceneError, SceneFault, files};
 
 /// What files of camera paths look like, for help texts and messages.
 pub const FORMS: &str =
@@ -68,7 +68,7 @@ impl CameraPath {
     /// # Errors
     /// [`SceneError`] with the path, and the line or key, of the first thing that is missing or wrong.
     pub fn open(path: &Path, scene: &Scene, pinhole: &Pinhole) -> Result<CameraPath, SceneError> {
-        let unknown = || SceneError::UnknownCameraPath { path: path.to_path_buf(), looked_for: FORMS };
+        let unknown = || FilePlace::file(path).fault(SceneFault::UnknownCameraPath(FORMS));
         if path.is_dir() {
             return Err(unknown());
         }
@@ -90,7 +90,7 @@ impl CameraPath {
         };
         let RawPath { views, frames_per_second } = raw;
         if views.is_empty() {
-            return Err(SceneError::NoCameras { path: path.to_path_buf() });
+            return Err(FilePlace::file(path).fault(SceneFault::NoCameras));
         }
         let cameras = views.iter().map(|view| camera_in(view, pinhole, &scene.frame)).collect::<Result<Vec<_>, _>>()?;
         let names = names(path, views)?;
@@ -102,7 +102,7 @@ impl CameraPath {
 /// The names of a path's cameras, made up where they are missing or equal.
 fn names(path: &Path, views: Vec<RawView>) -> Result<Vec<String>, SceneError> {
     if let Some(view) = views.iter().find(|view| !view.name.is_empty() && !is_name(&view.name)) {
-        return Err(SceneError::Name { path: path.to_path_buf(), name: view.name.clone() });
+        return Err(FilePlace::file(path).fault(SceneFault::Name(view.name.clone())));
     }
     let differ = views.iter().map(|view| view.name.as_str()).collect::<HashSet<_>>().len() == views.len();
     let name = |(index, view): (usize, RawView)| {

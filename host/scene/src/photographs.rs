@@ -25,29 +25,15 @@ pub enum PhotographsError {
     /// A photograph could not be read.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// The working size is unusable.
-    #[error("view '{view}' cannot be resampled to {width}x{height}: {error}")]
-    Size {
-        /// The view.
-        view: String,
-        /// Requested width.
-        width: u32,
-        /// Requested height.
-        height: u32,
-        /// What is wrong with it.
-        error: PinholeError,
-    },
-    /// The background covers the whole photograph, or nothing of it.
+    /// The working width and height of a view are unusable.
+    #[error("view '{0}' cannot be resampled to {1}x{2}: {3}")]
+    Size(String, u32, u32, PinholeError),
+    /// The background, for which this colour was assumed, covers the whole photograph, or nothing of it.
     #[error(
-        "{path}: shows no object in front of the background ({colour}); give the background's colour, or photographs with an \
+        "{0}: shows no object in front of the background ({1}); give the background's colour, or photographs with an \
          alpha channel"
     )]
-    NoSilhouette {
-        /// The photograph.
-        path: String,
-        /// The background colour that was assumed.
-        colour: String,
-    },
+    NoSilhouette(String, String),
     /// The person stopped the work.
     #[error("interrupted")]
     Interrupted(#[from] Interrupted),
@@ -80,8 +66,8 @@ impl SourceImage {
     pub fn reduced(&self, side: u32) -> Result<SourceImage, PinholeError> {
         let (width, height) = reduced_size(&self.camera, side);
         let pinhole = self.camera.pinhole.resized(width, height)?;
-        let own_size = [self.camera.pinhole.width(), self.camera.pinhole.height()];
-        let texels = resample::area_average(&self.texels, own_size, [width, height]);
+        let size_before = [self.camera.pinhole.width(), self.camera.pinhole.height()];
+        let texels = resample::area_average(&self.texels, size_before, [width, height]);
         Ok(SourceImage { camera: Camera { pinhole, ..self.camera }, texels })
     }
 }
@@ -323,39 +309,29 @@ impl<'a> Album<'a> {
                 matte::MAX_NOISE_LEVEL
             ));
         }
-        let (points, near_far) = self.space(views);
-        let all = |borders: &[Option<matte::Border>]| {
-            let images = views.par_iter().zip(borders).map(|(&view, border)| {
+        let cut_out = |is_whole: bool| {
+            let source = |(&view, border): (&usize, &Option<matte::Border>)| {
                 progress.check()?;
-                let photograph = self.source(view, ignores)?;
-                let must_show = border.is_some() || !whole_pictures;
-                self.cut_out(view, photograph, longest_side, border.as_ref(), &backdrop, must_show)
-            });
-            in_order(images)
+                let border = border.as_ref().filter(|_| !is_whole);
+                self.cut_out(view, self.source(view, ignores)?, longest_side, border, &backdrop, !is_whole)
+            };
+            in_order(views.par_iter().zip(&borders).map(source))
         };
-        if whole_pictures {
-            borders.iter_mut().for_each(|border| *border = None);
-        }
-        let names = || views.iter().map(|&view| self.scene.views[view].name.as_str());
-        match all(&borders) {
-            Err(PhotographsError::NoSilhouette { path, colour }) if choice == BackgroundChoice::Auto => {
+        let mut has_silhouettes = !whole_pictures;
+        let images = match cut_out(whole_pictures) {
+            Err(PhotographsError::NoSilhouette(path, colour)) if choice == BackgroundChoice::Auto => {
                 warnings.push(format!(
                     "{path}: shows no object in front of a background of {colour}: nothing is cut out, whole pictures are used"
                 ));
-                borders.iter_mut().for_each(|border| *border = None);
-                let images = in_order(views.par_iter().map(|&view| {
-                    progress.check()?;
-                    self.cut_out(view, self.source(view, ignores)?, longest_side, None, &backdrop, false)
-                }))?;
-                warnings.extend(exposure::warning(&images, names()));
-                Ok(SourceImages { images, background, has_silhouettes: false, points, near_far, warnings })
+                has_silhouettes = false;
+                cut_out(true)?
             }
-            images => {
-                let images = images?;
-                warnings.extend(exposure::warning(&images, names()));
-                Ok(SourceImages { images, background, has_silhouettes: !whole_pictures, points, near_far, warnings })
-            }
-        }
+            images => images?,
+        };
+        let names = views.iter().map(|&view| self.scene.views[view].name.as_str());
+        warnings.extend(exposure::warning(&images, names));
+        let (points, near_far) = self.space(views);
+        Ok(SourceImages { images, background, has_silhouettes, points, near_far, warnings })
     }
 
     /// Points that at least two of these views saw, and the depth bounds over all of them.
@@ -388,13 +364,9 @@ impl<'a> Album<'a> {
         }
         // Enlarging a source would add pixels but no detail.
         let (width, height) = reduced_size(camera, longest_side);
-        let pinhole = camera.pinhole.resized(width, height).map_err(|error| PhotographsError::Size {
-            view: name.clone(),
-            width,
-            height,
-            error,
-        })?;
-        let own_size = photograph.pixels.dimensions().into();
+        let pinhole = camera.pinhole.resized(width, height);
+        let pinhole = pinhole.map_err(|error| PhotographsError::Size(name.clone(), width, height, error))?;
+        let size_before = photograph.pixels.dimensions().into();
         let texels = if border.is_none() && !must_show {
             let pixels = photograph.pixels.as_raw().as_chunks::<4>().0;
             let seen = photograph.seen.as_ref().map(|seen| seen.as_raw());
@@ -402,15 +374,15 @@ impl<'a> Album<'a> {
                 Some(seen) if seen[at] == 0 => [0.0; 4],
                 _ => matte::premultiplied_by_alpha(pixels[at]),
             };
-            resample::area_average_of(texel, own_size, [width, height])
+            resample::area_average_of(texel, size_before, [width, height])
         } else {
             let premultiplied = matte::premultiplied(&photograph, border, backdrop);
             let opaque = premultiplied.iter().filter(|texel| texel[3] > 0.5).count();
             if must_show && (opaque == 0 || (opaque == premultiplied.len() && !photograph.has_alpha)) {
                 let path = image.as_ref().map_or_else(|| name.clone(), |path| path.display().to_string());
-                return Err(PhotographsError::NoSilhouette { path, colour: backdrop.to_string() });
+                return Err(PhotographsError::NoSilhouette(path, backdrop.to_string()));
             }
-            resample::area_average(&premultiplied, own_size, [width, height])
+            resample::area_average(&premultiplied, size_before, [width, height])
         };
         Ok(SourceImage { camera: Camera { pinhole, ..*camera }, texels })
     }
@@ -424,7 +396,7 @@ pub fn longest_side(camera: &Camera) -> u32 {
 /// Size of a camera's image with its longest side scaled to `side`; at least one pixel on a side.
 pub fn scaled_size(camera: &Camera, side: u32) -> (u32, u32) {
     let scale = f64::from(side) / f64::from(longest_side(camera));
-    let scaled = |own: u32| ((f64::from(own) * scale).round() as u32).max(1);
+    let scaled = |side: u32| ((f64::from(side) * scale).round() as u32).max(1);
     (scaled(camera.pinhole.width()), scaled(camera.pinhole.height()))
 }
 

@@ -5,9 +5,9 @@
 //! nor element in its errors; of the format only the header's grammar is needed, because rows of fixed length are
 //! slices.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use crate::scene::{FaultLocation, FileFault, PlyFault, SceneError};
+use crate::scene::{FileFault, FilePlace, PlyFault, SceneError, SceneFault};
 
 /// Most bytes of a header: 62 properties of a Gaussian take two thousand.
 const MAX_HEADER: usize = 64 << 10;
@@ -93,9 +93,9 @@ pub(crate) struct PlyHeader<'a> {
 
 impl<'a> PlyHeader<'a> {
     /// # Errors
-    /// [`SceneError::Ply`] with the line of the first thing that is not a header's.
+    /// [`SceneFault::Ply`] with the line of the first thing that is not a header's.
     pub(crate) fn read(path: &'a Path, bytes: &[u8]) -> Result<PlyHeader<'a>, SceneError> {
-        let failed = |line, fault| wrong(path, line, fault);
+        let failed = |line, fault| FilePlace::line(path, line).fault(SceneFault::Ply(fault));
         let (mut elements, mut length, mut has_format) = (Vec::<PlyElement>::new(), 0, false);
         let mut comments = Vec::new();
         let mut line = 0;
@@ -137,16 +137,15 @@ impl<'a> PlyHeader<'a> {
     /// # Errors
     /// [`SceneError`] if there is no such element, if a list stands in it or before it, or if the file is too short.
     pub(crate) fn rows<'b>(&self, bytes: &'b [u8], name: &'static str) -> Result<(&PlyElement, &'b [u8]), SceneError> {
-        let fault = |fault| SceneError::Ply { path: self.path(), place: FaultLocation::File, fault };
+        let fault = |fault| FilePlace::file(self.path).fault(SceneFault::Ply(fault));
         let mut rest = &bytes[self.length..];
         for element in &self.elements {
             let Some(size) = element.row_size else { return Err(fault(PlyFault::List(element.name.clone()))) };
             let room = rest.len() / size.max(1);
             let count = usize::try_from(element.count).ok().filter(|count| *count <= room);
             let Some(count) = count else {
-                let no_room = FileFault::NoRoom { of: "rows", count: element.count, most: room };
-                let place = FaultLocation::Key(format!("element {}", element.name));
-                return Err(SceneError::Damaged { path: self.path(), place, fault: no_room });
+                let no_room = FileFault::NoRoom("rows", element.count, room);
+                return Err(FilePlace::key(self.path, format!("element {}", element.name)).fault(no_room));
             };
             let (rows, behind) = rest.split_at(count * size);
             if element.name == name {
@@ -160,10 +159,6 @@ impl<'a> PlyHeader<'a> {
     /// The elements in the order of the file.
     pub(crate) fn elements(&self) -> &[PlyElement] {
         &self.elements
-    }
-
-    fn path(&self) -> PathBuf {
-        self.path.to_path_buf()
     }
 }
 
@@ -184,7 +179,7 @@ pub fn header<'a>(
     text.into_bytes()
 }
 
-/// Adds the property of a line, whose first word is left out.
+/// Adds the property of a line, of which these are the words behind the first.
 fn add(element: &mut PlyElement, words: &[&str]) -> Result<(), PlyFault> {
     match *words {
         ["list", _, _, _] => element.row_size = None,
@@ -200,10 +195,6 @@ fn add(element: &mut PlyElement, words: &[&str]) -> Result<(), PlyFault> {
         _ => return Err(PlyFault::Line(excerpt(&format!("property {}", words.join(" "))))),
     }
     Ok(())
-}
-
-fn wrong(path: &Path, line: usize, fault: PlyFault) -> SceneError {
-    SceneError::Ply { path: path.to_path_buf(), place: FaultLocation::Line(line), fault }
 }
 
 /// The beginning of a text from a file, for a message.

@@ -62,9 +62,9 @@ impl Rig {
     pub fn nearest(&self, cameras: &[Camera]) -> Vec<f32> {
         let directions: Vec<Vec3> =
             cameras.iter().map(|c| (c.pose.centre_world() - self.focus).normalize_or_zero()).collect();
-        let nearest = |own: usize| {
-            let others = directions.iter().enumerate().filter(|(other, _)| *other != own);
-            others.map(|(_, other)| other.dot(directions[own]).clamp(-1.0, 1.0).acos().to_degrees()).reduce(f32::min)
+        let nearest = |camera: usize| {
+            let others = directions.iter().enumerate().filter(|(other, _)| *other != camera);
+            others.map(|(_, other)| other.dot(directions[camera]).clamp(-1.0, 1.0).acos().to_degrees()).reduce(f32::min)
         };
         (0..cameras.len()).filter_map(nearest).collect()
     }
@@ -95,7 +95,7 @@ pub fn spread(points: &[Vec3], count: usize) -> Vec<usize> {
     let mut chosen: Vec<usize> = Vec::new();
     let mut gaps = vec![f32::INFINITY; points.len()];
     while chosen.len() < count.min(points.len()) {
-        let rest = (0..points.len()).filter(|own| !chosen.contains(own));
+        let rest = (0..points.len()).filter(|point| !chosen.contains(point));
         let Some(next) = rest.rev().max_by(|a, b| gaps[*a].total_cmp(&gaps[*b])) else { break };
         gaps.iter_mut().zip(points).for_each(|(gap, point)| *gap = gap.min(point.distance(points[next])));
         chosen.push(next);

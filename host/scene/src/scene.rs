@@ -26,14 +26,14 @@ pub(crate) mod files;
 mod found_poses;
 pub(crate) mod frame;
 mod images;
+mod inputs;
 pub(crate) mod json;
 mod llff;
-mod masks;
+pub(crate) mod masks;
 mod middlebury;
 mod missing;
 mod neus;
 mod numpy;
-mod own_files;
 pub mod reader;
 mod split;
 mod srn;
@@ -42,8 +42,8 @@ mod undistort;
 mod unlisted;
 
 use check::Checked;
-pub use error::SceneError;
-pub use fault::{FaultLocation, FileFault, IntrinsicsFault, NumpyFault, PlyFault};
+pub use error::{SceneError, SceneFault};
+pub use fault::{FaultLocation, FileFault, FilePlace, ImageFault, IntrinsicsFault, NumpyFault, PlyFault};
 pub use frame::SRN_DISTANCE;
 use images::Turn;
 pub use images::{encode_png, picture_size, read_picture};
@@ -237,11 +237,9 @@ impl Scene {
             checked.conventions.extend(line);
             checked.warnings.extend(warning);
             let mut names = HashSet::new();
-            for view in &checked.views {
-                if !names.insert(view.name.as_str()) {
-                    let path = view.image.clone().unwrap_or(found);
-                    return Err(SceneError::DuplicateName { path, name: view.name.clone() });
-                }
+            if let Some(twin) = checked.views.iter().find(|view| !names.insert(view.name.as_str())) {
+                let place = FilePlace::file(twin.image.clone().unwrap_or(found));
+                return Err(place.fault(SceneFault::DuplicateName(twin.name.clone())));
             }
             let Checked { views, points, mut warnings, conventions, mut unused, lists, frame } = checked;
             warnings.extend(unlisted::photographs(&views));
@@ -250,11 +248,10 @@ impl Scene {
             let (path, layout) = (path.to_path_buf(), reader.name());
             return Ok(Scene { path, layout, views, points, warnings, conventions, unused, masks, mask_choice, frame });
         }
-        let (path, looked_for) = (path.to_path_buf(), looked_for(readers));
-        Err(match files::photograph_count(&path) {
-            0 => SceneError::UnknownLayout { path, looked_for },
-            count => SceneError::BarePhotographs { path, count },
-        })
+        Err(FilePlace::file(path).fault(match files::photograph_count(path) {
+            0 => SceneFault::UnknownLayout(looked_for(readers)),
+            count => SceneFault::BarePhotographs(count),
+        }))
     }
 
     /// Its name: that of its folder, for any spelling of the path.
@@ -336,16 +333,14 @@ impl Scene {
     }
 
     fn view(&self, view: usize) -> Result<&View, SceneError> {
-        self.views.get(view).ok_or_else(|| {
-            let (path, view_count) = (self.path.clone(), self.views.len());
-            SceneError::NoSuchView { path, view, view_count }
-        })
+        self.views
+            .get(view)
+            .ok_or_else(|| FilePlace::file(&self.path).fault(SceneFault::NoSuchView(view, self.views.len())))
     }
 
     fn photograph_file(&self, view: usize) -> Result<&Path, SceneError> {
         let View { name, image, .. } = self.view(view)?;
-        let missing = || SceneError::NoPhotograph { path: self.path.clone(), name: name.clone() };
-        image.as_deref().ok_or_else(missing)
+        image.as_deref().ok_or_else(|| FilePlace::file(&self.path).fault(SceneFault::NoPhotograph(name.clone())))
     }
 
     /// The index of the view that `text` refers to; `None` if it may be none or several ([`Scene::views_meant`]).

@@ -4,7 +4,7 @@
 //! unchanged if the layout can hold their lens and their mask; otherwise they are written undistorted, with the mask as
 //! the alpha channel. In NeRF's and COLMAP's layouts masks say which pixels do not count: those of an object become the
 //! alpha channel, of photographs that are not undistorted. A layout that cannot hold a scene refuses it with the
-//! reason; data that is lost without changing what the cameras see (points, near and far bounds, splits) is listed in [`Written::left_out`].
+//! reason; data that is lost without changing what the cameras see (points, near and far bounds, splits) is listed in [`Written::lost`].
 //!
 //! The folder appears whole or not at all: it is filled under a temporary name in the same folder, opened as any scene
 //! (`readback`), and renamed.
@@ -106,41 +106,21 @@ impl FromStr for Layout {
 /// Why a scene was not written.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteSceneError {
-    /// The layout cannot hold it.
-    #[error("{}: the layout {layout} cannot hold this scene: {reason}", scene.display())]
-    Unfit {
-        /// The scene.
-        scene: PathBuf,
-        /// The layout.
-        layout: Layout,
-        /// The content that it cannot hold.
-        reason: String,
-    },
+    /// The layout cannot hold the scene: the content that it cannot hold.
+    #[error("{0}: the layout {1} cannot hold this scene: {2}")]
+    Unfit(PathBuf, Layout, String),
     /// The path exists already.
-    #[error("{}: exists already and is not an empty folder; give another name", folder.display())]
-    Occupied {
-        /// The folder to write.
-        folder: PathBuf,
-    },
-    /// The operating system reported an error.
-    #[error("{}: cannot be written: {cause}", path.display())]
-    Io {
-        /// The file or folder.
-        path: PathBuf,
-        /// What the system said.
-        cause: std::io::Error,
-    },
+    #[error("{}: exists already and is not an empty folder; give another name", .0.display())]
+    Occupied(PathBuf),
+    /// The operating system reported an error for a file or folder.
+    #[error("{0}: cannot be written: {1}")]
+    Io(PathBuf, std::io::Error),
     /// A photograph could not be read.
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// A photograph could not be encoded.
-    #[error("{}: cannot be encoded: {cause}", path.display())]
-    Encode {
-        /// The file to write.
-        path: PathBuf,
-        /// What the encoder said.
-        cause: image::ImageError,
-    },
+    #[error("{0}: cannot be encoded: {1}")]
+    Encode(PathBuf, image::ImageError),
     /// The person stopped the work.
     #[error("interrupted")]
     Interrupted(#[from] Interrupted),
@@ -154,7 +134,7 @@ pub struct Written {
     /// Number of photographs.
     pub photograph_count: usize,
     /// The content that the layout does not hold, a line each.
-    pub left_out: Vec<String>,
+    pub lost: Vec<String>,
 }
 
 /// Writes a scene in a layout to a folder that does not exist or is empty.
@@ -181,12 +161,12 @@ pub fn write_with(
     beside: &[(&str, Vec<u8>)],
     progress: &dyn Progress,
 ) -> Result<Written, WriteSceneError> {
-    let failed = |cause| WriteSceneError::Io { path: folder.to_path_buf(), cause };
+    let failed = |cause| WriteSceneError::Io(folder.to_path_buf(), cause);
     let is_empty = || fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none());
     if folder.is_symlink() || folder.exists() && !is_empty() {
-        return Err(WriteSceneError::Occupied { folder: folder.to_path_buf() });
+        return Err(WriteSceneError::Occupied(folder.to_path_buf()));
     }
-    let unfit = |reason| WriteSceneError::Unfit { scene: scene.path.clone(), layout, reason };
+    let unfit = |reason| WriteSceneError::Unfit(scene.path.clone(), layout, reason);
     scene.views.iter().try_for_each(|view| check_name(layout, &view.name)).map_err(unfit)?;
     match layout {
         Layout::Transforms => all_photographed(scene),
@@ -213,7 +193,7 @@ pub fn write_with(
     readback::check(scene, layout, &draft).map_err(unfit)?;
     beside.iter().try_for_each(|(name, bytes)| out.put(name, bytes))?;
     unfinished.finish().map_err(failed)?;
-    Ok(Written { folder: folder.to_path_buf(), photograph_count, left_out: left_out(scene, layout) })
+    Ok(Written { folder: folder.to_path_buf(), photograph_count, lost: lost(scene, layout) })
 }
 
 /// A folder that is being filled.
@@ -228,7 +208,7 @@ impl Draft<'_> {
     fn file(&self, name: &str) -> Result<PathBuf, WriteSceneError> {
         let path = self.folder.join(name);
         if let Some(folder) = path.parent() {
-            fs::create_dir_all(folder).map_err(|cause| WriteSceneError::Io { path: folder.to_path_buf(), cause })?;
+            fs::create_dir_all(folder).map_err(|cause| WriteSceneError::Io(folder.to_path_buf(), cause))?;
         }
         Ok(path)
     }
@@ -236,7 +216,7 @@ impl Draft<'_> {
     /// Writes a file.
     fn put(&self, name: &str, contents: impl AsRef<[u8]>) -> Result<(), WriteSceneError> {
         let path = self.file(name)?;
-        fs::write(&path, contents).map_err(|cause| WriteSceneError::Io { path, cause })
+        fs::write(&path, contents).map_err(|cause| WriteSceneError::Io(path, cause))
     }
 }
 
@@ -249,14 +229,14 @@ fn all_photographed(scene: &Scene) -> Result<(), String> {
 }
 
 /// The content that a layout does not hold.
-fn left_out(scene: &Scene, layout: Layout) -> Vec<String> {
+fn lost(scene: &Scene, layout: Layout) -> Vec<String> {
     let views = |has: fn(&View) -> bool| scene.views.iter().filter(|view| has(view)).count();
     let mut lines = Vec::new();
     if !layout.is_colmap() && !scene.points.is_empty() {
         lines.push(format!("{} reconstructed points", scene.points.len()));
     }
     let depths = views(|view| view.near_far.is_some());
-    if layout != Layout::Llff && !(layout == Layout::Neus && neus::is_own(scene)) && depths > 0 {
+    if layout != Layout::Llff && !(layout == Layout::Neus && neus::has_unit_sphere(scene)) && depths > 0 {
         lines.push(format!("near and far depths of {depths} views"));
     }
     let parts = views(|view| view.split.is_some());

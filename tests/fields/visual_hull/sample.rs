@@ -143,7 +143,7 @@ fn a_photograph_of_nothing_is_named() {
     let album = Album::open(&scene, 0..20, &Silent).expect("photographs");
     let sources: Vec<usize> = (0..20).collect();
     match album.sources(&sources, 128, BackgroundChoice::Colour([1.0; 3]), &Silent) {
-        Err(PhotographsError::NoSilhouette { path, colour }) => {
+        Err(PhotographsError::NoSilhouette(path, colour)) => {
             assert!(path.ends_with("000007.png"), "{path}");
             assert!(colour.contains("255,255,255"), "{colour}");
         }

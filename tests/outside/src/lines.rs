@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use viewfuse::scene::reader::{
     ImageFile, PoseForm, RawIntrinsics, RawPose, RawScene, RawView, Reader, number_lines, read_text,
 };
-use viewfuse::scene::{FaultLocation, SceneError};
+use viewfuse::scene::{FileFault, FilePlace, SceneError};
 
 /// `cameras.list`: of `photograph_0.png` and so on a line each, the focal length, then the pose's upper three rows.
 #[derive(Clone, Copy, Debug)]
@@ -35,16 +35,14 @@ impl Reader for Lines {
 }
 
 fn view(list: &Path, index: usize, line: usize, numbers: &[f64]) -> Result<RawView, SceneError> {
-    let (path, place) = (list.to_path_buf(), FaultLocation::Line(line));
-    let Ok([focal, pose @ ..]) = <[f64; 13]>::try_from(numbers) else {
-        return Err(SceneError::WrongCount { path, place, of: "numbers", expected: 13, found: numbers.len() });
+    let place = FilePlace::line(list, line);
+    let &[focal, a, b, c, x, d, e, f, y, g, h, i, z] = numbers else {
+        return Err(place.fault(FileFault::WrongCount { of: "numbers", expected: 13, found: numbers.len() }));
     };
-    let mut matrix = [0.0; 16];
-    matrix[..12].copy_from_slice(&pose);
-    matrix[15] = 1.0;
+    let matrix = [[a, b, c, x], [d, e, f, y], [g, h, i, z], [0.0, 0.0, 0.0, 1.0]];
     let name = format!("photograph_{index}");
     let image = ImageFile::open(&list.with_file_name(format!("{name}.png")))?;
-    let intrinsics = RawIntrinsics::centred(focal, image.size(), path.clone(), place.clone());
-    let pose = RawPose { matrix, form: PoseForm::WorldFromOpenCv, path, place };
+    let intrinsics = RawIntrinsics::centred(focal, image.size(), place.clone());
+    let pose = RawPose { matrix, form: PoseForm::WorldFromOpenCv, place };
     Ok(RawView::new(name, Some(image), pose, Some(intrinsics)))
 }

@@ -201,7 +201,7 @@ fn written(
 
 /// Which photographs cannot be used, and why attempts were refused: each reason once.
 fn told(found: &Found, refusal: &Refusal, progress: &Terminal) {
-    for (name, reason) in found.left_out(None) {
+    for (name, reason) in found.excluded(None) {
         progress.warn(&format!("{name}: {reason}"));
     }
     let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
@@ -244,7 +244,7 @@ fn picture_of_matches(found: &Found) -> RgbImage {
 fn print(found: &Found, verdict: &Verdict, record: &Record<'_>) -> std::io::Result<()> {
     let all = found.intake.photos.len() + found.intake.unusable.len();
     say(format_args!("registered {} of {all} photographs", verdict.photos.len()))?;
-    record.left_out.iter().try_for_each(|(name, reason)| say(format_args!("left out   {name}: {reason}")))?;
+    record.excluded.iter().try_for_each(|(name, reason)| say(format_args!("left out   {name}: {reason}")))?;
     let doubtful = verdict.doubtful();
     if !doubtful.is_empty() {
         say(format_args!(

@@ -11,7 +11,7 @@ use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use viewfuse_pose::is_current;
-use viewfuse_scene::{Scene, SceneError};
+use viewfuse_scene::{Scene, SceneError, SceneFault};
 
 #[derive(Args)]
 pub(crate) struct PoseOption {
@@ -32,7 +32,7 @@ impl PoseOption {
 
 fn posed(scene: &Path) -> anyhow::Result<PathBuf> {
     // All other errors are those of the command itself.
-    if !matches!(Scene::open(scene), Err(SceneError::BarePhotographs { .. })) {
+    if !matches!(Scene::open(scene), Err(SceneError { fault: SceneFault::BarePhotographs(_), .. })) {
         return Ok(scene.to_path_buf());
     }
     let folder = beside(scene)?;

@@ -2,8 +2,7 @@
 
 use super::photographed;
 use viewfuse_scene::Scene;
-use viewfuse_scene::few_shot::{SelectionError, view_list};
-use viewfuse_weighting::sources::MAX_SOURCES;
+use viewfuse_scene::few_shot::{SelectionError, SelectionFault, check_count, view_list};
 
 /// The views of two lists; a source is never a target.
 pub(super) fn fixed(
@@ -12,21 +11,14 @@ pub(super) fn fixed(
     targets: &str,
     least_sources: usize,
 ) -> Result<(Vec<usize>, Vec<usize>), SelectionError> {
-    let scene_name = || scene.path.display().to_string();
     let (sources, mut targets) = (view_list(scene, sources)?, view_list(scene, targets)?);
     targets.retain(|target| !sources.contains(target));
     if let Some(&view) = sources.iter().chain(&targets).find(|&&view| scene.views[view].image.is_none()) {
-        return Err(SelectionError::NoPhotograph { scene: scene_name(), name: scene.views[view].name.clone() });
+        return Err(SelectionFault::NoPhotograph(scene.views[view].name.clone()).in_scene(scene));
     }
-    let count = sources.len();
-    if count < least_sources {
-        return Err(SelectionError::TooFewSources { scene: scene_name(), count, least: least_sources });
-    }
-    if count > MAX_SOURCES {
-        return Err(SelectionError::TooManySources { scene: scene_name(), count });
-    }
+    check_count(scene, sources.len(), least_sources)?;
     if targets.is_empty() {
-        return Err(SelectionError::NoTargets { scene: scene_name() });
+        return Err(SelectionFault::NoTargets.in_scene(scene));
     }
     Ok((sources, targets))
 }
@@ -47,8 +39,7 @@ pub(super) fn nearest(
         None => views.clone(),
     };
     if let Some(&view) = targets.iter().find(|target| !views.contains(target)) {
-        let (scene_name, name) = (scene.path.display().to_string(), scene.views[view].name.clone());
-        return Err(SelectionError::NoPhotograph { scene: scene_name, name });
+        return Err(SelectionFault::NoPhotograph(scene.views[view].name.clone()).in_scene(scene));
     }
     let pose = |view: usize| &scene.views[view].camera.pose;
     let of_target = |target: usize| {

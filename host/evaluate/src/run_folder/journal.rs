@@ -196,7 +196,7 @@ pub(super) fn check(path: &Path) -> Result<Option<u64>, FolderError> {
     if lines.is_begun_like(BEGINNING) {
         Ok((!lines.unfinished().is_empty()).then_some(lines.whole()))
     } else {
-        Err(WriteError::NotOwn { path: path.to_path_buf() }.into())
+        Err(WriteError::Foreign(path.to_path_buf()).into())
     }
 }
 

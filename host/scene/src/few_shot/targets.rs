@@ -1,6 +1,6 @@
 //! Checks of the targets of a run: their names, and whether the sources show anything of them.
 
-use super::{FewShot, SelectionError, Target};
+use super::{FewShot, SelectionError, SelectionFault, Target};
 use crate::Scene;
 use crate::rig::{Rig, half_diagonal_slope};
 use std::collections::HashMap;
@@ -14,11 +14,11 @@ pub(super) fn check_names(scene: &Scene, targets: &[Target]) -> Result<(), Selec
     for Target { name, .. } in targets {
         let key = name.to_lowercase().as_str().nfc().collect::<String>();
         if let Some(first) = seen.insert(key, name) {
-            let (scene, first, second) = (scene.path.display().to_string(), first.to_owned(), name.clone());
-            return Err(match first == second {
-                true => SelectionError::SameName { scene, name: second },
-                false => SelectionError::AlikeNames { scene, first, second },
-            });
+            let fault = match first == name {
+                true => SelectionFault::SameName(name.clone()),
+                false => SelectionFault::AlikeNames(first.to_owned(), name.clone()),
+            };
+            return Err(fault.in_scene(scene));
         }
     }
     Ok(())

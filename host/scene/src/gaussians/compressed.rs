@@ -7,11 +7,11 @@ use std::path::Path;
 use glam::DVec3;
 use viewfuse_core::gaussian::{REST_COUNTS, SH_0};
 
-use super::place::{Place, RawGaussian};
+use super::place::{GaussianPlace, RawGaussian};
 use super::splat::logit;
 use super::{GaussianScene, refused};
 use crate::ply::{PlyElement, PlyHeader, PlyType};
-use crate::scene::SceneError;
+use crate::scene::{FileFault, FilePlace, SceneError};
 
 /// Gaussians that share a chunk.
 const CHUNK: usize = 256;
@@ -30,7 +30,7 @@ pub(super) fn is_of(header: &PlyHeader<'_>) -> bool {
 /// Where a number is in a row.
 fn offset(path: &Path, element: &PlyElement, name: &str, kind: PlyType) -> Result<usize, SceneError> {
     let property = element.property(name).filter(|property| property.kind == kind);
-    let missing = || SceneError::MissingKey { path: path.to_path_buf(), key: format!("property {name}") };
+    let missing = || FilePlace::file(path).fault(FileFault::MissingKey(format!("property {name}")));
     property.map(|property| property.offset).ok_or_else(missing)
 }
 
@@ -38,7 +38,7 @@ pub(super) fn read(
     path: &Path,
     bytes: &[u8],
     header: &PlyHeader<'_>,
-    place: &Place<'_>,
+    place: &GaussianPlace<'_>,
 ) -> Result<GaussianScene, SceneError> {
     let (chunk, chunks) = header.rows(bytes, "chunk")?;
     let (vertex, vertices) = header.rows(bytes, "vertex")?;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use viewfuse_job::files::read_at_most;
 
 use super::comments::Comments;
-use super::place::Place;
+use super::place::GaussianPlace;
 use super::{GaussianScene, compressed, harmonics, ply, refused, splat, spz};
 use crate::parser_world::{PARSER, ParserWorld};
 use crate::ply::PlyHeader;
@@ -68,7 +68,7 @@ impl GaussianFile {
 fn read(path: &Path, frame: &SceneFrame, world: Option<&(ParserWorld, PathBuf)>) -> Result<GaussianFile, SceneError> {
     let bytes = read_at_most(path, MAX_BYTES).map_err(|cause| unreadable(path, cause))?;
     let mut notes = Vec::new();
-    let mut place = Place::new(path, frame, world.map(|(world, _)| world));
+    let mut place = GaussianPlace::new(path, frame, world.map(|(world, _)| world));
     let is_splat = has_extension(path, &["splat"]) || !bytes.is_empty() && splat::is_plausible(&bytes);
     let known = |(magic, extension, _): &&(&[u8], &str, &str)| match *extension {
         // Two bytes are no proof.
@@ -84,8 +84,8 @@ fn read(path: &Path, frame: &SceneFrame, world: Option<&(ParserWorld, PathBuf)>)
     } else {
         let header = PlyHeader::read(path, &bytes)?;
         let said = Comments::read(path, &header.comments)?;
-        if said.is_own {
-            place = Place::new(path, frame, None);
+        if said.is_by_viewfuse {
+            place = GaussianPlace::new(path, frame, None);
         }
         place.origin = said.origin;
         notes

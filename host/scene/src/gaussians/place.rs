@@ -8,7 +8,7 @@ use viewfuse_core::pose::MAX_COORDINATE;
 use super::{Gaussian, MAX_LOGARITHM};
 use crate::SceneFrame;
 use crate::parser_world::ParserWorld;
-use crate::scene::{FaultLocation, SceneError};
+use crate::scene::{FileFault, FilePlace, SceneError, SceneFault};
 
 /// A Gaussian as a file states it.
 pub(super) struct RawGaussian {
@@ -22,7 +22,7 @@ pub(super) struct RawGaussian {
 }
 
 /// How a file's coordinates become the world's.
-pub(super) struct Place<'a> {
+pub(super) struct GaussianPlace<'a> {
     path: &'a Path,
     frame: &'a SceneFrame,
     world: Option<&'a ParserWorld>,
@@ -33,11 +33,11 @@ pub(super) struct Place<'a> {
     log_unit: f64,
 }
 
-impl<'a> Place<'a> {
-    pub(super) fn new(path: &'a Path, frame: &'a SceneFrame, world: Option<&'a ParserWorld>) -> Place<'a> {
+impl<'a> GaussianPlace<'a> {
+    pub(super) fn new(path: &'a Path, frame: &'a SceneFrame, world: Option<&'a ParserWorld>) -> GaussianPlace<'a> {
         let turned = world.map(ParserWorld::file_from_parser).map(|axes| (axes, DQuat::from_mat3(&axes).normalize()));
         let log_unit = frame.scale.ln() + world.map_or(0.0, |world| world.scale().ln());
-        Place { path, frame, world, origin: DVec3::ZERO, turned, log_unit }
+        GaussianPlace { path, frame, world, origin: DVec3::ZERO, turned, log_unit }
     }
 
     /// The rotation of the file's axes to the world's, if there is one.
@@ -58,17 +58,15 @@ impl<'a> Place<'a> {
         if *self.frame != SceneFrame::FILE {
             position = self.frame.world(position);
         }
-        let place = || FaultLocation::Key(format!("vertex[{index}]"));
-        let path = || self.path.to_path_buf();
+        let place = || FilePlace::key(self.path, format!("vertex[{index}]"));
         let limit = f64::from(MAX_COORDINATE);
         if !position.to_array().iter().all(|coordinate| coordinate.abs() <= limit) {
-            let [x, y, z] = stated.to_array();
-            return Err(SceneError::Point { path: path(), place: place(), x, y, z });
+            return Err(place().fault(SceneFault::Point(stated.to_array())));
         }
         let values = rotation.iter().chain(f_dc).map(|value| f64::from(*value));
         let logarithms = log_scales.iter().copied().filter(|value| *value != f64::NEG_INFINITY);
         if let Some(value) = values.chain(logarithms).find(|value| !value.is_finite()) {
-            return Err(SceneError::NotFinite { path: path(), place: place(), word: value.to_string() });
+            return Err(place().fault(FileFault::NotFinite(value.to_string())));
         }
         let mut rotation = *rotation;
         if let Some((_, turn)) = self.turned {

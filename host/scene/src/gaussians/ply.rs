@@ -5,16 +5,16 @@ use std::path::Path;
 use glam::DVec3;
 use viewfuse_core::gaussian::{REST_COUNTS, SH_0};
 
-use super::place::{Place, RawGaussian};
+use super::place::{GaussianPlace, RawGaussian};
 use super::splat::logit;
 use super::{Gaussian, GaussianScene, refused};
 use crate::ply::{PlyElement, PlyHeader, PlyProperty, PlyType};
-use crate::scene::{FaultLocation, PlyFault, SceneError};
+use crate::scene::{FileFault, FilePlace, PlyFault, SceneError, SceneFault};
 
 /// The element whose rows are Gaussians.
 const ELEMENT: &str = "vertex";
 
-/// The columns that are read, in the order of [`Row::gaussian`].
+/// The columns that are read, in the order of [`GaussianRow::gaussian`].
 const COLUMNS: [&str; 14] = [
     "x", "y", "z", "opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3", "f_dc_0", "f_dc_1",
     "f_dc_2",
@@ -27,15 +27,15 @@ const RGB: [&str; 3] = ["red", "green", "blue"];
 const FILTER: &str = "filter_3D";
 
 /// What is in the file's rows.
-struct Columns<'a> {
+struct GaussianColumns<'a> {
     /// [`COLUMNS`]; without the third scale for flat Gaussians, without coefficients for colours of [`RGB`].
     values: [Option<&'a PlyProperty>; 14],
     rgb: Option<[&'a PlyProperty; 3]>,
     filter: Option<&'a PlyProperty>,
 }
 
-impl<'a> Columns<'a> {
-    fn of(path: &Path, element: &'a PlyElement, notes: &mut Vec<String>) -> Result<Columns<'a>, SceneError> {
+impl<'a> GaussianColumns<'a> {
+    fn of(path: &Path, element: &'a PlyElement, notes: &mut Vec<String>) -> Result<GaussianColumns<'a>, SceneError> {
         let has = |name: &str| element.property(name).is_some();
         if has("x") && !has("opacity") && !COLUMNS[4..11].iter().any(|name| has(name)) {
             let problem = "a point cloud or a mesh, not Gaussians: it has no scales, rotations and opacities; make \
@@ -43,7 +43,7 @@ impl<'a> Columns<'a> {
             return Err(refused(path, problem));
         }
         let rgb = (!has("f_dc_0") && RGB.iter().all(|name| has(name)))
-            .then(|| RGB.map(|name| element.property(name).filter(|own| own.kind == PlyType::Whole(1))));
+            .then(|| RGB.map(|name| element.property(name).filter(|property| property.kind == PlyType::Whole(1))));
         let rgb = match rgb {
             Some([Some(red), Some(green), Some(blue)]) => Some([red, green, blue]),
             _ => None,
@@ -60,8 +60,13 @@ impl<'a> Columns<'a> {
                 || name.starts_with("f_rest_")
                 || rgb.is_some() && RGB.contains(&name)
         };
-        let unknown: Vec<&str> =
-            element.properties.iter().map(|own| own.name.as_str()).filter(|name| !is_known(name)).take(8).collect();
+        let unknown: Vec<&str> = element
+            .properties
+            .iter()
+            .map(|property| property.name.as_str())
+            .filter(|name| !is_known(name))
+            .take(8)
+            .collect();
         if !unknown.is_empty() {
             notes.push(format!("properties without effect: {} (not known)", unknown.join(", ")));
         }
@@ -74,7 +79,7 @@ impl<'a> Columns<'a> {
         if rgb.is_some() {
             notes.push("colours are red, green and blue of 8 bits: they are the same from everywhere".to_owned());
         }
-        Ok(Columns { values, rgb, filter })
+        Ok(GaussianColumns { values, rgb, filter })
     }
 }
 
@@ -82,11 +87,11 @@ pub(super) fn read(
     path: &Path,
     bytes: &[u8],
     header: &PlyHeader<'_>,
-    place: &Place<'_>,
+    place: &GaussianPlace<'_>,
     notes: &mut Vec<String>,
 ) -> Result<GaussianScene, SceneError> {
     let (element, rows) = header.rows(bytes, ELEMENT)?;
-    let columns = Columns::of(path, element, notes)?;
+    let columns = GaussianColumns::of(path, element, notes)?;
     // Rows have at least these columns: the lengths are bounded by that of the file.
     let size = element.row_size.unwrap_or(1).max(1);
     let rest_columns = without_padding(rest(path, element)?, rows, size);
@@ -96,7 +101,7 @@ pub(super) fn read(
     let mut gaussians = Vec::with_capacity(rows.len() / size);
     let mut f_rest = Vec::with_capacity(rows.len() / size * rest_columns.len());
     for (index, bytes) in rows.chunks_exact(size).enumerate() {
-        let row = Row { path, index, bytes };
+        let row = GaussianRow { path, index, bytes };
         gaussians.push(row.gaussian(&columns, place)?);
         for column in &rest_columns {
             f_rest.push(row.finite(column)? as f32);
@@ -115,57 +120,64 @@ fn without_padding<'a>(mut columns: Vec<&'a PlyProperty>, rows: &[u8], size: usi
         let is_of_degree = |index: usize| index % count >= below;
         let of_degree: Vec<_> = columns.iter().enumerate().filter(|(index, _)| is_of_degree(*index)).collect();
         let is_zero = |row: &[u8]| {
-            of_degree.iter().all(|(_, own)| row[own.offset..own.offset + own.kind.size()].iter().all(|byte| *byte == 0))
+            of_degree
+                .iter()
+                .all(|(_, column)| row[column.offset..column.offset + column.kind.size()].iter().all(|byte| *byte == 0))
         };
         if !rows.chunks_exact(size).all(is_zero) {
             break;
         }
-        columns = columns.into_iter().enumerate().filter(|(index, _)| !is_of_degree(*index)).map(|own| own.1).collect();
+        columns = columns
+            .into_iter()
+            .enumerate()
+            .filter(|(index, _)| !is_of_degree(*index))
+            .map(|(_, column)| column)
+            .collect();
     }
     columns
 }
 
 /// The property of this name, a `float` or a `double`.
 fn column<'a>(path: &Path, element: &'a PlyElement, name: &str) -> Result<&'a PlyProperty, SceneError> {
-    let missing = || SceneError::MissingKey { path: path.to_path_buf(), key: format!("property {name}") };
-    let property = element.property(name).ok_or_else(missing)?;
-    if let PlyType::Whole(_) = property.kind {
-        let key = format!("property {name}");
-        return Err(SceneError::WrongType { path: path.to_path_buf(), key, expected: "float or double" });
+    let (place, key) = (FilePlace::file(path), format!("property {name}"));
+    match element.property(name) {
+        None => Err(place.fault(FileFault::MissingKey(key))),
+        Some(PlyProperty { kind: PlyType::Whole(_), .. }) => {
+            Err(place.fault(FileFault::WrongType(key, "float or double")))
+        }
+        Some(property) => Ok(property),
     }
-    Ok(property)
 }
 
 /// The properties `f_rest_0`, `f_rest_1` and so on: none, 9, 24 or 45.
 fn rest<'a>(path: &Path, element: &'a PlyElement) -> Result<Vec<&'a PlyProperty>, SceneError> {
     let count = element.properties.iter().filter(|property| property.name.starts_with("f_rest_")).count();
     if !REST_COUNTS.iter().any(|degree| 3 * *degree as usize == count) {
-        let fault = PlyFault::RestCount(count);
-        return Err(SceneError::Ply { path: path.to_path_buf(), place: FaultLocation::File, fault });
+        return Err(FilePlace::file(path).fault(SceneFault::Ply(PlyFault::RestCount(count))));
     }
     (0..count).map(|index| column(path, element, &format!("f_rest_{index}"))).collect()
 }
 
 /// A row of the file.
-struct Row<'a> {
+struct GaussianRow<'a> {
     path: &'a Path,
     index: usize,
     bytes: &'a [u8],
 }
 
-impl Row<'_> {
-    fn gaussian(&self, columns: &Columns<'_>, place: &Place<'_>) -> Result<Gaussian, SceneError> {
+impl GaussianRow<'_> {
+    fn gaussian(&self, columns: &GaussianColumns<'_>, place: &GaussianPlace<'_>) -> Result<Gaussian, SceneError> {
         let values = &columns.values;
-        let value = |index: usize| values[index].map_or(Ok(0.0), |own| self.finite(own));
-        let scale = |index: usize| values[index].map_or(Ok(f64::NEG_INFINITY), |own| self.logarithm(own, false));
-        let position = [0, 1, 2].map(|index| values[index].map_or(0.0, |own| self.value(own)));
+        let value = |index: usize| values[index].map_or(Ok(0.0), |column| self.finite(column));
+        let scale = |index: usize| values[index].map_or(Ok(f64::NEG_INFINITY), |column| self.logarithm(column, false));
+        let position = [0, 1, 2].map(|index| values[index].map_or(0.0, |column| self.value(column)));
         let mut raw = RawGaussian {
             position: DVec3::from(position),
-            opacity: values[3].map_or(Ok(0.0), |own| self.logarithm(own, true))?,
+            opacity: values[3].map_or(Ok(0.0), |column| self.logarithm(column, true))?,
             log_scales: [scale(4)?, scale(5)?, scale(6)?],
             rotation: [value(7)? as f32, value(8)? as f32, value(9)? as f32, value(10)? as f32],
             f_dc: match columns.rgb {
-                Some(rgb) => rgb.map(|own| (f32::from(self.bytes[own.offset]) / 255.0 - 0.5) / SH_0),
+                Some(rgb) => rgb.map(|column| (f32::from(self.bytes[column.offset]) / 255.0 - 0.5) / SH_0),
                 None => [value(11)? as f32, value(12)? as f32, value(13)? as f32],
             },
         };
@@ -197,12 +209,8 @@ impl Row<'_> {
     }
 
     fn not_finite(&self, property: &PlyProperty, value: f64) -> SceneError {
-        let (path, word) = (self.path.to_path_buf(), value.to_string());
-        SceneError::NotFinite { path, place: self.place(&format!(".{}", property.name)), word }
-    }
-
-    fn place(&self, of: &str) -> FaultLocation {
-        FaultLocation::Key(format!("{ELEMENT}[{}]{of}", self.index))
+        let key = format!("{ELEMENT}[{}].{}", self.index, property.name);
+        FilePlace::key(self.path, key).fault(FileFault::NotFinite(value.to_string()))
     }
 }
 

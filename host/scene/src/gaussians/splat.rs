@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::DVec3;
 use viewfuse_core::gaussian::{SH_0, opacity};
 
-use super::place::{Place, RawGaussian};
+use super::place::{GaussianPlace, RawGaussian};
 use super::{Gaussian, GaussianScene, refused};
 use crate::SceneFrame;
 use crate::scene::SceneError;
@@ -24,7 +24,7 @@ pub(super) fn is_plausible(bytes: &[u8]) -> bool {
         })
 }
 
-pub(super) fn read(path: &Path, bytes: &[u8], place: &Place<'_>) -> Result<GaussianScene, SceneError> {
+pub(super) fn read(path: &Path, bytes: &[u8], place: &GaussianPlace<'_>) -> Result<GaussianScene, SceneError> {
     if !is_plausible(bytes) {
         return Err(refused(path, "not a .splat: it is no sequence of 32 bytes with finite numbers a Gaussian"));
     }

@@ -13,13 +13,12 @@ use glam::DVec3;
 use viewfuse_core::gaussian::{REST_COUNTS, opacity};
 
 use super::harmonics::signs_without_yz;
-use super::place::{Place, RawGaussian};
+use super::place::{GaussianPlace, RawGaussian};
 use super::splat::{logit, unit};
 use super::{GaussianScene, MAX_DEGREE, refused};
 use crate::SceneFrame;
 use crate::scene::SceneError;
 
-/// `NGSP`.
 const MAGIC: [u8; 4] = *b"NGSP";
 const HEADER: usize = 16;
 /// The version that all readers read.
@@ -33,7 +32,7 @@ const ANTIALIASED: u8 = 1;
 /// Levels of a magnitude in the quaternions of version 3.
 const MAGNITUDE: u32 = (1 << 9) - 1;
 
-pub(super) fn read(path: &Path, bytes: &[u8], place: &Place<'_>) -> Result<GaussianScene, SceneError> {
+pub(super) fn read(path: &Path, bytes: &[u8], place: &GaussianPlace<'_>) -> Result<GaussianScene, SceneError> {
     let mut stream = GzDecoder::new(bytes);
     let mut take = |size: usize| {
         let mut part = Vec::new();
@@ -129,13 +128,18 @@ fn smallest_three(bytes: &[u8]) -> [f32; 4] {
 /// What the format cannot hold.
 pub(super) fn bytes(scene: &GaussianScene, frame: &SceneFrame) -> Result<Vec<u8>, String> {
     let place = |position: [f32; 3]| frame.file(glam::Vec3::from(position).as_dvec3()) * DVec3::new(1.0, -1.0, -1.0);
-    let greatest =
-        scene.gaussians.iter().map(|own| place(own.position).abs().max_element()).fold(0.0, f64::max).max(1.0e-9);
+    let greatest = scene
+        .gaussians
+        .iter()
+        .map(|gaussian| place(gaussian.position).abs().max_element())
+        .fold(0.0, f64::max)
+        .max(1.0e-9);
     let fraction = (f64::from((1 << 23) - 1) / greatest).log2().floor().min(23.0);
     if fraction < 0.0 {
         return Err(format!(".spz has no room for the coordinate {greatest:e}"));
     }
-    let mut log_scales: Vec<f64> = scene.gaussians.iter().flat_map(|own| own.log_scales).map(f64::from).collect();
+    let mut log_scales: Vec<f64> =
+        scene.gaussians.iter().flat_map(|gaussian| gaussian.log_scales).map(f64::from).collect();
     log_scales.sort_by(f64::total_cmp);
     let median = log_scales.get(log_scales.len() / 2).map_or(0.0, |median| median + frame.scale.ln());
     if !(-10.0..=5.9).contains(&median) {
@@ -148,15 +152,15 @@ pub(super) fn bytes(scene: &GaussianScene, frame: &SceneFrame) -> Result<Vec<u8>
         std::array::from_fn(|_| Vec::new());
     let byte = |value: f32| value.round() as u8;
     let (rest_count, signs) = (REST_COUNTS[scene.degree.min(MAX_DEGREE) as usize] as usize, signs_without_yz());
-    for (index, own) in scene.gaussians.iter().enumerate() {
-        for coordinate in place(own.position).to_array() {
+    for (index, gaussian) in scene.gaussians.iter().enumerate() {
+        for coordinate in place(gaussian.position).to_array() {
             let fixed = (coordinate * fraction.exp2()).round() as i32;
             positions.extend(&fixed.to_le_bytes()[..3]);
         }
-        alphas.push(byte(opacity(own.opacity) * 255.0));
-        colours.extend(own.f_dc.map(|value| byte((value * COLOUR + 0.5) * 255.0)));
-        scales.extend(own.log_scales.map(|value| byte((value + frame.scale.ln() as f32 + 10.0) * 16.0)));
-        let [w, x, y, z] = unit(own.rotation);
+        alphas.push(byte(opacity(gaussian.opacity) * 255.0));
+        colours.extend(gaussian.f_dc.map(|value| byte((value * COLOUR + 0.5) * 255.0)));
+        scales.extend(gaussian.log_scales.map(|value| byte((value + frame.scale.ln() as f32 + 10.0) * 16.0)));
+        let [w, x, y, z] = unit(gaussian.rotation);
         // w is not stored, and not negative.
         let sign = if w < 0.0 { -1.0 } else { 1.0 };
         rotations.extend([x, -y, -z].map(|value| byte((sign * value + 1.0) * 127.5)));
@@ -175,7 +179,7 @@ pub(super) fn bytes(scene: &GaussianScene, frame: &SceneFrame) -> Result<Vec<u8>
         stream.write_all(&[scene.degree as u8, fraction as u8, flags, 0])?;
         [&positions, &alphas, &colours, &scales, &rotations, &harmonics]
             .iter()
-            .try_for_each(|own| stream.write_all(own))
+            .try_for_each(|part| stream.write_all(part))
     };
     write().map_err(|cause| cause.to_string())?;
     stream.finish().map_err(|cause| cause.to_string())

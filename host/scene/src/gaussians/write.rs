@@ -13,28 +13,41 @@ use crate::SceneFrame;
 use crate::ply::header;
 use crate::scene::files::has_extension;
 
-pub(super) fn write(scene: &GaussianScene, path: &Path, frame: &SceneFrame) -> Result<(), WriteError> {
-    check_place(path, frame)?;
-    let bytes = if has_extension(path, &["splat"]) {
-        splat::bytes(scene, frame)
-    } else if has_extension(path, &["spz"]) {
-        spz::bytes(scene, frame).map_err(|cause| unwritten(path, cause))?
-    } else {
-        ply(scene, frame)
-    };
-    write_whole(path, &bytes)
-}
-
-pub(super) fn check_place(path: &Path, frame: &SceneFrame) -> Result<(), WriteError> {
-    if frame.origin == DVec3::ZERO || !has_extension(path, &["splat", "spz"]) {
-        return Ok(());
+impl GaussianScene {
+    /// Writes a file in the coordinates of the scene's files, completely or not at all: a `.splat` or a `.spz` if it is
+    /// called so, otherwise a PLY file as the strictest readers want it, of `float`, with normals (0) and all
+    /// coefficients of degree 3. Where the scene was moved when it was opened, `float` would not hold the coordinates:
+    /// they are about the origin that a comment states, and are read back with it.
+    ///
+    /// # Errors
+    /// [`WriteError`]; also where a `.splat` or a `.spz` cannot hold the coordinates.
+    pub fn write(&self, path: &Path, frame: &SceneFrame) -> Result<(), WriteError> {
+        GaussianScene::check_place(path, frame)?;
+        let bytes = if has_extension(path, &["splat"]) {
+            splat::bytes(self, frame)
+        } else if has_extension(path, &["spz"]) {
+            spz::bytes(self, frame).map_err(|cause| unwritten(path, cause))?
+        } else {
+            ply(self, frame)
+        };
+        write_whole(path, &bytes)
     }
-    // `float` and fixed point lose such coordinates, and no header states an origin.
-    let [x, y, z] = frame.origin.to_array();
-    let cause = format!(
-        "the scene is around ({x}, {y}, {z}): .splat and .spz hold no such coordinates and state no origin; write a .ply"
-    );
-    Err(unwritten(path, cause))
+
+    /// Whether a file of this name can hold the coordinates of a scene's files: before there are Gaussians to write.
+    ///
+    /// # Errors
+    /// [`WriteError`] for a `.splat` or a `.spz` where the scene was moved when it was opened.
+    pub fn check_place(path: &Path, frame: &SceneFrame) -> Result<(), WriteError> {
+        if frame.origin == DVec3::ZERO || !has_extension(path, &["splat", "spz"]) {
+            return Ok(());
+        }
+        // `float` and fixed point lose such coordinates, and no header states an origin.
+        let [x, y, z] = frame.origin.to_array();
+        let cause = format!(
+            "the scene is around ({x}, {y}, {z}): .splat and .spz hold no such coordinates and state no origin; write a .ply"
+        );
+        Err(unwritten(path, cause))
+    }
 }
 
 fn unwritten(path: &Path, cause: String) -> WriteError {

@@ -52,18 +52,23 @@ impl Arc {
         stands.sort_by(|a, b| a.0.total_cmp(&b.0));
         let count = stands.len();
         // The angle from a camera to the next one, around the circle.
-        let gap = |own: usize| {
-            let turn = if own + 1 == count { TAU } else { 0.0 };
-            stands[(own + 1) % count].0 + turn - stands[own].0
+        let gap = |stand: usize| {
+            let turn = if stand + 1 == count { TAU } else { 0.0 };
+            stands[(stand + 1) % count].0 + turn - stands[stand].0
         };
-        let ends: Vec<usize> = (0..count).filter(|&own| gap(own) > MAX_GAP).collect();
+        let ends: Vec<usize> = (0..count).filter(|&stand| gap(stand) > MAX_GAP).collect();
         let runs = ends.iter().enumerate().map(|(index, &end)| {
             let before = ends[(index + ends.len() - 1) % ends.len()];
             let first = (before + 1) % count;
             let length = 1 + (end + count - first) % count;
             let turn = if end < first { TAU } else { 0.0 };
-            let own: Vec<usize> = (0..length).map(|step| stands[(first + step) % count].1).collect();
-            Arc { start: stands[first].0, width: stands[end].0 + turn - stands[first].0, cameras: own, ..full.clone() }
+            let members: Vec<usize> = (0..length).map(|step| stands[(first + step) % count].1).collect();
+            Arc {
+                start: stands[first].0,
+                width: stands[end].0 + turn - stands[first].0,
+                cameras: members,
+                ..full.clone()
+            }
         });
         let order = |a: &Arc, b: &Arc| a.cameras.len().cmp(&b.cameras.len()).then(a.width.total_cmp(&b.width));
         match runs.max_by(order) {

@@ -2,12 +2,12 @@
 //!
 //! | columns | what |
 //! |---|---|
-//! | `name` | name of the picture; may be left out |
+//! | `name` | name of the picture; may be missing |
 //! | `x y z` | the camera's centre, with one of the next two |
 //! | `qw qx qy qz` | rotation from the camera to the world, camera axes x right, y down, z forward; of any length |
 //! | `look_x look_y look_z` | the point that is in the middle of the picture; upright by the scene's cameras |
 //! | `m00 m01 m02 m03 m10 .. m23` | instead: the camera-to-world matrix, row-major, the same camera axes |
-//! | `fx fy cx cy width height` | intrinsics in pixels; left out, those of the scene's first photograph |
+//! | `fx fy cx cy width height` | intrinsics in pixels; without them, those of the scene's first photograph |
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -21,7 +21,7 @@ use crate::rig::Rig;
 use crate::scene::check::size;
 use crate::scene::files::number;
 use crate::scene::reader::{PoseForm, RawIntrinsics, RawPose, RawView};
-use crate::scene::{FaultLocation, SceneError};
+use crate::scene::{FileFault, FilePlace, SceneError};
 
 /// For the error of a wrong column.
 const COLUMNS: &str =
@@ -35,7 +35,7 @@ const INTRINSICS: [&str; 6] = ["fx", "fy", "cx", "cy", "width", "height"];
 const NAME: &str = "name";
 
 /// The columns of a table: a name and its place.
-struct Columns {
+struct PoseColumns {
     places: BTreeMap<String, usize>,
 }
 
@@ -47,10 +47,8 @@ enum Form {
     Look,
 }
 
-impl Columns {
-    /// # Errors
-    /// What is wrong with the names.
-    fn of(names: &csv::StringRecord) -> Result<Columns, String> {
+impl PoseColumns {
+    fn of(names: &csv::StringRecord) -> Result<PoseColumns, String> {
         let mut places = BTreeMap::new();
         for (place, name) in names.iter().enumerate() {
             let name = name.trim();
@@ -62,7 +60,7 @@ impl Columns {
                 return Err(format!("column {name:?} is there twice"));
             }
         }
-        Ok(Columns { places })
+        Ok(PoseColumns { places })
     }
 
     fn has(&self, group: &[&str]) -> bool {
@@ -97,16 +95,16 @@ impl Columns {
 }
 
 /// One line of the table.
-struct Row<'a> {
+struct PoseRow<'a> {
     path: &'a Path,
     line: usize,
-    columns: &'a Columns,
+    columns: &'a PoseColumns,
     cells: &'a csv::StringRecord,
 }
 
-impl Row<'_> {
-    fn place(&self) -> FaultLocation {
-        FaultLocation::Line(self.line)
+impl PoseRow<'_> {
+    fn place(&self) -> FilePlace {
+        FilePlace::line(self.path, self.line)
     }
 
     /// The numbers of these columns, which are there.
@@ -120,10 +118,11 @@ impl Row<'_> {
     }
 
     /// The camera-to-world matrix, row-major; `up` is the direction that is up in the pictures.
-    fn matrix(&self, form: Form, up: DVec3) -> Result<[f64; 16], SceneError> {
+    fn matrix(&self, form: Form, up: DVec3) -> Result<[[f64; 4]; 4], SceneError> {
+        const LAST: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
         if matches!(form, Form::Matrix) {
-            let rows = self.numbers(MATRIX)?;
-            return Ok(std::array::from_fn(|index| rows.get(index).copied().unwrap_or(f64::from(index == 15))));
+            let [a, b, c, d, e, f, g, h, i, j, k, l] = self.numbers(MATRIX)?;
+            return Ok([[a, b, c, d], [e, f, g, h], [i, j, k, l], LAST]);
         }
         let centre = DVec3::from_array(self.numbers(CENTRE)?);
         let rotation = if matches!(form, Form::Rotation) {
@@ -135,9 +134,8 @@ impl Row<'_> {
             DMat3::from_cols(right, forward.cross(right), forward)
         };
         // A zero quaternion and a view straight along `up` give no numbers here, and no pose.
-        let columns = [rotation.x_axis, rotation.y_axis, rotation.z_axis, centre];
-        let entry = |index: usize| if index < 12 { columns[index % 4][index / 4] } else { f64::from(index == 15) };
-        Ok(std::array::from_fn(entry))
+        let row = |row: usize| [rotation.x_axis, rotation.y_axis, rotation.z_axis, centre].map(|column| column[row]);
+        Ok([row(0), row(1), row(2), LAST])
     }
 
     fn intrinsics(&self) -> Result<Option<RawIntrinsics>, SceneError> {
@@ -148,9 +146,8 @@ impl Row<'_> {
         Ok(Some(RawIntrinsics {
             focal: [fx, fy],
             principal: [cx, cy],
-            size: Some(size(self.path, self.place(), width, height)?),
+            size: Some(size(&self.place(), width, height)?),
             lens: None,
-            path: self.path.to_path_buf(),
             place: self.place(),
             size_place: self.place(),
         }))
@@ -160,15 +157,14 @@ impl Row<'_> {
 pub(super) fn read(path: &Path, text: &str, scene: &Scene) -> Result<RawPath, SceneError> {
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
     let not_a_table = |error: csv::Error| {
-        let place =
-            error.position().map_or(FaultLocation::File, |position| FaultLocation::Line(position.line() as usize));
-        SceneError::Table { path: path.to_path_buf(), place, reason: error.to_string() }
+        let line = error.position().map(|position| position.line() as usize);
+        let place = line.map_or_else(|| FilePlace::file(path), |line| FilePlace::line(path, line));
+        place.fault(FileFault::Table(error.to_string()))
     };
     let names = reader.headers().map_err(not_a_table)?;
-    let place = FaultLocation::Line(names.position().map_or(1, |position| position.line() as usize));
-    let wrong =
-        |problem| SceneError::Columns { path: path.to_path_buf(), place: place.clone(), problem, columns: COLUMNS };
-    let columns = Columns::of(names).map_err(wrong)?;
+    let line = names.position().map_or(1, |position| position.line() as usize);
+    let wrong = |problem| FilePlace::line(path, line).fault(FileFault::Columns(problem, COLUMNS));
+    let columns = PoseColumns::of(names).map_err(wrong)?;
     let form = columns.form().map_err(wrong)?;
     let cameras: Vec<Camera> = scene.views.iter().map(|view| view.camera).collect();
     let up = Rig::of(&cameras).up.as_dvec3();
@@ -176,13 +172,8 @@ pub(super) fn read(path: &Path, text: &str, scene: &Scene) -> Result<RawPath, Sc
     for cells in reader.records() {
         let cells = &cells.map_err(not_a_table)?;
         let line = cells.position().map_or(0, |position| position.line() as usize);
-        let row = Row { path, line, columns: &columns, cells };
-        let pose = RawPose {
-            matrix: row.matrix(form, up)?,
-            form: PoseForm::WorldFromOpenCv,
-            path: path.to_path_buf(),
-            place: row.place(),
-        };
+        let row = PoseRow { path, line, columns: &columns, cells };
+        let pose = RawPose { matrix: row.matrix(form, up)?, form: PoseForm::WorldFromOpenCv, place: row.place() };
         let name = columns.places.get(NAME).and_then(|place| cells.get(*place)).map(stem_of);
         views.push(RawView::new(name.unwrap_or_default(), None, pose, row.intrinsics()?));
     }

@@ -18,56 +18,41 @@ use crate::parser_world::ParserWorld;
 use crate::scene::check::size;
 use crate::scene::json::Object;
 use crate::scene::reader::{PoseForm, RawIntrinsics, RawPose, RawView};
-use crate::scene::{FaultLocation, IntrinsicsFault, SceneError};
+use crate::scene::{FilePlace, IntrinsicsFault, SceneError};
 
 /// The key by which such a file is recognised.
 pub(super) const KEY: &str = "camera_path";
 
 pub(super) fn read(path: &Path, top: &Object<'_>, scene: &Scene) -> Result<RawPath, SceneError> {
-    let place = |key: &str| FaultLocation::Key(key.to_owned());
-    let required = |key: &str| {
-        top.number(key)?.ok_or_else(|| SceneError::MissingKey { path: path.to_path_buf(), key: key.to_owned() })
-    };
     if let Some(kind) = top.get("camera_type")
         && kind.as_str() != Some("perspective")
     {
-        let (key, value) = ("camera_type".to_owned(), kind.to_string());
-        return Err(SceneError::Distorted { path: path.to_path_buf(), key, value });
+        let fault = IntrinsicsFault::Distorted("camera_type".to_owned(), kind.to_string());
+        return Err(FilePlace::file(path).fault(fault));
     }
-    let [width, height] = size(path, place("render_height"), required("render_width")?, required("render_height")?)?;
+    let (width, height) = (top.required_number("render_width")?, top.required_number("render_height")?);
+    let [width, height] = size(&FilePlace::key(path, "render_height"), width, height)?;
     let world = ParserWorld::beside(path, scene)?;
     let mut views = Vec::new();
     for (index, value) in top.array(KEY)?.iter().enumerate() {
         let key = format!("{KEY}[{index}]");
         let frame = Object::new(path, &key, value)?;
-        let pose_key = frame.full("camera_to_world");
-        let mut matrix = frame.numbers::<16>("camera_to_world")?;
+        let numbers = frame.numbers::<16>("camera_to_world")?;
+        let mut matrix = std::array::from_fn(|row| std::array::from_fn(|column| numbers[4 * row + column]));
         if let Some(world) = &world {
-            world.undo(&mut matrix);
+            matrix = world.undo(&matrix);
         }
-        let missing = || SceneError::MissingKey { path: path.to_path_buf(), key: frame.full("fov") };
-        let angle = frame.number("fov")?.ok_or_else(missing)? * PI / 180.0;
+        let angle = frame.required_number("fov")? * PI / 180.0;
         if !(angle > 0.0 && angle < PI) {
-            let (path, place, fault) =
-                (path.to_path_buf(), FaultLocation::Key(frame.full("fov")), IntrinsicsFault::Angle { angle });
-            return Err(SceneError::Intrinsics { path, place, fault });
+            return Err(FilePlace::key(path, frame.full("fov")).fault(IntrinsicsFault::Angle(angle)));
         }
         let focal = 0.5 * f64::from(height) / (0.5 * angle).tan();
         let intrinsics = RawIntrinsics {
-            focal: [focal; 2],
-            principal: [width, height].map(|side| 0.5 * f64::from(side)),
-            size: Some([width, height]),
-            lens: None,
-            path: path.to_path_buf(),
-            place: FaultLocation::Key(key),
-            size_place: place("render_width"),
+            size_place: FilePlace::key(path, "render_width"),
+            ..RawIntrinsics::centred(focal, [width, height], FilePlace::key(path, &key))
         };
-        let pose = RawPose {
-            matrix,
-            form: PoseForm::WorldFromOpenGl,
-            path: path.to_path_buf(),
-            place: FaultLocation::Key(pose_key),
-        };
+        let place = FilePlace::key(path, frame.full("camera_to_world"));
+        let pose = RawPose { matrix, form: PoseForm::WorldFromOpenGl, place };
         views.push(RawView::new(String::new(), None, pose, Some(intrinsics)));
     }
     Ok(RawPath { views, frames_per_second: top.number("fps")? })

@@ -9,7 +9,7 @@ use viewfuse_core::camera::Pinhole;
 use super::RawPath;
 use crate::scene::SceneError;
 use crate::scene::json::Object;
-use crate::scene::transforms::frame::Frame;
+use crate::scene::transforms::frame::TransformsFrame;
 
 /// The key by which such a file is recognised.
 pub(super) const KEY: &str = "frames";
@@ -18,7 +18,7 @@ pub(super) fn read(path: &Path, top: &Object<'_>, pinhole: &Pinhole) -> Result<R
     let mut views = Vec::new();
     for (index, value) in top.array(KEY)?.iter().enumerate() {
         let key = format!("{KEY}[{index}]");
-        let frame = Frame { path, scopes: [Object::new(path, &key, value)?, top.clone()], key };
+        let frame = TransformsFrame { path, scopes: [Object::new(path, &key, value)?, top.clone()], key };
         views.push(frame.camera_alone([pinhole.width(), pinhole.height()])?);
     }
     Ok(RawPath { views, frames_per_second: top.number("fps")? })

@@ -24,15 +24,15 @@ pub struct GroundTruth {
 pub fn read_over(path: &Path, size: Option<[u32; 2]>, background: Option<[f32; 3]>) -> Result<RgbImage, SceneError> {
     let picture = read_picture(path)?;
     let has_alpha = picture.color().has_alpha() && background.is_some();
-    let own_size = [picture.width(), picture.height()];
-    if !has_alpha && size.is_none_or(|size| size == own_size) {
+    let size_before = [picture.width(), picture.height()];
+    if !has_alpha && size.is_none_or(|size| size == size_before) {
         return Ok(picture.into_rgb8());
     }
     let photograph = Photograph { pixels: picture.into_rgba8(), has_alpha, seen: None };
     let photograph = if has_alpha { photograph } else { photograph.without_alpha() };
-    let size = size.unwrap_or(own_size);
+    let size = size.unwrap_or(size_before);
     let over = matte::laid_over(&photograph, background.unwrap_or_default());
-    Ok(to_rgb8(&resample::area_average(&over, own_size, size), size))
+    Ok(to_rgb8(&resample::area_average(&over, size_before, size), size))
 }
 
 impl Album<'_> {
@@ -56,8 +56,8 @@ impl Album<'_> {
             photograph = Cow::Owned(photograph.into_owned().without_alpha());
         }
         let background = background.unwrap_or_default();
-        let own_size = photograph.pixels.dimensions();
-        let texels = resample::area_average(&matte::laid_over(&photograph, background), own_size.into(), size);
+        let size_before = photograph.pixels.dimensions();
+        let texels = resample::area_average(&matte::laid_over(&photograph, background), size_before.into(), size);
         let seen = photograph.seen.as_ref().map(|seen| resample::seen(seen, size.into()));
         Ok(GroundTruth { picture: to_rgb8(&texels, size), seen: seen.filter(|seen| seen.as_raw().contains(&0)) })
     }

@@ -6,6 +6,7 @@
 //! them.
 
 use crate::Photograph;
+use crate::scene::masks::meaning::flood;
 use std::fmt;
 use std::str::FromStr;
 
@@ -151,8 +152,8 @@ pub(super) fn premultiplied(photograph: &Photograph, border: Option<&Border>, ba
         .pixels()
         .zip(alphas)
         .map(|(pixel, alpha)| {
-            let own = colour_of(pixel);
-            let [r, g, b] = [0, 1, 2].map(|c| (own[c] - (1.0 - alpha) * behind[c]).clamp(0.0, alpha));
+            let colour = colour_of(pixel);
+            let [r, g, b] = [0, 1, 2].map(|c| (colour[c] - (1.0 - alpha) * behind[c]).clamp(0.0, alpha));
             [r, g, b, alpha]
         })
         .collect()
@@ -169,8 +170,8 @@ pub(super) fn premultiplied_by_alpha(pixel: [u8; 4]) -> [f32; 4] {
 pub(super) fn laid_over(photograph: &Photograph, background: [f32; 3]) -> Vec<[f32; 4]> {
     let over = |pixel: &image::Rgba<u8>| {
         let alpha = f32::from(pixel[3]) / 255.0;
-        let own = colour_of(pixel);
-        let [r, g, b] = [0, 1, 2].map(|c| own[c] * alpha + background[c] * (1.0 - alpha));
+        let colour = colour_of(pixel);
+        let [r, g, b] = [0, 1, 2].map(|c| colour[c] * alpha + background[c] * (1.0 - alpha));
         [r, g, b, 1.0]
     };
     photograph.pixels.pixels().map(over).collect()
@@ -201,28 +202,16 @@ fn silhouette(photograph: &Photograph, behind: [f32; 3], threshold: f32) -> Vec<
     let colours: Vec<[f32; 3]> = photograph.pixels.pixels().map(colour_of).collect();
     let is_near = |at: usize| distance(colours[at], behind) < threshold;
 
-    // Flood from the border.
+    let at_border = |at: &usize| {
+        let (x, y) = (*at as i64 % width, *at as i64 / width);
+        x == 0 || y == 0 || x == width - 1 || y == height - 1
+    };
     let mut background = vec![false; colours.len()];
-    let mut front: Vec<usize> = Vec::new();
-    for y in 0..height {
-        for x in 0..width {
-            let at = (y * width + x) as usize;
-            if (x == 0 || y == 0 || x == width - 1 || y == height - 1) && is_near(at) {
-                background[at] = true;
-                front.push(at);
-            }
-        }
-    }
-    while let Some(at) = front.pop() {
-        let (x, y) = (at as i64 % width, at as i64 / width);
-        for (x, y) in [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)] {
-            let next = (y * width + x) as usize;
-            if x >= 0 && y >= 0 && x < width && y < height && !background[next] && is_near(next) {
-                background[next] = true;
-                front.push(next);
-            }
-        }
-    }
+    flood((0..colours.len()).filter(at_border), [width as usize, height as usize], |at| {
+        let is_new = !background[at] && is_near(at);
+        background[at] |= is_new;
+        is_new
+    });
 
     // A pixel of the object next to the background may be a mixture of both: project its colour on the line from the
     // background's to that of the solid pixels nearby.

@@ -13,9 +13,9 @@ const TRANSPARENT_WEIGHT: f32 = 1.0 / 64.0;
 /// A photograph at a smaller size, its colours weighted by their alpha; where all is transparent, their mean. Output
 /// pixels that are partly outside the seen area count as not seen.
 pub(super) fn reduced(photograph: &Photograph, (width, height): (u32, u32)) -> Photograph {
-    let (own_width, own_height) = photograph.pixels.dimensions();
-    let (columns, rows) = (spans(own_width, width), spans(own_height, height));
-    let stride = 4 * own_width as usize;
+    let (width_before, height_before) = photograph.pixels.dimensions();
+    let (columns, rows) = (spans(width_before, width), spans(height_before, height));
+    let stride = 4 * width_before as usize;
     let bytes = photograph.pixels.as_raw();
     let mut averaged = vec![[0_u8; 4]; width as usize * height as usize];
     let (arch, new_line) = (Arch::new(), || vec![0.0_f32; stride]);
@@ -24,17 +24,17 @@ pub(super) fn reduced(photograph: &Photograph, (width, height): (u32, u32)) -> P
     });
     let at = |x: u32, y: u32| averaged[(y * width + x) as usize];
     let pixels = RgbaImage::from_fn(width, height, |x, y| Rgba(at(x, y)));
-    let seen = photograph.seen.as_ref().map(|own| seen(own, (width, height)));
+    let seen = photograph.seen.as_ref().map(|before| seen(before, (width, height)));
     Photograph { pixels, has_alpha: photograph.has_alpha, seen }
 }
 
 /// What is seen at another size: output pixels that are partly outside the seen area count as not seen.
-pub(super) fn seen(own: &GrayImage, (width, height): (u32, u32)) -> GrayImage {
-    let (columns, rows) = (spans(own.width(), width), spans(own.height(), height));
+pub(super) fn seen(before: &GrayImage, (width, height): (u32, u32)) -> GrayImage {
+    let (columns, rows) = (spans(before.width(), width), spans(before.height(), height));
     let is_seen = |x: u32, y: u32| {
         let mut covered =
             rows[y as usize].iter().flat_map(|(y, _)| columns[x as usize].iter().map(move |(x, _)| (*x, *y)));
-        covered.all(|(x, y)| own.get_pixel(x as u32, y as u32)[0] > 0)
+        covered.all(|(x, y)| before.get_pixel(x as u32, y as u32)[0] > 0)
     };
     GrayImage::from_fn(width, height, |x, y| Luma([if is_seen(x, y) { u8::MAX } else { 0 }]))
 }
@@ -103,25 +103,25 @@ fn add_weighted(line: &mut [f32], source: &[u8], share: f32) {
     }
 }
 
-/// `[row][column]` of `size` = `[width, height]` from an image of `own_size`. Enlarging repeats the nearest pixels.
-pub(super) fn area_average(texels: &[[f32; 4]], own_size: [u32; 2], size: [u32; 2]) -> Vec<[f32; 4]> {
-    area_average_of(|texel| texels[texel], own_size, size)
+/// `[row][column]` of `size` = `[width, height]` from an image of `size_before`. Enlarging repeats the nearest pixels.
+pub(super) fn area_average(texels: &[[f32; 4]], size_before: [u32; 2], size: [u32; 2]) -> Vec<[f32; 4]> {
+    area_average_of(|texel| texels[texel], size_before, size)
 }
 
 /// As [`area_average`], of texels that are made when they are needed: by their index, row by row.
 pub(super) fn area_average_of(
     texel: impl Fn(usize) -> [f32; 4] + Sync,
-    own_size: [u32; 2],
+    size_before: [u32; 2],
     size: [u32; 2],
 ) -> Vec<[f32; 4]> {
-    if own_size == size {
+    if size_before == size {
         return (0..(size[0] * size[1]) as usize).map(texel).collect();
     }
-    let columns = spans(own_size[0], size[0]);
-    let rows = spans(own_size[1], size[1]);
-    let own_width = own_size[0] as usize;
+    let columns = spans(size_before[0], size[0]);
+    let rows = spans(size_before[1], size[1]);
+    let width_before = size_before[0] as usize;
     let mut averaged = vec![[0.0; 4]; (size[0] * size[1]) as usize];
-    let (arch, new_line) = (Arch::new(), || vec![[0.0; 4]; own_width]);
+    let (arch, new_line) = (Arch::new(), || vec![[0.0; 4]; width_before]);
     averaged.par_chunks_mut(size[0] as usize).zip(&rows).for_each_init(new_line, |line, (output, row)| {
         arch.dispatch(Averaged { texel: &texel, row, columns: &columns, line, output });
     });
@@ -166,14 +166,14 @@ fn add(sums: &mut [f32; 4], share: f32, texel: [f32; 4]) {
 }
 
 /// For each output pixel along an axis, the input pixels that it covers with their shares, which sum to 1.
-fn spans(own: u32, wanted: u32) -> Vec<Vec<(usize, f32)>> {
-    let step = f64::from(own) / f64::from(wanted);
-    (0..wanted)
+fn spans(before: u32, after: u32) -> Vec<Vec<(usize, f32)>> {
+    let step = f64::from(before) / f64::from(after);
+    (0..after)
         .map(|output| {
             let (start, end) = (f64::from(output) * step, f64::from(output + 1) * step);
             // Rounding must not make a span touch another pixel.
             let first = (start + 1e-9).floor() as usize;
-            let last = ((end - 1e-9).ceil() as usize).clamp(first + 1, own as usize);
+            let last = ((end - 1e-9).ceil() as usize).clamp(first + 1, before as usize);
             (first..last)
                 .map(|input| {
                     let covered = (end.min(input as f64 + 1.0) - start.max(input as f64)).max(0.0);

@@ -16,10 +16,8 @@ enum Parameter {
     Coefficient(usize),
 }
 
-/// A camera model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct CameraModel {
-    /// Its name.
     pub(super) name: &'static str,
     /// COLMAP's number of it, in binary files.
     pub(super) id: u32,
@@ -107,38 +105,13 @@ pub(crate) const KEYED_LENSES: [KeyedLens; 3] = [
 
 /// All keys of lenses' numbers: those above, OpenCV's thin prism and tilt, Metashape's affinity, skew and further
 /// tangential terms, instant-ngp's f-theta polynomial, COLMAP's FOV. A lens that has not the key needs a 0 there.
-pub(super) const LENS_KEYS: [&str; 24] = [
-    "k1",
-    "k2",
-    "k3",
-    "k4",
-    "k5",
-    "k6",
-    "p1",
-    "p2",
-    "p3",
-    "p4",
-    "s1",
-    "s2",
-    "s3",
-    "s4",
-    "tau_x",
-    "tau_y",
-    "b1",
-    "b2",
-    "ftheta_p0",
-    "ftheta_p1",
-    "ftheta_p2",
-    "ftheta_p3",
-    "ftheta_p4",
-    "omega",
-];
+pub(super) const LENS_KEYS: &str = "k1 k2 k3 k4 k5 k6 p1 p2 p3 p4 s1 s2 s3 s4 tau_x tau_y b1 b2 \
+                                    ftheta_p0 ftheta_p1 ftheta_p2 ftheta_p3 ftheta_p4 omega";
 
 /// Flags of projections that are not read (instant-ngp), with any numbers.
 pub(super) const REFUSED_FLAGS: [&str; 2] = ["equirectangular", "latlong"];
 
 impl KeyedLens {
-    /// The lens with this name.
     pub(super) fn named(name: &str) -> Option<&'static KeyedLens> {
         let is_one = |lens: &&KeyedLens| lens.models.iter().any(|model| model.eq_ignore_ascii_case(name));
         KEYED_LENSES.iter().find(is_one)

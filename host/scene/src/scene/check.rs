@@ -10,8 +10,8 @@ use image::metadata::Orientation;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::pose::{MAX_COORDINATE, Pose, PoseError, RIGID_TOLERANCE};
 
-use super::error::SceneError;
-use super::fault::{FaultLocation, IntrinsicsFault};
+use super::error::{SceneError, SceneFault};
+use super::fault::{FileFault, FilePlace, ImageFault, IntrinsicsFault};
 use super::frame;
 use super::images;
 use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPoint, RawPose, RawScene, RawView};
@@ -22,7 +22,7 @@ const MAX_NAME: usize = 240;
 
 /// Whether a view may be called so: results are files of its name.
 pub(crate) fn is_name(name: &str) -> bool {
-    let is_no_part = |own: char| std::path::is_separator(own) || own == '\0';
+    let is_no_part = |letter: char| std::path::is_separator(letter) || letter == '\0';
     !name.is_empty() && name.len() <= MAX_NAME && !name.contains(is_no_part)
 }
 
@@ -44,12 +44,12 @@ pub(super) fn scene(found: &Path, form: &'static str, raw: RawScene) -> Result<C
     let mut order: Vec<usize> = (0..raw_views.len()).collect();
     // Stable: photographs first, otherwise in their order.
     order.sort_by_key(|&view| raw_views[view].image.is_none());
-    let no_views = || SceneError::NoViews { path: found.to_path_buf(), looked_for: form };
+    let no_views = || FilePlace::file(found).fault(SceneFault::NoViews(form));
 
     let mut views: Vec<View> = Vec::with_capacity(raw_views.len());
     for raw in order.iter().map(|&view| &raw_views[view]) {
         if !is_name(&raw.name) {
-            return Err(SceneError::Name { path: found.to_path_buf(), name: raw.name.clone() });
+            return Err(FilePlace::file(found).fault(SceneFault::Name(raw.name.clone())));
         }
         let pinhole = match (&raw.intrinsics, views.first()) {
             (Some(intrinsics), _) => pinhole_of(intrinsics, raw.image.as_ref())?,
@@ -83,8 +83,9 @@ pub(super) fn scene(found: &Path, form: &'static str, raw: RawScene) -> Result<C
     for (now, &before) in order.iter().enumerate() {
         place[before] = now as u32;
     }
-    let intrinsics = raw_views.iter().filter_map(|view| view.intrinsics.as_ref()).map(|own| &own.path);
-    let lists = raw_views.iter().map(|view| &view.pose.path).chain(intrinsics).chain([&points_path]).cloned().collect();
+    let intrinsics = raw_views.iter().filter_map(|view| view.intrinsics.as_ref()).map(|raw| &raw.place.path);
+    let poses = raw_views.iter().map(|view| &view.pose.place.path);
+    let lists = poses.chain(intrinsics).chain([&points_path]).cloned().collect();
     let points = points.into_iter().map(|raw| point(&points_path, raw, &frame, &place)).collect::<Result<_, _>>()?;
     Ok(Checked { views, points, warnings, conventions, unused, lists, frame })
 }
@@ -103,15 +104,14 @@ fn near_far(raw: &RawView, frame: &SceneFrame) -> Result<Option<[f32; 2]>, Scene
     if low > 0.0 && low < high && high <= MAX_COORDINATE {
         return Ok(Some([low, high]));
     }
-    let RawPose { path, place, .. } = &raw.pose;
-    Err(SceneError::Depths { path: path.clone(), place: place.clone(), near, far })
+    Err(raw.pose.place.clone().fault(SceneFault::Depths(near, far)))
 }
 
 fn point(path: &Path, raw: RawPoint, frame: &SceneFrame, place: &[u32]) -> Result<ScenePoint, SceneError> {
-    let [x, y, z] = raw.position;
     let position_world = frame.world(DVec3::from_array(raw.position)).as_vec3();
     if !(position_world.abs().max_element() <= MAX_COORDINATE) || position_world.is_nan() {
-        return Err(SceneError::Point { path: path.to_path_buf(), place: raw.place, x, y, z });
+        let place = FilePlace { path: path.to_path_buf(), location: raw.location };
+        return Err(place.fault(SceneFault::Point(raw.position)));
     }
     let mut views: Vec<u32> = raw.views.iter().filter_map(|&view| place.get(view as usize).copied()).collect();
     views.sort_unstable();
@@ -122,79 +122,64 @@ fn point(path: &Path, raw: RawPoint, frame: &SceneFrame, place: &[u32]) -> Resul
 
 /// A pose from the 16 numbers of a row-major matrix, in the world of a frame.
 fn pose(raw: &RawPose, frame: &SceneFrame) -> Result<Pose, SceneError> {
-    let RawPose { matrix, form, path, place } = raw;
+    let RawPose { matrix, form, place } = raw;
     let checked = if *frame == SceneFrame::FILE {
         match form {
-            PoseForm::WorldFromOpenCv => Pose::from_opencv(&rows(matrix)),
-            PoseForm::WorldFromOpenGl => Pose::from_opengl(&rows(matrix)),
+            PoseForm::WorldFromOpenCv => Pose::from_opencv(&single(matrix)),
+            PoseForm::WorldFromOpenGl => Pose::from_opengl(&single(matrix)),
             // Transposing inverts a rigid matrix only, so the matrix as given must pass too.
             PoseForm::OpenCvFromWorld => {
-                Pose::from_opencv(&rows(matrix)).and_then(|_| Pose::from_opencv(&rows(&world_from_camera(raw))))
+                Pose::from_opencv(&single(matrix)).and_then(|_| Pose::from_opencv(&single(&world_from_camera(raw))))
             }
         }
     } else {
         let mut moved = world_from_camera(raw);
-        let centre = frame.world(centre(&moved));
-        (moved[3], moved[7], moved[11]) = (centre.x, centre.y, centre.z);
-        Pose::from_opencv(&rows(&moved))
+        let centre = frame.world(axis(&moved).0);
+        (moved[0][3], moved[1][3], moved[2][3]) = (centre.x, centre.y, centre.z);
+        Pose::from_opencv(&single(&moved))
     };
     checked.map_err(|reason: PoseError| {
-        let (path, place) = (path.clone(), place.clone());
-        match (reason, form, scale(matrix)) {
+        place.clone().fault(match (reason, form, scale(matrix)) {
             (PoseError::NotRigid { .. }, PoseForm::WorldFromOpenCv | PoseForm::WorldFromOpenGl, Some(scale)) => {
-                SceneError::Scaled { path, place, scale }
+                SceneFault::Scaled(scale)
             }
-            _ => SceneError::Pose { path, place, reason },
-        }
+            _ => SceneFault::Pose(reason),
+        })
     })
 }
 
 /// The scale of a matrix whose 3x3 block is a rotation times a number: of a camera below a scaled object.
-fn scale(m: &[f64; 16]) -> Option<f64> {
-    let block = DMat3::from_cols_array(&[m[0], m[4], m[8], m[1], m[5], m[9], m[2], m[6], m[10]]);
+fn scale(m: &[[f64; 4]; 4]) -> Option<f64> {
+    let column = |at: usize| DVec3::new(m[0][at], m[1][at], m[2][at]);
+    let block = DMat3::from_cols(column(0), column(1), column(2));
     let scale = block.determinant().cbrt();
     let rotation = block * (1.0 / scale);
     let is_rotation = (rotation.transpose() * rotation).abs_diff_eq(DMat3::IDENTITY, f64::from(RIGID_TOLERANCE));
     (scale > 0.0 && is_rotation).then_some(scale)
 }
 
-fn rows(matrix: &[f64; 16]) -> [[f32; 4]; 4] {
-    std::array::from_fn(|row| std::array::from_fn(|column| matrix[4 * row + column] as f32))
+fn single(matrix: &[[f64; 4]; 4]) -> [[f32; 4]; 4] {
+    matrix.map(|row| row.map(|value| value as f32))
 }
 
-/// The camera's centre from a camera-to-world matrix.
-fn centre(world_from_camera: &[f64; 16]) -> DVec3 {
-    DVec3::new(world_from_camera[3], world_from_camera[7], world_from_camera[11])
-}
-
-/// The camera's centre and its principal axis.
-fn axis(world_from_camera: &[f64; 16]) -> (DVec3, DVec3) {
-    let m = world_from_camera;
-    (centre(m), DVec3::new(m[2], m[6], m[10]).normalize_or_zero())
+/// The camera's centre and its principal axis, from a camera-to-world matrix.
+fn axis(m: &[[f64; 4]; 4]) -> (DVec3, DVec3) {
+    (DVec3::new(m[0][3], m[1][3], m[2][3]), DVec3::new(m[0][2], m[1][2], m[2][2]).normalize_or_zero())
 }
 
 /// The camera-to-world matrix in OpenCV axes; of a world-to-camera one, `[R^T | -R^T t]`.
-fn world_from_camera(raw: &RawPose) -> [f64; 16] {
+fn world_from_camera(raw: &RawPose) -> [[f64; 4]; 4] {
     let mut m = raw.matrix;
     match raw.form {
         PoseForm::WorldFromOpenCv => m,
         PoseForm::WorldFromOpenGl => {
-            for row in 0..3 {
-                m[4 * row + 1] = -m[4 * row + 1];
-                m[4 * row + 2] = -m[4 * row + 2];
-            }
+            m[..3].iter_mut().for_each(|row| (row[1], row[2]) = (-row[1], -row[2]));
             m
         }
         PoseForm::OpenCvFromWorld => {
-            let mut inverse = [0.0; 16];
-            for row in 0..3 {
-                for column in 0..3 {
-                    inverse[4 * row + column] = m[4 * column + row];
-                }
-                inverse[4 * row + 3] = -(m[row] * m[3] + m[4 + row] * m[7] + m[8 + row] * m[11]);
-            }
-            inverse[15] = 1.0;
-            inverse
+            let centre = |axis: usize| -(m[0][axis] * m[0][3] + m[1][axis] * m[1][3] + m[2][axis] * m[2][3]);
+            let row = |axis: usize| [m[0][axis], m[1][axis], m[2][axis], centre(axis)];
+            [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]
         }
     }
 }
@@ -203,32 +188,24 @@ fn world_from_camera(raw: &RawPose) -> [f64; 16] {
 /// image.
 ///
 /// # Errors
-/// [`SceneError::SizeMismatch`] if the photograph cannot be the whole image at another scale,
-/// [`SceneError::Orientation`] if it is ambiguous whether the camera is that of the stored or of the upright picture.
+/// [`ImageFault::SizeMismatch`] if the photograph cannot be the whole image at another scale,
+/// [`ImageFault::Orientation`] if it is ambiguous whether the camera is that of the stored or of the upright picture.
 fn pinhole_of(raw: &RawIntrinsics, image: Option<&ImageFile>) -> Result<Pinhole, SceneError> {
-    let RawIntrinsics { focal, principal, size: stated, lens: _, path, place, size_place } = raw;
-    let image_size = match image {
-        Some(image) => Some(upright_size(image, *stated)?),
-        None => None,
-    };
+    let RawIntrinsics { focal, principal, size: stated, lens: _, place, size_place } = raw;
+    let image_size = image.map(|image| upright_size(image, *stated)).transpose()?;
     let Some(size) = (*stated).or(image_size) else {
-        return Err(SceneError::MissingKey { path: path.clone(), key: "the size of the image".to_string() });
+        return Err(FilePlace::file(&place.path).fault(FileFault::MissingKey("the size of the image".to_string())));
     };
-    let own = pinhole(path, place, *focal, *principal, size)?;
-    let (Some(image), Some(image_size)) = (image, image_size) else { return Ok(own) };
+    let stated = pinhole(place, *focal, *principal, size)?;
+    let (Some(image), Some(image_size)) = (image, image_size) else { return Ok(stated) };
     if !same_shape(size, image_size) {
-        return Err(SceneError::SizeMismatch {
-            path: image.path().to_path_buf(),
-            width: image_size[0],
-            height: image_size[1],
-            declared_in: format!("{}{size_place}", path.display()),
-            declared_width: size[0],
-            declared_height: size[1],
-        });
+        let declared_in = size_place.to_string();
+        let fault = ImageFault::SizeMismatch { size: image_size, declared: size, declared_in };
+        return Err(FilePlace::file(image.path()).fault(fault));
     }
     let scale = [0, 1].map(|axis| f64::from(image_size[axis]) / f64::from(size[axis]));
     let scaled = |pair: &[f64; 2]| [pair[0] * scale[0], pair[1] * scale[1]];
-    pinhole(path, size_place, scaled(focal), scaled(principal), image_size)
+    pinhole(size_place, scaled(focal), scaled(principal), image_size)
 }
 
 /// The size of the camera's picture: the stored one, or the upright one if the file's orientation tag says that it must
@@ -243,37 +220,24 @@ fn upright_size(image: &ImageFile, stated: Option<[u32; 2]>) -> Result<[u32; 2],
     match (fits(stored), fits(turned)) {
         (true, false) => Ok(stored),
         (false, true) => Ok(turned),
-        _ => Err(SceneError::Orientation {
-            path: image.path().to_path_buf(),
-            tag: image.orientation().to_exif(),
-            orientation: image.orientation(),
-        }),
+        _ => Err(FilePlace::file(image.path()).fault(ImageFault::Orientation(image.orientation()))),
     }
 }
 
 /// The pinhole of images of this size, if the numbers are a pinhole camera.
-fn pinhole(
-    path: &Path,
-    place: &FaultLocation,
-    focal: [f64; 2],
-    principal: [f64; 2],
-    size: [u32; 2],
-) -> Result<Pinhole, SceneError> {
+fn pinhole(place: &FilePlace, focal: [f64; 2], principal: [f64; 2], size: [u32; 2]) -> Result<Pinhole, SceneError> {
     let single = |pair: [f64; 2]| pair.map(|value| value as f32);
-    Pinhole::new(single(focal), single(principal), size[0], size[1]).map_err(|error| {
-        let fault = IntrinsicsFault::from_pinhole(error, focal, principal, size);
-        SceneError::Intrinsics { path: path.to_path_buf(), place: place.clone(), fault }
-    })
+    let pinhole = Pinhole::new(single(focal), single(principal), size[0], size[1]);
+    pinhole.map_err(|error| place.clone().fault(IntrinsicsFault::from_pinhole(error, focal, principal, size)))
 }
 
 /// A width and a height from numbers of a file.
-pub(crate) fn size(path: &Path, place: FaultLocation, width: f64, height: f64) -> Result<[u32; 2], SceneError> {
+pub(crate) fn size(place: &FilePlace, width: f64, height: f64) -> Result<[u32; 2], SceneError> {
     let whole = |side: f64| (1.0..=f64::from(1u32 << 20)).contains(&side) && side.fract() == 0.0;
-    if whole(width) && whole(height) {
-        return Ok([width as u32, height as u32]);
+    match whole(width) && whole(height) {
+        true => Ok([width as u32, height as u32]),
+        false => Err(place.clone().fault(IntrinsicsFault::Size(width, height))),
     }
-    let fault = IntrinsicsFault::Size { width, height };
-    Err(SceneError::Intrinsics { path: path.to_path_buf(), place, fault })
 }
 
 /// Whether one size is the other at another scale, each side rounded to a whole pixel up or down.

@@ -1,17 +1,58 @@
-//! Parts of [`super::SceneError`]: the place in a file, and faults of intrinsics, files, arrays and PLY headers.
+//! Places in files, and the parts of [`super::SceneFault`]: faults of images, intrinsics, files, arrays and PLY headers.
 
 use std::fmt;
+use std::path::PathBuf;
 
+use image::ImageError;
+use image::metadata::Orientation;
 use thiserror::Error;
 use viewfuse_core::camera::{LONGEST_FOCAL, PinholeError, SHORTEST_FOCAL};
+use viewfuse_core::lens::LensError;
+use viewfuse_job::panics::Panicked;
 
-/// The place of a fault in a file.
+use super::MAX_SIDE;
+
+/// A place in a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FilePlace {
+    /// The file, or a folder.
+    pub path: PathBuf,
+    /// Where in it.
+    pub location: FaultLocation,
+}
+
+impl FilePlace {
+    /// A file as a whole, or a folder.
+    pub fn file(path: impl Into<PathBuf>) -> FilePlace {
+        FilePlace { path: path.into(), location: FaultLocation::File }
+    }
+
+    /// A line of a file, counted from 1.
+    pub fn line(path: impl Into<PathBuf>, line: usize) -> FilePlace {
+        FilePlace { path: path.into(), location: FaultLocation::Line(line) }
+    }
+
+    /// A key of a file.
+    pub fn key(path: impl Into<PathBuf>, key: impl Into<String>) -> FilePlace {
+        FilePlace { path: path.into(), location: FaultLocation::Key(key.into()) }
+    }
+}
+
+impl fmt::Display for FilePlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}{}", self.path.display(), self.location)
+    }
+}
+
+/// Where in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FaultLocation {
     /// The file as a whole.
     File,
     /// A line, counted from 1.
     Line(usize),
+    /// A line and a column, counted from 1.
+    Column(usize, usize),
     /// A byte of a binary file, counted from 0.
     Byte(usize),
     /// A key of a JSON file, such as `frames[3].fl_x`; arrays count from 0.
@@ -24,6 +65,7 @@ impl fmt::Display for FaultLocation {
         match self {
             FaultLocation::File => Ok(()),
             FaultLocation::Line(line) => write!(f, ":{line}"),
+            FaultLocation::Column(line, column) => write!(f, ":{line}:{column}"),
             FaultLocation::Byte(at) => write!(f, ": byte {at}"),
             FaultLocation::Key(key) => write!(f, ": {key}"),
         }
@@ -42,121 +84,170 @@ impl fmt::Display for Short {
     }
 }
 
-/// Why numbers from a file are not a pinhole camera.
-#[derive(Clone, Copy, Debug, PartialEq, Error)]
-pub enum IntrinsicsFault {
-    /// A focal length is out of range.
-    #[error("focal lengths {} and {} are not both from {SHORTEST_FOCAL} to {LONGEST_FOCAL:e} pixels", Short(*x), Short(*y))]
-    Focal {
-        /// Focal length along x.
-        x: f64,
-        /// Focal length along y.
-        y: f64,
-    },
-    /// A coordinate of the principal point is out of range.
+/// Why an image file cannot be used.
+#[derive(Debug, Error)]
+pub enum ImageFault {
+    /// It cannot be decoded.
+    #[error("not a readable image: {}", in_one_line(.0))]
+    Unreadable(Box<ImageError>),
+    /// A decoder panics on it.
+    #[error("not a readable image: {0}")]
+    Decoder(Panicked),
+    /// Its header has too large a size.
+    #[error("the image is {0} x {1}; at most {MAX_SIDE} pixels are allowed on a side")]
+    TooLarge(u32, u32),
+    /// Its pixels take too much memory for its width and height: the bytes that decoding takes, and the most that are used.
     #[error(
-        "principal point ({}, {}) is further than {LONGEST_FOCAL:e} pixels from the corner of the image", Short(*x), Short(*y)
+        "the image is {} x {}: decoding it takes {} MiB; at most {} MiB are used for a photograph",
+        .0[0], .0[1], .1 >> 20, .2 >> 20
     )]
-    Principal {
-        /// Coordinate to the right.
-        x: f64,
-        /// Coordinate downwards.
-        y: f64,
+    TooMuch([u32; 2], u64, u64),
+    /// It has more bytes than are read of any image of its size, which is in words, where the header says it.
+    #[error("the file has {} MiB; of an image{} at most {} MiB are read", .0 >> 20, .1, .2 >> 20)]
+    TooLong(u64, String, u64),
+    /// It is too short for the width and height in its header: its bytes.
+    #[error("the image is {} x {}, and its file has only {} bytes", .0[0], .0[1], .1)]
+    Hollow([u32; 2], u64),
+    /// Its size is not that of its camera.
+    #[error("the image is {} x {}, but {declared_in} is for {} x {}", size[0], size[1], declared[0], declared[1])]
+    SizeMismatch {
+        /// Width and height of the image.
+        size: [u32; 2],
+        /// Those of the camera's images.
+        declared: [u32; 2],
+        /// The source of the other size: a file, with the line or key.
+        declared_in: String,
     },
+    /// It must be turned to be upright, and it is ambiguous whether the cameras are for the upright or the stored picture.
+    #[error(
+        "the file says that its pixels must be turned to be upright (EXIF orientation {}, {:?}), and the \
+         size that the cameras are for does not tell whether they are those of the stored or of the upright picture; save \
+         the photograph without the tag", .0.to_exif(), .0
+    )]
+    Orientation(Orientation),
+}
+
+/// Most characters of what a decoder says.
+const MAX_CAUSE: usize = 300;
+
+/// A message of a decoder: some end in a line break, some list every number that they do not know.
+fn in_one_line(cause: &ImageError) -> String {
+    let line = cause.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+    match line.char_indices().nth(MAX_CAUSE) {
+        Some((end, _)) => format!("{}...", &line[..end]),
+        None => line,
+    }
+}
+
+/// Why numbers from a file are not a camera that is read.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum IntrinsicsFault {
+    /// A focal length, along x or y, is out of range.
+    #[error("focal lengths {} and {} are not both from {SHORTEST_FOCAL} to {LONGEST_FOCAL:e} pixels", Short(*.0), Short(*.1))]
+    Focal(f64, f64),
+    /// A coordinate of the principal point, to the right or downwards, is out of range.
+    #[error(
+        "principal point ({}, {}) is further than {LONGEST_FOCAL:e} pixels from the corner of the image", Short(*.0), Short(*.1)
+    )]
+    Principal(f64, f64),
     /// A width or height is not a whole number of pixels from 1 to 2^20.
-    #[error("image size {width} x {height} is not two whole numbers from 1 to 1048576")]
-    Size {
-        /// Width as stated in the file.
-        width: f64,
-        /// Height as stated in the file.
-        height: f64,
-    },
+    #[error("image size {0} x {1} is not two whole numbers from 1 to 1048576")]
+    Size(f64, f64),
     /// An opening angle is not between 0 and pi.
-    #[error("opening angle {angle} is not between 0 and pi radians")]
-    Angle {
-        /// The angle as stated in the file.
-        angle: f64,
-    },
-    /// The image axes are not at right angles.
-    #[error("the skew {skew} of K is not 0; only square image axes are supported")]
-    Skew {
-        /// Element (0, 1) of the matrix.
-        skew: f64,
-    },
+    #[error("opening angle {0} is not between 0 and pi radians")]
+    Angle(f64),
+    /// The image axes are not at right angles: element (0, 1) of K is not 0.
+    #[error("the skew {0} of K is not 0; only square image axes are supported")]
+    Skew(f64),
     /// A projection of 3 x 4 numbers that is singular.
     #[error("the projection is singular: it has no centre")]
     Projection,
     /// The matrix is not upper triangular with a last row of `0 0 1`.
     #[error("K does not have the form fx 0 cx / 0 fy cy / 0 0 1")]
     Form,
+    /// The coefficients are not a lens.
+    #[error("{0}")]
+    Lens(LensError),
+    /// A key, and its value, of a lens that is not supported.
+    #[error(
+        "{0} is {1}: this lens is not supported; undistort the photographs first, for example \
+         with COLMAP's image_undistorter, and use the cameras that it writes"
+    )]
+    Distorted(String, String),
+    /// A camera model that is not supported, and the names of those that are.
+    #[error("camera model {0} is not supported; the models are {1}")]
+    CameraModel(String, String),
 }
 
 impl IntrinsicsFault {
     /// The fault that core reports for these numbers, with their values.
     pub(super) fn from_pinhole(error: PinholeError, focal: [f64; 2], principal: [f64; 2], size: [u32; 2]) -> Self {
         match error {
-            PinholeError::Focal => IntrinsicsFault::Focal { x: focal[0], y: focal[1] },
-            PinholeError::Principal => IntrinsicsFault::Principal { x: principal[0], y: principal[1] },
-            PinholeError::Size => IntrinsicsFault::Size { width: size[0].into(), height: size[1].into() },
+            PinholeError::Focal => IntrinsicsFault::Focal(focal[0], focal[1]),
+            PinholeError::Principal => IntrinsicsFault::Principal(principal[0], principal[1]),
+            PinholeError::Size => IntrinsicsFault::Size(size[0].into(), size[1].into()),
         }
     }
 }
 
-/// What is wrong with a file that is damaged.
+/// What is wrong with what a file holds.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum FileFault {
-    /// It ends too early.
-    #[error("ends after {length} bytes, inside {of}")]
-    Truncated {
-        /// Its length in bytes.
-        length: usize,
-        /// What is cut off.
-        of: &'static str,
-    },
-    /// Data follows its expected end.
-    #[error("{left} bytes are left over")]
-    LeftOver {
-        /// How many bytes.
-        left: usize,
-    },
-    /// Its header states more entries than the file can hold.
-    #[error("announces {count} {of}; the file has room for {most}")]
-    NoRoom {
-        /// What is counted.
-        of: &'static str,
-        /// The stated count.
-        count: u64,
-        /// The largest possible count.
-        most: usize,
-    },
-    /// A text in a binary file is not UTF-8.
-    #[error("{of} is not UTF-8 text")]
-    NotText {
-        /// What it should be.
-        of: &'static str,
-    },
+    /// A word, shortened if it is long, where a number should be.
+    #[error("{0:?} is not a number")]
+    NotANumber(String),
+    /// NaN, an infinity, or a number too large to hold.
+    #[error("{0:?} is not a finite number")]
+    NotFinite(String),
     /// A number that must be whole and not negative is not.
-    #[error("{word:?} is not a whole number")]
-    NotWhole {
-        /// The word.
-        word: String,
-    },
-    /// Two entries have one number.
-    #[error("there are two {of} with the number {id}")]
-    DuplicateId {
-        /// What they are.
+    #[error("{0:?} is not a whole number")]
+    NotWhole(String),
+    /// Too few or too many numbers (or rows).
+    #[error("found {found} {of} instead of {expected}")]
+    WrongCount {
+        /// The counted items.
         of: &'static str,
-        /// The number.
-        id: u64,
+        /// The expected count.
+        expected: usize,
+        /// The count found.
+        found: usize,
     },
-    /// A reference to an entry that does not exist.
-    #[error("there is no {of} with the number {id}")]
-    NoSuchId {
-        /// What is referred to.
-        of: &'static str,
-        /// The number.
-        id: u64,
-    },
+    /// Not JSON: what the parser says.
+    #[error("not valid JSON: {0}")]
+    Json(String),
+    /// A required key is missing.
+    #[error("{0} is missing")]
+    MissingKey(String),
+    /// A key holds another kind of value than this one.
+    #[error("{0} must be {1}")]
+    WrongType(String, &'static str),
+    /// Two keys, each with its value, contradict each other.
+    #[error("{0} and {1} contradict each other: keep the one that is right")]
+    Contradiction(String, String),
+    /// Not a table of CSV: what the parser says.
+    #[error("not a table of comma-separated values: {0}")]
+    Table(String),
+    /// A column of a table of poses is missing, unknown, or there twice; and the columns that there can be.
+    #[error("{0}; the columns are {1}")]
+    Columns(String, &'static str),
+    /// It ends too early: after so many bytes, inside this.
+    #[error("ends after {0} bytes, inside {1}")]
+    Truncated(usize, &'static str),
+    /// So many bytes follow its expected end.
+    #[error("{0} bytes are left over")]
+    Surplus(usize),
+    /// Its header states more entries of a kind than the file can hold: how many, and how many it can.
+    #[error("announces {1} {0}; the file has room for {2}")]
+    NoRoom(&'static str, u64, usize),
+    /// What should be a text is not UTF-8.
+    #[error("{0} is not UTF-8 text")]
+    NotText(&'static str),
+    /// Two entries of a kind have one number.
+    #[error("there are two {0} with the number {1}")]
+    DuplicateId(&'static str, u64),
+    /// A reference to an entry of a kind that does not exist.
+    #[error("there is no {0} with the number {1}")]
+    NoSuchId(&'static str, u64),
 }
 
 /// Why bytes are not an array of NumPy's.
@@ -177,14 +268,9 @@ pub enum NumpyFault {
     /// Not floating point numbers.
     #[error("it holds elements of type {0:?}; <f4 and <f8 are read")]
     Kind(String),
-    /// NaN or an infinity.
-    #[error("element {index} is {value}")]
-    NotFinite {
-        /// Its index in the order of the file, from 0.
-        index: usize,
-        /// The number.
-        value: f64,
-    },
+    /// NaN or an infinity, and its index in the order of the file, from 0.
+    #[error("element {0} is {1}")]
+    NotFinite(usize, f64),
     /// An array of an archive is too large for cameras.
     #[error("it is larger than 16 MiB")]
     TooLarge,

@@ -7,8 +7,8 @@ use std::{fs, io};
 
 use viewfuse_job::files::read_at_most;
 
-use super::error::SceneError;
-use super::fault::{FaultLocation, FileFault};
+use super::error::{SceneError, SceneFault};
+use super::fault::{FileFault, FilePlace};
 
 /// Extensions of photographs, compared without regard to case.
 pub(super) const IMAGE_EXTENSIONS: [&str; 9] = ["png", "jpg", "jpeg", "webp", "tif", "tiff", "JPG", "JPEG", "PNG"];
@@ -18,44 +18,37 @@ pub(super) const IMAGE_FOLDERS: [&str; 8] =
     ["images", "images_1", "images_2", "images_4", "images_8", "input", "image", "rgb"];
 
 /// Most bytes of a list of cameras, points or depths.
-pub(super) const LONGEST_FILE: u64 = 4 << 30;
+pub(super) const MAX_FILE: u64 = 4 << 30;
 
 /// Most bytes of any other text: a `transforms.json` of ten thousand views takes ten million.
 const MAX_TEXT: u64 = 256 << 20;
 
 /// Longest part of a wrong word that an error quotes: a binary file's first "word" may be the whole file.
-const LONGEST_EXCERPT: usize = 40;
+const MAX_EXCERPT: usize = 40;
 
 /// The error for a file or folder that the operating system could not open.
 pub(crate) fn unreadable(path: &Path, cause: io::Error) -> SceneError {
-    let path = path.to_path_buf();
-    if cause.kind() == io::ErrorKind::NotFound {
-        SceneError::Missing { path }
-    } else {
-        SceneError::Read { path, cause }
-    }
+    let is_missing = cause.kind() == io::ErrorKind::NotFound;
+    FilePlace::file(path).fault(if is_missing { SceneFault::Missing } else { SceneFault::Read(cause) })
 }
 
 /// The contents of a text file of at most 256 MiB, without the byte order mark that some editors put in front. The
 /// length is judged before anything is read.
 ///
 /// # Errors
-/// [`SceneError::Missing`], [`SceneError::Read`] if it cannot be read, or [`SceneError::Damaged`] with the line if it
-/// is not UTF-8.
+/// [`SceneFault::Missing`], [`SceneFault::Read`] if it cannot be read, or [`FileFault::NotText`] with the line if it is
+/// not UTF-8.
 pub fn read_text(path: &Path) -> Result<String, SceneError> {
     read_text_of(path, MAX_TEXT)
 }
 
 /// The same for another limit.
-///
-/// # Errors
-/// As [`read_text`].
 pub(super) fn read_text_of(path: &Path, most: u64) -> Result<String, SceneError> {
     let bytes = read_at_most(path, most).map_err(|cause| unreadable(path, cause))?;
     let text = String::from_utf8(bytes).map_err(|error| {
         let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
-        let place = FaultLocation::Line(1 + before.iter().filter(|byte| **byte == b'\n').count());
-        SceneError::Damaged { path: path.to_path_buf(), place, fault: FileFault::NotText { of: "this line" } }
+        let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
+        FilePlace::line(path, line).fault(FileFault::NotText("this line"))
     })?;
     Ok(match text.strip_prefix('\u{feff}') {
         Some(rest) => rest.to_string(),
@@ -63,40 +56,34 @@ pub(super) fn read_text_of(path: &Path, most: u64) -> Result<String, SceneError>
     })
 }
 
-/// The files in a folder for whose name `wanted` holds, in natural order. Hidden files are left out: archives made on a
-/// Mac contain a `._000000.png` next to each `000000.png`.
+/// The files in a folder for whose name `wanted` holds, in natural order, without hidden ones: archives made on a Mac
+/// contain a `._000000.png` next to each `000000.png`.
 ///
 /// # Errors
-/// [`SceneError::Missing`] or [`SceneError::Read`] for a folder that cannot be listed.
+/// [`SceneFault::Missing`] or [`SceneFault::Read`] for a folder that cannot be listed.
 pub fn list(folder: &Path, wanted: impl Fn(&Path) -> bool) -> Result<Vec<PathBuf>, SceneError> {
-    let failed = |cause| unreadable(folder, cause);
-    let mut paths = Vec::new();
-    for entry in fs::read_dir(folder).map_err(failed)? {
-        let path = entry.map_err(failed)?.path();
-        let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
-        if !hidden && wanted(&path) && path.is_file() {
-            paths.push(path);
-        }
-    }
-    // Names that are equal as text are not equal as names.
-    paths.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()).then_with(|| a.cmp(b)));
-    Ok(paths)
+    entries(folder, |_, path| wanted(path) && path.is_file())
 }
 
-/// The folders in a folder, in natural order. Hidden ones and links are left out.
+/// The folders in a folder, in natural order, without hidden ones and links.
 ///
 /// # Errors
 /// As [`list`].
 pub fn folders(folder: &Path) -> Result<Vec<PathBuf>, SceneError> {
+    entries(folder, |entry, _| entry.file_type().is_ok_and(|kind| kind.is_dir()))
+}
+
+fn entries(folder: &Path, wanted: impl Fn(&fs::DirEntry, &Path) -> bool) -> Result<Vec<PathBuf>, SceneError> {
     let failed = |cause| unreadable(folder, cause);
     let mut paths = Vec::new();
     for entry in fs::read_dir(folder).map_err(failed)? {
         let entry = entry.map_err(failed)?;
-        let is_hidden = entry.file_name().to_string_lossy().starts_with('.');
-        if !is_hidden && entry.file_type().is_ok_and(|kind| kind.is_dir()) {
-            paths.push(entry.path());
+        let (path, is_hidden) = (entry.path(), entry.file_name().to_string_lossy().starts_with('.'));
+        if !is_hidden && wanted(&entry, &path) {
+            paths.push(path);
         }
     }
+    // Names that are equal as text are not equal as names.
     paths.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()).then_with(|| a.cmp(b)));
     Ok(paths)
 }
@@ -111,19 +98,13 @@ pub(super) fn photograph_count(folder: &Path) -> usize {
 
 /// The existing ones of `images` and, by increasing N, `images_N`: photographs at full size and N times smaller.
 pub(super) fn image_folders(root: &Path) -> Result<Vec<PathBuf>, SceneError> {
-    let failed = |cause| unreadable(root, cause);
-    let mut folders: Vec<(u64, PathBuf)> = Vec::new();
     // The folder of a bare file name is the current one.
     let here = if root.as_os_str().is_empty() { Path::new(".") } else { root };
-    for entry in std::fs::read_dir(here).map_err(failed)? {
-        let path = entry.map_err(failed)?.path();
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        if let Some(factor) = reduction(&name).filter(|_| path.is_dir()) {
-            folders.push((factor, path));
-        }
-    }
-    folders.sort();
-    Ok(folders.into_iter().map(|(_, path)| path).collect())
+    let factor = |path: &PathBuf| reduction(&path.file_name().unwrap_or_default().to_string_lossy());
+    let mut folders = entries(here, |_, path| path.is_dir())?;
+    folders.retain(|path| factor(path).is_some());
+    folders.sort_by_key(factor);
+    Ok(folders)
 }
 
 /// How many times smaller the photographs in a folder `images` or `images_N` are.
@@ -182,7 +163,7 @@ pub(super) fn appended(path: &Path, extension: &str) -> PathBuf {
 /// The numbers of each line that is not blank, with the line's number from 1; `path` is the text's file.
 ///
 /// # Errors
-/// [`SceneError::NotANumber`] or [`SceneError::NotFinite`], with the line.
+/// [`FileFault::NotANumber`] or [`FileFault::NotFinite`], with the line.
 pub fn number_lines(path: &Path, text: &str) -> Result<Vec<(usize, Vec<f64>)>, SceneError> {
     lines(text)
         .map(|(line, content)| {
@@ -198,16 +179,17 @@ pub(super) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
 
 /// A finite number from a word of a line.
 pub(crate) fn number(path: &Path, line: usize, word: &str) -> Result<f64, SceneError> {
-    let (path, place) = (path.to_path_buf(), FaultLocation::Line(line));
-    let Ok(value) = word.parse::<f64>() else {
-        return Err(SceneError::NotANumber { path, place, word: excerpt(word) });
+    let fault = match word.parse::<f64>() {
+        Ok(value) if value.is_finite() => return Ok(value),
+        Ok(_) => FileFault::NotFinite(excerpt(word)),
+        Err(_) => FileFault::NotANumber(excerpt(word)),
     };
-    if value.is_finite() { Ok(value) } else { Err(SceneError::NotFinite { path, place, word: excerpt(word) }) }
+    Err(FilePlace::line(path, line).fault(fault))
 }
 
 /// The first few characters of a word.
 pub(crate) fn excerpt(word: &str) -> String {
-    let mut short: String = word.chars().take(LONGEST_EXCERPT).collect();
+    let mut short: String = word.chars().take(MAX_EXCERPT).collect();
     if short.len() < word.len() {
         short.push_str("...");
     }

@@ -6,6 +6,7 @@ use std::path::Path;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use viewfuse_job::files::read_at_most;
+use viewfuse_job::text::listed;
 
 use super::View;
 
@@ -20,7 +21,7 @@ const MAX_NAMES: usize = 8;
 
 /// What is read of a record.
 #[derive(Deserialize)]
-struct Record {
+struct FoundPoses {
     files: Vec<IgnoredAny>,
     accepted: Vec<Accepted>,
     left_out: Vec<(String, String)>,
@@ -41,26 +42,27 @@ pub(super) fn warnings(root: &Path, views: &[View]) -> Vec<String> {
     let Some(record) = read_at_most(&path, MAX_BYTES).ok().and_then(|text| serde_json::from_slice(&text).ok()) else {
         return Vec::new();
     };
-    let Record { files, accepted, left_out } = record;
+    let FoundPoses { files, accepted, left_out: excluded } = record;
     let mut warnings = Vec::new();
     let is_view = |name: &str| views.iter().any(|view| view.name == name);
     let doubtful = accepted.iter().filter(|photo| photo.verdict == "doubtful" && is_view(&photo.photograph));
     let doubtful: Vec<&str> = doubtful.map(|photo| photo.photograph.as_str()).collect();
     if !doubtful.is_empty() {
         let (some, all) = (doubtful.len(), accepted.len());
-        warnings.push(format!("{}: {some} of {all} poses are doubtful ({})", path.display(), listed(&doubtful)));
+        warnings.push(format!(
+            "{}: {some} of {all} poses are doubtful ({})",
+            path.display(),
+            listed(&doubtful, MAX_NAMES)
+        ));
     }
     if accepted.len() < files.len() {
-        let names: Vec<&str> = left_out.iter().map(|(name, _)| name.as_str()).collect();
+        let names: Vec<&str> = excluded.iter().map(|(name, _)| name.as_str()).collect();
         let (some, all) = (accepted.len(), files.len());
         let path = path.display();
-        warnings.push(format!("{path}: poses were found for {some} of {all} photographs (without {})", listed(&names)));
+        warnings.push(format!(
+            "{path}: poses were found for {some} of {all} photographs (without {})",
+            listed(&names, MAX_NAMES)
+        ));
     }
     warnings
-}
-
-fn listed(names: &[&str]) -> String {
-    let more = names.len().saturating_sub(MAX_NAMES);
-    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    names[..names.len().min(MAX_NAMES)].join(", ") + &more
 }

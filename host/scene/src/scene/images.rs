@@ -15,6 +15,7 @@ use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, ImageResult, L
 use viewfuse_job::panics::caught;
 
 use super::error::SceneError;
+use super::fault::{FilePlace, ImageFault};
 use super::files::unreadable;
 use super::{MAX_SIDE, Photograph};
 
@@ -66,9 +67,9 @@ pub(super) struct Header {
 /// Size and orientation; nothing of the size that the header states is allocated.
 ///
 /// # Errors
-/// [`SceneError::TooLarge`] if a side has more than [`MAX_SIDE`] pixels, [`SceneError::TooMuch`] if all pixels together
-/// take too much memory, [`SceneError::LongImage`] if the file is longer than such an image;
-/// otherwise as for any unreadable image.
+/// [`ImageFault::TooLarge`] if a side has more than [`MAX_SIDE`] pixels, [`ImageFault::TooMuch`] if all pixels together
+/// take too much memory, [`ImageFault::TooLong`] if the file is longer than such an image; otherwise as for any
+/// unreadable image.
 pub(super) fn header(path: &Path) -> Result<Header, SceneError> {
     let length = path.metadata().map_err(|cause| unreadable(path, cause))?.len();
     // Decoders of some formats read all of it, before they know a size.
@@ -79,18 +80,18 @@ pub(super) fn header(path: &Path) -> Result<Header, SceneError> {
     };
     let [width, height] = found.size;
     if width > MAX_SIDE || height > MAX_SIDE {
-        return Err(SceneError::TooLarge { path: path.to_path_buf(), width, height });
+        return Err(FilePlace::file(path).fault(ImageFault::TooLarge(width, height)));
     }
     let bytes = found.bytes + RGBA_BYTES * u64::from(width) * u64::from(height);
     if bytes > MAX_DECODING {
-        return Err(SceneError::TooMuch { path: path.to_path_buf(), width, height, bytes, most: MAX_DECODING });
+        return Err(FilePlace::file(path).fault(ImageFault::TooMuch(found.size, bytes, MAX_DECODING)));
     }
     not_longer(path, length, 2 * bytes + FILE_ALLOWANCE, || format!(" of {width} x {height}"))?;
     Ok(found)
 }
 
 fn not_longer(path: &Path, length: u64, most: u64, of_size: impl Fn() -> String) -> Result<(), SceneError> {
-    let too_long = || SceneError::LongImage { path: path.to_path_buf(), length, of_size: of_size(), most };
+    let too_long = || FilePlace::file(path).fault(ImageFault::TooLong(length, of_size(), most));
     if length > most { Err(too_long()) } else { Ok(()) }
 }
 
@@ -160,7 +161,7 @@ impl Turn {
 /// size.
 ///
 /// # Errors
-/// [`SceneError::SizeMismatch`] if the file has another size.
+/// [`ImageFault::SizeMismatch`] if the file has another size.
 pub(super) fn decode(path: &Path, size: [u32; 2]) -> Result<(Photograph, Turn), SceneError> {
     let (mut decoded, orientation) = pixels(path)?;
     let bytes = decoded.as_bytes().len() as u64;
@@ -168,21 +169,15 @@ pub(super) fn decode(path: &Path, size: [u32; 2]) -> Result<(Photograph, Turn), 
     if turn.is_applied {
         decoded.apply_orientation(orientation);
     }
-    let (width, height) = (decoded.width(), decoded.height());
-    if [width, height] != size {
-        return Err(SceneError::SizeMismatch {
-            path: path.to_path_buf(),
-            width,
-            height,
-            declared_in: "the scene as it was opened".to_string(),
-            declared_width: size[0],
-            declared_height: size[1],
-        });
+    let found = [decoded.width(), decoded.height()];
+    if found != size {
+        let declared_in = "the scene as it was opened".to_string();
+        return Err(FilePlace::file(path).fault(ImageFault::SizeMismatch { size: found, declared: size, declared_in }));
     }
     let has_channel = decoded.color().has_alpha();
     let pixels = match decoded {
         // Pixel by pixel; `into_rgba8` goes through the conversion of colour spaces, which takes ten times as long.
-        DynamicImage::ImageRgb8(own) => own.convert(),
+        DynamicImage::ImageRgb8(opaque) => opaque.convert(),
         other => other.into_rgba8(),
     };
     // SRN's photographs have an alpha channel that is 255 everywhere: it is ignored.
@@ -196,7 +191,7 @@ pub(super) fn inverse(orientation: Orientation) -> Orientation {
         Orientation::Rotate90 => Orientation::Rotate270,
         Orientation::Rotate270 => Orientation::Rotate90,
         // Flips and the turn by 180 degrees undo themselves.
-        own => own,
+        itself => itself,
     }
 }
 
@@ -216,7 +211,7 @@ pub(super) fn pixels(path: &Path) -> Result<(DynamicImage, Orientation), SceneEr
     let Header { size: [width, height], orientation, bytes } = header(path)?;
     let length = path.metadata().map_err(|cause| unreadable(path, cause))?.len();
     if bytes > SMALL_IMAGE && bytes / MAX_RATIO > length {
-        return Err(SceneError::Hollow { path: path.to_path_buf(), width, height, length });
+        return Err(FilePlace::file(path).fault(ImageFault::Hollow([width, height], length)));
     }
     let mut limits = Limits::default();
     limits.max_image_width = Some(width);
@@ -235,10 +230,12 @@ pub(super) fn pixels(path: &Path) -> Result<(DynamicImage, Orientation), SceneEr
 
 /// What a decoder makes of a file; it may fail or panic.
 fn decoding<T>(path: &Path, decode: impl FnOnce() -> image::ImageResult<T>) -> Result<T, SceneError> {
-    match caught(decode) {
-        Ok(decoded) => decoded.map_err(|cause| SceneError::Image { path: path.to_path_buf(), cause }),
-        Err(panic) => Err(SceneError::Decoder { path: path.to_path_buf(), panic }),
-    }
+    let fault = match caught(decode) {
+        Ok(Ok(decoded)) => return Ok(decoded),
+        Ok(Err(cause)) => ImageFault::Unreadable(Box::new(cause)),
+        Err(panic) => ImageFault::Decoder(panic),
+    };
+    Err(FilePlace::file(path).fault(fault))
 }
 
 /// The pixels of any picture, upright as its orientation tag (EXIF) says: PNG, JPEG, WebP or TIFF of at most

@@ -7,7 +7,7 @@ use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor}
 use serde_json::{Map, Value};
 
 use super::error::SceneError;
-use super::fault::FaultLocation;
+use super::fault::{FaultLocation, FileFault, FilePlace};
 
 /// An object of a JSON file and its place.
 #[derive(Clone, Debug)]
@@ -26,7 +26,8 @@ pub(crate) fn parse(path: &Path, text: &str) -> Result<Value, SceneError> {
         // The parser appends the place, which our message has in front, where editors expect it.
         let said = error.to_string();
         let reason = said.strip_suffix(&format!(" at line {line} column {column}")).unwrap_or(&said).to_string();
-        SceneError::Json { path: path.to_path_buf(), line, column, reason }
+        let place = FilePlace { path: path.to_path_buf(), location: FaultLocation::Column(line, column) };
+        place.fault(FileFault::Json(reason))
     })
 }
 
@@ -56,14 +57,22 @@ impl<'a> Object<'a> {
         self.entries.iter().map(|(key, value)| (key.as_str(), value))
     }
 
-    /// A required value.
     pub(super) fn required(&self, key: &str) -> Result<&'a Value, SceneError> {
-        self.get(key).ok_or_else(|| SceneError::MissingKey { path: self.path.to_path_buf(), key: self.full(key) })
+        self.get(key).ok_or_else(|| self.missing(key))
+    }
+
+    /// The error for a required key that is missing.
+    pub(crate) fn missing(&self, key: &str) -> SceneError {
+        FilePlace::file(self.path).fault(FileFault::MissingKey(self.full(key)))
     }
 
     /// A number, if there is one.
     pub(crate) fn number(&self, key: &str) -> Result<Option<f64>, SceneError> {
         self.get(key).map(|value| number(self.path, &self.full(key), value)).transpose()
+    }
+
+    pub(crate) fn required_number(&self, key: &str) -> Result<f64, SceneError> {
+        self.number(key)?.ok_or_else(|| self.missing(key))
     }
 
     /// A required text.
@@ -75,12 +84,6 @@ impl<'a> Object<'a> {
     /// A required array.
     pub(crate) fn array(&self, key: &str) -> Result<&'a [Value], SceneError> {
         array(self.path, &self.full(key), self.required(key)?)
-    }
-
-    /// The 16 numbers of a required array of 4 rows of 4 numbers.
-    pub(super) fn matrix(&self, key: &str) -> Result<[f64; 16], SceneError> {
-        let rows = self.rows::<4>(key)?;
-        Ok(std::array::from_fn(|index| rows[index / 4][index % 4]))
     }
 
     /// A required array of this many rows of 4 numbers.
@@ -126,17 +129,12 @@ fn of_length<'a, const N: usize>(
     values: &'a [Value],
     of: &'static str,
 ) -> Result<&'a [Value; N], SceneError> {
-    values.try_into().map_err(|_| SceneError::WrongCount {
-        path: path.to_path_buf(),
-        place: FaultLocation::Key(key.to_string()),
-        of,
-        expected: N,
-        found: values.len(),
-    })
+    let fault = || FileFault::WrongCount { of, expected: N, found: values.len() };
+    values.try_into().map_err(|_| FilePlace::key(path, key).fault(fault()))
 }
 
 fn wrong_type(path: &Path, key: String, expected: &'static str) -> SceneError {
-    SceneError::WrongType { path: path.to_path_buf(), key, expected }
+    FilePlace::file(path).fault(FileFault::WrongType(key, expected))
 }
 
 /// A value in whose objects no key stands twice: parsers keep one of the two, not all the same one.

@@ -14,13 +14,12 @@ use std::path::{Path, PathBuf};
 
 use super::check;
 use super::colmap::{self, Origin};
-use super::error::SceneError;
-use super::fault::FaultLocation;
+use super::error::{SceneError, SceneFault};
+use super::fault::{FileFault, FilePlace};
 use super::files::{self, IMAGE_EXTENSIONS};
 use super::numpy;
 use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPoint, RawPose, RawScene, RawView, Reader};
 
-/// Name of the file.
 const FILE_NAME: &str = "poses_bounds.npy";
 
 /// Numbers in a row.
@@ -52,9 +51,9 @@ impl Reader for Llff {
         let rows: Vec<&[f64]> = match array.shape[..] {
             [_, ROW] => array.values.chunks_exact(ROW).collect(),
             _ => {
-                let (path, place) = (file.to_path_buf(), FaultLocation::File);
                 let found = array.shape.get(1).copied().unwrap_or(array.values.len());
-                return Err(SceneError::WrongCount { path, place, of: "numbers in a row", expected: ROW, found });
+                let fault = FileFault::WrongCount { of: "numbers in a row", expected: ROW, found };
+                return Err(FilePlace::file(file).fault(fault));
             }
         };
         let images = photographs(file, rows.len())?;
@@ -74,10 +73,11 @@ fn points(file: &Path, views: &[RawView]) -> Result<(Vec<RawPoint>, PathBuf), St
     let origin = colmap::beside(&root).map_err(|error| error.to_string())?;
     let Some(Origin { cameras_from_world, points, points_path }) = origin else { return Ok(Default::default()) };
     // Each centre, from `[R | t]` and from the row: -R^T t.
-    let differs = |(m, view): (&[f64; 16], &RawView)| {
+    let differs = |(m, view): (&[[f64; 4]; 4], &RawView)| {
         let c = &view.pose.matrix;
-        let offset = |axis: usize| -(m[axis] * m[3] + m[4 + axis] * m[7] + m[8 + axis] * m[11]) - c[4 * axis + 3];
-        let size = 1.0 + [3, 7, 11].map(|entry| m[entry].abs()).into_iter().fold(0.0, f64::max);
+        let centre = |axis: usize| -(m[0][axis] * m[0][3] + m[1][axis] * m[1][3] + m[2][axis] * m[2][3]);
+        let offset = |axis: usize| centre(axis) - c[axis][3];
+        let size = 1.0 + [0, 1, 2].map(|row| m[row][3].abs()).into_iter().fold(0.0, f64::max);
         // A NaN counts as different.
         !((0..3).all(|axis| offset(axis).abs() <= SAME_CENTRE * size))
     };
@@ -103,24 +103,20 @@ fn photographs(file: &Path, row_count: usize) -> Result<Vec<PathBuf>, SceneError
     Err(match wrong {
         Some((path, found)) => {
             let of = "photographs (rows of poses_bounds.npy)";
-            SceneError::WrongCount { path, place: FaultLocation::File, of, expected: row_count, found }
+            FilePlace::file(path).fault(FileFault::WrongCount { of, expected: row_count, found })
         }
-        None => SceneError::NoViews { path: root, looked_for: "images/, images_2/, images_4/, images_8/" },
+        None => FilePlace::file(root).fault(SceneFault::NoViews("images/, images_2/, images_4/, images_8/")),
     })
 }
 
 fn view(file: &Path, row: usize, numbers: &[f64], image: &Path) -> Result<RawView, SceneError> {
-    let (path, place) = (file.to_path_buf(), FaultLocation::Key(format!("row {row}")));
+    let place = FilePlace::key(file, format!("row {row}"));
     let at = |line: usize, column: usize| numbers[5 * line + column];
-    let mut matrix = [0.0; 16];
-    for line in 0..3 {
-        let [down, right, backwards, centre] = [0, 1, 2, 3].map(|column| at(line, column));
-        matrix[4 * line..4 * line + 4].copy_from_slice(&[right, down, -backwards, centre]);
-    }
-    matrix[15] = 1.0;
-    let size = check::size(file, place.clone(), at(1, 4), at(0, 4))?;
-    let intrinsics = RawIntrinsics::centred(at(2, 4), size, path.clone(), place.clone());
-    let pose = RawPose { matrix, form: PoseForm::WorldFromOpenCv, path, place };
+    let row = |line: usize| [at(line, 1), at(line, 0), -at(line, 2), at(line, 3)];
+    let matrix = [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]];
+    let size = check::size(&place, at(1, 4), at(0, 4))?;
+    let intrinsics = RawIntrinsics::centred(at(2, 4), size, place.clone());
+    let pose = RawPose { matrix, form: PoseForm::WorldFromOpenCv, place };
     let mut view = RawView::new(files::stem(image), Some(ImageFile::open(image)?), pose, Some(intrinsics));
     view.near_far = Some([numbers[15], numbers[16]]);
     Ok(view)

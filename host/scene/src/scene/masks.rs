@@ -11,7 +11,7 @@
 //! photograph's folder or one above it: `images/left/1.jpg` has `masks/left/1.jpg.png` (COLMAP) or `masks/left/1.png`
 //! (nerfstudio), or one of another extension.
 
-pub(super) mod meaning;
+pub(crate) mod meaning;
 
 use std::path::{Path, PathBuf};
 
@@ -22,12 +22,12 @@ use image::{DynamicImage, GrayImage, Luma};
 use super::Photograph;
 use super::View;
 use super::check::same_shape;
-use super::error::SceneError;
+use super::error::{SceneError, SceneFault};
+use super::fault::{FilePlace, ImageFault};
 use super::files::{self, IMAGE_EXTENSIONS};
 use super::images::{self, Turn};
 use meaning::MaskMeaning;
 
-/// Folders of masks.
 const FOLDERS: [&str; 2] = ["mask", "masks"];
 
 /// What the names of instant-ngp's masks begin with.
@@ -97,31 +97,27 @@ fn beside(root: &Path, image: &Path) -> Option<PathBuf> {
 /// # Errors
 /// [`SceneError`] if it cannot be decoded or does not have the photograph's shape.
 pub(super) fn read(path: &Path, photograph: &Turn, meaning: MaskMeaning) -> Result<GrayImage, SceneError> {
-    let (mut decoded, own) = images::pixels(path)?;
+    let (mut decoded, stated) = images::pixels(path)?;
     let stored = [decoded.width(), decoded.height()];
     let Turn { orientation, is_applied, .. } = *photograph;
-    let is_upright =
-        if own != Orientation::NoTransforms && same_shape(images::turned(stored, own), photograph.upright()) {
-            decoded.apply_orientation(own);
-            true
-        } else {
-            // Of photographs with an orientation not both: those that have one shape either way are refused.
-            match (same_shape(stored, photograph.upright()), same_shape(stored, photograph.stored)) {
-                (false, false) => {
-                    let ([width, height], [declared_width, declared_height]) = (stored, photograph.size());
-                    let (path, declared_in) = (path.to_path_buf(), "the photograph that it is for".to_string());
-                    return Err(SceneError::SizeMismatch {
-                        path,
-                        width,
-                        height,
-                        declared_in,
-                        declared_width,
-                        declared_height,
-                    });
-                }
-                (is_upright, _) => is_upright,
+    let is_turned = stated != Orientation::NoTransforms;
+    let is_upright = if is_turned && same_shape(images::turned(stored, stated), photograph.upright()) {
+        decoded.apply_orientation(stated);
+        true
+    } else {
+        // Of photographs with an orientation not both: those that have one shape either way are refused.
+        match (same_shape(stored, photograph.upright()), same_shape(stored, photograph.stored)) {
+            (false, false) => {
+                let (declared, declared_in) = (photograph.size(), "the photograph that it is for".to_string());
+                return Err(FilePlace::file(path).fault(ImageFault::SizeMismatch {
+                    size: stored,
+                    declared,
+                    declared_in,
+                }));
             }
-        };
+            (is_upright, _) => is_upright,
+        }
+    };
     match (is_upright, is_applied) {
         (false, true) => decoded.apply_orientation(orientation),
         (true, false) => decoded.apply_orientation(images::inverse(orientation)),
@@ -170,7 +166,7 @@ pub(super) fn is_as_stored(path: &Path, photograph: &Turn) -> Result<bool, Scene
 /// Multiplies the photograph's alpha channel by an object's mask, or marks what an ignore mask takes away as not seen.
 ///
 /// # Errors
-/// As [`read`]; [`SceneError::UnclearMasks`] if it is not known which of both the mask is.
+/// As [`read`]; [`SceneFault::UnclearMasks`] if it is not known which of both the mask is.
 pub(super) fn apply(
     path: &Path,
     photograph: &mut Photograph,
@@ -178,7 +174,7 @@ pub(super) fn apply(
     meaning: MaskMeaning,
 ) -> Result<(), SceneError> {
     if let MaskMeaning::Unclear { percent } = meaning {
-        return Err(SceneError::UnclearMasks { path: path.to_path_buf(), percent });
+        return Err(FilePlace::file(path).fault(SceneFault::UnclearMasks(percent)));
     }
     let mut mask = read(path, turn, meaning)?;
     let (width, height) = photograph.pixels.dimensions();

@@ -9,8 +9,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::error::SceneError;
-use super::fault::{FaultLocation, IntrinsicsFault};
+use super::error::{SceneError, SceneFault};
+use super::fault::{FileFault, FilePlace, IntrinsicsFault};
 use super::files;
 use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawScene, RawView, Reader};
 
@@ -45,62 +45,51 @@ impl Reader for Middlebury {
             [list] => Ok(Some(list.clone())),
             [first, second, ..] => {
                 let name = |list: &Path| list.file_name().unwrap_or_default().to_string_lossy().into_owned();
-                Err(SceneError::Ambiguous { path: path.to_path_buf(), first: name(first), second: name(second) })
+                Err(FilePlace::file(path).fault(SceneFault::Ambiguous(name(first), name(second))))
             }
         }
     }
 
     fn read(&self, list: &Path) -> Result<RawScene, SceneError> {
-        Ok(RawScene::from(read(list)?))
+        let text = files::read_text(list)?;
+        let mut lines = files::lines(&text);
+        let no_views = || FilePlace::file(list).fault(SceneFault::NoViews("a count, then a line each"));
+        let (count_line, count) = lines.next().ok_or_else(no_views)?;
+        let place = FilePlace::line(list, count_line);
+        let Ok(expected) = count.trim().parse::<usize>() else {
+            return Err(place.fault(FileFault::NotANumber(files::excerpt(count.trim()))));
+        };
+        let views = lines.map(|(line, content)| read_view(list, line, content)).collect::<Result<Vec<_>, _>>()?;
+        if views.len() != expected {
+            let fault = FileFault::WrongCount { of: "lines of cameras", expected, found: views.len() };
+            return Err(place.fault(fault));
+        }
+        if views.is_empty() { Err(no_views()) } else { Ok(RawScene::from(views)) }
     }
-}
-
-/// All views of a list, in its order.
-fn read(list: &Path) -> Result<Vec<RawView>, SceneError> {
-    let text = files::read_text(list)?;
-    let mut lines = files::lines(&text);
-    let no_views = || SceneError::NoViews { path: list.to_path_buf(), looked_for: "a count, then a line each" };
-    let (count_line, count) = lines.next().ok_or_else(no_views)?;
-    let Ok(declared) = count.trim().parse::<usize>() else {
-        let (path, place) = (list.to_path_buf(), FaultLocation::Line(count_line));
-        return Err(SceneError::NotANumber { path, place, word: files::excerpt(count.trim()) });
-    };
-    let views = lines.map(|(line, content)| read_view(list, line, content)).collect::<Result<Vec<_>, _>>()?;
-    if views.len() != declared {
-        let (path, place, found) = (list.to_path_buf(), FaultLocation::Line(count_line), views.len());
-        return Err(SceneError::WrongCount { path, place, of: "lines of cameras", expected: declared, found });
-    }
-    if views.is_empty() { Err(no_views()) } else { Ok(views) }
 }
 
 fn read_view(list: &Path, line: usize, content: &str) -> Result<RawView, SceneError> {
-    let path = || list.to_path_buf();
-    let place = FaultLocation::Line(line);
+    let place = FilePlace::line(list, line);
     let mut words = content.split_whitespace();
     let file_name = words.next().unwrap_or_default();
     let numbers = words.map(|word| files::number(list, line, word)).collect::<Result<Vec<_>, _>>()?;
     if numbers.len() != NUMBER_COUNT {
-        let of = "numbers after the name";
-        return Err(SceneError::WrongCount { path: path(), place, of, expected: NUMBER_COUNT, found: numbers.len() });
+        let (of, found) = ("numbers after the name", numbers.len());
+        return Err(place.fault(FileFault::WrongCount { of, expected: NUMBER_COUNT, found }));
     }
     let (k, r, t) = (&numbers[..9], &numbers[9..18], &numbers[18..]);
-
-    let intrinsics_fault = |fault| SceneError::Intrinsics { path: path(), place: FaultLocation::Line(line), fault };
     if k[1].abs() > MAX_ROUNDING {
-        return Err(intrinsics_fault(IntrinsicsFault::Skew { skew: k[1] }));
+        return Err(place.fault(IntrinsicsFault::Skew(k[1])));
     }
     if [k[3], k[6], k[7], k[8] - 1.0].iter().any(|zero| zero.abs() > MAX_ROUNDING) {
-        return Err(intrinsics_fault(IntrinsicsFault::Form));
+        return Err(place.fault(IntrinsicsFault::Form));
     }
-    let pose = RawPose {
-        matrix: [r[0], r[1], r[2], t[0], r[3], r[4], r[5], t[1], r[6], r[7], r[8], t[2], 0.0, 0.0, 0.0, 1.0],
-        form: PoseForm::OpenCvFromWorld,
-        path: path(),
-        place: place.clone(),
-    };
+    let row = |at: usize| [r[3 * at], r[3 * at + 1], r[3 * at + 2], t[at]];
+    let matrix = [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]];
+    let pose = RawPose { matrix, form: PoseForm::OpenCvFromWorld, place: place.clone() };
     let image: PathBuf = list.with_file_name(file_name.replace('\\', "/")).components().collect();
     if !image.is_file() {
-        return Err(SceneError::PoseWithoutImage { path: path(), place, image });
+        return Err(place.fault(SceneFault::PoseWithoutImage(image)));
     }
     let image = ImageFile::open(&image)?;
     let intrinsics = RawIntrinsics {
@@ -108,7 +97,6 @@ fn read_view(list: &Path, line: usize, content: &str) -> Result<RawView, SceneEr
         principal: [k[2] + 0.5, k[5] + 0.5],
         size: None,
         lens: None,
-        path: path(),
         place: place.clone(),
         size_place: place,
     };

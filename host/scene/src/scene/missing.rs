@@ -2,15 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use super::error::SceneError;
-use super::fault::FaultLocation;
+use super::error::{SceneError, SceneFault};
+use super::fault::FilePlace;
 
 /// The photographs of a list that are missing.
 #[derive(Debug, Default)]
 pub(super) struct Missing {
     listed: usize,
     count: usize,
-    first: Option<(FaultLocation, PathBuf)>,
+    first: Option<(FilePlace, PathBuf)>,
 }
 
 impl Missing {
@@ -20,7 +20,7 @@ impl Missing {
     }
 
     /// Counts a photograph of the list that does not exist; `place` is its place in the list.
-    pub(super) fn missed(&mut self, place: FaultLocation, image: PathBuf) {
+    pub(super) fn missed(&mut self, place: FilePlace, image: PathBuf) {
         self.listed += 1;
         self.count += 1;
         self.first.get_or_insert((place, image));
@@ -29,13 +29,11 @@ impl Missing {
     /// The warning, if any is missing; `list` is the file that names them.
     ///
     /// # Errors
-    /// [`SceneError::PoseWithoutImage`] if all are missing.
+    /// [`SceneFault::PoseWithoutImage`] if all are missing.
     pub(super) fn warning(self, list: &Path) -> Result<Option<String>, SceneError> {
         let Missing { listed, count, first } = self;
         match first {
-            Some((place, image)) if count == listed => {
-                Err(SceneError::PoseWithoutImage { path: list.to_path_buf(), place, image })
-            }
+            Some((place, image)) if count == listed => Err(place.fault(SceneFault::PoseWithoutImage(image))),
             Some((_, image)) => Ok(Some(format!(
                 "{}: {count} of {listed} photographs are not there and left out (the first is {})",
                 list.display(),

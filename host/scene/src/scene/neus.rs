@@ -15,19 +15,18 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
 
-use super::error::SceneError;
-use super::fault::{FaultLocation, IntrinsicsFault};
+use super::error::{SceneError, SceneFault};
+use super::fault::{FileFault, FilePlace, IntrinsicsFault};
 use super::files::{self, IMAGE_EXTENSIONS};
 use super::masks::meaning::MaskMeaning;
 use super::missing::Missing;
-use super::numpy::{self, Array};
+use super::numpy::{self, NumpyArray};
 use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawScene, RawView, Reader};
 
 /// Names of the archive, in the order in which they are searched; then any other `cameras*.npz`.
 const FILE_NAMES: [&str; 3] = ["cameras_sphere.npz", "cameras.npz", "cameras_large.npz"];
 /// Folders of photographs.
 const IMAGE_FOLDERS: [&str; 3] = ["image", "images", "rgb"];
-/// Folders of masks.
 const MASK_FOLDERS: [&str; 2] = ["mask", "masks"];
 /// Prefix of the projections' names, before their number.
 const WORLD: &str = "world_mat_";
@@ -64,7 +63,7 @@ impl Reader for Neus {
 
     fn read(&self, file: &Path) -> Result<RawScene, SceneError> {
         let matrices = numpy::read_npz(file, |name| numbered(name, WORLD).or(numbered(name, SCALE)).is_some())?;
-        let mut worlds: BTreeMap<u64, &Array> = BTreeMap::new();
+        let mut worlds: BTreeMap<u64, &NumpyArray> = BTreeMap::new();
         for (name, array) in &matrices {
             if let Some(number) = numbered(name, WORLD) {
                 worlds.insert(number, array);
@@ -75,17 +74,18 @@ impl Reader for Neus {
         let folder = folder.unwrap_or_else(|| root.join(IMAGE_FOLDERS[0]));
         let images = files::list(&folder, |path| files::has_extension(path, &IMAGE_EXTENSIONS))?;
         if images.is_empty() || worlds.is_empty() {
-            let path = if worlds.is_empty() { file.to_path_buf() } else { folder };
-            return Err(SceneError::NoViews { path, looked_for: "photographs in image/, world_mat_0 in the archive" });
+            let place = FilePlace::file(if worlds.is_empty() { file } else { &folder });
+            return Err(place.fault(SceneFault::NoViews("photographs in image/, world_mat_0 in the archive")));
         }
         let numbers = numbers_of(file, &images, &worlds)?;
         let masks = masks(&root, &images)?;
         let mut missing = Missing::default();
         for number in worlds.keys() {
-            match numbers.contains(number) {
-                true => missing.found(),
-                false => missing
-                    .missed(FaultLocation::Key(format!("{WORLD}{number}")), folder.join(format!("{number:06}.png"))),
+            if numbers.contains(number) {
+                missing.found();
+            } else {
+                let place = FilePlace::key(file, format!("{WORLD}{number}"));
+                missing.missed(place, folder.join(format!("{number:06}.png")));
             }
         }
         let mut views = Vec::new();
@@ -108,7 +108,7 @@ fn numbered(name: &str, prefix: &str) -> Option<u64> {
 }
 
 /// The matrix of each photograph: those of different numbers in their names, if the archive has all of them.
-fn numbers_of(file: &Path, images: &[PathBuf], worlds: &BTreeMap<u64, &Array>) -> Result<Vec<u64>, SceneError> {
+fn numbers_of(file: &Path, images: &[PathBuf], worlds: &BTreeMap<u64, &NumpyArray>) -> Result<Vec<u64>, SceneError> {
     let by_name: Option<Vec<u64>> = images.iter().map(|image| files::trailing_number(&files::stem(image))).collect();
     let fit = |numbers: &Vec<u64>| {
         let mut seen = HashSet::new();
@@ -120,8 +120,8 @@ fn numbers_of(file: &Path, images: &[PathBuf], worlds: &BTreeMap<u64, &Array>) -
     if images.len() == worlds.len() {
         return Ok(worlds.keys().copied().collect());
     }
-    let (path, place, of) = (file.to_path_buf(), FaultLocation::File, "matrices world_mat_N (one a photograph)");
-    Err(SceneError::WrongCount { path, place, of, expected: images.len(), found: worlds.len() })
+    let (of, expected, found) = ("matrices world_mat_N (one a photograph)", images.len(), worlds.len());
+    Err(FilePlace::file(file).fault(FileFault::WrongCount { of, expected, found }))
 }
 
 /// Masks by the number that their names end in; those with a photograph's name are found by it ([`super::masks`]).
@@ -136,14 +136,18 @@ fn masks(root: &Path, images: &[PathBuf]) -> Result<BTreeMap<u64, PathBuf>, Scen
 }
 
 /// A 4x4 matrix (of a 3x4 one the last row is `0 0 0 1`).
-fn matrix(file: &Path, name: &str, matrices: &BTreeMap<String, Array>) -> Result<Option<[[f64; 4]; 4]>, SceneError> {
+fn matrix(
+    file: &Path,
+    name: &str,
+    matrices: &BTreeMap<String, NumpyArray>,
+) -> Result<Option<[[f64; 4]; 4]>, SceneError> {
     let Some(array) = matrices.get(name) else { return Ok(None) };
     let rows = match array.shape[..] {
         [4, 4] => 4,
         [3, 4] => 3,
         _ => {
-            let (path, place, found) = (file.to_path_buf(), FaultLocation::Key(name.to_string()), array.values.len());
-            return Err(SceneError::WrongCount { path, place, of: "numbers (4 x 4)", expected: 16, found });
+            let fault = FileFault::WrongCount { of: "numbers (4 x 4)", expected: 16, found: array.values.len() };
+            return Err(FilePlace::key(file, name).fault(fault));
         }
     };
     let mut matrix = [[0.0, 0.0, 0.0, 1.0]; 4];
@@ -153,35 +157,39 @@ fn matrix(file: &Path, name: &str, matrices: &BTreeMap<String, Array>) -> Result
     Ok(Some(matrix))
 }
 
-fn view(file: &Path, number: u64, matrices: &BTreeMap<String, Array>, image: &Path) -> Result<RawView, SceneError> {
-    let (path, place) = (file.to_path_buf(), FaultLocation::Key(format!("{WORLD}{number}")));
-    let world = matrix(file, &format!("{WORLD}{number}"), matrices)?.unwrap_or_default();
+fn view(
+    file: &Path,
+    number: u64,
+    matrices: &BTreeMap<String, NumpyArray>,
+    image: &Path,
+) -> Result<RawView, SceneError> {
+    let key = format!("{WORLD}{number}");
+    let world = matrix(file, &key, matrices)?.unwrap_or_default();
     let scale = matrix(file, &format!("{SCALE}{number}"), matrices)?;
     let projection = match scale {
         Some(scale) => product(&world, &scale),
         None => world,
     };
-    let fault = |fault| SceneError::Intrinsics { path: path.clone(), place: place.clone(), fault };
-    let Parts { k, camera_from_world, centre } =
+    let place = FilePlace::key(file, key);
+    let fault = |fault: IntrinsicsFault| place.clone().fault(fault);
+    let ProjectionParts { k, camera_from_world, centre } =
         take_apart(&projection).ok_or_else(|| fault(IntrinsicsFault::Projection))?;
     let skew = k.y_axis.x;
     if skew.abs() > MAX_SKEW {
-        return Err(fault(IntrinsicsFault::Skew { skew }));
+        return Err(fault(IntrinsicsFault::Skew(skew)));
     }
     let r = camera_from_world.transpose();
-    let column = |row: usize| [r.col(0)[row], r.col(1)[row], r.col(2)[row], centre[row]];
-    let ([a, b, c, d], [e, f, g, h], [i, j, l, m]) = (column(0), column(1), column(2));
-    let matrix = [a, b, c, d, e, f, g, h, i, j, l, m, 0.0, 0.0, 0.0, 1.0];
+    let row = |row: usize| [r.col(0)[row], r.col(1)[row], r.col(2)[row], centre[row]];
+    let matrix = [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]];
     let intrinsics = RawIntrinsics {
         focal: [k.x_axis.x, k.y_axis.y],
         principal: [k.z_axis.x + 0.5, k.z_axis.y + 0.5],
         size: None,
         lens: None,
-        path: path.clone(),
         place: place.clone(),
         size_place: place.clone(),
     };
-    let pose = RawPose { matrix, form: PoseForm::WorldFromOpenCv, path: path.clone(), place: place.clone() };
+    let pose = RawPose { matrix, form: PoseForm::WorldFromOpenCv, place };
     let mut view = RawView::new(files::stem(image), Some(ImageFile::open(image)?), pose, Some(intrinsics));
     let depth = -centre.dot(r.z_axis);
     view.near_far = (scale.is_some() && depth > 1.0).then_some([depth - 1.0, depth + 1.0]);
@@ -195,14 +203,14 @@ fn product(a: &[[f64; 4]; 4], b: &[[f64; 4]; 4]) -> [[f64; 4]; 4] {
 
 /// A projection `K R (X - centre)`; `K` upper triangular with a positive diagonal and a last entry of 1, `R` a
 /// rotation.
-struct Parts {
+struct ProjectionParts {
     k: DMat3,
     camera_from_world: DMat3,
     centre: DVec3,
 }
 
 /// `None` for a projection that is singular or not finite.
-fn take_apart(projection: &[[f64; 4]; 4]) -> Option<Parts> {
+fn take_apart(projection: &[[f64; 4]; 4]) -> Option<ProjectionParts> {
     let row = |row: usize| DVec3::new(projection[row][0], projection[row][1], projection[row][2]);
     let largest = (0..3).map(|r| row(r).length()).fold(0.0, f64::max);
     // A projection means the same at any scale; of the two signs, the one that makes R a rotation.
@@ -219,15 +227,12 @@ fn take_apart(projection: &[[f64; 4]; 4]) -> Option<Parts> {
     let x = orthogonal(first, &[z, y])?;
     let (k22, k11, k00) = (third.dot(z), second.dot(y), first.dot(x));
     let (k12, k02, k01) = (second.dot(z), first.dot(z), first.dot(y));
-    let k =
-        DMat3::from_cols(DVec3::new(k00, 0.0, 0.0), DVec3::new(k01, k11, 0.0), DVec3::new(k02, k12, k22)) * (1.0 / k22);
+    let columns = [DVec3::new(k00, 0.0, 0.0), DVec3::new(k01, k11, 0.0), DVec3::new(k02, k12, k22)];
+    let k = DMat3::from_cols(columns[0], columns[1], columns[2]) * (1.0 / k22);
     let camera_from_world = DMat3::from_cols(x, y, z).transpose();
     let centre = -(DMat3::from_cols(first, second, third).transpose().inverse() * last);
-    (k.is_finite() && camera_from_world.is_finite() && centre.is_finite()).then_some(Parts {
-        k,
-        camera_from_world,
-        centre,
-    })
+    let is_finite = k.is_finite() && camera_from_world.is_finite() && centre.is_finite();
+    is_finite.then_some(ProjectionParts { k, camera_from_world, centre })
 }
 
 /// The unit vector along the component of `vector` that is orthogonal to these unit vectors.

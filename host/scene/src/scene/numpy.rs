@@ -12,14 +12,14 @@ use zip::ZipArchive;
 use zip::result::ZipError;
 
 use super::bytes;
-use super::error::SceneError;
-use super::fault::NumpyFault;
+use super::error::{SceneError, SceneFault};
+use super::fault::{FilePlace, NumpyFault};
 use super::files::unreadable;
 
 /// The magic number of a file.
 const MAGIC: &[u8] = b"\x93NUMPY";
 /// Most bytes of a header.
-const LONGEST_HEADER: usize = 1 << 16;
+const MAX_HEADER: usize = 1 << 16;
 /// Most dimensions of an array.
 const MAX_DIMENSIONS: usize = 8;
 /// Most bytes of an array in an archive: cameras take some hundred.
@@ -27,20 +27,20 @@ const MAX_ENTRY: u64 = 1 << 24;
 
 /// An array of numbers, row-major.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Array {
+pub(super) struct NumpyArray {
     pub(super) shape: Vec<usize>,
     pub(super) values: Vec<f64>,
 }
 
 /// The array of a `.npy` file.
-pub(super) fn read_npy(path: &Path) -> Result<Array, SceneError> {
+pub(super) fn read_npy(path: &Path) -> Result<NumpyArray, SceneError> {
     let bytes = bytes::read(path)?;
-    parse(&bytes).map_err(|fault| SceneError::Numpy { path: path.to_path_buf(), entry: String::new(), fault })
+    parse(&bytes).map_err(|fault| FilePlace::file(path).fault(SceneFault::Numpy(fault)))
 }
 
 /// The arrays of an `.npz` file for whose name (without `.npy`) `wanted` holds.
-pub(super) fn read_npz(path: &Path, wanted: impl Fn(&str) -> bool) -> Result<BTreeMap<String, Array>, SceneError> {
-    let zip_error = |cause: ZipError| SceneError::Zip { path: path.to_path_buf(), cause };
+pub(super) fn read_npz(path: &Path, wanted: impl Fn(&str) -> bool) -> Result<BTreeMap<String, NumpyArray>, SceneError> {
+    let zip_error = |cause: ZipError| FilePlace::file(path).fault(SceneFault::Zip(cause));
     let file = File::open(path).map_err(|cause| unreadable(path, cause))?;
     let mut archive = ZipArchive::new(BufReader::new(file)).map_err(zip_error)?;
     let mut arrays = BTreeMap::new();
@@ -50,7 +50,7 @@ pub(super) fn read_npz(path: &Path, wanted: impl Fn(&str) -> bool) -> Result<BTr
         if !wanted(&name) {
             continue;
         }
-        let failed = |fault| SceneError::Numpy { path: path.to_path_buf(), entry: format!(": {name}"), fault };
+        let failed = |fault| FilePlace::key(path, &name).fault(SceneFault::Numpy(fault));
         let mut bytes = Vec::new();
         let read = entry.take(MAX_ENTRY + 1).read_to_end(&mut bytes);
         read.map_err(|cause| zip_error(ZipError::Io(cause)))?;
@@ -66,7 +66,7 @@ pub(super) fn read_npz(path: &Path, wanted: impl Fn(&str) -> bool) -> Result<BTr
 }
 
 /// An array from the bytes of a `.npy` file.
-fn parse(bytes: &[u8]) -> Result<Array, NumpyFault> {
+fn parse(bytes: &[u8]) -> Result<NumpyArray, NumpyFault> {
     let rest = bytes.strip_prefix(MAGIC).ok_or(NumpyFault::Magic)?;
     let (header, data) = match *rest {
         [1, _, a, b, ..] => split(&rest[4..], u16::from_le_bytes([a, b]).into())?,
@@ -94,13 +94,13 @@ fn parse(bytes: &[u8]) -> Result<Array, NumpyFault> {
         _ => data.as_chunks::<4>().0.iter().map(|bytes| f64::from(f32::from_le_bytes(*bytes))).collect(),
     };
     if let Some(index) = values.iter().position(|value| !value.is_finite()) {
-        return Err(NumpyFault::NotFinite { index, value: values[index] });
+        return Err(NumpyFault::NotFinite(index, values[index]));
     }
-    Ok(if fortran { Array { values: row_major(&values, &shape), shape } } else { Array { shape, values } })
+    Ok(if fortran { NumpyArray { values: row_major(&values, &shape), shape } } else { NumpyArray { shape, values } })
 }
 
 fn split(bytes: &[u8], length: usize) -> Result<(&str, &[u8]), NumpyFault> {
-    if length > LONGEST_HEADER || length > bytes.len() {
+    if length > MAX_HEADER || length > bytes.len() {
         return Err(NumpyFault::Truncated);
     }
     let (header, data) = bytes.split_at(length);

@@ -10,7 +10,7 @@ use image::metadata::Orientation;
 use viewfuse_core::lens::Lens;
 
 use super::error::SceneError;
-use super::fault::FaultLocation;
+use super::fault::{FaultLocation, FilePlace};
 use super::images;
 use super::masks::meaning::MaskMeaning;
 use super::split::Split;
@@ -54,7 +54,7 @@ pub struct RawScene {
     pub points: Vec<RawPoint>,
     /// The file that contains the points; empty without any.
     pub points_path: PathBuf,
-    /// What was left out or ignored, a line each.
+    /// What was dropped or ignored, a line each.
     pub warnings: Vec<String>,
     /// Conventions of the files that were applied, a line each, as `masks: pixels that do not count, 11 files`.
     pub conventions: Vec<String>,
@@ -79,8 +79,8 @@ pub struct RawPoint {
     pub colour: [u8; 3],
     /// The views that saw it, as indices into [`RawScene::views`].
     pub views: Vec<u32>,
-    /// Its place in [`RawScene::points_path`].
-    pub place: FaultLocation,
+    /// Where it stands in [`RawScene::points_path`].
+    pub location: FaultLocation,
 }
 
 /// An unchecked view, as on disk. Only the photograph's header has been checked.
@@ -158,13 +158,11 @@ pub enum PoseForm {
 #[derive(Clone, Debug, PartialEq)]
 pub struct RawPose {
     /// The 4x4 matrix, row-major.
-    pub matrix: [f64; 16],
+    pub matrix: [[f64; 4]; 4],
     /// Its convention.
     pub form: PoseForm,
-    /// The file that contains it.
-    pub path: PathBuf,
-    /// The place in the file.
-    pub place: FaultLocation,
+    /// The place that states it.
+    pub place: FilePlace,
 }
 
 /// Intrinsics as numbers of a file, in our image coordinates: the top left pixel's centre is at (0.5, 0.5).
@@ -179,25 +177,16 @@ pub struct RawIntrinsics {
     pub size: Option<[u32; 2]>,
     /// The lens distortion. A photograph is undistorted when it is read.
     pub lens: Option<Lens>,
-    /// The file that contains them.
-    pub path: PathBuf,
-    /// The place of focal lengths and principal point in the file.
-    pub place: FaultLocation,
-    /// The place of the size in the file.
-    pub size_place: FaultLocation,
+    /// The place that states focal lengths and principal point.
+    pub place: FilePlace,
+    /// The place that states the size.
+    pub size_place: FilePlace,
 }
 
 impl RawIntrinsics {
     /// One focal length for both axes, the principal point in the centre of images of this size, no lens distortion.
-    pub fn centred(focal: f64, size: [u32; 2], path: PathBuf, place: FaultLocation) -> RawIntrinsics {
-        RawIntrinsics {
-            focal: [focal; 2],
-            principal: size.map(|side| f64::from(side) / 2.0),
-            size: Some(size),
-            lens: None,
-            path,
-            place: place.clone(),
-            size_place: place,
-        }
+    pub fn centred(focal: f64, size: [u32; 2], place: FilePlace) -> RawIntrinsics {
+        let principal = size.map(|side| f64::from(side) / 2.0);
+        RawIntrinsics { focal: [focal; 2], principal, size: Some(size), lens: None, size_place: place.clone(), place }
     }
 }

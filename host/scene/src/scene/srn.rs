@@ -19,8 +19,8 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use super::check;
-use super::error::SceneError;
-use super::fault::{FaultLocation, IntrinsicsFault};
+use super::error::{SceneError, SceneFault};
+use super::fault::{FaultLocation, FileFault, FilePlace, IntrinsicsFault};
 use super::files::{self, IMAGE_EXTENSIONS};
 use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawScene, RawView, Reader};
 use super::split::Split;
@@ -47,55 +47,46 @@ impl Reader for Srn {
         Ok(is_there.then(|| path.to_path_buf()))
     }
 
+    /// Photographs first, then target poses, each in natural order.
     fn read(&self, folder: &Path) -> Result<RawScene, SceneError> {
-        read(folder)
-    }
-}
-
-/// All views of an SRN folder: photographs first, then target poses, each in natural order.
-fn read(folder: &Path) -> Result<RawScene, SceneError> {
-    let image_folder = folder.join("rgb");
-    let photographs = files::list(&image_folder, |path| files::has_extension(path, &IMAGE_EXTENSIONS))?;
-    let pose_folder = folder.join("pose");
-    let poses = list_poses(&pose_folder)?;
-    check_partners(&photographs, &poses, &image_folder, &pose_folder)?;
-    if photographs.is_empty() {
-        return Err(SceneError::NoViews { path: image_folder, looked_for: "*.png, *.jpg" });
-    }
-    let list = read_intrinsics(&folder.join("intrinsics.txt"))?;
-
-    let mut views = Vec::new();
-    for image in photographs {
-        let pose = read_pose(&partner(&image, &pose_folder, "txt"), list.form)?;
-        views.push(RawView::new(
-            files::stem(&image),
-            Some(ImageFile::open(&image)?),
-            pose,
-            Some(list.intrinsics.clone()),
-        ));
-    }
-    let target_folder = folder.join("target_pose");
-    if target_folder.is_dir() {
-        for path in list_poses(&target_folder)? {
-            let pose = read_pose(&path, list.form)?;
-            let name = format!("{TARGET_PREFIX}{}", files::stem(&path));
-            // A target is rendered at the size of the photographs; if these are smaller than in `intrinsics.txt`, so is
-            // it.
-            views.push(RawView::new(name, None, pose, None));
+        let [image_folder, pose_folder, target_folder] = ["rgb", "pose", "target_pose"].map(|name| folder.join(name));
+        let photographs = files::list(&image_folder, |path| files::has_extension(path, &IMAGE_EXTENSIONS))?;
+        let poses = list_poses(&pose_folder)?;
+        check_partners(&photographs, &poses, &image_folder, &pose_folder)?;
+        if photographs.is_empty() {
+            return Err(FilePlace::file(image_folder).fault(SceneFault::NoViews("*.png, *.jpg")));
         }
+        let list = read_intrinsics(&folder.join("intrinsics.txt"))?;
+
+        let mut views = Vec::new();
+        for image in photographs {
+            let pose = read_pose(&partner(&image, &pose_folder, "txt"), list.form)?;
+            let (name, file) = (files::stem(&image), ImageFile::open(&image)?);
+            views.push(RawView::new(name, Some(file), pose, Some(list.intrinsics.clone())));
+        }
+        if target_folder.is_dir() {
+            for path in list_poses(&target_folder)? {
+                let pose = read_pose(&path, list.form)?;
+                let name = format!("{TARGET_PREFIX}{}", files::stem(&path));
+                // A target is rendered at the size of the photographs; if these are smaller than in `intrinsics.txt`,
+                // so is it.
+                views.push(RawView::new(name, None, pose, None));
+            }
+        }
+        let mut scene = RawScene::from(views);
+        if list.is_matrix {
+            scene.conventions.push("intrinsics.txt: K alone, for the photographs' size (NSVF)".to_string());
+            split_by_digit(&mut scene);
+        }
+        Ok(scene)
     }
-    let mut scene = RawScene::from(views);
-    if list.is_matrix {
-        scene.conventions.push("intrinsics.txt: K alone, for the photographs' size (NSVF)".to_string());
-        split_by_digit(&mut scene);
-    }
-    Ok(scene)
 }
 
 /// NSVF's splits, if all photographs' names begin with one.
 fn split_by_digit(scene: &mut RawScene) {
     const SPLITS: [(&str, Split); 3] = [("0_", Split::Train), ("1_", Split::Validation), ("2_", Split::Test)];
-    let split_of = |view: &RawView| SPLITS.iter().find(|(digit, _)| view.name.starts_with(digit)).map(|(_, own)| *own);
+    let split_of =
+        |view: &RawView| SPLITS.into_iter().find(|(digit, _)| view.name.starts_with(digit)).map(|named| named.1);
     let has_photograph = |view: &&RawView| view.image.is_some();
     if scene.views.iter().filter(has_photograph).all(|view| split_of(view).is_some()) {
         scene.views.iter_mut().for_each(|view| view.split = split_of(view));
@@ -118,11 +109,12 @@ fn check_partners(
     let pictured: HashSet<&OsStr> = photographs.iter().filter_map(|path| path.file_stem()).collect();
     let lacks = |names: &HashSet<&OsStr>, path: &Path| path.file_stem().is_none_or(|name| !names.contains(name));
     if let Some(path) = photographs.iter().find(|path| lacks(&posed, path)) {
-        return Err(SceneError::ImageWithoutPose { path: path.clone(), pose: partner(path, pose_folder, "txt") });
+        let pose = partner(path, pose_folder, "txt");
+        return Err(FilePlace::file(path).fault(SceneFault::ImageWithoutPose(pose)));
     }
     if let Some(path) = poses.iter().find(|path| lacks(&pictured, path)) {
         let image = partner(path, image_folder, "png");
-        return Err(SceneError::PoseWithoutImage { path: path.clone(), place: FaultLocation::File, image });
+        return Err(FilePlace::file(path).fault(SceneFault::PoseWithoutImage(image)));
     }
     Ok(())
 }
@@ -135,11 +127,11 @@ fn partner(path: &Path, folder: &Path, extension: &str) -> PathBuf {
 fn read_pose(path: &Path, form: PoseForm) -> Result<RawPose, SceneError> {
     let lines = files::number_lines(path, &files::read_text(path)?)?;
     let numbers: Vec<f64> = lines.into_iter().flat_map(|(_, numbers)| numbers).collect();
-    let Ok(matrix) = <[f64; 16]>::try_from(numbers.as_slice()) else {
-        let (path, place, found) = (path.to_path_buf(), FaultLocation::File, numbers.len());
-        return Err(SceneError::WrongCount { path, place, of: "numbers", expected: 16, found });
-    };
-    Ok(RawPose { matrix, form, path: path.to_path_buf(), place: FaultLocation::File })
+    let place = FilePlace::file(path);
+    match numbers.as_chunks() {
+        (&[a, b, c, d], []) => Ok(RawPose { matrix: [a, b, c, d], form, place }),
+        _ => Err(place.fault(FileFault::WrongCount { of: "numbers", expected: 16, found: numbers.len() })),
+    }
 }
 
 /// The contents of `intrinsics.txt`.
@@ -156,8 +148,8 @@ fn read_intrinsics(path: &Path) -> Result<IntrinsicsFile, SceneError> {
     if let Some(k) = matrix(&lines) {
         return matrix_intrinsics(path, lines[0].0, &k);
     }
-    let wrong_count = |place, of, expected, found| {
-        Err(SceneError::WrongCount { path: path.to_path_buf(), place, of, expected, found })
+    let wrong_count = |location, of, expected, found| {
+        Err(FilePlace { path: path.to_path_buf(), location }.fault(FileFault::WrongCount { of, expected, found }))
     };
     let Some(((focal_line, first), rest)) = lines.split_first() else {
         return wrong_count(FaultLocation::File, "lines of numbers", 4, 0);
@@ -178,14 +170,10 @@ fn read_intrinsics(path: &Path) -> Result<IntrinsicsFile, SceneError> {
             return wrong_count(FaultLocation::Line(*line), "lines after the size that are not a lone 0 or 1", 0, 1);
         }
     };
-    let (place, size_place) = (FaultLocation::Line(*focal_line), FaultLocation::Line(size_line));
-    let size = Some(check::size(path, size_place.clone(), width, height)?);
-    let (focal, principal, path) = ([focal, focal], [x, y], path.to_path_buf());
-    Ok(IntrinsicsFile {
-        intrinsics: RawIntrinsics { focal, principal, size, lens: None, path, place, size_place },
-        form,
-        is_matrix: false,
-    })
+    let (place, size_place) = (FilePlace::line(path, *focal_line), FilePlace::line(path, size_line));
+    let size = Some(check::size(&size_place, width, height)?);
+    let intrinsics = RawIntrinsics { focal: [focal, focal], principal: [x, y], size, lens: None, place, size_place };
+    Ok(IntrinsicsFile { intrinsics, form, is_matrix: false })
 }
 
 /// K, where the lines are nothing but a matrix of 3x3 or 4x4 numbers, or one in a line.
@@ -201,15 +189,14 @@ fn matrix(lines: &[(usize, Vec<f64>)]) -> Option<[[f64; 4]; 4]> {
 }
 
 fn matrix_intrinsics(path: &Path, line: usize, k: &[[f64; 4]; 4]) -> Result<IntrinsicsFile, SceneError> {
-    let (path, place) = (path.to_path_buf(), FaultLocation::Line(line));
+    let place = FilePlace::line(path, line);
     let [[focal_x, skew, x, _], [_, focal_y, y, _], ..] = *k;
     let expected = [[focal_x, skew, x, 0.0], [0.0, focal_y, y, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
     if *k != expected || skew != 0.0 {
-        let fault = if *k == expected { IntrinsicsFault::Skew { skew } } else { IntrinsicsFault::Form };
-        return Err(SceneError::Intrinsics { path, place, fault });
+        return Err(place.fault(if *k == expected { IntrinsicsFault::Skew(skew) } else { IntrinsicsFault::Form }));
     }
     let size_place = place.clone();
     let (focal, principal) = ([focal_x, focal_y], [x, y]);
-    let intrinsics = RawIntrinsics { focal, principal, size: None, lens: None, path, place, size_place };
+    let intrinsics = RawIntrinsics { focal, principal, size: None, lens: None, place, size_place };
     Ok(IntrinsicsFile { intrinsics, form: PoseForm::WorldFromOpenCv, is_matrix: true })
 }

@@ -22,13 +22,14 @@ mod keys;
 
 use std::path::{Path, PathBuf};
 
-use super::error::SceneError;
+use super::error::{SceneError, SceneFault};
+use super::fault::FilePlace;
 use super::files;
 use super::json::{self, Object};
 use super::missing::Missing;
 use super::reader::{RawScene, RawView, Reader};
 use super::split::Split;
-use frame::{Frame, Listed, Lists};
+use frame::{Listed, Lists, TransformsFrame};
 use keys::Keys;
 
 /// Name of the file of a whole scene.
@@ -97,7 +98,7 @@ fn read(path: &Path, split: Option<Split>) -> Result<RawScene, SceneError> {
     let top = Object::new(path, "", &value)?;
     let frames = top.array("frames")?;
     if frames.is_empty() {
-        return Err(SceneError::NoViews { path: path.to_path_buf(), looked_for: "frames[]" });
+        return Err(FilePlace::file(path).fault(SceneFault::NoViews("frames[]")));
     }
     let mut lists = Lists::new(path, &top)?;
     let mut keys = Keys::new(&top);
@@ -106,7 +107,7 @@ fn read(path: &Path, split: Option<Split>) -> Result<RawScene, SceneError> {
     let mut depth_count = 0;
     for (index, value) in frames.iter().enumerate() {
         let key = format!("frames[{index}]");
-        let frame = Frame { path, scopes: [Object::new(path, &key, value)?, top.clone()], key };
+        let frame = TransformsFrame { path, scopes: [Object::new(path, &key, value)?, top.clone()], key };
         keys.add(&frame.scopes[0]);
         depth_count += usize::from(frame.has_depth());
         match frame.view(&mut lists)? {

@@ -22,7 +22,7 @@ pub(super) enum Form {
 struct ModelView {
     /// Number of the camera and of the image.
     id: u32,
-    model: Model,
+    model: ModelName,
     size: [u32; 2],
     parameters: Vec<f64>,
     /// World to camera, `w x y z`.
@@ -35,7 +35,7 @@ struct ModelView {
 }
 
 /// A reconstructed point of the model.
-struct ModelPoint {
+struct WrittenPoint {
     id: u64,
     position: [f64; 3],
     colour: [u8; 3],
@@ -46,7 +46,7 @@ struct ModelPoint {
 }
 
 /// A camera model: COLMAP's name and number.
-struct Model(&'static str, u32);
+struct ModelName(&'static str, u32);
 
 pub(super) fn write(out: &mut Draft, form: Form) -> Result<usize, WriteSceneError> {
     let (scene, mut seen) = (out.scene, observations(out.scene));
@@ -91,7 +91,7 @@ pub(super) fn write(out: &mut Draft, form: Form) -> Result<usize, WriteSceneErro
 }
 
 /// The scene's points in the coordinates of its files.
-fn points(scene: &Scene) -> Vec<ModelPoint> {
+fn points(scene: &Scene) -> Vec<WrittenPoint> {
     let mut next = vec![0; scene.views.len()];
     let point = |(index, point): (usize, &crate::ScenePoint)| {
         let place = |&view: &u32| {
@@ -99,7 +99,7 @@ fn points(scene: &Scene) -> Vec<ModelPoint> {
             next[view as usize] += 1;
             [view + 1, place]
         };
-        ModelPoint {
+        WrittenPoint {
             id: index as u64 + 1,
             position: scene.frame.file(point.position_world.as_dvec3()).to_array(),
             colour: point.colour,
@@ -149,18 +149,18 @@ pub(super) fn holds(lens: &Lens) -> bool {
 }
 
 /// Model and parameters of a view's camera.
-fn parameters(view: &View) -> (Model, Vec<f64>) {
+fn parameters(view: &View) -> (ModelName, Vec<f64>) {
     let pinhole = &view.camera.pinhole;
     let ([fx, fy], [cx, cy]) = (pinhole.focal().map(f64::from), pinhole.principal().map(f64::from));
     let Some(lens) = view.lens.as_ref().filter(|lens| holds(lens)) else {
-        return (Model("PINHOLE", 1), vec![fx, fy, cx, cy]);
+        return (ModelName("PINHOLE", 1), vec![fx, fy, cx, cy]);
     };
     let [k1, k2, k3, k4, k5, k6, p1, p2, _] = lens.coefficients();
     match (lens.projection(), [k3, k4, k5, k6] == [0.0; 4]) {
-        (Projection::Fisheye, _) => (Model("OPENCV_FISHEYE", 5), vec![fx, fy, cx, cy, k1, k2, k3, k4]),
-        (Projection::Perspective, true) => (Model("OPENCV", 4), vec![fx, fy, cx, cy, k1, k2, p1, p2]),
+        (Projection::Fisheye, _) => (ModelName("OPENCV_FISHEYE", 5), vec![fx, fy, cx, cy, k1, k2, k3, k4]),
+        (Projection::Perspective, true) => (ModelName("OPENCV", 4), vec![fx, fy, cx, cy, k1, k2, p1, p2]),
         (Projection::Perspective, false) => {
-            (Model("FULL_OPENCV", 6), vec![fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6])
+            (ModelName("FULL_OPENCV", 6), vec![fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6])
         }
     }
 }

@@ -23,7 +23,7 @@ use crate::scene::files::{natural_order, trailing_number};
 use crate::{Scene, View};
 
 /// Whether the scene is in the coordinates of a unit sphere that this layout gave it.
-pub(super) fn is_own(scene: &Scene) -> bool {
+pub(super) fn has_unit_sphere(scene: &Scene) -> bool {
     // Depths come from the sphere: an archive without one has none.
     scene.layout == Layout::Neus.reader() && scene.views.iter().any(|view| view.near_far.is_some())
 }
@@ -52,7 +52,7 @@ pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
     ];
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     let path = out.file("cameras_sphere.npz")?;
-    let failed = |cause: std::io::Error| WriteSceneError::Io { path: path.clone(), cause };
+    let failed = |cause: std::io::Error| WriteSceneError::Io(path.clone(), cause);
     for (view, number) in out.scene.views.iter().zip(numbers) {
         for (name, matrix) in [("world_mat", projection(out.scene, view)), ("scale_mat", scale)] {
             let stored = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
@@ -94,7 +94,7 @@ fn numbers(views: &[View], files: &[String]) -> Vec<u64> {
 
 /// Centre and radius of the sphere in the coordinates of the scene's files.
 pub(super) fn sphere(scene: &Scene) -> (DVec3, f64) {
-    if is_own(scene) {
+    if has_unit_sphere(scene) {
         return (DVec3::ZERO, 1.0);
     }
     let cameras: Vec<Camera> = scene.views.iter().map(|view| view.camera).collect();

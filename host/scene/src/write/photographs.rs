@@ -105,18 +105,15 @@ impl Draft<'_> {
         let extension = source.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         let file = format!("{name}.{extension}");
         let path = self.file(&format!("{folder}/{file}"))?;
-        fs::copy(source, &path).map_err(|cause| WriteSceneError::Io { path, cause })?;
+        fs::copy(source, &path).map_err(|cause| WriteSceneError::Io(path, cause))?;
         Ok(file)
     }
 
     fn png(&self, folder: &str, name: &str, picture: DynamicImage) -> Result<String, WriteSceneError> {
         let file = format!("{name}.png");
-        let path = self.file(&format!("{folder}/{file}"))?;
-        let bytes = match encode_png(&picture) {
-            Ok(bytes) => bytes,
-            Err(cause) => return Err(WriteSceneError::Encode { path, cause }),
-        };
-        fs::write(&path, bytes).map_err(|cause| WriteSceneError::Io { path, cause })?;
+        let encoded = encode_png(&picture);
+        let failed = |cause| WriteSceneError::Encode(self.folder.join(folder).join(&file), cause);
+        self.put(&format!("{folder}/{file}"), encoded.map_err(failed)?)?;
         Ok(file)
     }
 }

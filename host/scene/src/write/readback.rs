@@ -13,9 +13,6 @@ const MAX_SHARES: [f64; 2] = [1.0e-3, 1.0e-5];
 const MAX_TURN: f32 = 1.0e-2;
 
 /// Checks that the files in `draft` are the scene.
-///
-/// # Errors
-/// What is read back otherwise, in words.
 pub(super) fn check(scene: &Scene, layout: Layout, draft: &Path) -> Result<(), String> {
     let read = Scene::open(draft).map_err(|error| {
         let place = format!("{}{}", draft.display(), std::path::MAIN_SEPARATOR);

@@ -7,6 +7,7 @@ use std::path::Path;
 use super::super::bytes::{self, Bytes};
 use super::super::camera_models::CameraModel;
 use super::super::error::SceneError;
+use super::super::fault::FilePlace;
 use super::{ModelCamera, ModelImage, ModelPoint, camera, known};
 
 /// `cameras.bin`: number, model, width, height, parameters.
@@ -16,15 +17,15 @@ pub(super) fn cameras(path: &Path) -> Result<Vec<(u32, ModelCamera)>, SceneError
     let count = bytes.count(24, "cameras")?;
     let mut all = Vec::with_capacity(count);
     for _ in 0..count {
-        let place = bytes.place();
+        let place = FilePlace { path: path.to_path_buf(), location: bytes.location() };
         let id = bytes.u32("a camera")?;
         let number = bytes.u32("a camera")?;
-        let model = known(path, &place, CameraModel::numbered(number).ok_or_else(|| CameraModel::title(number)))?;
+        let model = known(&place, CameraModel::numbered(number).ok_or_else(|| CameraModel::title(number)))?;
         let size = [bytes.u64("a camera")? as f64, bytes.u64("a camera")? as f64];
         let parameters = (0..model.parameter_count())
             .map(|_| bytes.f64("the parameters of a camera"))
             .collect::<Result<Vec<_>, _>>()?;
-        all.push((id, camera(path, place, Ok(model), size, &parameters)?));
+        all.push((id, camera(place, Ok(model), size, &parameters)?));
     }
     bytes.end()?;
     Ok(all)
@@ -44,7 +45,7 @@ pub(super) fn images(path: &Path) -> Result<Vec<ModelImage>, SceneError> {
     let count = bytes.count(73, "images")?;
     let mut all = Vec::with_capacity(count);
     for _ in 0..count {
-        let place = bytes.place();
+        let place = FilePlace { path: path.to_path_buf(), location: bytes.location() };
         let id = bytes.u32("an image")?;
         let rotation = bytes.f64s("the rotation of an image")?;
         let translation = bytes.f64s("the translation of an image")?;
@@ -65,24 +66,20 @@ pub(super) fn points(path: &Path) -> Result<Vec<ModelPoint>, SceneError> {
     let count = bytes.count(51, "points")?;
     let mut all = Vec::with_capacity(count);
     for _ in 0..count {
-        let place = bytes.place();
+        let location = bytes.location();
         bytes.u64("a point")?;
         let position = bytes.f64s("the position of a point")?;
         let colour = [bytes.u8("a point")?, bytes.u8("a point")?, bytes.u8("a point")?];
-        let error = error(&mut bytes)?;
+        // -1 before COLMAP has computed it.
+        let error = bytes.f64("the error of a point")?;
         let length = bytes.count(8, "images that saw a point")?;
         let mut images = Vec::with_capacity(length);
         for _ in 0..length {
             images.push(bytes.u32("the images that saw a point")?);
             bytes.u32("the images that saw a point")?;
         }
-        all.push(ModelPoint { position, colour, error, images, place });
+        all.push(ModelPoint { position, colour, error, images, location });
     }
     bytes.end()?;
     Ok(all)
-}
-
-/// A point's error: -1 before COLMAP has computed it.
-fn error(bytes: &mut Bytes) -> Result<f64, SceneError> {
-    bytes.f64("the error of a point")
 }

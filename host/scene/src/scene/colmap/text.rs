@@ -4,8 +4,8 @@ use std::path::Path;
 
 use super::super::camera_models::CameraModel;
 use super::super::error::SceneError;
-use super::super::fault::{FaultLocation, FileFault};
-use super::super::files::{self, LONGEST_FILE, number, read_text_of};
+use super::super::fault::{FaultLocation, FileFault, FilePlace};
+use super::super::files::{self, MAX_FILE, number, read_text_of};
 use super::{ModelCamera, ModelImage, ModelPoint, camera};
 
 /// The lines that are not comments, numbered from 1. Blank ones are kept: `images.txt` has them.
@@ -16,20 +16,17 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
 
 /// A whole number that is not negative.
 fn whole(path: &Path, line: usize, word: &str) -> Result<u32, SceneError> {
-    word.parse().map_err(|_| SceneError::Damaged {
-        path: path.to_path_buf(),
-        place: FaultLocation::Line(line),
-        fault: FileFault::NotWhole { word: files::excerpt(word) },
-    })
+    let fault = || FilePlace::line(path, line).fault(FileFault::NotWhole(files::excerpt(word)));
+    word.parse().map_err(|_| fault())
 }
 
 fn too_few(path: &Path, line: usize, of: &'static str, expected: usize, found: usize) -> SceneError {
-    SceneError::WrongCount { path: path.to_path_buf(), place: FaultLocation::Line(line), of, expected, found }
+    FilePlace::line(path, line).fault(FileFault::WrongCount { of, expected, found })
 }
 
 /// `cameras.txt`: `CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]`.
 pub(super) fn cameras(path: &Path) -> Result<Vec<(u32, ModelCamera)>, SceneError> {
-    let text = read_text_of(path, LONGEST_FILE)?;
+    let text = read_text_of(path, MAX_FILE)?;
     let mut all = Vec::new();
     for (line, content) in lines(&text).filter(|(_, content)| !content.is_empty()) {
         let words: Vec<&str> = content.split_whitespace().collect();
@@ -40,7 +37,7 @@ pub(super) fn cameras(path: &Path) -> Result<Vec<(u32, ModelCamera)>, SceneError
         let size = [number(path, line, width)?, number(path, line, height)?];
         let parameters = parameters.iter().map(|word| number(path, line, word)).collect::<Result<Vec<_>, _>>()?;
         let model = CameraModel::named(name).ok_or_else(|| files::excerpt(name));
-        all.push((id, camera(path, FaultLocation::Line(line), model, size, &parameters)?));
+        all.push((id, camera(FilePlace::line(path, line), model, size, &parameters)?));
     }
     Ok(all)
 }
@@ -48,7 +45,7 @@ pub(super) fn cameras(path: &Path) -> Result<Vec<(u32, ModelCamera)>, SceneError
 /// `images.txt`: of each image `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, then a line of the points found in it,
 /// which is skipped. Files without these second lines are read, too.
 pub(super) fn images(path: &Path) -> Result<Vec<ModelImage>, SceneError> {
-    let text = read_text_of(path, LONGEST_FILE)?;
+    let text = read_text_of(path, MAX_FILE)?;
     let mut all = Vec::new();
     let mut lines = lines(&text).peekable();
     while let Some((line, content)) = lines.next() {
@@ -83,7 +80,7 @@ fn image(path: &Path, line: usize, content: &str) -> Result<ModelImage, SceneErr
         translation: std::array::from_fn(|index| translation[index]),
         camera: whole(path, line, words[8])?,
         name: behind(content, 9).to_string(),
-        place: FaultLocation::Line(line),
+        place: FilePlace::line(path, line),
     })
 }
 
@@ -98,7 +95,7 @@ fn behind(content: &str, words: usize) -> &str {
 
 /// `points3D.txt`: `POINT3D_ID X Y Z R G B ERROR` and `IMAGE_ID POINT2D_IDX` of each image that saw it.
 pub(super) fn points(path: &Path) -> Result<Vec<ModelPoint>, SceneError> {
-    let text = read_text_of(path, LONGEST_FILE)?;
+    let text = read_text_of(path, MAX_FILE)?;
     let mut all = Vec::new();
     for (line, content) in lines(&text).filter(|(_, content)| !content.is_empty()) {
         let words: Vec<&str> = content.split_whitespace().collect();
@@ -117,8 +114,8 @@ pub(super) fn points(path: &Path) -> Result<Vec<ModelPoint>, SceneError> {
             *level = whole(path, line, word)?.min(255) as u8;
         }
         let images = track.iter().step_by(2).map(|word| whole(path, line, word)).collect::<Result<Vec<_>, _>>()?;
-        let (error, place) = (number(path, line, error)?, FaultLocation::Line(line));
-        all.push(ModelPoint { position, colour, error, images, place });
+        let (error, location) = (number(path, line, error)?, FaultLocation::Line(line));
+        all.push(ModelPoint { position, colour, error, images, location });
     }
     Ok(all)
 }

@@ -239,25 +239,27 @@ fn is_region(cells: &[bool], columns: usize) -> bool {
 /// The cells of the largest region of connected ones that count.
 fn largest_region(cells: &[bool], columns: usize) -> usize {
     let mut open = cells.to_vec();
-    let mut largest = 0;
-    for start in 0..cells.len() {
-        let (mut front, mut count) = (Vec::new(), 0);
-        if std::mem::take(&mut open[start]) {
-            front.push(start);
-        }
-        while let Some(cell) = front.pop() {
-            count += 1;
-            let (column, row) = (cell % columns, cell / columns);
-            for near in
-                [(column.wrapping_sub(1), row), (column + 1, row), (column, row.wrapping_sub(1)), (column, row + 1)]
-            {
-                let inside = near.0 < columns && near.1 < cells.len() / columns;
-                if inside && std::mem::take(&mut open[near.1 * columns + near.0]) {
-                    front.push(near.1 * columns + near.0);
-                }
+    let mut region = |start| flood([start], [columns, cells.len() / columns], |cell| std::mem::take(&mut open[cell]));
+    (0..cells.len()).map(&mut region).max().unwrap_or(0)
+}
+
+/// Takes cells of a grid, row by row: of the first ones those that `take` accepts, then on and on of their neighbours.
+/// Returns how many were taken; `take` must accept a cell once.
+pub(crate) fn flood(
+    first: impl IntoIterator<Item = usize>,
+    [columns, rows]: [usize; 2],
+    mut take: impl FnMut(usize) -> bool,
+) -> usize {
+    let mut front: Vec<usize> = first.into_iter().filter(|cell| take(*cell)).collect();
+    let mut count = front.len();
+    while let Some(cell) = front.pop() {
+        let (x, y) = (cell % columns, cell / columns);
+        for (x, y) in [(x.wrapping_sub(1), y), (x + 1, y), (x, y.wrapping_sub(1)), (x, y + 1)] {
+            if x < columns && y < rows && take(y * columns + x) {
+                front.push(y * columns + x);
+                count += 1;
             }
         }
-        largest = largest.max(count);
     }
-    largest
+    count
 }

@@ -9,8 +9,8 @@ use viewfuse_core::lens::{Coefficients, Lens, Projection};
 
 use super::super::camera_models::{KEYED_LENSES, KeyedLens, LENS_KEYS, REFUSED_FLAGS, keyed_lens_names};
 use super::super::check;
-use super::super::error::SceneError;
-use super::super::fault::{FaultLocation, IntrinsicsFault};
+use super::super::error::{SceneError, SceneFault};
+use super::super::fault::{FileFault, FilePlace, IntrinsicsFault};
 use super::super::files::{self, IMAGE_EXTENSIONS};
 use super::super::json::Object;
 use super::super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawView};
@@ -25,7 +25,7 @@ pub(super) enum Listed {
     /// A view with its photograph.
     View(Box<RawView>),
     /// A photograph that does not exist, and the place that names it.
-    Missing(FaultLocation, PathBuf),
+    Missing(FilePlace, PathBuf),
 }
 
 /// The splits of photographs by the lists at the top level of a file. Names are compared as paths.
@@ -72,7 +72,7 @@ fn beside(file: &Path, path: &str) -> PathBuf {
 }
 
 /// One entry of `frames`.
-pub(crate) struct Frame<'a> {
+pub(crate) struct TransformsFrame<'a> {
     pub(crate) path: &'a Path,
     /// `frames[3]`.
     pub(crate) key: String,
@@ -80,7 +80,7 @@ pub(crate) struct Frame<'a> {
     pub(crate) scopes: [Object<'a>; 2],
 }
 
-impl<'a> Frame<'a> {
+impl<'a> TransformsFrame<'a> {
     pub(super) fn view(&self, lists: &mut Lists) -> Result<Listed, SceneError> {
         let [frame, _] = &self.scopes;
         let pose = self.pose()?;
@@ -88,7 +88,7 @@ impl<'a> Frame<'a> {
         let given = self.beside(file_path);
         let split = lists.split(&given);
         let Some(image) = photograph(&given).or_else(|| smaller(&given)) else {
-            return Ok(Listed::Missing(FaultLocation::Key(frame.full("file_path")), given));
+            return Ok(Listed::Missing(FilePlace::key(self.path, frame.full("file_path")), given));
         };
         let image = ImageFile::open(&image)?;
         let intrinsics = Some(self.intrinsics(image.size())?);
@@ -105,7 +105,7 @@ impl<'a> Frame<'a> {
         let pose = self.pose()?;
         let has_focal = ["fl_x", "camera_angle_x", "x_fov"].iter().any(|key| self.get(key).is_some());
         let intrinsics = if has_focal { Some(RawIntrinsics { lens: None, ..self.intrinsics(size)? }) } else { None };
-        let intrinsics = intrinsics.map(|own| RawIntrinsics { size: own.size.or(Some(size)), ..own });
+        let intrinsics = intrinsics.map(|raw| RawIntrinsics { size: raw.size.or(Some(size)), ..raw });
         let name = frame.get("file_path").and_then(Value::as_str).map(|path| files::picture_stem(&self.beside(path)));
         Ok(RawView::new(name.unwrap_or_default(), None, pose, intrinsics))
     }
@@ -113,10 +113,9 @@ impl<'a> Frame<'a> {
     fn pose(&self) -> Result<RawPose, SceneError> {
         let [frame, _] = &self.scopes;
         Ok(RawPose {
-            matrix: frame.matrix("transform_matrix")?,
+            matrix: frame.rows("transform_matrix")?,
             form: PoseForm::WorldFromOpenGl,
-            path: self.path.to_path_buf(),
-            place: FaultLocation::Key(frame.full("transform_matrix")),
+            place: FilePlace::key(self.path, frame.full("transform_matrix")),
         })
     }
 
@@ -135,8 +134,7 @@ impl<'a> Frame<'a> {
         if mask.is_file() {
             return Ok(Some(mask));
         }
-        let (path, place) = (self.path.to_path_buf(), FaultLocation::Key(frame.full("mask_path")));
-        Err(SceneError::NoMask { path, place, mask })
+        Err(FilePlace::key(self.path, frame.full("mask_path")).fault(SceneFault::NoMask(mask)))
     }
 
     /// A path relative to the JSON file.
@@ -145,10 +143,10 @@ impl<'a> Frame<'a> {
     }
 
     fn intrinsics(&self, image_size: [u32; 2]) -> Result<RawIntrinsics, SceneError> {
-        let place = || FaultLocation::Key(self.key.clone());
+        let place = FilePlace::key(self.path, &self.key);
         let stated = match (self.number("w")?, self.number("h")?) {
             (None, None) => None,
-            (Some((width, _)), Some((height, _))) => Some(check::size(self.path, place(), width, height)?),
+            (Some((width, _)), Some((height, _))) => Some(check::size(&place, width, height)?),
             (Some(_), None) => return Err(self.missing("h")),
             (None, Some(_)) => return Err(self.missing("w")),
         };
@@ -160,16 +158,8 @@ impl<'a> Frame<'a> {
             self.number("cx")?.map_or(centre[0], |(value, _)| value),
             self.number("cy")?.map_or(centre[1], |(value, _)| value),
         ];
-        let (path, place, size_place) = (self.path.to_path_buf(), place(), place());
-        Ok(RawIntrinsics {
-            focal: [focal_x, focal_y],
-            principal,
-            size: stated,
-            lens: self.lens()?,
-            path,
-            place,
-            size_place,
-        })
+        let (focal, lens, size_place) = ([focal_x, focal_y], self.lens(&place)?, place.clone());
+        Ok(RawIntrinsics { focal, principal, size: stated, lens, place, size_place })
     }
 
     /// A focal length along an axis: from the frame in any form, otherwise from the top level of the file.
@@ -182,9 +172,7 @@ impl<'a> Frame<'a> {
             for (key, unit) in [(format!("camera_angle_{axis}"), 1.0), (format!("{axis}_fov"), PI / 180.0)] {
                 let Some(angle) = scope.number(&key)?.map(|angle| angle * unit) else { continue };
                 if !(angle > 0.0 && angle < PI) {
-                    let (path, place) = (self.path.to_path_buf(), FaultLocation::Key(scope.full(&key)));
-                    let fault = IntrinsicsFault::Angle { angle };
-                    return Err(SceneError::Intrinsics { path, place, fault });
+                    return Err(FilePlace::key(self.path, scope.full(&key)).fault(IntrinsicsFault::Angle(angle)));
                 }
                 return Ok(Some(f64::from(side) / 2.0 / (angle / 2.0).tan()));
             }
@@ -192,10 +180,9 @@ impl<'a> Frame<'a> {
         Ok(None)
     }
 
-    /// The lens that the frame or the file states.
-    fn lens(&self) -> Result<Option<Lens>, SceneError> {
-        let refuse =
-            |key: String, value: String| Err(SceneError::Distorted { path: self.path.to_path_buf(), key, value });
+    /// The lens that the frame, whose place this is, or the file states.
+    fn lens(&self, place: &FilePlace) -> Result<Option<Lens>, SceneError> {
+        let refuse = |key, value| Err(FilePlace::file(self.path).fault(IntrinsicsFault::Distorted(key, value)));
         let [perspective, _, fisheye] = &KEYED_LENSES;
         let flag = match self.get("is_fisheye") {
             Some((Value::Bool(true), key)) => Some(key),
@@ -203,22 +190,16 @@ impl<'a> Frame<'a> {
             Some((value, key)) => return refuse(key, files::excerpt(&value.to_string())),
         };
         let keyed = match self.get("camera_model") {
-            None => {
-                if flag.is_some() {
-                    fisheye
-                } else {
-                    perspective
-                }
-            }
+            None if flag.is_some() => fisheye,
+            None => perspective,
             Some((value, key)) => KeyedLens::named(value.as_str().unwrap_or_default()).ok_or_else(|| {
-                let (path, place) = (self.path.to_path_buf(), FaultLocation::Key(key));
                 let model = files::excerpt(&value.to_string());
-                SceneError::CameraModel { path, place, model, supported: keyed_lens_names() }
+                FilePlace::key(self.path, key).fault(IntrinsicsFault::CameraModel(model, keyed_lens_names()))
             })?,
         };
         if let Some(key) = flag.filter(|_| keyed.projection != Projection::Fisheye) {
-            let (path, second) = (self.path.to_path_buf(), format!("camera_model {}", keyed.models[0]));
-            return Err(SceneError::Contradiction { path, first: format!("{key} true"), second });
+            let second = format!("camera_model {}", keyed.models[0]);
+            return Err(FilePlace::file(self.path).fault(FileFault::Contradiction(format!("{key} true"), second)));
         }
         for flag in REFUSED_FLAGS {
             if let Some((value, key)) = self.get(flag)
@@ -228,7 +209,7 @@ impl<'a> Frame<'a> {
             }
         }
         let mut coefficients = Coefficients::default();
-        for key in LENS_KEYS {
+        for key in LENS_KEYS.split(' ') {
             let Some((value, full)) = self.number(key)? else { continue };
             match keyed.keys.iter().find(|(known, _)| *known == key) {
                 Some((_, index)) => coefficients[*index] = value,
@@ -236,11 +217,8 @@ impl<'a> Frame<'a> {
                 None => {}
             }
         }
-        let lens = Lens::new(keyed.projection, coefficients).map_err(|reason| SceneError::Lens {
-            path: self.path.to_path_buf(),
-            place: FaultLocation::Key(self.key.clone()),
-            reason,
-        })?;
+        let lens = Lens::new(keyed.projection, coefficients);
+        let lens = lens.map_err(|reason| place.clone().fault(IntrinsicsFault::Lens(reason)))?;
         Ok((!lens.is_pinhole()).then_some(lens))
     }
 
@@ -262,11 +240,11 @@ impl<'a> Frame<'a> {
     /// The error for a key that is neither in the frame nor at the top.
     fn missing(&self, key: &str) -> SceneError {
         let key = format!("{key}, in {} and at the top level,", self.key);
-        SceneError::MissingKey { path: self.path.to_path_buf(), key }
+        FilePlace::file(self.path).fault(FileFault::MissingKey(key))
     }
 }
 
-/// The photograph of a path, with the extension that the Blender flavour leaves out.
+/// The photograph of a path, with the extension that the Blender flavour omits.
 fn photograph(given: &Path) -> Option<PathBuf> {
     let with_extension = |extension: &&str| files::appended(given, extension);
     let mut candidates = std::iter::once(given.to_path_buf()).chain(IMAGE_EXTENSIONS.iter().map(with_extension));

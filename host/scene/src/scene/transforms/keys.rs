@@ -9,48 +9,20 @@ use super::super::camera_models::{LENS_KEYS, REFUSED_FLAGS};
 use super::super::json::Object;
 
 /// Keys of intrinsics, beside those of lenses.
-const INTRINSICS: [&str; 12] = [
-    "fl_x",
-    "fl_y",
-    "cx",
-    "cy",
-    "w",
-    "h",
-    "camera_angle_x",
-    "camera_angle_y",
-    "x_fov",
-    "y_fov",
-    "camera_model",
-    "is_fisheye",
-];
+const INTRINSICS: &str = "fl_x fl_y cx cy w h camera_angle_x camera_angle_y x_fov y_fov camera_model is_fisheye";
 
 /// The other keys that are read; the applied ones and `fps` with camera paths.
-const READ: [&str; 12] = [
-    "frames",
-    "file_path",
-    "transform_matrix",
-    "mask_path",
-    "depth_file_path",
-    "time",
-    "train_filenames",
-    "val_filenames",
-    "test_filenames",
-    "applied_transform",
-    "applied_scale",
-    "fps",
-];
+const READ: &str = "frames file_path transform_matrix mask_path depth_file_path time train_filenames val_filenames \
+                    test_filenames applied_transform applied_scale fps";
 
 /// Keys that are not read and change which pictures a program makes that reads them (instant-ngp).
-const TELLING: [&str; 8] = [
-    "rolling_shutter",
-    "transform_matrix_start",
-    "transform_matrix_end",
-    "white_transparent",
-    "black_transparent",
-    "n_frames",
-    "sharpness_discard_threshold",
-    "normal_mts_args",
-];
+const TELLING: &str = "rolling_shutter transform_matrix_start transform_matrix_end white_transparent \
+                       black_transparent n_frames sharpness_discard_threshold normal_mts_args";
+
+/// Whether a key is one of those that a text lists.
+fn is_in(keys: &str, key: &str) -> bool {
+    keys.split(' ').any(|known| known == key)
+}
 
 /// What was found of the keys of a file.
 pub(super) struct Keys<'a> {
@@ -87,7 +59,7 @@ impl<'a> Keys<'a> {
     pub(super) fn add(&mut self, frame: &Object<'a>) {
         self.frame_count += 1;
         let differs = |(key, value): &(&str, &Value)| {
-            let is_camera = INTRINSICS.contains(key) || LENS_KEYS.contains(key);
+            let is_camera = is_in(INTRINSICS, key) || is_in(LENS_KEYS, key);
             is_camera && self.top.get(key).is_some_and(|top| top != *value && top.as_f64() != value.as_f64())
         };
         let overridden: Vec<&str> = frame.entries().filter(differs).map(|(key, _)| key).collect();
@@ -142,7 +114,7 @@ fn list(keys: &BTreeSet<&str>) -> String {
 }
 
 fn is_read(key: &str) -> bool {
-    [&INTRINSICS[..], &READ, &LENS_KEYS, &REFUSED_FLAGS].into_iter().any(|keys| keys.contains(&key))
+    [INTRINSICS, READ, LENS_KEYS].into_iter().any(|keys| is_in(keys, key)) || REFUSED_FLAGS.contains(&key)
 }
 
 /// Whether a key that changes pictures has a value that says something.
@@ -155,5 +127,5 @@ fn is_telling((key, value): &(&str, &Value)) -> bool {
             _ => false,
         }
     }
-    TELLING.contains(key) && !is_idle(value)
+    is_in(TELLING, key) && !is_idle(value)
 }

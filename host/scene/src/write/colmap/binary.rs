@@ -1,12 +1,12 @@
 //! COLMAP's binary files: little endian, a count of 64 bits before what is counted.
 
-use super::{Model, ModelPoint, ModelView};
+use super::{ModelName, ModelView, WrittenPoint};
 
 /// Bytes of a file.
 #[derive(Default)]
-struct Bytes(Vec<u8>);
+struct FileBytes(Vec<u8>);
 
-impl Bytes {
+impl FileBytes {
     fn count(&mut self, count: usize) {
         self.0.extend((count as u64).to_le_bytes());
     }
@@ -25,9 +25,9 @@ impl Bytes {
 }
 
 pub(super) fn cameras(views: &[ModelView]) -> Vec<u8> {
-    let mut bytes = Bytes::default();
+    let mut bytes = FileBytes::default();
     bytes.count(views.len());
-    for ModelView { id, model: Model(_, model), size: [width, height], parameters, .. } in views {
+    for ModelView { id, model: ModelName(_, model), size: [width, height], parameters, .. } in views {
         bytes.u32(*id);
         bytes.u32(*model);
         bytes.u64((*width).into());
@@ -38,7 +38,7 @@ pub(super) fn cameras(views: &[ModelView]) -> Vec<u8> {
 }
 
 pub(super) fn images(views: &[ModelView]) -> Vec<u8> {
-    let mut bytes = Bytes::default();
+    let mut bytes = FileBytes::default();
     bytes.count(views.len());
     for ModelView { id, rotation, translation, name, observations, .. } in views {
         bytes.u32(*id);
@@ -55,10 +55,10 @@ pub(super) fn images(views: &[ModelView]) -> Vec<u8> {
     bytes.0
 }
 
-pub(super) fn points(points: &[ModelPoint]) -> Vec<u8> {
-    let mut bytes = Bytes::default();
+pub(super) fn points(points: &[WrittenPoint]) -> Vec<u8> {
+    let mut bytes = FileBytes::default();
     bytes.count(points.len());
-    for ModelPoint { id, position, colour, error, track } in points {
+    for WrittenPoint { id, position, colour, error, track } in points {
         bytes.u64(*id);
         bytes.f64s(position);
         bytes.0.extend(colour);

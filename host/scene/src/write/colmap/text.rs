@@ -3,13 +3,13 @@
 use std::fmt::Write;
 
 use super::super::words;
-use super::{Model, ModelPoint, ModelView};
+use super::{ModelName, ModelView, WrittenPoint};
 
 // Writing to a text cannot fail.
 
 pub(super) fn cameras(views: &[ModelView]) -> String {
     let mut text = String::from("# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n");
-    for ModelView { id, model: Model(model, _), size: [width, height], parameters, .. } in views {
+    for ModelView { id, model: ModelName(model, _), size: [width, height], parameters, .. } in views {
         let _ = writeln!(text, "{id} {model} {width} {height} {}", words(parameters.iter().copied()));
     }
     text
@@ -25,9 +25,9 @@ pub(super) fn images(views: &[ModelView]) -> String {
     text
 }
 
-pub(super) fn points(points: &[ModelPoint]) -> String {
+pub(super) fn points(points: &[WrittenPoint]) -> String {
     let mut text = String::from("# POINT3D_ID X Y Z R G B ERROR TRACK[] as (IMAGE_ID POINT2D_IDX)\n");
-    for ModelPoint { id, position, colour: [red, green, blue], error, track } in points {
+    for WrittenPoint { id, position, colour: [red, green, blue], error, track } in points {
         let _ = write!(text, "{id} {} {red} {green} {blue} {error}", words(position.iter().copied()));
         for [image, place] in track {
             let _ = write!(text, " {image} {place}");
