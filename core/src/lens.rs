@@ -1,9 +1,10 @@
-//! Lenses: where a point of the ideal (pinhole) image appears in a photograph taken through a real lens.
+//! Lenses: where a point of the ideal (pinhole) image appears in a photograph taken through a real lens, and back.
 //!
 //! Points are in normalised coordinates: `x / z`, `y / z` of a point in camera coordinates (x right, y down, z
 //! forward), so that the pixel is `focal * point + principal`. [`Lens::distort`] maps the ideal point to the
-//! photograph's. Two families cover the models of COLMAP, OpenCV and nerfstudio (OpenCV's documentation, "Camera
-//! Calibration and 3D Reconstruction" and "Fisheye camera model"); a model with fewer coefficients leaves the others 0:
+//! photograph's, [`Lens::undistort`] is its inverse. Two families cover the models of COLMAP, OpenCV and nerfstudio
+//! (OpenCV's documentation, "Camera Calibration and 3D Reconstruction" and "Fisheye camera model"); a model with fewer
+//! coefficients leaves the others 0:
 //!
 //! ```text
 //! perspective   r2 = x^2 + y^2,  g = (1 + k1 r2 + k2 r2^2 + k3 r2^3 + q4 r2^4) / (1 + k4 r2 + k5 r2^2 + k6 r2^3)
@@ -16,16 +17,80 @@
 //!
 //! nerfstudio and Metashape call `q4` their k4: their polynomial goes on where OpenCV's has a denominator.
 //!
-//! Limits: a lens's polynomials are fitted to its image and may fold over outside it; [`Lens::reach`] is the radius up
-//! to which the map is one to one.
+//! One source serves `f32` ([`LensBlock`], for kernels and firmware) and `f64` ([`Lens`], for undistorting
+//! photographs): the functions are generic over [`Real`].
+//!
+//! Limits: a lens's polynomials are fitted to its image and may fold over outside it. [`Undistorted::residual`] detects
+//! a point that no ideal point maps to; [`Lens::reach`] is the radius up to which the map is one to one.
 
 use crate::math;
+use bytemuck::{Pod, Zeroable};
 use core::fmt;
+use core::ops::{Add, Div, Mul, Sub};
 
-/// Greatest magnitude of a coefficient.
+/// Steps of Newton's method at most. Lenses of cameras take 3 to 6 in either precision.
+const MAX_STEPS: u32 = 24;
+/// Halvings of a step that does not reduce the residual, at most.
+const MAX_HALVINGS: u32 = 12;
+/// Greatest magnitude of a coefficient: powers of eight of them stay finite in `f32`.
 pub const MAX_COEFFICIENT: f64 = 1.0e4;
 /// Coefficients `[k1, k2, k3, k4, k5, k6, p1, p2, q4]`; a fisheye ignores all but the first four.
-pub type Coefficients = [f64; 9];
+pub type Coefficients<T> = [T; 9];
+/// Largest angle from the principal axis that an ideal image holds, in radians: 89.9 degrees.
+const WIDEST: f32 = 1.569_051;
+
+/// A number type in which lenses are computed: `f32` or `f64`.
+pub trait Real:
+    Copy + PartialOrd + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+    /// The nearest value.
+    fn of(value: f32) -> Self;
+    /// Square root.
+    fn root(self) -> Self;
+    /// Arc tangent of a number of at least 0.
+    fn arc_tangent(self) -> Self;
+    /// Tangent of an angle in `[0, pi / 2)`.
+    fn tangent(self) -> Self;
+}
+
+impl Real for f32 {
+    #[inline]
+    fn of(value: f32) -> f32 {
+        value
+    }
+    #[inline]
+    fn root(self) -> f32 {
+        math::sqrt(self)
+    }
+    #[inline]
+    fn arc_tangent(self) -> f32 {
+        math::angle_from_components(self, 1.0)
+    }
+    #[inline]
+    fn tangent(self) -> f32 {
+        let (sin, cos) = math::sin_cos(self);
+        sin / cos
+    }
+}
+
+impl Real for f64 {
+    #[inline]
+    fn of(value: f32) -> f64 {
+        value as f64
+    }
+    #[inline]
+    fn root(self) -> f64 {
+        math::sqrt_f64(self)
+    }
+    #[inline]
+    fn arc_tangent(self) -> f64 {
+        math::arc_tangent_f64(self)
+    }
+    #[inline]
+    fn tangent(self) -> f64 {
+        math::tangent_f64(self)
+    }
+}
 
 /// How a lens maps angles to radii before its own distortion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,7 +125,17 @@ impl core::error::Error for LensError {}
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Lens {
     projection: Projection,
-    coefficients: Coefficients,
+    coefficients: Coefficients<f64>,
+}
+
+/// An ideal point and its residual.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Undistorted<T> {
+    /// The ideal point, normalised.
+    pub point: [T; 2],
+    /// Distance between the given point and where the lens maps `point`, normalised (times the focal length: pixels).
+    pub residual: T,
 }
 
 impl Lens {
@@ -68,7 +143,7 @@ impl Lens {
     ///
     /// # Errors
     /// [`LensError`] names the first one that is not usable.
-    pub fn new(projection: Projection, coefficients: Coefficients) -> Result<Lens, LensError> {
+    pub fn new(projection: Projection, coefficients: Coefficients<f64>) -> Result<Lens, LensError> {
         let mut index = 0;
         while index < coefficients.len() {
             let value = coefficients[index];
@@ -86,7 +161,7 @@ impl Lens {
     }
 
     /// Its coefficients.
-    pub fn coefficients(&self) -> Coefficients {
+    pub fn coefficients(&self) -> Coefficients<f64> {
         self.coefficients
     }
 
@@ -98,6 +173,11 @@ impl Lens {
     /// Where an ideal point appears in the photograph. Normalised coordinates.
     pub fn distort(&self, point: [f64; 2]) -> [f64; 2] {
         distort(self.projection == Projection::Fisheye, &self.coefficients, point)
+    }
+
+    /// The ideal point that appears at a point of the photograph. Normalised coordinates.
+    pub fn undistort(&self, point: [f64; 2]) -> Undistorted<f64> {
+        undistort(self.projection == Projection::Fisheye, &self.coefficients, point)
     }
 
     /// Distance from the centre of the ideal image, normalised, up to which the radial part of the map grows, at most
@@ -114,50 +194,225 @@ impl Lens {
         }
         most
     }
+
+    /// The lens as plain data for kernels, in `f32`.
+    pub fn block(&self) -> LensBlock {
+        let c = self.coefficients;
+        LensBlock {
+            first: [c[0] as f32, c[1] as f32, c[2] as f32, c[3] as f32],
+            second: [c[4] as f32, c[5] as f32, c[6] as f32, c[7] as f32],
+            is_fisheye: (self.projection == Projection::Fisheye) as u32,
+            fourth: c[8] as f32,
+            padding: [0; 2],
+        }
+    }
+}
+
+/// A lens as plain data: what a kernel reads from a buffer. Made from a checked [`Lens`] by [`Lens::block`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct LensBlock {
+    /// `k1 k2 k3 k4`.
+    pub first: [f32; 4],
+    /// `k5 k6 p1 p2`; unused by a fisheye.
+    pub second: [f32; 4],
+    /// 1 for a fisheye, 0 for a perspective lens.
+    pub is_fisheye: u32,
+    /// `q4`; unused by a fisheye.
+    pub fourth: f32,
+    /// Zeros.
+    pub padding: [u32; 2],
+}
+
+const _: () = assert!(size_of::<LensBlock>() == 48);
+
+impl LensBlock {
+    fn coefficients(&self) -> Coefficients<f32> {
+        let (a, b) = (self.first, self.second);
+        [a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3], self.fourth]
+    }
+
+    /// Where an ideal point appears in the photograph. Normalised coordinates.
+    #[inline]
+    pub fn distort(&self, point: [f32; 2]) -> [f32; 2] {
+        distort(self.is_fisheye != 0, &self.coefficients(), point)
+    }
+
+    /// The ideal point that appears at a point of the photograph. Normalised coordinates.
+    #[inline]
+    pub fn undistort(&self, point: [f32; 2]) -> Undistorted<f32> {
+        undistort(self.is_fisheye != 0, &self.coefficients(), point)
+    }
 }
 
 /// Where an ideal point appears in the photograph. Total: a denominator of 0 and points that are not finite give the
 /// result of IEEE arithmetic.
 #[inline]
-pub fn distort(is_fisheye: bool, coefficients: &Coefficients, point: [f64; 2]) -> [f64; 2] {
+pub fn distort<T: Real>(is_fisheye: bool, coefficients: &Coefficients<T>, point: [T; 2]) -> [T; 2] {
     let [x, y] = point;
     let squared = x * x + y * y;
-    let [k1, k2, k3, k4, k5, k6, p1, p2, q4] = *coefficients;
     if is_fisheye {
-        let radius = math::sqrt_f64(squared);
+        let radius = squared.root();
         // The centre is a fixed point: there the factor is 1.
-        if !(radius > 1.0e-12) {
+        if !(radius > T::of(1.0e-12)) {
             return point;
         }
-        let angle = math::arc_tangent_f64(radius);
-        let s = angle * angle;
-        let factor = angle * (1.0 + s * (k1 + s * (k2 + s * (k3 + s * k4)))) / radius;
+        let factor = bent(coefficients, radius.arc_tangent()) / radius;
         return [x * factor, y * factor];
     }
-    let factor = (1.0 + squared * (k1 + squared * (k2 + squared * (k3 + squared * q4))))
-        / (1.0 + squared * (k4 + squared * (k5 + squared * k6)));
+    let [k1, k2, k3, k4, k5, k6, p1, p2, q4] = *coefficients;
+    let (one, two) = (T::of(1.0), T::of(2.0));
+    let factor = (one + squared * (k1 + squared * (k2 + squared * (k3 + squared * q4))))
+        / (one + squared * (k4 + squared * (k5 + squared * k6)));
     [
-        x * factor + 2.0 * p1 * x * y + p2 * (squared + 2.0 * x * x),
-        y * factor + p1 * (squared + 2.0 * y * y) + 2.0 * p2 * x * y,
+        x * factor + two * p1 * x * y + p2 * (squared + two * x * x),
+        y * factor + p1 * (squared + two * y * y) + two * p2 * x * y,
     ]
+}
+
+/// A fisheye's radius at an angle from the principal axis.
+#[inline]
+fn bent<T: Real>(coefficients: &Coefficients<T>, angle: T) -> T {
+    let s = angle * angle;
+    let [k1, k2, k3, k4, ..] = *coefficients;
+    angle * (T::of(1.0) + s * (k1 + s * (k2 + s * (k3 + s * k4))))
+}
+
+/// The slope of [`bent`].
+#[inline]
+fn bent_slope<T: Real>(coefficients: &Coefficients<T>, angle: T) -> T {
+    let s = angle * angle;
+    let [k1, k2, k3, k4, ..] = *coefficients;
+    let (three, five, seven, nine) = (T::of(3.0), T::of(5.0), T::of(7.0), T::of(9.0));
+    T::of(1.0) + s * (three * k1 + s * (five * k2 + s * (seven * k3 + s * nine * k4)))
+}
+
+/// A perspective lens's factor `g` at a squared radius, and its slope in the squared radius.
+#[inline]
+fn factor_and_slope<T: Real>(coefficients: &Coefficients<T>, squared: T) -> (T, T) {
+    let [k1, k2, k3, k4, k5, k6, _, _, q4] = *coefficients;
+    let (one, two, three, four) = (T::of(1.0), T::of(2.0), T::of(3.0), T::of(4.0));
+    let above = one + squared * (k1 + squared * (k2 + squared * (k3 + squared * q4)));
+    let below = one + squared * (k4 + squared * (k5 + squared * k6));
+    let above_slope = k1 + squared * (two * k2 + squared * (three * k3 + squared * four * q4));
+    let below_slope = k4 + squared * (two * k5 + squared * three * k6);
+    (above / below, (above_slope * below - above * below_slope) / (below * below))
 }
 
 /// How fast the photograph's radius grows with the ideal one, without the tangential part; not positive where a
 /// rational factor's denominator is not.
-fn radial_slope(is_fisheye: bool, coefficients: &Coefficients, radius: f64) -> f64 {
-    let [k1, k2, k3, k4, k5, k6, _, _, q4] = *coefficients;
+fn radial_slope(is_fisheye: bool, coefficients: &Coefficients<f64>, radius: f64) -> f64 {
     if is_fisheye {
-        let angle = math::arc_tangent_f64(radius);
-        let s = angle * angle;
-        return 1.0 + s * (3.0 * k1 + s * (5.0 * k2 + s * (7.0 * k3 + s * 9.0 * k4)));
+        return bent_slope(coefficients, radius.arc_tangent());
     }
     let squared = radius * radius;
-    let below = 1.0 + squared * (k4 + squared * (k5 + squared * k6));
-    if !(below > 0.0) {
+    let [_, _, _, k4, k5, k6, ..] = *coefficients;
+    if !(1.0 + squared * (k4 + squared * (k5 + squared * k6)) > 0.0) {
         return 0.0;
     }
-    let above = 1.0 + squared * (k1 + squared * (k2 + squared * (k3 + squared * q4)));
-    let above_slope = k1 + squared * (2.0 * k2 + squared * (3.0 * k3 + squared * 4.0 * q4));
-    let below_slope = k4 + squared * (2.0 * k5 + squared * 3.0 * k6);
-    above / below + 2.0 * squared * ((above_slope * below - above * below_slope) / (below * below))
+    let (factor, slope) = factor_and_slope(coefficients, squared);
+    factor + 2.0 * squared * slope
+}
+
+/// The ideal point that appears at a point of the photograph: Newton's method from the point itself, each step halved
+/// until it reduces the residual. It ends if no step does, after 24 steps at most. Total: if no ideal point maps to the
+/// given one, or it is not finite, the residual is large or not finite.
+///
+/// Inside [`Lens::reach`] the residual is a few units in the last place of the point (in `f64` below 1e-14 for points
+/// up to 10; in `f32` below 2e-6).
+#[inline]
+pub fn undistort<T: Real>(is_fisheye: bool, coefficients: &Coefficients<T>, point: [T; 2]) -> Undistorted<T> {
+    let guess = if is_fisheye { unbent(coefficients, point) } else { straightened(coefficients, point) };
+    let miss = missed(is_fisheye, coefficients, guess, point);
+    Undistorted { point: guess, residual: miss.root() }
+}
+
+/// Squared distance between a point and where the lens maps a guess.
+#[inline]
+fn missed<T: Real>(is_fisheye: bool, coefficients: &Coefficients<T>, guess: [T; 2], point: [T; 2]) -> T {
+    let at = distort(is_fisheye, coefficients, guess);
+    let (x, y) = (at[0] - point[0], at[1] - point[1]);
+    x * x + y * y
+}
+
+/// Newton's method on a fisheye's angle.
+#[inline]
+fn unbent<T: Real>(coefficients: &Coefficients<T>, point: [T; 2]) -> [T; 2] {
+    let zero = T::of(0.0);
+    let radius = (point[0] * point[0] + point[1] * point[1]).root();
+    if !(radius > T::of(1.0e-12)) {
+        return point;
+    }
+    let widest = T::of(WIDEST);
+    let mut angle = if radius < widest { radius } else { widest };
+    let mut miss = bent(coefficients, angle) - radius;
+    let mut step = 0;
+    while step < MAX_STEPS {
+        let slope = bent_slope(coefficients, angle);
+        // Beyond the fold: back towards the centre, where the slope is 1.
+        let move_by = if slope > T::of(1.0e-3) { miss / slope } else { angle * T::of(0.5) };
+        let mut share = T::of(1.0);
+        let mut halving = 0;
+        let mut moved = false;
+        while halving < MAX_HALVINGS && !moved {
+            let next = angle - share * move_by;
+            let next = if next > widest { widest } else { next };
+            let next = if next > zero { next } else { zero };
+            let next_miss = bent(coefficients, next) - radius;
+            if next_miss * next_miss < miss * miss {
+                angle = next;
+                miss = next_miss;
+                moved = true;
+            }
+            share = share * T::of(0.5);
+            halving += 1;
+        }
+        step = if moved { step + 1 } else { MAX_STEPS };
+    }
+    let factor = angle.tangent() / radius;
+    [point[0] * factor, point[1] * factor]
+}
+
+/// Newton's method in the plane of a perspective lens.
+#[inline]
+fn straightened<T: Real>(coefficients: &Coefficients<T>, point: [T; 2]) -> [T; 2] {
+    let p1 = coefficients[6];
+    let p2 = coefficients[7];
+    let (two, six) = (T::of(2.0), T::of(6.0));
+    let mut guess = point;
+    let mut miss = missed(false, coefficients, guess, point);
+    let mut step = 0;
+    while step < MAX_STEPS {
+        let [x, y] = guess;
+        let (factor, slope) = factor_and_slope(coefficients, x * x + y * y);
+        // The Jacobian is symmetric.
+        let xx = factor + two * x * x * slope + two * p1 * y + six * p2 * x;
+        let xy = two * x * y * slope + two * p1 * x + two * p2 * y;
+        let yy = factor + two * y * y * slope + six * p1 * y + two * p2 * x;
+        let determinant = xx * yy - xy * xy;
+        let at = distort(false, coefficients, guess);
+        let (a, b) = (at[0] - point[0], at[1] - point[1]);
+        // Beyond the fold: back towards the centre, where the map is the identity.
+        let (dx, dy) = if determinant > T::of(1.0e-6) {
+            ((yy * a - xy * b) / determinant, (xx * b - xy * a) / determinant)
+        } else {
+            (x * T::of(0.5), y * T::of(0.5))
+        };
+        let mut share = T::of(1.0);
+        let mut halving = 0;
+        let mut moved = false;
+        while halving < MAX_HALVINGS && !moved {
+            let next = [x - share * dx, y - share * dy];
+            let next_miss = missed(false, coefficients, next, point);
+            if next_miss < miss {
+                guess = next;
+                miss = next_miss;
+                moved = true;
+            }
+            share = share * T::of(0.5);
+            halving += 1;
+        }
+        step = if moved { step + 1 } else { MAX_STEPS };
+    }
+    guess
 }

@@ -9,7 +9,7 @@
 //! fetch             elements by index, wherever they lie           Fetch, StartingAt
 //! half_precision    two numbers in a word (f16)                    f16_bits, f16_value, packed_f16
 //! pose, camera      camera poses and intrinsics                    Pose, Pinhole, Camera, Ray, Projection
-//! lens              lens distortion                                Lens: distort
+//! lens              lens distortion                                Lens, LensBlock: distort, undistort
 //! sources           the poses of the source views                  Sources<S>
 //! weights           weights of the source views                    Weights<S>: finite, >= 0, sum 1; leaving views out
 //! weighting         pose -> weight, by formula                     Scheme, weigh

@@ -149,7 +149,7 @@ fn a_photograph_longer_than_its_pixels_is_refused() {
     }
     fs::copy(folder.path().join("room/images/003.jpg"), folder.file("bare/1.jpg")).expect("a copy");
     lengthen("bare/1.jpg", 3072);
-    let parts = ["bare: 2 photographs can be used", "1.jpg: the file has 3072 MiB"];
+    let parts = ["bare: 2 of the photographs can be used", "1.jpg: the file has 3072 MiB"];
     assert_command_refused(limited(folder.path(), "pose bare -o posed"), folder.path(), &parts);
 }
 

@@ -10,6 +10,7 @@ viewfuse_tests::trials![
     the_few_sources_of_a_target,
     the_few_sources_of_a_path,
     labels_name_schemes,
+    nothing_counts_twice_in_a_table,
     tables_for_papers,
 ];
 
@@ -114,6 +115,28 @@ fn labels_name_schemes() {
     // One that means another scheme would be read as that.
     let taken = "weights toy --target 20 --weights mean=error:alpha=1";
     assert_wrong_arguments(BINARY, folder, taken, &["'mean' is a weighting itself"]);
+}
+
+fn nothing_counts_twice_in_a_table() {
+    let scene = toy();
+    let run = "evaluate toy --targets 20 --size 16x16 --device cpu --weights mean";
+    let once = done(scene.path(), run);
+    // Times differ.
+    let of_mean = |table: &str| -> Vec<String> {
+        let row = table.lines().find(|line| line.trim_start().starts_with("mean ")).expect("a row");
+        row.split_whitespace().take(5).map(str::to_owned).collect()
+    };
+    let twice = done(scene.path(), &format!("{run} --weights mean"));
+    assert!(twice.contains("toy: 1 target\n") && of_mean(&twice) == of_mean(&once), "{twice}");
+    for (more, part) in [
+        ("--weights a=l1 --weights a=error:alpha=1", "two rows of the table would be called 'a'"),
+        ("./toy/../toy", "toy/../toy: the scene is given twice"),
+        ("-o scores.png", "a table as CSV is written; give a name as scores.csv"),
+        ("-o toy/transforms_train.json", "the scene toy is read from this file"),
+    ] {
+        assert_wrong_arguments(BINARY, scene.path(), &format!("{run} {more}"), &[part]);
+    }
+    assert_wrong_arguments(BINARY, scene.path(), "inspect toy -o cameras.jpg", &["PNG", "cameras.png"]);
 }
 
 fn tables_for_papers() {

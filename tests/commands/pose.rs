@@ -322,7 +322,7 @@ fn too_many_and_too_few() {
         BINARY,
         two.path(),
         "pose bare -o posed",
-        &["bare: 2 photographs can be used", "cut.jpg: the file ends"],
+        &["bare: 2 of the photographs can be used", "cut.jpg: the file ends"],
     );
     assert_refused(BINARY, two.path(), "pose bare -o bare", &["bare: exists already"]);
     assert_wrong_arguments(BINARY, two.path(), "pose bare -o posed --focal 0", &["--focal"]);

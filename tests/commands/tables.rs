@@ -61,10 +61,11 @@ fn weights_as_json() {
 }
 
 fn evaluates_schemes_against_the_nearest_copy() {
-    let scene = toy();
-    let run = "evaluate toy ./toy --targets 20,21 --size 64x64 --weights mean --weights error:alpha=1 -o scores.csv";
+    let (scene, other) = (toy(), toy());
+    fs::rename(other.path().join("toy"), scene.path().join("again")).expect("a second scene");
+    let run = "evaluate toy again --targets 20,21 --size 64x64 --weights mean --weights error:alpha=1 -o scores.csv";
     let table = done(scene.path(), run);
-    for title in ["toy: 2 targets", "./toy: 2 targets", "all 2 scenes: 4 targets"] {
+    for title in ["toy: 2 targets", "again: 2 targets", "all 2 scenes: 4 targets"] {
         assert!(table.contains(title), "no {title:?} in\n{table}");
     }
     for row in ["nearest copy", "mean", "error:alpha=1"] {
@@ -87,7 +88,7 @@ fn evaluates_schemes_against_the_nearest_copy() {
         assert!(own[0][7].parse::<f64>().expect("a time") >= 0.0);
         [own[0][4], own[0][5]].map(|number| number.parse().expect("a number"))
     };
-    for scene in ["toy", "./toy"] {
+    for scene in ["toy", "again"] {
         for target in ["000020", "000021"] {
             let [copy, weighted] = ["nearest copy", "error:alpha=1"].map(|scheme| score(scene, scheme, target));
             assert!(weighted[0] > copy[0] + 3.0 && weighted[1] > copy[1], "{target}: {weighted:?} after {copy:?}");

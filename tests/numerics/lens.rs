@@ -1,6 +1,7 @@
-//! Lenses: the formulas by another hand (figures of OpenCV 5.0.0's `projectPoints` and `fisheye::projectPoints`).
+//! Lenses: the formulas by another hand (figures of OpenCV 5.0.0's `projectPoints` and `fisheye::projectPoints`), and
+//! that what is distorted is undistorted, over whole pictures.
 
-use viewfuse_core::lens::{Lens, LensError, MAX_COEFFICIENT, Projection};
+use viewfuse_core::lens::{Lens, LensBlock, LensError, MAX_COEFFICIENT, Projection};
 
 /// Points before the camera, at depth 1.
 const POINTS: [[f64; 2]; 5] = [[0.0, 0.0], [0.3, -0.2], [-0.55, 0.4], [0.1, 0.7], [-0.8, -0.6]];
@@ -119,6 +120,14 @@ fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
+/// A picture of 1600 x 1200 pixels with this focal length: its pixels' normalised coordinates, every 20th of them, the
+/// corners among them.
+fn picture(focal: f64) -> impl Iterator<Item = [f64; 2]> {
+    let rows = (0..=1200).step_by(20);
+    rows.flat_map(move |y| (0..=1600).step_by(20).map(move |x| [f64::from(x) - 800.0, f64::from(y) - 600.0]))
+        .map(move |pixel| pixel.map(|value| value / focal))
+}
+
 #[test]
 fn each_model_is_that_of_opencv() {
     for case in &CASES {
@@ -130,13 +139,57 @@ fn each_model_is_that_of_opencv() {
 }
 
 #[test]
-fn the_reach_of_a_lens_ends_at_its_fold() {
-    // This barrel folds at a radius of sqrt(1 / 0.9).
+fn what_is_distorted_is_undistorted_over_the_whole_picture() {
+    let focal = 1100.0;
+    for case in &CASES {
+        let lens = case.lens();
+        let mut worst = (0.0_f64, 0.0_f64);
+        for point in picture(focal) {
+            assert!(point[0].hypot(point[1]) <= lens.reach(2.0), "{}", case.model);
+            let back = lens.undistort(lens.distort(point));
+            worst = (worst.0.max(distance(back.point, point) * focal), worst.1.max(back.residual * focal));
+        }
+        // The promise is 1e-6 pixels.
+        assert!(worst.0 < 1e-9 && worst.1 < 1e-9, "{}: {worst:?} pixels", case.model);
+    }
+}
+
+#[test]
+fn the_same_in_single_precision() {
+    let focal = 1100.0;
+    for case in &CASES {
+        let (lens, block) = (case.lens(), case.lens().block());
+        let mut worst = (0.0_f64, 0.0_f64);
+        for point in picture(focal) {
+            let exact = lens.distort(point);
+            let found = block.distort(point.map(|value| value as f32)).map(f64::from);
+            let back = block.undistort(exact.map(|value| value as f32));
+            worst.0 = worst.0.max(distance(found, exact) * focal);
+            worst.1 = worst.1.max(distance(back.point.map(f64::from), point) * focal);
+            assert!(f64::from(back.residual) * focal < 2e-3, "{}: {back:?}", case.model);
+        }
+        assert!(worst.0 < 1e-3 && worst.1 < 5e-3, "{}: {worst:?} pixels", case.model);
+    }
+}
+
+#[test]
+fn what_no_ideal_point_maps_to_is_told() {
+    // This barrel folds at a radius of sqrt(1 / 0.9), where the photograph's is 0.703.
     let barrel = Lens::new(Projection::Perspective, [-0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).expect("a lens");
     let fold = (1.0_f64 / 0.9).sqrt();
     assert!((barrel.reach(2.0) - fold).abs() < 1e-3, "{}", barrel.reach(2.0));
-    for case in &CASES {
-        assert!(case.lens().reach(2.0) >= 0.909, "{}: a whole picture", case.model);
+    let inside = barrel.undistort([0.69, 0.0]);
+    assert!(inside.residual < 1e-12 && inside.point[0] < fold, "{inside:?}");
+    assert!(barrel.undistort([0.8, 0.0]).residual > 0.09);
+    // A fisheye's picture is wider than any ideal one.
+    let fisheye = Lens::new(Projection::Fisheye, [0.0; 9]).expect("a lens");
+    assert!(fisheye.undistort([1.5, 0.0]).residual < 1e-12);
+    assert!(fisheye.undistort([1.8, 0.0]).residual > 0.2);
+    for lens in [barrel, fisheye] {
+        for point in [[f64::NAN, 0.0], [f64::INFINITY, 1.0], [1e300, -1e300]] {
+            let found = lens.undistort(point);
+            assert!(!(found.residual < 1.0), "{found:?}");
+        }
     }
 }
 
@@ -151,5 +204,5 @@ fn coefficients_are_checked() {
     }
     let pinhole = Lens::new(Projection::Perspective, [0.0; 9]).expect("a pinhole");
     assert!(pinhole.is_pinhole() && !Lens::new(Projection::Fisheye, [0.0; 9]).expect("a lens").is_pinhole());
-    assert_eq!(pinhole.distort([0.3, 0.4]), [0.3, 0.4]);
+    assert_eq!((pinhole.block(), pinhole.distort([0.3, 0.4])), (LensBlock::default(), [0.3, 0.4]));
 }

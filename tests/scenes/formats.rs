@@ -100,6 +100,16 @@ fn webp_and_tiff_are_read_whatever_they_are_called() {
 }
 
 #[test]
+fn a_jpeg_that_ends_before_its_picture_is_refused() {
+    let whole = tagged(32, 24, 1);
+    open(&folder(None, &whole)).photograph(0).expect("a photograph");
+    // Decoders would fill the rest with grey.
+    let cut = folder(None, &whole[..whole.len() - 40]);
+    let error = open(&cut).photograph(0).expect_err("a part of a picture").to_string();
+    assert!(error.ends_with("images/1.jpg: the file ends before the picture does"), "{error}");
+}
+
+#[test]
 fn a_header_behind_many_tags_is_found() {
     // A profile of 600 kB before the picture: more than is read at first.
     let mut bytes = tagged(32, 24, 6);

@@ -26,18 +26,10 @@ fn pixel_centre(column: u32, row: u32) -> [f64; 2] {
     [(f64::from(column) + 0.5 - CENTRE[0]) / FOCAL, (f64::from(row) + 0.5 - CENTRE[1]) / FOCAL]
 }
 
-/// The ideal point that appears at a point of the photograph: from the point itself, by what is missed.
-fn undistorted(lens: &Lens, point: [f64; 2]) -> [f64; 2] {
-    (0..60).fold(point, |guess, _| {
-        let found = lens.distort(guess);
-        [0, 1].map(|axis| guess[axis] + point[axis] - found[axis])
-    })
-}
-
 /// The photograph that the lens takes of the directions, with `transforms.json`.
 fn folder(model: &str, lens: &Lens) -> Folder {
     let photograph = image::RgbImage::from_fn(SIZE[0], SIZE[1], |column, row| {
-        let ideal = undistorted(lens, pixel_centre(column, row));
+        let ideal = lens.undistort(pixel_centre(column, row)).point;
         image::Rgb(colour(ideal).map(|value| value.round() as u8))
     });
     let folder = Folder::new();
@@ -106,7 +98,7 @@ fn a_real_photograph_through_nerfstudios_polynomial() {
     let lens = Lens::new(Projection::Perspective, [-0.2, 0.06, -0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.25]).expect("a lens");
     let ([fx, fy], [cx, cy]) = (camera.focal().map(f64::from), camera.principal().map(f64::from));
     let taken = RgbImage::from_fn(width, height, |x, y| {
-        let [x, y] = undistorted(&lens, [(f64::from(x) + 0.5 - cx) / fx, (f64::from(y) + 0.5 - cy) / fy]);
+        let [x, y] = lens.undistort([(f64::from(x) + 0.5 - cx) / fx, (f64::from(y) + 0.5 - cy) / fy]).point;
         let place = [x * fx + cx - 0.5, y * fy + cy - 0.5].map(|at| at.max(0.0) as f32);
         let [x, y] = [place[0].min((width - 1) as f32), place[1].min((height - 1) as f32)];
         let pixel = image::imageops::interpolate_bilinear(&truth, x, y).expect("a pixel inside");

@@ -53,7 +53,7 @@ pub enum PoseError {
     #[error(transparent)]
     Solver(#[from] SolverError),
     /// So many photographs of a folder can be used, too few; and those that cannot, with reasons.
-    #[error("{0}: {1} photographs can be used, three are needed{2}")]
+    #[error("{0}: {1} of the photographs can be used, three are needed{2}")]
     Few(String, usize, String),
     /// A photograph changed while the work went on, a pose is none, or a photograph that was held out could not be
     /// rendered.

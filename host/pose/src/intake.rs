@@ -5,7 +5,7 @@ mod checks;
 mod working;
 
 use crate::exif::Exif;
-use checks::{cut_short, is_same, sharpness, unread};
+use checks::{is_same, sharpness, unread};
 use image::imageops;
 use image::metadata::Orientation;
 use image::{DynamicImage, RgbImage};
@@ -344,9 +344,6 @@ impl From<IntakeError> for Refused {
 fn photo(path: &Path, root: &Path, scratch: &Path) -> Result<Photo, Refused> {
     let unreadable = |error: SceneError| Refused::Photograph(error.fault.to_string());
     let header = ImageFile::open(path).map_err(unreadable)?;
-    if cut_short(path).map_err(|cause| IntakeError::Io(path.to_path_buf(), cause))? {
-        return Err(Refused::Photograph("the file ends before the picture does".to_owned()));
-    }
     let exif = Exif::read(path, header.size());
     let picture = read_picture(path).map_err(unreadable)?;
     let (name, file) = (name_in(root, path), place_in(root, path));

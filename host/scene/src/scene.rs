@@ -27,6 +27,7 @@ mod found_poses;
 pub(crate) mod frame;
 mod images;
 mod inputs;
+mod jpeg;
 pub(crate) mod json;
 mod llff;
 pub(crate) mod masks;
@@ -47,6 +48,7 @@ pub use fault::{FaultLocation, FileFault, FilePlace, ImageFault, IntrinsicsFault
 pub use frame::SRN_DISTANCE;
 use images::Turn;
 pub use images::{encode_png, picture_size, read_picture};
+pub use inputs::reads_below;
 use masks::meaning::Decision;
 pub use masks::meaning::{MaskChoice, MaskMeaning, UnknownMasks};
 use reader::Reader;

@@ -137,8 +137,6 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
         return protocol::run(arguments, protocol, &weightings, values);
     }
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);
-    let csv = |path: &Path| refuse_extension(path, "a table as CSV", &["csv", "txt"]);
-    arguments.output.as_deref().map_or(Ok(()), csv)?;
     arguments.output.as_deref().map_or(Ok(()), check_writable)?;
     let field = arguments.model.open(arguments.seed, None)?;
     let about = field.about();
@@ -150,6 +148,8 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
     let scenes: Vec<Scene> = paths.iter().map(|path| arguments.picture.masks.open(path)).collect::<Result<_, _>>()?;
     scenes.iter().for_each(warn_of);
     arguments.output.as_deref().map_or(Ok(()), |path| keep_file_apart(&scenes, path))?;
+    let csv = |path: &Path| refuse_extension(path, "a table as CSV", &["csv", "txt"]);
+    arguments.output.as_deref().map_or(Ok(()), csv)?;
     let (mut all, mut json_tables): (Vec<Vec<Score>>, Vec<serde_json::Value>) = (Vec::new(), Vec::new());
     let mut tell = |name: &str, results: &Table| -> anyhow::Result<()> {
         let title = format!("{name}: {}", counted(results.target_count, "target"));

@@ -55,13 +55,13 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    arguments.output.as_deref().map_or(Ok(()), |path| refuse_extension(path, "a picture as PNG", &["png"]))?;
     let (_, scene) = arguments.pose.open(&arguments.scene, &arguments.masks)?;
     if arguments.views {
         return print_views(&list_views(&scene), arguments.json);
     }
     arguments.output.as_deref().map_or(Ok(()), check_writable)?;
     arguments.output.as_deref().map_or(Ok(()), |path| keep_file_apart([&scene], path))?;
+    arguments.output.as_deref().map_or(Ok(()), |path| refuse_extension(path, "a picture as PNG", &["png"]))?;
     let progress = Terminal::new("reading the photographs");
     let inspection = inspect(&scene, arguments.background, &progress)?;
     let measure = || Quality::of(&scene, arguments.background, &progress);

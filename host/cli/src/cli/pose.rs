@@ -2,7 +2,6 @@
 
 mod solvers;
 
-use super::outputs::keep_folder_apart;
 use super::printing::{complain, say};
 use super::terminal::Terminal;
 use super::threads::on_threads;
@@ -22,10 +21,10 @@ use viewfuse_output::png::write_png;
 use viewfuse_pose::{
     FocalSource, Found, Kept, Matches, Options, Record, Refusal, Solver, Verdict, find, has_record, write,
 };
-use viewfuse_scene::encode_png;
 use viewfuse_scene::inspect::inspect;
 use viewfuse_scene::photographs::BackgroundChoice;
 use viewfuse_scene::write::Layout;
+use viewfuse_scene::{encode_png, reads_below};
 
 /// Most photographs of which a refusal tells which others they match.
 const MAX_ROWS: usize = 24;
@@ -35,12 +34,12 @@ const MAX_ROWS: usize = 24;
     viewfuse pose photos/ -o posed\n      posed/sparse/0 and posed/images (COLMAP's layout), pose.json, cameras.png; then: viewfuse render posed --orbit 24 -o out\n  \
     viewfuse pose photos/ --focal 1375 -o posed\n      photographs that do not state their focal length\n  \
     viewfuse pose photos/ --from openmvg,colmap -o posed\n      with your own COLMAP as a second opinion\n\n\
-    Poses are found several times, with other features and, where the focal length is unknown, other guesses of it. What is\n\
-    written is what two attempts agree on, and what passes this: each photograph, left out and rendered from the others, is met\n\
-    at its pose, better than by copies of its neighbours, and not two degrees beside it. Where neighbours are too far away for\n\
+    Poses are found several times, with other features and, where the focal length is unknown, other guesses of it. What is \
+    written is what two attempts agree on, and what passes this: each photograph, left out and rendered from the others, is met \
+    at its pose, better than by copies of its neighbours, and not two degrees beside it. Where neighbours are too far away for \
     that, attempts must agree more closely and over many points, and the pose is doubtful: pose.json and every command that opens\n\
     the scene say so. If nothing passes, no scene is written, and it is said which photographs match which.\n\n\
-    The same command goes on with a run that was stopped or killed: attempts that were finished lie in a hidden folder beside the\n\
+    The same command goes on with a run that was stopped or killed: attempts that were finished lie in a hidden folder beside the \
     output (.posed.attempts) until the command ends by itself.")]
 pub(crate) struct Arguments {
     /// The folder of the photographs: JPEG, PNG, WebP
@@ -87,10 +86,19 @@ fn parse_layout(text: &str) -> Result<Layout, String> {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let Arguments { photographs, output, .. } = arguments;
+    if photographs.is_file() {
+        return Err(wrong(format_args!("{}: is a file; give the folder of the photographs", photographs.display())));
+    }
     let is_empty = || std::fs::read_dir(output).is_ok_and(|mut entries| entries.next().is_none());
     if output.is_symlink() || output.exists() && !is_empty() {
         remove_kept_for(output);
         bail!("{}: exists already and is not an empty folder; give another name", output.display());
+    }
+    if reads_below(photographs, output) {
+        let output = output.display();
+        return Err(wrong(format_args!(
+            "--output {output}: photographs are read from this folder; give another folder"
+        )));
     }
     if let Some(file) = &arguments.matches {
         keep_picture_apart(file, photographs, output)?;
@@ -191,7 +199,6 @@ fn written(
             );
         }
     };
-    keep_folder_apart([&verdict.scene], output)?;
     let picture = camera_map(&verdict.scene, &inspect(&verdict.scene, BackgroundChoice::None, &progress)?);
     let files = [("cameras.png", encode_png(&DynamicImage::ImageRgb8(picture))?)];
     progress.stage("writing the scene", 9..10, 10);

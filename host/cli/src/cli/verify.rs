@@ -4,6 +4,7 @@ use super::options::DeviceOptions;
 use super::printing::say;
 use super::table::table;
 use super::terminal::Terminal;
+use super::wrong::wrong;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -24,6 +25,9 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    if let Some(folder) = arguments.files.iter().find(|path| path.is_dir()) {
+        return Err(wrong(format_args!("{}: is a folder; give files of reference values", folder.display())));
+    }
     let Chosen { device, .. } = arguments.device.open()?;
     let mut all_pass = true;
     let (terminal, count) = (Terminal::new("verifying"), arguments.files.len());

@@ -38,6 +38,11 @@ impl FolderLock {
             }
         }
     }
+
+    /// Whether there is a lock.
+    pub fn is_held(&self) -> bool {
+        self.0.is_some()
+    }
 }
 
 #[cfg(all(test, unix))]

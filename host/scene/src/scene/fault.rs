@@ -93,6 +93,9 @@ pub enum ImageFault {
     /// A decoder panics on it.
     #[error("not a readable image: {0}")]
     Decoder(Panicked),
+    /// A JPEG that ends before its picture does: decoders would fill the rest with grey.
+    #[error("the file ends before the picture does")]
+    CutShort,
     /// Its header has too large a size.
     #[error("the image is {0} x {1}; at most {MAX_SIDE} pixels are allowed on a side")]
     TooLarge(u32, u32),

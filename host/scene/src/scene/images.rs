@@ -17,6 +17,7 @@ use viewfuse_job::panics::caught;
 use super::error::SceneError;
 use super::fault::{FilePlace, ImageFault};
 use super::files::unreadable;
+use super::jpeg::cut_short;
 use super::{MAX_SIDE, Photograph};
 
 /// Most bytes of a decoded pixel: four channels of 16 bits.
@@ -212,6 +213,9 @@ pub(super) fn pixels(path: &Path) -> Result<(DynamicImage, Orientation), SceneEr
     let length = path.metadata().map_err(|cause| unreadable(path, cause))?.len();
     if bytes > SMALL_IMAGE && bytes / MAX_RATIO > length {
         return Err(FilePlace::file(path).fault(ImageFault::Hollow([width, height], length)));
+    }
+    if cut_short(path).map_err(|cause| unreadable(path, cause))? {
+        return Err(FilePlace::file(path).fault(ImageFault::CutShort));
     }
     let mut limits = Limits::default();
     limits.max_image_width = Some(width);

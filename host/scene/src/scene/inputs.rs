@@ -32,8 +32,7 @@ impl Scene {
     /// Whether pictures written into `folder`, which need not exist, would replace files of the scene or be read as
     /// some: it is the scene's own folder, one with its photographs or masks, or one below it that layouts read.
     pub fn reads_folder(&self, folder: &Path) -> bool {
-        let (root, folder) = (self.root(), absolute(folder));
-        folder == root || self.is_inside(&root, &folder) || self.picture_folders().contains(&folder)
+        reads_below(&self.root(), folder) || self.picture_folders().contains(&absolute(folder))
     }
 
     /// Whether writing the file `path`, which need not exist, would replace a file of the scene or be read as one.
@@ -44,7 +43,7 @@ impl Scene {
         let is_recognised = RECOGNISED.contains(&&*name) || name.ends_with("_par.txt");
         let is_list = path.parent() == Some(&root) && (is_recognised || path.is_file() && has_extension(&path, &LISTS));
         is_list
-            || path.parent().is_some_and(|folder| folder != root && self.is_inside(&root, folder))
+            || path.parent().is_some_and(|folder| folder != root && is_inside(&root, folder))
             || pictures.map(|picture| absolute(picture)).any(|picture| picture == path)
     }
 
@@ -54,23 +53,29 @@ impl Scene {
         if path.is_file() { path.parent().map(Path::to_path_buf).unwrap_or(path) } else { path }
     }
 
-    /// Whether a folder is one below the scene's that layouts read.
-    fn is_inside(&self, root: &Path, folder: &Path) -> bool {
-        let Some(Component::Normal(first)) =
-            folder.strip_prefix(root).ok().and_then(|inside| inside.components().next())
-        else {
-            return false;
-        };
-        let first = first.to_string_lossy();
-        FOLDERS.contains(&first.as_ref()) || IMAGE_FOLDERS.contains(&first.as_ref()) || is_images_folder(&first)
-    }
-
     /// The folders of photographs and masks.
     fn picture_folders(&self) -> HashSet<PathBuf> {
         let pictures = self.views.iter().flat_map(|view| view.image.iter().chain(&view.mask));
         let folders: HashSet<&Path> = pictures.filter_map(|picture| picture.parent()).collect();
         folders.into_iter().map(absolute).collect()
     }
+}
+
+/// Whether pictures written into `folder`, which need not exist, would be read as some of the scene in `root`, whatever its
+/// layout: it is `root` itself, or a folder below it that layouts read.
+pub fn reads_below(root: &Path, folder: &Path) -> bool {
+    let (root, folder) = (absolute(root), absolute(folder));
+    folder == root || is_inside(&root, &folder)
+}
+
+/// Whether a folder is one below the scene's that layouts read.
+fn is_inside(root: &Path, folder: &Path) -> bool {
+    let Some(Component::Normal(first)) = folder.strip_prefix(root).ok().and_then(|inside| inside.components().next())
+    else {
+        return false;
+    };
+    let first = first.to_string_lossy();
+    FOLDERS.contains(&first.as_ref()) || IMAGE_FOLDERS.contains(&first.as_ref()) || is_images_folder(&first)
 }
 
 /// The path without links and `..`, as far as it exists.

@@ -33,23 +33,14 @@ pub(super) fn undistorted(photograph: &Photograph, lens: &Lens, pinhole: &Pinhol
     let stored = photograph.seen.as_ref().map(|stored| stored.as_raw().as_slice());
     lines.enumerate().for_each(|(row, (line, seen))| {
         let (mapping, pixels, has_alpha) = (&mapping, line.as_chunks_mut().0, photograph.has_alpha);
-        arch.dispatch(UndistortedLine {
-            texels,
-            stored,
-            has_alpha,
-            mapping,
-            is_fisheye,
-            row: row as u32,
-            pixels,
-            seen,
-        });
+        arch.dispatch(Line { texels, stored, has_alpha, mapping, is_fisheye, row: row as u32, pixels, seen });
     });
     let all_seen = seen.as_raw().iter().all(|seen| *seen > 0);
     Photograph { pixels, has_alpha: photograph.has_alpha, seen: (!all_seen).then_some(seen) }
 }
 
 /// A line of the result.
-struct UndistortedLine<'a> {
+struct Line<'a> {
     texels: &'a [[u8; 4]],
     /// What counts of them; `None` for all.
     stored: Option<&'a [u8]>,
@@ -61,12 +52,12 @@ struct UndistortedLine<'a> {
     seen: &'a mut [u8],
 }
 
-impl WithSimd for UndistortedLine<'_> {
+impl WithSimd for Line<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let UndistortedLine { texels, stored, has_alpha, mapping, is_fisheye, row, pixels, seen } = self;
+        let Line { texels, stored, has_alpha, mapping, is_fisheye, row, pixels, seen } = self;
         let mut corners = Corners::NONE;
         for (part, (pixels, seen)) in (0_u32..).zip(pixels.chunks_mut(PART).zip(seen.chunks_mut(PART))) {
             let first = part * PART as u32;
@@ -104,7 +95,7 @@ struct Mapping {
     focal: [f64; 2],
     principal: [f64; 2],
     size: [u32; 2],
-    coefficients: Coefficients,
+    coefficients: Coefficients<f64>,
     /// Where the lens's polynomials fold the image over, from the centre.
     reach: f64,
 }

@@ -8,7 +8,7 @@ use viewfuse_core::camera::{Camera, Pinhole, PinholeError, Projection, Ray};
 use viewfuse_core::composite::{Composite, Compositor};
 use viewfuse_core::fuse::VisibleFusion;
 use viewfuse_core::gaussian::ProjectedGaussian;
-use viewfuse_core::lens::{self, Lens, LensError};
+use viewfuse_core::lens::{self, Lens, LensError, Undistorted};
 use viewfuse_core::pose::{Pose, PoseError};
 use viewfuse_core::rays::{RayPoint, TargetRay};
 use viewfuse_core::sampler::churn::{Churn, Churned};
@@ -26,7 +26,7 @@ pub fn all() {
     has_format::<(SourceKeys<8>, Camera, Pinhole, PinholeError)>();
     has_format::<(Projection, Ray, Composite<3>, Compositor<3>)>();
     has_format::<(VisibleFusion<3>, lens::Projection, Lens)>();
-    has_format::<LensError>();
+    has_format::<(LensError, Undistorted<f32>, Undistorted<f64>)>();
     has_format::<(Pose, PoseError, RayPoint, TargetRay)>();
     has_format::<(Churn, Churned, Verdict, Corrected)>();
     has_format::<(History, Mix, Sampler, UnknownSampler)>();

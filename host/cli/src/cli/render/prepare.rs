@@ -52,6 +52,8 @@ impl Prepared {
             refuse_file(&arguments.output)?;
         }
         let weighting = arguments.weighting()?;
+        // Finding poses takes minutes: what can be refused without them is.
+        let device = arguments.device.open()?;
         let (folder, scene) = arguments.pose.open(&arguments.scene, &arguments.picture.masks)?;
         warn_of(&scene);
         if !arguments.is_stream() {
@@ -69,7 +71,6 @@ impl Prepared {
             arguments.model.says_omissions() || !arguments.sequence.is_empty(),
         );
         let rate = arguments.outputs.rate(job.frames_per_second);
-        let device = arguments.device.open()?;
         let (mut identity, mut earlier) = (None, Vec::new());
         if !arguments.is_stream() {
             check_writable(&arguments.output.join(RECORD))?;
