@@ -126,7 +126,7 @@ pub struct Chosen {
     /// The errors that pixels of a confidence have; `None` if nothing could be held out, and for fields without
     /// confidences.
     pub calibration: Option<Calibration>,
-    /// What two sources are good for of which none could be held out; `None` otherwise.
+    /// What two sources are good for of which none could be held out; `None` otherwise, and where nothing was measured.
     pub pair: Option<Pair>,
     measure: Measure,
     poses: Vec<Pose>,
@@ -252,7 +252,7 @@ fn choose_of(
         poses: cameras.iter().map(|camera| camera.pose).collect(),
     };
     if held_out.is_empty() {
-        chosen.pair = Pair::of(&cameras, stage.images.has_silhouettes);
+        chosen.pair = Pair::of(renderer.about().name, &cameras, stage.images.has_silhouettes);
         return Ok(chosen);
     }
     chosen.weighting = first;

@@ -14,6 +14,9 @@ const PHOTOGRAPHS: [(f32, Measured); 3] = [
 /// The same of objects with silhouettes, whatever the angle: two silhouettes leave a shape open.
 const OBJECTS: Measured = Measured { psnr: [15.2, 18.8], pairs: 9 };
 
+/// The field that the pictures were of: of others nothing was measured.
+const MEASURED: &str = "training-free";
+
 /// Two sources.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Pair {
@@ -35,9 +38,9 @@ pub struct Measured {
 }
 
 impl Pair {
-    /// Of the cameras of two sources; `None` of any other number.
-    pub(super) fn of(cameras: &[Camera], has_silhouettes: bool) -> Option<Pair> {
-        let degrees = Rig::of(cameras).median_gap(cameras).filter(|_| cameras.len() == 2)?;
+    /// Of the cameras of two sources; `None` of any other number, and for fields of which nothing was measured.
+    pub(super) fn of(field: &str, cameras: &[Camera], has_silhouettes: bool) -> Option<Pair> {
+        let degrees = Rig::of(cameras).median_gap(cameras).filter(|_| cameras.len() == 2 && field == MEASURED)?;
         let (_, photographs) = PHOTOGRAPHS.into_iter().find(|(most, _)| degrees <= *most)?;
         Some(Pair { degrees, has_silhouettes, measured: if has_silhouettes { OBJECTS } else { photographs } })
     }
@@ -63,12 +66,13 @@ mod tests {
     #[test]
     fn what_two_photographs_are_good_for_falls_with_the_angle_between_them() {
         let greatest = |degrees: f32, has_silhouettes: bool| {
-            let pair = Pair::of(&around(&[0.0, degrees]), has_silhouettes).expect("a pair");
+            let pair = Pair::of(MEASURED, &around(&[0.0, degrees]), has_silhouettes).expect("a pair");
             assert!((pair.degrees - degrees).abs() < 0.01, "{pair:?}");
             pair.measured.psnr[1]
         };
         assert!(greatest(10.0, false) > greatest(20.0, false) && greatest(20.0, false) > greatest(40.0, false));
         assert_eq!(greatest(10.0, true), greatest(40.0, true));
-        assert_eq!(Pair::of(&around(&[0.0, 10.0, 20.0]), false), None);
+        assert_eq!(Pair::of(MEASURED, &around(&[0.0, 10.0, 20.0]), false), None);
+        assert_eq!(Pair::of("plane-sweep", &around(&[0.0, 10.0]), false), None);
     }
 }
