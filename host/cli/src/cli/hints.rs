@@ -62,24 +62,25 @@ fn sentence(hint: Hint) -> Option<&'static str> {
         Hint::NoObject => "`viewfuse inspect` shows the poses; --background sets the background",
         Hint::PictureSize => "give another --size",
         Hint::OtherRun => {
-            "render all targets in one run or with the same options and --sources, give another folder, or --replace to remove them"
+            "render all targets in one run or with the same options and --sources, give another folder, or --replace \
+             to remove them"
         }
         Hint::Shard => "give each its own --shard",
         Hint::BuildWithTiff => {
             "a build with `--features formats` reads it: `cargo install --path host/cli --features formats`"
         }
         Hint::Poses => {
-            "`viewfuse pose FOLDER -o posed` finds poses and writes a scene, and so does --pose on the way of `render`, `view` and \
-             `inspect`; `viewfuse --help` lists the layouts of posed photographs"
+            "`viewfuse pose FOLDER -o posed` finds poses and writes a scene, and so does --pose on the way of `render`, \
+             `view` and `inspect`; `viewfuse --help` lists the layouts of posed photographs"
         }
         Hint::FewerPhotographs => "--every N takes every Nth",
         Hint::Solver("colmap") => {
-            "install COLMAP (Debian and Ubuntu: `apt install colmap`, macOS: `brew install colmap`, or conda-forge's `colmap`); \
-             VIEWFUSE_COLMAP names the program where it lies elsewhere"
+            "install COLMAP (Debian and Ubuntu: `apt install colmap`, macOS: `brew install colmap`, or conda-forge's \
+             `colmap`); VIEWFUSE_COLMAP names the program where it lies elsewhere"
         }
         Hint::Solver("pycolmap") => {
-            "`python3 -m pip install pycolmap` installs it; VIEWFUSE_PYTHON names the Python that has it, for example that of a \
-             virtual environment"
+            "`python3 -m pip install pycolmap` installs it; VIEWFUSE_PYTHON names the Python that has it, for \
+             example that of a virtual environment"
         }
         Hint::Solver(_) => {
             "in the repository `cargo openmvg` builds it, and `cargo install --path host/pose/openmvg \
