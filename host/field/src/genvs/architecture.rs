@@ -12,6 +12,7 @@
 mod denoiser;
 mod encoder;
 
+pub(super) use denoiser::PREFIX as DENOISER;
 pub use denoiser::{Block, Convolution, Denoiser, DenoiserLevel, DenoiserStep, Estimate, Resampling, group_count};
 pub use encoder::{ASPP_RATES, Encoder};
 pub use viewfuse_nn::resnet::Level;

@@ -39,9 +39,6 @@ pub(super) struct Condition<'a, D: Device> {
 
 impl<D: Device> Parts<D> {
     /// Loads them, for images of at least `side` rows and columns.
-    ///
-    /// # Errors
-    /// If the checkpoint cannot be read, or the device has no memory left.
     pub(super) fn load(
         device: &D,
         checkpoint: &Checkpoint,
@@ -50,11 +47,10 @@ impl<D: Device> Parts<D> {
     ) -> Result<Parts<D>, FieldError> {
         let loader = |prefix| Loader::new(device, checkpoint, prefix);
         let features = architecture.encoder.feature_count;
-        let denoiser = architecture.denoiser.as_ref().map(|denoiser| {
-            let sides: Vec<u32> =
-                (0..denoiser.levels.len()).map(|level| (denoiser.image_side >> level) as u32).collect();
-            Denoiser::load(&loader("denoiser.model."), side, &sides).map(|loaded| (loaded, denoiser.estimate))
-        });
+        let denoiser = architecture
+            .denoiser
+            .as_ref()
+            .map(|denoiser| Denoiser::load(&loader(""), side, denoiser).map(|loaded| (loaded, denoiser.estimate)));
         Ok(Parts {
             encoder: Encoder::load(&loader("pixel_nerf_net.encoder."), &architecture.encoder, side)?,
             points: PointNetwork::load(&loader("pixel_nerf_net."), features as u32, architecture.mlp_width as u32)?,

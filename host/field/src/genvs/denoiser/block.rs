@@ -1,5 +1,6 @@
 //! A residual block of the U-Net, and self-attention behind it.
 
+use super::super::architecture::{self, Resampling};
 use super::{PLAIN, group_norm};
 use crate::FieldError;
 use std::f32::consts::FRAC_1_SQRT_2;
@@ -13,21 +14,9 @@ use viewfuse_nn::norm::GroupNorm;
 use viewfuse_nn::scratch::Scratch;
 use viewfuse_nn::weights::ConvolutionWeights;
 
-/// Resampling of a block. The published filter is `[1, 1]`: the mean of 2x2 pixels, or each of them
-/// repeated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Resample {
-    /// Nothing.
-    None,
-    /// Half as many rows and columns.
-    Halve,
-    /// Twice as many.
-    Double,
-}
-
 /// A block's layers.
 pub(super) struct Block<D: Device> {
-    resample: Resample,
+    resampling: Resampling,
     halving: Option<DepthwiseConvolution<D>>,
     norm0: GroupNorm<D>,
     conv0: Convolution<D>,
@@ -38,10 +27,8 @@ pub(super) struct Block<D: Device> {
     /// The shortcut's convolution (`skip`), where sizes or channels change.
     shortcut: Option<Convolution<D>>,
     attention: Option<Attention<D>>,
-    /// Channels of its input.
-    pub(super) in_channels: u32,
-    /// Channels of its output.
-    pub(super) channels: u32,
+    /// The channels of its input in front of those of the skip connection; `None` without one.
+    pub(super) in_front: Option<u32>,
 }
 
 /// Self-attention with one head.
@@ -56,16 +43,15 @@ impl<D: Device> Block<D> {
     /// Loads it, for images of at least `side` rows and columns (of its output).
     pub(super) fn load(
         loader: &Loader<'_, D>,
-        name: &str,
-        resample: Resample,
+        block: &architecture::Block,
         side: u32,
         first_shift: u32,
     ) -> Result<Block<D>, FieldError> {
+        let architecture::Block { name, in_channels, joined_channels, resampling, .. } = block;
+        let (resampling, joined_channels) = (*resampling, *joined_channels);
         let layer = |layer: &str| format!("{name}.{layer}");
-        let conv0 = loader.convolution(&layer("conv0"), side)?;
-        let has = |name: &str| loader.tensors.has(&layer(&format!("{name}.weight")));
-        let shortcut = |weights: ConvolutionWeights| match resample {
-            Resample::Halve => weights.followed_by_average_pool(),
+        let shortcut = |weights: ConvolutionWeights| match resampling {
+            Resampling::Down => weights.followed_by_average_pool(),
             _ => weights,
         };
         let attention = || {
@@ -79,31 +65,29 @@ impl<D: Device> Block<D> {
                 proj: loader.convolution(&layer("proj"), 0)?,
             })
         };
-        let halving = (resample == Resample::Halve).then(|| DepthwiseConvolution::average_pool(loader.device));
-        let norm0 = group_norm(loader, &layer("norm0"))?;
+        let halving = (resampling == Resampling::Down).then(|| DepthwiseConvolution::average_pool(loader.device));
         Ok(Block {
-            resample,
+            resampling,
             halving: halving.transpose()?,
-            in_channels: norm0.channels,
-            channels: conv0.channels,
-            norm0,
-            conv0,
+            in_front: (joined_channels > 0).then(|| (in_channels - joined_channels) as u32),
+            norm0: group_norm(loader, &layer("norm0"))?,
+            conv0: loader.convolution(&layer("conv0"), side)?,
             first_shift,
             norm1: group_norm(loader, &layer("norm1"))?,
             conv1: loader.convolution(&layer("conv1"), side)?,
-            shortcut: has("skip").then(|| loader.changed_convolution(&layer("skip"), 0, shortcut)).transpose()?,
-            attention: has("qkv").then(attention).transpose()?,
+            shortcut: block.has_skip().then(|| loader.changed_convolution(&layer("skip"), 0, shortcut)).transpose()?,
+            attention: block.has_attention.then(attention).transpose()?,
         })
     }
 
     /// Size of the output for an input.
     pub(super) fn out_size(&self, size: Size) -> Size {
-        let size = match self.resample {
-            Resample::None => size,
-            Resample::Halve => size.halved(),
-            Resample::Double => size.doubled(),
+        let size = match self.resampling {
+            Resampling::None => size,
+            Resampling::Down => size.halved(),
+            Resampling::Up => size.doubled(),
         };
-        size.with_channels(self.channels)
+        size.with_channels(self.conv0.channels)
     }
 
     /// Runs it into an image of the right size; `shifts` are those of all blocks.
@@ -120,14 +104,14 @@ impl<D: Device> Block<D> {
             let halved = halving.run(scratch, options, &normalised)?;
             scratch.recycle(std::mem::replace(&mut normalised, halved));
         }
-        let upsampling = if self.resample == Resample::Double { 2 } else { 1 };
+        let upsampling = if self.resampling == Resampling::Up { 2 } else { 1 };
         let options = ConvolutionOptions { upsampling, ..PLAIN };
         let shift = Residual::Channels(shifts, self.first_shift);
         let inside = self.conv0.run(scratch, options, &normalised, shift)?;
         scratch.recycle(normalised);
         let normalised = self.norm1.run(scratch, &inside, true)?;
         scratch.recycle(inside);
-        let stride = if self.resample == Resample::Halve { 2 } else { 1 };
+        let stride = if self.resampling == Resampling::Down { 2 } else { 1 };
         let shortcut_options = ConvolutionOptions { stride, padding: Some(0), ..options };
         let shortcut = match &self.shortcut {
             Some(layer) => Some(layer.run(scratch, shortcut_options, image, Residual::None)?),

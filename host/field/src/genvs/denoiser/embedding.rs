@@ -4,6 +4,7 @@
 //! `affine`). The embedding runs on the host, once a call and not once a pixel; the layers of all blocks are one linear
 //! layer.
 
+use super::super::architecture::DENOISER;
 use crate::FieldError;
 use viewfuse_core::math::{exp, ln, sin_cos};
 use viewfuse_device::Device;
@@ -45,7 +46,8 @@ pub(super) struct Embedding<D: Device> {
 
 impl<D: Device> Embedding<D> {
     pub(super) fn load(loader: &Loader<'_, D>, shifts: ShiftLayers) -> Result<Embedding<D>, FieldError> {
-        let [map_layer0, map_layer1] = ["map_layer0", "map_layer1"].map(|name| loader.tensors.linear(name));
+        let [map_layer0, map_layer1] =
+            ["0", "1"].map(|layer| loader.tensors.linear(&format!("{DENOISER}.map_layer{layer}")));
         let (map_layer0, map_layer1) = (map_layer0?, map_layer1?);
         let affine = LinearWeights::concatenated(&shifts.layers, map_layer1.bias.len());
         let affine = affine.load(loader.device)?;
