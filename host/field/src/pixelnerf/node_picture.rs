@@ -8,7 +8,7 @@
 use super::network::Workspace;
 use super::node_ray::NodeRay;
 use super::pass::{Evaluated, Renderer};
-use super::picture::{between, widest_step};
+use super::picture::{between, between_grids, first_step, grid, widest_step};
 use crate::{FieldError, Rendered};
 use std::mem::replace;
 use viewfuse_core::rays::{RayPoint, TargetRay, cast_ray};
@@ -61,29 +61,23 @@ impl<D: Device> Renderer<'_, D> {
         workspace: &mut Workspace<D>,
         evaluated: &mut [Evaluated; 2],
     ) -> Result<Rendered, FieldError> {
-        let (width, height) = (self.cast.camera.width, self.cast.camera.height);
-        let count = (width * height) as usize;
-        let (colours, depths) = (vec![[0.0; 4]; count], vec![0.0; count]);
-        let picture = Rendered { colours, depths, confidences: Vec::new(), width, height };
+        let picture = self.empty_picture();
+        let (width, height, count) = (picture.width, picture.height, picture.colours.len());
         let node_count = self.omissions.nodes as usize;
         let values = vec![EMPTY; (width.div_ceil(2) * height.div_ceil(2)) as usize * node_count];
         let mut so_far = Unfinished { picture, empty: vec![0; count], values, node_count };
         let (most_difference, far_difference) = self.interpolation();
         let most_step = widest_step(width.min(height));
         let is_small = width * height < SMALL;
-        let mut step = first_step(width.min(height));
-        let grid = |step: u32| {
-            let rows = (0..height).step_by(step as usize);
-            rows.flat_map(move |row| (0..width).step_by(step as usize).map(move |column| [column, row]))
-        };
-        let first: Vec<u32> = grid(step).map(|[column, row]| row * width + column).collect();
+        let mut step = first_step(width.min(height), WIDEST_FIRST_STEP, MIN_FIRST_GRID);
+        let first: Vec<u32> = grid([width, height], step).map(|[column, row]| row * width + column).collect();
         let candidates = vec![self.all_nodes(); first.len()];
         let values = vec![EMPTY; first.len() * node_count];
         self.render_nodes(workspace, &first, &candidates, values, evaluated, &mut so_far)?;
         while step > 1 {
             let half = step / 2;
             let (mut pixels, mut candidates, mut values) = (Vec::new(), Vec::new(), Vec::new());
-            for [column, row] in grid(half).filter(|place| place.iter().any(|place| !place.is_multiple_of(step))) {
+            for [column, row] in between_grids([width, height], step) {
                 let pixel = (row * width + column) as usize;
                 let around = so_far.around([column, row], step);
                 let empty = so_far.empty_around(around, step, if is_small { step } else { 0 });
@@ -301,13 +295,4 @@ fn point(ray: &TargetRay, index: usize, node: usize, count: usize) -> RayPoint {
     let depth = NodeRay::depth(ray, node, count);
     let position = [0, 1, 2].map(|axis| ray.origin[axis] + ray.direction[axis] * depth);
     RayPoint { position, length: 0.0, direction: ray.direction, sample: (index * count + node) as u32 }
-}
-
-/// The step of the first grid: a power of two.
-fn first_step(side: u32) -> u32 {
-    let mut step = 2;
-    while step < WIDEST_FIRST_STEP && side >= 2 * step * MIN_FIRST_GRID {
-        step *= 2;
-    }
-    step
 }

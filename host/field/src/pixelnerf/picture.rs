@@ -20,17 +20,21 @@ impl<D: Device> Renderer<'_, D> {
         probes: Option<&Probes<D>>,
         evaluated: &mut [Evaluated; 2],
     ) -> Result<Rendered, FieldError> {
-        let (width, height) = (self.cast.camera.width, self.cast.camera.height);
-        let count = (width * height) as usize;
-        let (colours, depths) = (vec![[0.0; 4]; count], vec![0.0; count]);
-        let mut picture = Rendered { colours, depths, confidences: Vec::new(), width, height };
+        let mut picture = self.empty_picture();
         if self.omissions.interpolation > 0.0 {
             self.render_grids(workspace, probes, evaluated, &mut picture)?;
         } else {
-            let all: Vec<u32> = (0..width * height).collect();
+            let all: Vec<u32> = (0..picture.width * picture.height).collect();
             self.render_into(workspace, &all, probes, evaluated, &mut picture)?;
         }
         Ok(picture)
+    }
+
+    /// A picture without colours and depths so far.
+    pub(super) fn empty_picture(&self) -> Rendered {
+        let (width, height) = (self.cast.camera.width, self.cast.camera.height);
+        let count = (width * height) as usize;
+        Rendered { colours: vec![[0.0; 4]; count], depths: vec![0.0; count], confidences: Vec::new(), width, height }
     }
 
     /// A wide grid of rays, then grids of half the width, whose rays are left out where those around them are alike.
@@ -44,19 +48,13 @@ impl<D: Device> Renderer<'_, D> {
         let (width, height) = (picture.width, picture.height);
         let (most_difference, far_difference) = self.interpolation();
         let mut step = widest_step(width.min(height));
-        let grid = |step: u32| {
-            let rows = (0..height).step_by(step as usize);
-            rows.flat_map(move |row| (0..width).step_by(step as usize).map(move |column| [column, row]))
-        };
-        let first: Vec<u32> = grid(step).map(|[column, row]| row * width + column).collect();
+        let first: Vec<u32> = grid([width, height], step).map(|[column, row]| row * width + column).collect();
         let mut ray_count = first.len();
         self.render_into(workspace, &first, probes, evaluated, picture)?;
         while step > 1 {
             let half = step / 2;
             let mut rays = Vec::new();
-            for [column, row] in
-                grid(half).filter(|[column, row]| !column.is_multiple_of(step) || !row.is_multiple_of(step))
-            {
+            for [column, row] in between_grids([width, height], step) {
                 let pixel = row * width + column;
                 match between(picture, [column, row], step, most_difference, far_difference) {
                     Some((colour, depth)) => {
@@ -126,13 +124,29 @@ impl<D: Device> Renderer<'_, D> {
     }
 }
 
-/// The step of the first grid: a power of two.
+/// The step of the widest grid whose pixels are interpolated.
 pub(super) fn widest_step(side: u32) -> u32 {
+    first_step(side, WIDEST_STEP, MIN_GRID)
+}
+
+/// The step of the first grid: a power of two up to `widest`, of at least so many rows and columns where it is not 2.
+pub(super) fn first_step(side: u32, widest: u32, min_grid: u32) -> u32 {
     let mut step = 2;
-    while step < WIDEST_STEP && side >= 2 * step * MIN_GRID {
+    while step < widest && side >= 2 * step * min_grid {
         step *= 2;
     }
     step
+}
+
+/// Columns and rows of the grid of `step` in a picture.
+pub(super) fn grid([width, height]: [u32; 2], step: u32) -> impl Iterator<Item = [u32; 2]> {
+    let rows = (0..height).step_by(step as usize);
+    rows.flat_map(move |row| (0..width).step_by(step as usize).map(move |column| [column, row]))
+}
+
+/// What the grid of half the step has more.
+pub(super) fn between_grids(size: [u32; 2], step: u32) -> impl Iterator<Item = [u32; 2]> {
+    grid(size, step / 2).filter(move |place| place.iter().any(|place| !place.is_multiple_of(step)))
 }
 
 /// The mean colour and a depth of a pixel's two or four neighbours on the grid of `step`, if all of them are in the
