@@ -63,7 +63,7 @@ fn assert_encodings_serve(
     let other = &others[0];
     assert!(!base.encodes_alike(other) && base.encodes_alike(&base));
     let relevance = stage.relevance(&weighting);
-    prepared.weighted().map_or(Ok(()), |weighted| weighted.weigh(&relevance)).expect("weighed");
+    prepared.weigh(&relevance).expect("weighed");
     let views: Vec<usize> = (0..job.sources.len()).collect();
     views.iter().for_each(|view| prepared.encode(*view, &Silent).expect("encoded"));
     prepared.set(other).expect("set");

@@ -66,9 +66,19 @@ pub trait Prepared {
         Record::default()
     }
 
-    /// Views are encoded for a weighting, if a view's encoding depends on how relevant the others are to it.
-    fn weighted(&mut self) -> Option<&mut dyn Weighted> {
-        None
+    /// Whether a view's encoding depends on how relevant the others are to it: views are encoded again for each
+    /// weighting.
+    fn is_weighted(&self) -> bool {
+        false
+    }
+
+    /// Begins a weighting, for views that depend on it. `relevance[view]` are the weights of all sources for source
+    /// `view` as a target, its own 0.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    fn weigh(&mut self, _relevance: &[SourceWeights]) -> Result<(), FieldError> {
+        Ok(())
     }
 
     /// Renders what follows under these options; those of another field change nothing. Views are encoded again where
@@ -133,15 +143,6 @@ pub trait Prepared {
     fn geometry(&self) -> Option<&dyn Geometry> {
         None
     }
-}
-
-/// Views whose encodings depend on the weighting: they are encoded again for each.
-pub trait Weighted {
-    /// Begins a weighting. `relevance[view]` are the weights of all sources for source `view` as a target, its own 0.
-    ///
-    /// # Errors
-    /// [`FieldError`].
-    fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError>;
 }
 
 /// How the error of a picture of an effort is found.

@@ -19,7 +19,6 @@ pub(crate) struct Session<'a> {
     pub(crate) prepared: Box<dyn Prepared + 'a>,
     /// `[view]`.
     encoded: Vec<bool>,
-    is_weighted: bool,
     /// The weights of the weighting that began, if encodings depend on it.
     relevance: Option<Vec<SourceWeights>>,
     /// The field's own options, or those in their place.
@@ -43,13 +42,12 @@ impl<'a> Session<'a> {
         sources: &SourceImages,
         progress: &dyn Progress,
     ) -> Result<Session<'a>, FieldError> {
-        let mut prepared = renderer.prepare(sources, progress)?;
+        let prepared = renderer.prepare(sources, progress)?;
         let options = renderer.options();
-        let (is_weighted, encoded) = (prepared.weighted().is_some(), vec![false; sources.images.len()]);
+        let encoded = vec![false; sources.images.len()];
         Ok(Session {
             renderer,
             encoded,
-            is_weighted,
             relevance: None,
             efforts: prepared.efforts(&options),
             prepared,
@@ -114,9 +112,9 @@ impl<'a> Session<'a> {
     /// Begins a weighting: encodes all views, if all of them contribute to each picture. `relevance[view]` are the
     /// weights of all sources for source `view` as a target, its own 0.
     pub(crate) fn weigh(&mut self, relevance: &[SourceWeights], progress: &dyn Progress) -> Result<(), FieldError> {
-        if let Some(weighted) = self.prepared.weighted() {
+        if self.prepared.is_weighted() {
             self.encoded.fill(false);
-            weighted.weigh(relevance)?;
+            self.prepared.weigh(relevance)?;
             self.relevance = Some(relevance.to_vec());
         }
         match self.prepared.encoding() {
@@ -140,7 +138,7 @@ impl<'a> Session<'a> {
     /// encoding is separate from that of rendering, which would do it otherwise. If encodings depend on the weighting
     /// and none has begun, all weights are equal.
     pub(crate) fn encode(&mut self, weights: &SourceWeights, progress: &dyn Progress) -> Result<(), FieldError> {
-        if self.is_weighted && self.relevance.is_none() {
+        if self.prepared.is_weighted() && self.relevance.is_none() {
             self.weigh(&even(self.encoded.len()), progress)?;
         }
         let mut is_new = false;
@@ -221,7 +219,7 @@ impl<'a> Session<'a> {
     pub(crate) fn record(&self) -> Record {
         let mut record = self.prepared.record();
         let skips_unused = self.prepared.encoding() != Encoding::All;
-        if !skips_unused && self.is_weighted {
+        if !skips_unused && self.prepared.is_weighted() {
             return record;
         }
         let count = self.encoded.iter().filter(|encoded| !**encoded).count();

@@ -12,7 +12,7 @@ use crate::row::{Origin, Row};
 use crate::variant::erased;
 use crate::{
     About, AnyField, AnyOptions, Encoding, Field, FieldError, Geometry, Options, Prepared, Purpose, Record, Rendered,
-    Request, Variant, Weighted,
+    Request, Variant,
 };
 use std::collections::BTreeMap;
 use viewfuse_device::Device;
@@ -196,8 +196,13 @@ impl<D: Device> Prepared for Alone<'_, D> {
         self.depths.views.record()
     }
 
-    fn weighted(&mut self) -> Option<&mut dyn Weighted> {
-        Some(self)
+    fn is_weighted(&self) -> bool {
+        true
+    }
+
+    fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
+        self.drop_splats();
+        self.depths.weigh(relevance)
     }
 
     fn set(&mut self, options: &AnyOptions) -> Result<(), FieldError> {
@@ -222,12 +227,5 @@ impl<D: Device> Prepared for Alone<'_, D> {
 
     fn geometry(&self) -> Option<&dyn Geometry> {
         Some(&self.depths)
-    }
-}
-
-impl<D: Device> Weighted for Alone<'_, D> {
-    fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
-        self.drop_splats();
-        self.depths.weigh(relevance)
     }
 }

@@ -1,9 +1,7 @@
 //! Sources that show a silhouette: a visual hull from silhouettes, depths by plane sweep, colours by weighted
 //! fusion; the mathematics is in [`viewfuse_kernels::visual_hull`].
 
-use crate::{
-    AnyOptions, DepthMap, Encoding, FieldError, Geometry, Options, Prepared, Rendered, Request, Variant, Weighted,
-};
+use crate::{AnyOptions, DepthMap, Encoding, FieldError, Geometry, Options, Prepared, Rendered, Request, Variant};
 use std::ops::Range;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_device::{Device, HullScene, Pixels};
@@ -266,8 +264,24 @@ impl<D: Device> Prepared for Views<'_, D> {
         Ok(Rendered { colours, depths, confidences: Vec::new(), width, height })
     }
 
-    fn weighted(&mut self) -> Option<&mut dyn Weighted> {
-        Some(self)
+    fn is_weighted(&self) -> bool {
+        true
+    }
+
+    fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
+        let Silhouettes { scene, texel_count, .. } = self.silhouettes();
+        let (device, texel_count, view_count) = (self.device, *texel_count, scene.object.view_count as usize);
+        // The last weighting's buffers are freed before new ones are allocated.
+        self.depths = None;
+        let pair_weights: Vec<f32> =
+            relevance.iter().flat_map(|weights| weights.values()[..view_count].iter().copied()).collect();
+        let sweep = Sweep {
+            pair_weights: device.upload(&pair_weights)?,
+            nothing: device.upload(&vec![NO_SURFACE; texel_count])?,
+            first_guess: device.zeros(texel_count)?,
+        };
+        self.depths = Some(Depths { maps: device.zeros(texel_count)?, sweep: Some(sweep) });
+        Ok(())
     }
 
     fn set(&mut self, options: &AnyOptions) -> Result<(), FieldError> {
@@ -283,24 +297,6 @@ impl<D: Device> Prepared for Views<'_, D> {
 
     fn geometry(&self) -> Option<&dyn Geometry> {
         Some(self)
-    }
-}
-
-impl<D: Device> Weighted for Views<'_, D> {
-    fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
-        let Silhouettes { scene, texel_count, .. } = self.silhouettes();
-        let (device, texel_count, view_count) = (self.device, *texel_count, scene.object.view_count as usize);
-        // The last weighting's buffers are freed before new ones are allocated.
-        self.depths = None;
-        let pair_weights: Vec<f32> =
-            relevance.iter().flat_map(|weights| weights.values()[..view_count].iter().copied()).collect();
-        let sweep = Sweep {
-            pair_weights: device.upload(&pair_weights)?,
-            nothing: device.upload(&vec![NO_SURFACE; texel_count])?,
-            first_guess: device.zeros(texel_count)?,
-        };
-        self.depths = Some(Depths { maps: device.zeros(texel_count)?, sweep: Some(sweep) });
-        Ok(())
     }
 }
 

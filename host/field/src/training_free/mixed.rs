@@ -11,7 +11,6 @@ use crate::gaussians::Recipe;
 use crate::variant::erased;
 use crate::{
     AnyOptions, Encoding, FieldError, Geometry, Prepared, Purpose, Record, Rendered, Request, Setting, Variant,
-    Weighted,
 };
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::Device;
@@ -167,8 +166,13 @@ impl<D: Device> Prepared for Mixed<'_, D> {
         self.depths.views.record()
     }
 
-    fn weighted(&mut self) -> Option<&mut dyn Weighted> {
-        Some(self)
+    fn is_weighted(&self) -> bool {
+        true
+    }
+
+    fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
+        (self.splats, self.last) = (Vec::new(), None);
+        self.depths.weigh(relevance)
     }
 
     fn set(&mut self, options: &AnyOptions) -> Result<(), FieldError> {
@@ -239,13 +243,6 @@ impl<D: Device> Prepared for Mixed<'_, D> {
 
     fn geometry(&self) -> Option<&dyn Geometry> {
         Some(&self.depths)
-    }
-}
-
-impl<D: Device> Weighted for Mixed<'_, D> {
-    fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
-        (self.splats, self.last) = (Vec::new(), None);
-        self.depths.weigh(relevance)
     }
 }
 

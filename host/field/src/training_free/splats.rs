@@ -56,7 +56,7 @@ impl<'a, D: Device> SourceDepths<'a, D> {
     pub(super) fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
         self.encoded.fill(false);
         self.relevance = relevance.to_vec();
-        self.views.weighted().map_or(Ok(()), |weighted| weighted.weigh(relevance))
+        self.views.weigh(relevance)
     }
 
     /// Sets the options of what prepared the sources.

@@ -11,7 +11,6 @@ use crate::training_free::space::Space;
 use crate::variant::erased;
 use crate::{
     AnyOptions, DepthMap, Encoding, FieldError, Geometry, Prepared, Purpose, Rendered, Request, Surfaces, Variant,
-    Weighted,
 };
 use std::borrow::Cow;
 use viewfuse_core::camera::CameraBlock;
@@ -165,8 +164,14 @@ impl<D: Device> Prepared for Views<'_, D> {
         Ok(rendered)
     }
 
-    fn weighted(&mut self) -> Option<&mut dyn Weighted> {
-        Some(self)
+    fn is_weighted(&self) -> bool {
+        true
+    }
+
+    fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
+        self.target = None;
+        self.maps = SourceMaps::new(self.scene.device, &self.matched, relevance.to_vec())?;
+        Ok(())
     }
 
     fn set(&mut self, options: &AnyOptions) -> Result<(), FieldError> {
@@ -199,14 +204,6 @@ impl<D: Device> Prepared for Views<'_, D> {
 
     fn geometry(&self) -> Option<&dyn Geometry> {
         Some(self)
-    }
-}
-
-impl<D: Device> Weighted for Views<'_, D> {
-    fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
-        self.target = None;
-        self.maps = SourceMaps::new(self.scene.device, &self.matched, relevance.to_vec())?;
-        Ok(())
     }
 }
 
