@@ -36,7 +36,7 @@ mod start;
 mod tiles;
 
 pub use given::{GivenGaussians, behind, scene_of};
-pub use optimise::{Optimisation, Optimised, Optimiser, optimisation, optimised};
+pub use optimise::{Optimisation, Optimised, optimisation, optimised};
 pub use picture::{Splatted, Splatter};
 pub use recipe::{MAX_COUNT, MAX_ITERATIONS, Recipe};
 pub use residuals::Residuals;

@@ -2,13 +2,11 @@
 //! views that are held out on the way.
 
 use crate::AnyField;
-use crate::gaussians::{GivenGaussians, Optimiser, Recipe, behind, scene_of};
+use crate::gaussians::{GivenGaussians, Optimisation, Recipe, behind, optimisation, scene_of};
 use crate::point_cloud::point_cloud;
 use crate::render::{RenderError, RenderOptions, Stage, open_album};
 use viewfuse_core::Vec3;
 use viewfuse_device::choice::AnyDevice;
-use viewfuse_device::cpu::Cpu;
-use viewfuse_device::{Device, Memory};
 use viewfuse_job::files::WriteError;
 use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_job::progress::{Progress, Silent};
@@ -139,80 +137,68 @@ impl<'a> SceneOptimisation<'a> {
         progress: &dyn Progress,
         mut keep: impl FnMut(&GaussianScene) -> Result<(), WriteError>,
     ) -> Result<EndedOptimisation, OptimiseError> {
-        match device {
-            AnyDevice::Cpu(own) => self.run_on(own, device, progress, &mut keep),
-            // A software driver takes longer than the CPU's own loops for the same steps; see `gaussians::optimised`.
-            AnyDevice::Vulkan(own) if own.is_software() => self.run_on(&Cpu, device, progress, &mut keep),
-            AnyDevice::Vulkan(own) => self.run_on(own.as_ref(), device, progress, &mut keep),
-        }
-    }
-
-    fn run_on<D: Device>(
-        &self,
-        device: &D,
-        any: &AnyDevice,
-        progress: &dyn Progress,
-        keep: &mut dyn FnMut(&GaussianScene) -> Result<(), WriteError>,
-    ) -> Result<EndedOptimisation, OptimiseError> {
         let field = AnyField::default();
-        let renderer = field.on(any);
+        let renderer = field.on(device);
         progress.stage("reading the photographs", 0..1, 10);
         let shown = self.sources.iter().chain(&self.held_out).copied();
         let album = open_album(self.scene, shown, renderer.as_ref(), &self.options, progress)?;
         let mut stage = Stage::prepare(self.scene, &album, &self.sources, renderer.as_ref(), &self.options, progress)?;
         progress.stage("finding surfaces", 1..3, 10);
         let points = point_cloud(&mut stage, &self.weighting, Recipe::cloud(self.sources.len()), &Silent)?;
-        let begun = Optimiser::new(device, &stage.images, &points, self.recipe).map_err(RenderError::from)?;
-        let Some(mut optimiser) = begun else {
+        let begun = match device {
+            AnyDevice::Cpu(own) => optimisation(own, &stage.images, &points, self.recipe),
+            AnyDevice::Vulkan(own) => optimisation(own.as_ref(), &stage.images, &points, self.recipe),
+        };
+        let Some(mut optimisation) = begun.map_err(RenderError::from)? else {
             return Err(OptimiseError::Few { scene: self.scene.path.display().to_string() });
         };
         if let Some(before) = &self.before {
             before.notes.iter().for_each(|note| progress.warn(note));
-            optimiser.resume(&before.scene.blocks(Vec3::ZERO));
+            optimisation.resume(&before.scene.blocks(Vec3::ZERO));
         }
         progress.stage("optimising", 3..10, 10);
         let more = if self.towards.is_empty() { 0 } else { TOWARDS };
-        progress.expect((optimiser.iteration_count() + more - optimiser.done()) as usize);
+        progress.expect((optimisation.iteration_count() + more - optimisation.done()) as usize);
         let mut scores = Vec::new();
-        self.advance(&mut optimiser, any, &album, progress, keep, &mut scores)?;
+        self.advance(optimisation.as_mut(), device, &album, progress, &mut keep, &mut scores)?;
         if more > 0 && !progress.is_cancelled() {
-            optimiser.extend(more);
-            optimiser.weigh(&self.weights()?);
-            self.advance(&mut optimiser, any, &album, progress, keep, &mut scores)?;
+            optimisation.extend(more);
+            optimisation.weigh(&self.weights()?);
+            self.advance(optimisation.as_mut(), device, &album, progress, &mut keep, &mut scores)?;
         }
-        let gaussians = optimiser.optimised().gaussians;
+        let gaussians = optimisation.optimised().gaussians;
         let sources = &self.sources[..self.sources.len().min(FIT_SOURCES)];
         let is_alone = self.held_out.is_empty() && !progress.is_cancelled();
-        let fit = is_alone.then(|| self.score(&gaussians, any, &album, sources)).transpose()?;
+        let fit = is_alone.then(|| self.score(&gaussians, device, &album, sources)).transpose()?;
         Ok(EndedOptimisation {
             gaussians: scene_of(&gaussians),
             background: behind(&stage.images),
-            done: optimiser.done(),
-            of: optimiser.iteration_count(),
+            done: optimisation.done(),
+            of: optimisation.iteration_count(),
             scores,
             fit: fit.map(|psnr| (psnr, sources.len())),
         })
     }
 
     /// All iterations, with scores and what is kept on the way; fewer if it is cancelled.
-    fn advance<D: Device>(
+    fn advance(
         &self,
-        optimiser: &mut Optimiser<'_, D>,
+        optimisation: &mut dyn Optimisation,
         any: &AnyDevice,
         album: &Album<'_>,
         progress: &dyn Progress,
         keep: &mut dyn FnMut(&GaussianScene) -> Result<(), WriteError>,
         scores: &mut Vec<(u32, f64)>,
     ) -> Result<(), OptimiseError> {
-        let of = optimiser.iteration_count();
-        while optimiser.done() < of && !progress.is_cancelled() {
-            optimiser.advance().map_err(RenderError::from)?;
+        let of = optimisation.iteration_count();
+        while optimisation.done() < of && !progress.is_cancelled() {
+            optimisation.run_to(optimisation.done() + 1, &Silent).map_err(RenderError::from)?;
             progress.step();
-            let done = optimiser.done();
+            let done = optimisation.done();
             if !done.is_multiple_of(SCORED) && done != of {
                 continue;
             }
-            let gaussians = optimiser.optimised().gaussians;
+            let gaussians = optimisation.optimised().gaussians;
             if done < of {
                 keep(&scene_of(&gaussians))?;
             }

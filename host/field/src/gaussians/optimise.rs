@@ -9,7 +9,6 @@ use super::recipe::Recipe;
 use super::start::{Extent, start};
 use crate::FieldError;
 use crate::point_cloud::CloudPoint;
-use std::sync::Arc;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::random::uniform;
 use viewfuse_device::Device;
@@ -40,8 +39,20 @@ pub struct Optimised {
 
 /// An optimisation, on whatever device makes its steps.
 pub trait Optimisation {
+    /// Counts each source's differences by its weight from now on; the weights are scaled to 1 in the mean.
+    fn weigh(&mut self, weights: &[f32]);
+
+    /// Goes on from Gaussians that were optimised before, with the finest level's iterations.
+    fn resume(&mut self, gaussians: &[GaussianBlock]);
+
+    /// Adds iterations at the finest level.
+    fn extend(&mut self, iterations: u32);
+
     /// How many iterations are done.
     fn done(&self) -> u32;
+
+    /// All iterations of the recipe.
+    fn iteration_count(&self) -> u32;
 
     /// The iterations up to this number of them, as far as the recipe has so many; none if so many are done.
     ///
@@ -91,8 +102,31 @@ pub fn optimised<D: Device>(
 }
 
 impl<D: Device> Optimisation for Optimiser<'_, D> {
+    fn weigh(&mut self, weights: &[f32]) {
+        let mean = weights.iter().sum::<f32>() / weights.len().max(1) as f32;
+        if mean > 0.0 && weights.len() == self.weights.len() {
+            self.weights = weights.iter().map(|weight| weight / mean).collect();
+        }
+    }
+
+    fn resume(&mut self, gaussians: &[GaussianBlock]) {
+        self.particles = gaussians.iter().copied().map(Particle::new).collect();
+        let [.., finest] = self.recipe.iterations;
+        self.iteration = self.iteration_count() - finest;
+        self.level = Some(self.level_of(self.iteration).0);
+    }
+
+    fn extend(&mut self, iterations: u32) {
+        let [.., finest] = &mut self.recipe.iterations;
+        *finest += iterations;
+    }
+
     fn done(&self) -> u32 {
         self.iteration
+    }
+
+    fn iteration_count(&self) -> u32 {
+        self.recipe.iterations.iter().sum()
     }
 
     fn run_to(&mut self, iteration: u32, progress: &dyn Progress) -> Result<(), FieldError> {
@@ -107,7 +141,12 @@ impl<D: Device> Optimisation for Optimiser<'_, D> {
     }
 
     fn optimised(&self) -> Optimised {
-        Optimiser::optimised(self)
+        Optimised {
+            gaussians: self.particles.iter().map(|particle| particle.gaussian).collect(),
+            near: self.splatter.near,
+            background: self.splatter.background,
+            gains: self.gains.iter().map(|gain| gain.value).collect(),
+        }
     }
 }
 
@@ -119,14 +158,13 @@ struct Gain {
     step_count: i32,
 }
 
-/// Optimises Gaussians for source views, an iteration at a time. A copy goes on by itself.
-#[derive(Debug)]
-pub struct Optimiser<'d, D> {
+/// Optimises Gaussians for source views, an iteration at a time.
+struct Optimiser<'d, D> {
     splatter: Splatter<'d, D>,
     recipe: Recipe,
     extent: Extent,
     /// `[level][source]`, the finest level first.
-    levels: Arc<Vec<Vec<LevelView>>>,
+    levels: Vec<Vec<LevelView>>,
     particles: Vec<Particle>,
     gains: Vec<Gain>,
     /// How much each source counts, 1 in the mean.
@@ -137,20 +175,6 @@ pub struct Optimiser<'d, D> {
     level: Option<usize>,
 }
 
-impl<D> Clone for Optimiser<'_, D> {
-    fn clone(&self) -> Self {
-        Optimiser {
-            splatter: Splatter { ..self.splatter },
-            levels: Arc::clone(&self.levels),
-            particles: self.particles.clone(),
-            gains: self.gains.clone(),
-            weights: self.weights.clone(),
-            round: self.round.clone(),
-            ..*self
-        }
-    }
-}
-
 /// Most Gaussians for the pixels of the largest source.
 fn most_for(views: &[LevelView], max_per_pixel: f32) -> usize {
     let pixels = views.iter().map(|view| view.camera.width * view.camera.height).max().unwrap_or(0);
@@ -159,10 +183,7 @@ fn most_for(views: &[LevelView], max_per_pixel: f32) -> usize {
 
 impl<'d, D: Device> Optimiser<'d, D> {
     /// Begins with the sources' surface points; `None` if there are too few of them.
-    ///
-    /// # Errors
-    /// [`FieldError`] if a source cannot be reduced.
-    pub fn new(
+    fn new(
         device: &'d D,
         images: &SourceImages,
         points: &[CloudPoint],
@@ -184,7 +205,7 @@ impl<'d, D: Device> Optimiser<'d, D> {
             splatter: Splatter { device, near: recipe.near * extent.depth, background },
             recipe,
             extent,
-            levels: Arc::new(levels),
+            levels,
             particles,
             gains: vec![gain; source_count],
             weights: vec![1.0; source_count],
@@ -192,64 +213,6 @@ impl<'d, D: Device> Optimiser<'d, D> {
             iteration: 0,
             level: None,
         }))
-    }
-
-    /// Counts each source's differences by its weight from now on; the weights are scaled to 1 in the mean.
-    pub fn weigh(&mut self, weights: &[f32]) {
-        let mean = weights.iter().sum::<f32>() / weights.len().max(1) as f32;
-        if mean > 0.0 && weights.len() == self.weights.len() {
-            self.weights = weights.iter().map(|weight| weight / mean).collect();
-        }
-    }
-
-    /// Goes on from Gaussians that were optimised before, with the finest level's iterations.
-    pub fn resume(&mut self, gaussians: &[GaussianBlock]) {
-        self.particles = gaussians.iter().copied().map(Particle::new).collect();
-        let [.., finest] = self.recipe.iterations;
-        self.iteration = self.iteration_count() - finest;
-        self.level = Some(self.level_of(self.iteration).0);
-    }
-
-    /// Adds iterations at the finest level.
-    pub fn extend(&mut self, iterations: u32) {
-        let [.., finest] = &mut self.recipe.iterations;
-        *finest += iterations;
-    }
-
-    /// How many iterations are done.
-    pub fn done(&self) -> u32 {
-        self.iteration
-    }
-
-    /// All iterations of the recipe.
-    pub fn iteration_count(&self) -> u32 {
-        self.recipe.iterations.iter().sum()
-    }
-
-    /// The Gaussians so far.
-    pub fn optimised(&self) -> Optimised {
-        Optimised {
-            gaussians: self.particles.iter().map(|particle| particle.gaussian).collect(),
-            near: self.splatter.near,
-            background: self.splatter.background,
-            gains: self.gains.iter().map(|gain| gain.value).collect(),
-        }
-    }
-
-    /// All iterations that are left.
-    ///
-    /// # Errors
-    /// [`FieldError`]; after one the Gaussians so far are still there.
-    pub fn run(&mut self, progress: &dyn Progress) -> Result<(), FieldError> {
-        self.run_to(u32::MAX, progress)
-    }
-
-    /// One iteration; nothing once all are done.
-    ///
-    /// # Errors
-    /// [`FieldError`].
-    pub fn advance(&mut self) -> Result<(), FieldError> {
-        if self.iteration < self.iteration_count() { self.iterate() } else { Ok(()) }
     }
 
     /// The level of an iteration, and how far through it is.
