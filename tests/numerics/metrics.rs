@@ -15,7 +15,7 @@ use viewfuse::evaluate::metrics::heads::{published_dists, published_lpips};
 use viewfuse::evaluate::metrics::kernel::kernel_distance;
 use viewfuse::evaluate::metrics::lpips::{Lpips, LpipsTrunk};
 use viewfuse::evaluate::metrics::trunk::{Convolution, InceptionKind, Pooling, Step, inception, tensors, vgg16};
-use viewfuse::evaluate::metrics::{MetricError, Metrics, Scored};
+use viewfuse::evaluate::metrics::{MetricError, Metrics, Scored, Scorer};
 use viewfuse::nn::checkpoint::{Checkpoint, TensorShape};
 use viewfuse::nn::initialisation;
 use viewfuse_core::metrics::{mean_squared_error, psnr, ssim};
@@ -215,10 +215,11 @@ fn pictures_that_cannot_be_compared() {
 fn conventions_decide_what_is_scored() {
     let [prediction, truth] = pair("noisy");
     let scores = |convention: Convention| -> Vec<Scored> {
-        let metrics = Metrics { convention, lpips: vec![lpips(LpipsTrunk::Alex)], dists: None, inception: None };
-        let features = metrics.features_of_truths(&Cpu, [&truth]).expect("no network, no features");
+        let metrics =
+            Metrics { device: &Cpu, convention, lpips: vec![lpips(LpipsTrunk::Alex)], dists: None, inception: None };
+        let features = metrics.features([&truth]).expect("no network, no features");
         assert!(features.is_none());
-        metrics.compare(&Cpu, &prediction, &truth, None).expect("scores")
+        metrics.score(&prediction, &truth, None).expect("scores")
     };
     let plain = scores(Convention::Plain);
     let names: Vec<&str> = plain.iter().map(|score| score.name).collect();

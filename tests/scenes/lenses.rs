@@ -5,7 +5,7 @@ use super::made::open;
 use image::{Rgb, RgbImage};
 use serde_json::{Value, json};
 use viewfuse::device::cpu::Cpu;
-use viewfuse::evaluate::metrics::Metrics;
+use viewfuse::evaluate::metrics::{Metrics, Scorer};
 use viewfuse::field::render::Truth;
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
@@ -186,13 +186,13 @@ fn what_the_lens_did_not_see_is_not_scored() {
         let over_all = Truth::compare(&exact, GroundTruth { seen: None, ..truth.clone() }).psnr;
         assert!(over_all < psnr - 10.0, "{over_all} {psnr}");
         // The metrics of an evaluation agree.
-        let metrics = Metrics::<Cpu>::plain();
+        let metrics = Metrics::plain(&Cpu);
         let of = |prediction: &RgbImage| {
-            let scored = metrics.compare(&Cpu, prediction, &truth.picture, truth.seen.as_ref()).expect("scores");
+            let scored = metrics.score(prediction, &truth.picture, truth.seen.as_ref()).expect("scores");
             (scored[0].value, scored[1].value)
         };
         assert_eq!((of(&exact), of(&wrong_outside)), ((psnr, ssim), (psnr, ssim)));
         let small = image::GrayImage::new(3, 3);
-        assert!(metrics.compare(&Cpu, &exact, &truth.picture, Some(&small)).is_err());
+        assert!(metrics.score(&exact, &truth.picture, Some(&small)).is_err());
     }
 }

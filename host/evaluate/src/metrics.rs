@@ -83,7 +83,9 @@ pub struct Scored {
 }
 
 /// The requested metrics, their networks on a device.
-pub struct Metrics<D: Device> {
+pub struct Metrics<'a, D: Device> {
+    /// The device.
+    pub device: &'a D,
     /// The convention of the scores.
     pub convention: Convention,
     /// LPIPS by any number of trunks.
@@ -94,12 +96,8 @@ pub struct Metrics<D: Device> {
     pub inception: Option<Inception<D>>,
 }
 
-impl<D: Device> Metrics<D> {
-    /// PSNR and SSIM of the pictures as they are.
-    pub fn plain() -> Metrics<D> {
-        Metrics { convention: Convention::Plain, lpips: Vec::new(), dists: None, inception: None }
-    }
-
+/// Scores pictures, on any device.
+pub trait Scorer {
     /// Scores a prediction: PSNR, SSIM if the pictures are at least 7x7, PSNR of corrected colours, and the metrics of
     /// the loaded networks, in the order of [`Scored::name`]'s list.
     ///
@@ -108,9 +106,17 @@ impl<D: Device> Metrics<D> {
     ///
     /// # Errors
     /// [`MetricError`].
-    pub fn compare(
+    fn score(
         &self,
-        device: &D,
+        prediction: &RgbImage,
+        truth: &RgbImage,
+        seen: Option<&GrayImage>,
+    ) -> Result<Vec<Scored>, MetricError>;
+}
+
+impl<D: Device> Scorer for Metrics<'_, D> {
+    fn score(
+        &self,
         prediction: &RgbImage,
         truth: &RgbImage,
         seen: Option<&GrayImage>,
@@ -128,72 +134,33 @@ impl<D: Device> Metrics<D> {
         let shown = with_truth_unseen(&shown, truth, seen);
         // Networks see the prediction as it was saved and the photograph as it is.
         for lpips in &self.lpips {
-            let value = lpips.distance(device, &shown, truth)?;
+            let value = lpips.distance(self.device, &shown, truth)?;
             scores.push(Scored { name: lpips.kind().metric(), value, more_is_better: false });
         }
         if let Some(dists) = &self.dists {
-            let value = dists.distance(device, &shown, truth)?;
+            let value = dists.distance(self.device, &shown, truth)?;
             scores.push(Scored { name: "dists", value, more_is_better: false });
         }
         Ok(scores)
     }
+}
 
-    /// Inception's features of predictions under the convention; `None` without that network.
-    ///
-    /// # Errors
-    /// [`MetricError`].
-    pub fn features_of_predictions<'a>(
-        &self,
-        device: &D,
-        pictures: impl IntoIterator<Item = &'a RgbImage>,
-    ) -> Result<Option<Features>, MetricError> {
-        let shown: Vec<_> = pictures.into_iter().map(|picture| self.convention.shown(picture)).collect();
-        self.features_of_truths(device, shown.iter().map(AsRef::as_ref))
+impl<'a, D: Device> Metrics<'a, D> {
+    /// PSNR and SSIM of the pictures as they are.
+    pub fn plain(device: &'a D) -> Metrics<'a, D> {
+        Metrics { device, convention: Convention::Plain, lpips: Vec::new(), dists: None, inception: None }
     }
 
-    /// Inception's features of photographs; `None` without that network.
+    /// Inception's features of photographs, or of predictions as [`Convention::shown`] has them; `None` without that
+    /// network.
     ///
     /// # Errors
     /// [`MetricError`].
-    pub fn features_of_truths<'a>(
+    pub fn features<'p>(
         &self,
-        device: &D,
-        pictures: impl IntoIterator<Item = &'a RgbImage>,
+        pictures: impl IntoIterator<Item = &'p RgbImage>,
     ) -> Result<Option<Features>, MetricError> {
-        self.inception.as_ref().map(|inception| inception.features(device, pictures)).transpose()
-    }
-}
-
-/// Scores pictures, on any device.
-pub trait Scorer {
-    /// Scores a prediction, as [`Metrics::compare`] does.
-    ///
-    /// # Errors
-    /// [`MetricError`].
-    fn score(
-        &self,
-        prediction: &RgbImage,
-        truth: &RgbImage,
-        seen: Option<&GrayImage>,
-    ) -> Result<Vec<Scored>, MetricError>;
-}
-
-/// Metrics with the device that holds their networks.
-pub struct MetricsOn<'a, D: Device> {
-    /// The device.
-    pub device: &'a D,
-    /// The metrics.
-    pub metrics: Metrics<D>,
-}
-
-impl<D: Device> Scorer for MetricsOn<'_, D> {
-    fn score(
-        &self,
-        prediction: &RgbImage,
-        truth: &RgbImage,
-        seen: Option<&GrayImage>,
-    ) -> Result<Vec<Scored>, MetricError> {
-        self.metrics.compare(self.device, prediction, truth, seen)
+        self.inception.as_ref().map(|inception| inception.features(self.device, pictures)).transpose()
     }
 }
 

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use viewfuse::device::cpu::Cpu;
 use viewfuse::evaluate::baseline::Baseline;
-use viewfuse::evaluate::metrics::{Metrics, MetricsOn};
+use viewfuse::evaluate::metrics::Metrics;
 use viewfuse::evaluate::summary::{Observation, Table, table};
 use viewfuse::evaluate::{Evaluator, PSNR, SSIM};
 use viewfuse::field::On;
@@ -39,7 +39,7 @@ fn scores(folder: &Path, schemes: &[&str]) -> Table {
         weightings: &weightings,
         renderer: &On { device: &Cpu, field: &field },
         options: &options,
-        scorer: &MetricsOn { device: &Cpu, metrics: Metrics::plain() },
+        scorer: &Metrics::plain(&Cpu),
         progress: &quiet,
     };
     let scores = evaluator.score_all(&scene, &selection).expect("scores");

@@ -17,7 +17,7 @@ use viewfuse_device::Device;
 use viewfuse_device::choice::{AnyDevice, Chosen};
 use viewfuse_evaluate::metrics::features::Features;
 use viewfuse_evaluate::metrics::trunk::InceptionKind;
-use viewfuse_evaluate::metrics::{Metrics, Scored};
+use viewfuse_evaluate::metrics::{Metrics, Scored, Scorer};
 use viewfuse_job::progress::Progress;
 use viewfuse_output::folder::recorded_background;
 use viewfuse_output::record::RECORD;
@@ -116,7 +116,7 @@ fn compare<D: Device>(arguments: &Arguments, pairs: &[Pair], device: &D) -> anyh
         progress.check()?;
         let ([prediction, truth], is_resampled) = opened(pair, &background)?;
         resampled += usize::from(is_resampled);
-        let scored = metrics.compare(device, &prediction, &truth, None);
+        let scored = metrics.score(&prediction, &truth, None);
         scores.push(scored.with_context(|| pair.prediction.display().to_string())?);
         if metrics.inception.is_some() {
             pictures.push([prediction, truth]);
@@ -124,7 +124,7 @@ fn compare<D: Device>(arguments: &Arguments, pairs: &[Pair], device: &D) -> anyh
         progress.step();
     }
     let sets = match &metrics.inception {
-        Some(_) if pictures.len() > 1 => features_of_sets(&metrics, &pictures, device, &progress)?,
+        Some(_) if pictures.len() > 1 => features_of_sets(&metrics, &pictures, &progress)?,
         _ => None,
     };
     drop(progress);
@@ -142,17 +142,17 @@ fn compare<D: Device>(arguments: &Arguments, pairs: &[Pair], device: &D) -> anyh
 
 /// Inception's features of all predictions and of all truths; `None` without that network.
 fn features_of_sets<D: Device>(
-    metrics: &Metrics<D>,
+    metrics: &Metrics<'_, D>,
     pictures: &[[RgbImage; 2]],
-    device: &D,
     progress: &dyn Progress,
 ) -> anyhow::Result<Option<[Features; 2]>> {
     progress.stage("features of the pictures", 1..2, 3);
-    let predictions = metrics.features_of_predictions(device, pictures.iter().map(|[prediction, _]| prediction))?;
+    let shown: Vec<_> = pictures.iter().map(|[prediction, _]| metrics.convention.shown(prediction)).collect();
+    let predictions = metrics.features(shown.iter().map(AsRef::as_ref))?;
     progress.stage("features of the truths", 2..3, 3);
     progress.expect(pictures.len());
     let truths = pictures.iter().map(|[_, truth]| truth).inspect(|_| progress.step());
-    let truths = metrics.features_of_truths(device, truths)?;
+    let truths = metrics.features(truths)?;
     Ok(predictions.zip(truths).map(|(predictions, truths)| [predictions, truths]))
 }
 

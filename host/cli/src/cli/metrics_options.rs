@@ -11,7 +11,7 @@ use viewfuse_evaluate::metrics::dists::Dists;
 use viewfuse_evaluate::metrics::features::Inception;
 use viewfuse_evaluate::metrics::heads::{published_dists, published_lpips};
 use viewfuse_evaluate::metrics::lpips::{Lpips, LpipsTrunk};
-use viewfuse_evaluate::metrics::{Metrics, MetricsOn, Scorer};
+use viewfuse_evaluate::metrics::{Metrics, Scorer};
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
 
 /// Heading of these options.
@@ -75,15 +75,13 @@ impl MetricOptions {
     /// Loads the networks to one of the devices.
     pub(crate) fn on<'a>(&self, device: &'a AnyDevice) -> anyhow::Result<Box<dyn Scorer + 'a>> {
         Ok(match device {
-            AnyDevice::Cpu(device) => Box::new(MetricsOn { device, metrics: self.open(device)? }),
-            AnyDevice::Vulkan(device) => {
-                Box::new(MetricsOn { device: device.as_ref(), metrics: self.open(device.as_ref())? })
-            }
+            AnyDevice::Cpu(device) => Box::new(self.open(device)?),
+            AnyDevice::Vulkan(device) => Box::new(self.open(device.as_ref())?),
         })
     }
 
     /// Loads the networks to a device.
-    pub(crate) fn open<D: Device>(&self, device: &D) -> anyhow::Result<Metrics<D>> {
+    pub(crate) fn open<'a, D: Device>(&self, device: &'a D) -> anyhow::Result<Metrics<'a, D>> {
         if self.fid.is_some() && cfg!(not(feature = "fid")) {
             return Err(wrong(not_built("FID and KID", "fid")));
         }
@@ -101,6 +99,7 @@ impl MetricOptions {
         };
         let inception = |path: &PathBuf| Inception::new(device, &Checkpoint::open(path)?).context("--fid");
         Ok(Metrics {
+            device,
             convention: self.metrics_as,
             lpips,
             dists: self.dists.as_ref().map(dists).transpose()?,
