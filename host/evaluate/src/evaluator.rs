@@ -4,7 +4,9 @@ use crate::baseline::plane::plane_depth;
 use crate::baseline::{BLENDED, Baseline, Shot};
 use crate::metrics::masked::MaskedTruth;
 use crate::metrics::{MetricError, Scorer};
+use crate::run_folder::{seconds, values};
 use image::{GrayImage, RgbImage};
+use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::time::{Duration, Instant};
@@ -63,7 +65,7 @@ pub const PSNR_CORRECTED: &str = "psnr-corrected";
 pub const SSIM: &str = "ssim";
 
 /// The score of one scheme at one target.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Score {
     /// The scheme, or the name of a [`Baseline`].
     pub scheme: String,
@@ -71,11 +73,13 @@ pub struct Score {
     pub target: String,
     /// Number of sources.
     pub source_count: usize,
-    /// Metrics by name, [`PSNR`] first.
-    pub values: Vec<(String, f64)>,
     /// Seconds for encoding and rendering this target with this scheme; encoding that targets share is divided among
     /// them.
+    #[serde(rename = "seconds", with = "seconds")]
     pub time: Duration,
+    /// Metrics by name, [`PSNR`] first.
+    #[serde(with = "values")]
+    pub values: Vec<(String, f64)>,
 }
 
 impl Score {

@@ -7,7 +7,6 @@ use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use std::time::Duration;
 use viewfuse_job::files::{Journal, JournalLines, WriteError};
 
 /// The jobs of a process: those whose number modulo `count` is `index`.
@@ -64,7 +63,6 @@ pub struct Finished {
     /// Names of the sources.
     pub sources: Vec<String>,
     /// Scores of every scheme at every target.
-    #[serde(with = "score_lines")]
     pub scores: Vec<Score>,
 }
 
@@ -77,20 +75,11 @@ const MAX_LINE: u64 = 64 << 20;
 /// What every line begins with, as [`Finished`] is written.
 const BEGINNING: &[u8] = b"{\"job\":";
 
-/// Scores as JSON: numbers that JSON cannot hold (the PSNR of equal pictures is infinite) as text.
-mod score_lines {
-    use super::{Deserialize, Duration, LONGEST_TIME, MAX_SCORE, Score, Serialize};
+/// A score's values as JSON: numbers that JSON cannot hold (the PSNR of equal pictures is infinite) as text.
+pub(crate) mod values {
+    use super::MAX_SCORE;
     use serde::de::Error;
-    use serde::{Deserializer, Serializer};
-
-    #[derive(Serialize, Deserialize)]
-    struct Line {
-        scheme: String,
-        target: String,
-        source_count: usize,
-        seconds: f64,
-        values: Vec<(String, Number)>,
-    }
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
     #[derive(Serialize, Deserialize)]
     #[serde(untagged)]
@@ -99,42 +88,44 @@ mod score_lines {
         Other(String),
     }
 
-    pub(super) fn serialize<S: Serializer>(scores: &[Score], serializer: S) -> Result<S::Ok, S::Error> {
+    pub(crate) fn serialize<S: Serializer>(values: &[(String, f64)], serializer: S) -> Result<S::Ok, S::Error> {
         let number =
             |value: f64| if value.is_finite() { Number::Finite(value) } else { Number::Other(value.to_string()) };
-        serializer.collect_seq(scores.iter().map(|score| Line {
-            scheme: score.scheme.clone(),
-            target: score.target.clone(),
-            source_count: score.source_count,
-            seconds: score.time.as_secs_f64(),
-            values: score.values.iter().map(|(name, value)| (name.clone(), number(*value))).collect(),
-        }))
+        serializer.collect_seq(values.iter().map(|(name, value)| (name, number(*value))))
     }
 
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Score>, D::Error> {
-        let score = |line: Line| {
-            let value = |(name, number): (String, Number)| {
-                let (value, text) = match number {
-                    Number::Finite(value) => (Some(value), format!("{value:e}")),
-                    Number::Other(text) => (text.parse().ok(), text),
-                };
-                let possible = value.filter(|value: &f64| !value.is_finite() || value.abs() <= MAX_SCORE);
-                possible
-                    .map(|value| (name.clone(), value))
-                    .ok_or_else(|| D::Error::custom(format!("{name} is '{text}'")))
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<(String, f64)>, D::Error> {
+        let value = |(name, number): (String, Number)| {
+            let (value, text) = match number {
+                Number::Finite(value) => (Some(value), format!("{value:e}")),
+                Number::Other(text) => (text.parse().ok(), text),
             };
-            if !(0.0..=LONGEST_TIME).contains(&line.seconds) {
-                return Err(D::Error::custom(format!("seconds is '{:e}'", line.seconds)));
+            match value.filter(|value: &f64| !value.is_finite() || value.abs() <= MAX_SCORE) {
+                Some(value) => Ok((name, value)),
+                None => Err(D::Error::custom(format!("{name} is '{text}'"))),
             }
-            Ok(Score {
-                scheme: line.scheme,
-                target: line.target,
-                source_count: line.source_count,
-                values: line.values.into_iter().map(value).collect::<Result<_, _>>()?,
-                time: Duration::try_from_secs_f64(line.seconds).map_err(D::Error::custom)?,
-            })
         };
-        Vec::<Line>::deserialize(deserializer)?.into_iter().map(score).collect()
+        Vec::deserialize(deserializer)?.into_iter().map(value).collect()
+    }
+}
+
+/// A time of a picture as seconds.
+pub(crate) mod seconds {
+    use super::LONGEST_TIME;
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serializer};
+    use std::time::Duration;
+
+    pub(crate) fn serialize<S: Serializer>(time: &Duration, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_f64(time.as_secs_f64())
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Duration, D::Error> {
+        let seconds = f64::deserialize(deserializer)?;
+        if !(0.0..=LONGEST_TIME).contains(&seconds) {
+            return Err(D::Error::custom(format!("seconds is '{seconds:e}'")));
+        }
+        Duration::try_from_secs_f64(seconds).map_err(D::Error::custom)
     }
 }
 
