@@ -116,11 +116,18 @@ impl Progress for Watch<'_> {
     }
 }
 
-/// A stage, and the scheme, the field's options and the mixture that its sources are encoded under; none before the
-/// first.
+/// A stage, and what its sources are encoded under; nothing before the first.
 struct Weighed<'a> {
     stage: Stage<'a>,
-    under: Option<(String, Option<AnyOptions>, Option<Mixture>)>,
+    under: Option<Under>,
+}
+
+/// What sources are encoded under.
+#[derive(PartialEq)]
+struct Under {
+    scheme: String,
+    options: Option<AnyOptions>,
+    mixture: Option<Mixture>,
 }
 
 impl<'a> Weighed<'a> {
@@ -128,28 +135,13 @@ impl<'a> Weighed<'a> {
         Weighed { stage, under: None }
     }
 
-    /// Whether this weighting has begun.
-    fn is_under(&self, scheme: &str, options: Option<&AnyOptions>, mixture: Option<&Mixture>) -> bool {
-        let is_same = |(known, varied, mixed): &(String, Option<AnyOptions>, Option<Mixture>)| {
-            known == scheme && varied.as_ref() == options && mixed.as_ref() == mixture
-        };
-        self.under.as_ref().is_some_and(is_same)
-    }
-
     /// Begins a weighting, unless it has begun. Sources that it does not encode are encoded by the frames that use
     /// them.
-    fn weigh(
-        &mut self,
-        weighting: &Weighting,
-        options: Option<&AnyOptions>,
-        mixture: Option<&Mixture>,
-        progress: &dyn Progress,
-    ) -> Result<(), RenderError> {
-        let scheme = weighting.to_string();
-        if !self.is_under(&scheme, options, mixture) {
+    fn weigh(&mut self, weighting: &Weighting, under: Under, progress: &dyn Progress) -> Result<(), RenderError> {
+        if self.under.as_ref() != Some(&under) {
             self.under = None;
-            self.stage.vary(options, mixture, progress)?;
-            self.under = Some((scheme, options.cloned(), mixture.cloned()));
+            self.stage.vary(under.options.as_ref(), under.mixture.as_ref(), progress)?;
+            self.under = Some(under);
             self.stage.weigh(weighting, progress)?;
         }
         Ok(())
@@ -177,9 +169,6 @@ struct RenderLoop<'a> {
 }
 
 /// Width and height of full pictures at a camera of a view.
-///
-/// # Errors
-/// [`RenderError`] if the requested size does not fit the scene.
 pub(crate) fn full_size(
     scene: &Scene,
     camera: &Camera,
@@ -191,9 +180,6 @@ pub(crate) fn full_size(
 }
 
 /// Renders until the progress says that it is cancelled.
-///
-/// # Errors
-/// [`RenderError`] if the sources cannot be prepared, or if the device fails.
 pub(crate) fn run(viewer: &Viewer<'_>, shared: &Shared, outer: &dyn Progress) -> Result<(), RenderError> {
     let Viewed { scene, sources, field, device, options, weighting, .. } = viewer.viewed;
     let watch = Watch { shared, outer, makes_way: MakesWay::Never };
@@ -235,7 +221,8 @@ pub(crate) fn run(viewer: &Viewer<'_>, shared: &Shared, outer: &dyn Progress) ->
             shared.status.begin("preparing coarse pictures");
             let stage = coarse::stage(scene, &album, sources, small, renderer.as_ref(), &coarse_options, &watch)?;
             let mut coarse = Weighed::new(stage);
-            coarse.weigh(weighting, options.field.as_ref(), None, &watch)?;
+            let under = Under { scheme: weighting.to_string(), options: options.field.clone(), mixture: None };
+            coarse.weigh(weighting, under, &watch)?;
             pictures.coarse = Some(coarse);
         } else {
             pictures.prepare(&watch)?;
@@ -366,10 +353,8 @@ impl<'a> RenderLoop<'a> {
     fn soon(&mut self, request: &Request) -> Result<(Frame, bool), RenderError> {
         let watch = Watch { shared: self.shared, outer: self.outer, makes_way: MakesWay::Never };
         let is_fast = !self.pace.is_live() && self.full_time.is_some_and(|time| time < TIME_OF_A_PICTURE);
-        let scheme = request.weighting.to_string();
-        let options = self.choice.options(&scheme, &self.viewer.viewed);
-        let mixture = self.choice.mixture(&scheme);
-        let is_ready = self.full.as_ref().is_some_and(|full| full.is_under(&scheme, options, mixture));
+        let under = Some(self.under(&request.weighting));
+        let is_ready = self.full.as_ref().is_some_and(|full| full.under == under);
         if is_fast && is_ready {
             return Ok((self.full_frame(request, &watch)?, true));
         }
@@ -389,10 +374,10 @@ impl<'a> RenderLoop<'a> {
     /// The full picture. Makes way for requests that press.
     fn at_rest(&mut self, request: &Request) -> Result<(Frame, bool), RenderError> {
         let watch = Watch { shared: self.shared, outer: self.outer, makes_way: MakesWay::ToPressing };
+        let under = self.under(&request.weighting);
         if let Some(coarse) = &mut self.coarse {
             self.shared.status.begin("encoding sources for coarse pictures");
-            let options = self.choice.options(&request.weighting.to_string(), &self.viewer.viewed);
-            coarse.weigh(&request.weighting, options, None, &watch)?;
+            coarse.weigh(&request.weighting, Under { mixture: None, ..under }, &watch)?;
             // A frame that has to encode sources first would come late.
             coarse.stage.encode_all(&watch)?;
         }
@@ -414,19 +399,27 @@ impl<'a> RenderLoop<'a> {
 
     fn full_frame(&mut self, request: &Request, watch: &Watch<'_>) -> Result<Frame, RenderError> {
         let target = Target { name: String::new(), camera: self.camera(request), truth: None };
+        let under = self.under(&request.weighting);
         let Some(full) = &mut self.full else {
             self.prepare(watch)?;
             return self.full_frame(request, watch);
         };
         self.shared.status.begin("encoding sources");
-        let scheme = request.weighting.to_string();
-        let options = self.choice.options(&scheme, &self.viewer.viewed);
-        full.weigh(&request.weighting, options, self.choice.mixture(&scheme), watch)?;
+        full.weigh(&request.weighting, under, watch)?;
         self.shared.status.begin("rendering");
         let start = Instant::now();
         let frame = full.stage.frame(&request.weighting, &target, watch)?;
         self.full_time = Some(start.elapsed());
         Ok(frame)
+    }
+
+    /// What full pictures under a weighting have: what was chosen along with it, or the render's options.
+    fn under(&self, weighting: &Weighting) -> Under {
+        let scheme = weighting.to_string();
+        let given = || (self.viewer.viewed.options.field.clone(), None);
+        let chosen = self.choice.made(&scheme).map(|chosen| (Some(chosen.options.clone()), chosen.mixture.clone()));
+        let (options, mixture) = chosen.unwrap_or_else(given);
+        Under { scheme, options, mixture }
     }
 
     /// The requested camera, with the intrinsics of the viewer.
