@@ -180,7 +180,7 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
 /// # Errors
 /// If another handler is already installed.
 pub fn listen() -> anyhow::Result<()> {
-    terminal::silence_caught_panics();
+    viewfuse_job::panics::silence_caught();
     terminal::survive_full_files();
     Ok(terminal::listen()?)
 }

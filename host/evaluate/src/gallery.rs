@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::{Path, PathBuf};
 use viewfuse_core::metrics::psnr;
+use viewfuse_field::held_out::nearest;
 use viewfuse_field::render::Frame;
 use viewfuse_job::files::{WriteError, read_at_most, write_whole};
 use viewfuse_output::png::write_png;
@@ -176,7 +177,8 @@ impl Gallery {
         if self.sources.is_empty() {
             self.sources = (0..sources.images.len()).map(|source| thumbnail(sources.picture(source))).collect();
             self.truth = Some(truth.picture.clone());
-            self.copy = nearest(frame, sources).map(|source| {
+            let distance = |source: usize| sources.images[source].camera.pose.distance(&frame.target.camera.pose);
+            self.copy = nearest(0..sources.images.len(), distance, 1).pop().map(|source| {
                 let (width, height) = truth.picture.dimensions();
                 let own = sources.picture(source);
                 (source, imageops::resize(&own, width, height, imageops::FilterType::Triangle))
@@ -235,12 +237,6 @@ impl Gallery {
         let json = serde_json::to_vec(&shown).map_err(|cause| GalleryError::Json { path: path.clone(), cause })?;
         Ok(write_whole(&path, &json)?)
     }
-}
-
-/// The source whose camera is nearest to the target's, by its index; of equally near ones the first.
-fn nearest(frame: &Frame, sources: &SourceImages) -> Option<usize> {
-    let distance = |source: usize| sources.images[source].camera.pose.distance(&frame.target.camera.pose);
-    (0..sources.images.len()).min_by(|a, b| distance(*a).total_cmp(&distance(*b)))
 }
 
 /// At most [`THUMBNAIL`] pixels on a side.

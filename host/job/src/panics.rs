@@ -2,7 +2,7 @@
 
 use std::any::Any;
 use std::cell::Cell;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
 
 thread_local! {
     /// How many calls of [`caught`] this thread is in.
@@ -28,8 +28,18 @@ pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, Panicked> {
     outcome.map_err(|panic| Panicked { message: message(panic.as_ref()) })
 }
 
-/// Whether a panic of this thread would become an error: a panic hook can then stay silent.
-pub fn is_catching() -> bool {
+/// Keeps panics silent that become errors, in the whole program.
+pub fn silence_caught() {
+    let hook = take_hook();
+    set_hook(Box::new(move |panic| {
+        if !is_catching() {
+            hook(panic);
+        }
+    }));
+}
+
+/// Whether a panic of this thread would become an error.
+fn is_catching() -> bool {
     DEPTH.with(Cell::get) > 0
 }
 

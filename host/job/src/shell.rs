@@ -4,7 +4,7 @@ use std::ffi::OsStr;
 
 /// Characters that change the direction of what follows, or break lines in some programs: a line that holds one is not
 /// what it looks like.
-fn turns(character: char) -> bool {
+pub fn turns(character: char) -> bool {
     matches!(character, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 

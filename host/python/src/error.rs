@@ -147,13 +147,3 @@ impl From<Failure> for PyErr {
         }
     }
 }
-
-/// A decoder that panics is an error of the file; its panic is not printed.
-pub(crate) fn silence_caught_panics() {
-    let hook = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |panic| {
-        if !viewfuse::job::panics::is_catching() {
-            hook(panic);
-        }
-    }));
-}

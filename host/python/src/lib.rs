@@ -56,7 +56,7 @@ mod module {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        crate::error::silence_caught_panics();
+        viewfuse::job::panics::silence_caught();
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

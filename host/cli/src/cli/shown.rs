@@ -1,6 +1,7 @@
 //! Text as it is shown on the terminal: names, keys and metadata from files must not control it.
 
 use std::fmt::{Display, Write};
+use viewfuse_job::shell::turns;
 
 /// The text with every control character, and every character that changes the direction of what follows, written as
 /// `\u001b`; line breaks and tabs stay. In JSON, where such characters stand only in strings, that is the same string.
@@ -25,11 +26,6 @@ fn escaped(text: &str, stays: impl Fn(char) -> bool) -> String {
         }
     }
     shown
-}
-
-/// Whether a character changes the direction of text, or breaks lines in some programs.
-fn turns(character: char) -> bool {
-    matches!(character, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 #[cfg(test)]

@@ -52,16 +52,6 @@ pub(crate) fn survive_full_files() {
     }
 }
 
-/// Keeps panics silent that become errors.
-pub(crate) fn silence_caught_panics() {
-    let hook = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |panic| {
-        if !viewfuse_job::panics::is_catching() {
-            hook(panic);
-        }
-    }));
-}
-
 /// On standard error: a bar on a terminal, elsewhere a line every few seconds, and warnings. Messages on standard
 /// output.
 pub struct Terminal {

@@ -1,6 +1,7 @@
 //! Sources and targets by lists, and by distance from the target.
 
 use super::photographed;
+use viewfuse_field::held_out;
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{SelectionError, SelectionFault, check_count, view_list};
 
@@ -25,9 +26,6 @@ pub(super) fn fixed(
 
 /// Each target of a list, or each view, with the `count` other views whose cameras are nearest to its own; the first of
 /// equally near ones.
-///
-/// # Errors
-/// [`SelectionError`] for a list that does not fit the scene.
 pub(super) fn nearest(
     scene: &Scene,
     count: usize,
@@ -43,9 +41,8 @@ pub(super) fn nearest(
     }
     let pose = |view: usize| &scene.views[view].camera.pose;
     let of_target = |target: usize| {
-        let mut others: Vec<usize> = views.iter().copied().filter(|&view| view != target).collect();
-        others.sort_by(|&a, &b| pose(a).distance(pose(target)).total_cmp(&pose(b).distance(pose(target))));
-        others.truncate(count);
+        let others = views.iter().copied().filter(|&view| view != target);
+        let mut others = held_out::nearest(others, |view| pose(view).distance(pose(target)), count);
         others.sort_unstable();
         (others, target)
     };
