@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any, Optional, Union, final
+from typing import Any, Literal, Optional, Union, final
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -242,7 +242,14 @@ class Frame:
     def expected(self) -> Optional[tuple[float, float, float]]:
         """The PSNR to expect and the ends of the interval that holds four of five, decibels.
 
-        None unless the scheme was chosen for the scene.
+        None unless the scheme was chosen for the scene, and where `beyond` says why.
+        """
+    @property
+    def beyond(self) -> Optional[tuple[Literal["far", "unseen"], float]]:
+        """Why no PSNR can be expected of this picture although the scheme was chosen; None otherwise.
+
+        "far" with how many times as far the camera is from the photographs as the farthest of these is from the
+        others, or "unseen" with the share of the picture that no photograph shows.
         """
     @property
     def seconds(self) -> float:

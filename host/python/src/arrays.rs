@@ -9,9 +9,6 @@ use std::borrow::Cow;
 use viewfuse::core::camera::Pinhole;
 
 /// A vector as an array of this shape, which takes its memory.
-///
-/// # Errors
-/// If it has another length.
 pub(crate) fn array<T: Element, D: IntoDimension>(
     py: Python<'_>,
     shape: D,

@@ -2,19 +2,14 @@
 
 use crate::error::Failure;
 use crate::given_weights::{GivenWeights, Raised};
-use crate::request::{background, leave_out, size};
+use crate::request::{Pictures, device};
 use pyo3::prelude::*;
-use std::path::PathBuf;
 use std::time::Duration;
-use viewfuse::device::choice::{self, AnyDevice, DeviceChoice, DeviceOptions};
+use viewfuse::device::choice::AnyDevice;
 use viewfuse::evaluate::baseline::Baseline;
-use viewfuse::evaluate::metrics::{Metrics, MetricsOn, Scorer};
+use viewfuse::evaluate::metrics::{Metrics, Scorer};
 use viewfuse::evaluate::{Evaluator, PSNR, PSNR_CORRECTED, SSIM, Score};
-use viewfuse::field::options::Given;
-use viewfuse::field::render::{DEFAULT_EARLY_TERMINATION, RenderOptions};
-use viewfuse::field::{AnyField, rows};
 use viewfuse::job::progress::Progress;
-use viewfuse::nn::checkpoint::Checkpoint;
 use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::Selection;
 use viewfuse::weighting::{OpenedChoice, WeightingChoice, scheme_names};
@@ -76,42 +71,21 @@ pub(crate) struct Evaluation {
     pub(crate) weights: Option<GivenSchemes>,
     /// What a function that gives weights raised.
     pub(crate) raised: Raised,
-    pub(crate) size: Option<(u32, u32)>,
-    pub(crate) model: Option<PathBuf>,
-    pub(crate) device: String,
-    pub(crate) background: String,
-    pub(crate) leave_out: f32,
-    pub(crate) seed: u64,
+    pub(crate) pictures: Pictures,
 }
 
 impl Evaluation {
     /// The scores, target by target: the baselines and then every scheme.
-    ///
-    /// # Errors
-    /// Those of the command.
     pub(crate) fn carry_out(&self, scene: &Scene, progress: &dyn Progress) -> Result<Vec<PyScore>, Failure> {
         let weightings = self.weightings(scene)?;
-        let field = match &self.model {
-            None => AnyField::default(),
-            Some(path) => rows::open(Checkpoint::open(path)?, &Given { seed: self.seed, ..Given::default() })?,
-        };
+        let field = self.pictures.field()?;
         let about = field.about();
-        let options = RenderOptions {
-            size: size(self.size)?,
-            background: background(&self.background)?,
-            leave_out: leave_out(self.leave_out)?,
-            early_termination: if about.ends_rays { DEFAULT_EARLY_TERMINATION } else { 0.0 },
-            ..RenderOptions::default()
-        };
-        let options = match rows::named(about.name) {
-            Some(row) => row.bounded(options),
-            None => options,
-        };
-        let device = choice::open(&self.device.parse::<DeviceChoice>()?, &DeviceOptions::default())?.device;
+        let options = self.pictures.options(&about)?;
+        let device = device(&self.pictures.device)?;
         let renderer = field.on(&device);
         let scorer: Box<dyn Scorer + '_> = match &device {
-            AnyDevice::Cpu(device) => Box::new(MetricsOn { device, metrics: Metrics::plain() }),
-            AnyDevice::Vulkan(device) => Box::new(MetricsOn { device: device.as_ref(), metrics: Metrics::plain() }),
+            AnyDevice::Cpu(device) => Box::new(Metrics::plain(device)),
+            AnyDevice::Vulkan(device) => Box::new(Metrics::plain(device.as_ref())),
         };
         let (renderer, scorer) = (renderer.as_ref(), scorer.as_ref());
         let evaluator = Evaluator { weightings: &weightings, renderer, options: &options, scorer, progress };

@@ -7,7 +7,7 @@ use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use viewfuse::core::camera::Pinhole;
-use viewfuse::field::auto::Expected;
+use viewfuse::field::auto::{Beyond, Expected};
 use viewfuse::field::render::{Frame, Truth};
 use viewfuse::output::png::write_png;
 use viewfuse::scene::Scene;
@@ -50,6 +50,9 @@ pub(crate) struct PyFrame {
     /// The PSNR to expect and the ends of the interval that holds four of five, decibels. None unless the scheme was
     /// chosen.
     expected: Option<(f64, f64, f64)>,
+    /// Why no PSNR can be expected where the scheme was chosen: "far" and how many times as far away as the farthest
+    /// source is from the others, or "unseen" and the share of the picture that no source shows. None otherwise.
+    beyond: Option<(&'static str, f64)>,
     /// Time for this view alone, seconds.
     seconds: f64,
 }
@@ -77,14 +80,12 @@ pub(crate) struct Finished {
     pub(crate) frame: Frame,
     pub(crate) scheme: String,
     pub(crate) expected: Option<Expected>,
+    pub(crate) beyond: Option<Beyond>,
 }
 
 /// The arrays take the frame's memory. `sources` are views of the scene.
-///
-/// # Errors
-/// None that is known: the frame's parts fit one another.
 pub(crate) fn to_python(py: Python<'_>, scene: &Scene, sources: &[usize], finished: Finished) -> PyResult<PyFrame> {
-    let Finished { frame, scheme, expected } = finished;
+    let Finished { frame, scheme, expected, beyond } = finished;
     let Frame { target, weights, colours, picture, mut depths, confidences, truth, time, .. } = frame;
     let (width, height) = (picture.width() as usize, picture.height() as usize);
     if scene.frame.scale != 1.0 {
@@ -117,6 +118,10 @@ pub(crate) fn to_python(py: Python<'_>, scene: &Scene, sources: &[usize], finish
         corrected_psnr,
         ssim,
         expected: expected.map(|Expected { psnr, interval: [low, high], .. }| (psnr, low, high)),
+        beyond: beyond.map(|beyond| match beyond {
+            Beyond::Far(times) => ("far", times),
+            Beyond::Unseen(share) => ("unseen", share.into()),
+        }),
         seconds: time.as_secs_f64(),
     })
 }

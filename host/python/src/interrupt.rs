@@ -61,9 +61,6 @@ impl Progress for Watched {
 }
 
 /// Runs short work that cannot be cancelled while other Python threads run. After Ctrl-C nobody waits for its end.
-///
-/// # Errors
-/// What a signal handler raised.
 pub(crate) fn left_alone<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
     let (sender, done) = channel();
     thread::spawn(move || sender.send(work()).ok());

@@ -1,14 +1,12 @@
 //! A scene's photographs to a file of Gaussians, with the defaults of the command.
 
 use crate::error::Failure;
-use crate::request::{background, size};
+use crate::request::{device, render_options};
 use pyo3::prelude::*;
 use std::fs::canonicalize;
 use std::path::PathBuf;
-use viewfuse::device::choice::{self, DeviceChoice, DeviceOptions};
 use viewfuse::field::gaussians::{MAX_COUNT, MAX_ITERATIONS, Recipe};
 use viewfuse::field::optimise::SceneOptimisation;
-use viewfuse::field::render::RenderOptions;
 use viewfuse::job::files::check_writable;
 use viewfuse::job::progress::Progress;
 use viewfuse::output::gaussian_page::{check_name, write_optimised};
@@ -57,9 +55,6 @@ pub(crate) struct Optimisation {
 
 impl Optimisation {
     /// Optimises, and writes the file: after a cancellation what there is so far.
-    ///
-    /// # Errors
-    /// Those of the command.
     pub(crate) fn carry_out(&self, scene: &Scene, progress: &dyn Progress) -> Result<PyGaussians, Failure> {
         let output = &self.output;
         check_name(output).map_err(|problem| Failure::Input(format!("{}: {problem}", output.display())))?;
@@ -82,16 +77,12 @@ impl Optimisation {
         GaussianScene::check_place(output, &scene.frame)?;
         let optimisation = SceneOptimisation {
             weighting,
-            options: RenderOptions {
-                size: size(self.size)?,
-                background: background(&self.background)?,
-                ..RenderOptions::default()
-            },
+            options: render_options(self.size, &self.background)?,
             recipe: Recipe { seed: self.seed, ..Recipe::default() }.with(iterations, count),
             before: self.resume.as_ref().map(|path| GaussianFile::open(path, scene)).transpose()?,
             ..of_scene
         };
-        let device = choice::open(&self.device.parse::<DeviceChoice>()?, &DeviceOptions::default())?.device;
+        let device = device(&self.device)?;
         let is_resumable = output.extension().is_some_and(|own| own.eq_ignore_ascii_case("ply"));
         let ended = optimisation.run(&device, progress, |so_far| match is_resumable {
             true => so_far.write(output, &scene.frame),

@@ -94,9 +94,6 @@ impl Reporter {
     }
 
     /// The bar stays as it is.
-    ///
-    /// # Errors
-    /// What tqdm raised.
     pub(crate) fn end(&self, py: Python<'_>) -> PyResult<()> {
         if let Reporter::Bar(bar) = self {
             bar.call_method0(py, "close")?;

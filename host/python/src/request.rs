@@ -9,8 +9,13 @@ use pyo3::types::PyDict;
 use std::path::PathBuf;
 use viewfuse::core::camera::Camera;
 use viewfuse::core::pose::{Pose, PoseError};
+use viewfuse::device::choice::{self, AnyDevice, DeviceChoice, DeviceOptions};
+use viewfuse::field::options::Given;
+use viewfuse::field::render::{DEFAULT_EARLY_TERMINATION, RenderOptions};
+use viewfuse::field::{About, AnyField, rows};
+use viewfuse::nn::checkpoint::Checkpoint;
 use viewfuse::scene::few_shot::{FewShot, PathChoice, Selection, SelectionFault, Target};
-use viewfuse::scene::photographs::BackgroundChoice;
+use viewfuse::scene::photographs::BackgroundError;
 use viewfuse::scene::{Scene, SceneFrame};
 
 /// The arguments that choose sources and targets, which several methods take as keywords.
@@ -86,40 +91,56 @@ impl Request {
     }
 }
 
-/// Width and height of pictures.
-///
-/// # Errors
-/// Those that no picture has.
-pub(crate) fn size(given: Option<(u32, u32)>) -> Result<Option<[u32; 2]>, Failure> {
-    let sides = 1..=16_384;
-    match given {
-        None => Ok(None),
-        Some((width, height)) if sides.contains(&width) && sides.contains(&height) => Ok(Some([width, height])),
-        Some((width, height)) => {
-            Err(Failure::Input(format!("size: {width}x{height}; width and height are from 1 to 16384")))
+/// How pictures are made: the arguments that renders and evaluations share.
+pub(crate) struct Pictures {
+    pub(crate) size: Option<(u32, u32)>,
+    pub(crate) model: Option<PathBuf>,
+    pub(crate) device: String,
+    pub(crate) background: String,
+    pub(crate) leave_out: f32,
+    pub(crate) seed: u64,
+}
+
+impl Pictures {
+    /// The checkpoint's field; the training-free one without.
+    pub(crate) fn field(&self) -> Result<AnyField, Failure> {
+        match &self.model {
+            None => Ok(AnyField::default()),
+            Some(path) => Ok(rows::open(Checkpoint::open(path)?, &Given { seed: self.seed, ..Given::default() })?),
         }
     }
-}
 
-/// # Errors
-/// What is no background.
-pub(crate) fn background(given: &str) -> Result<BackgroundChoice, Failure> {
-    given.parse().map_err(|error| Failure::Input(format!("{error}")))
-}
-
-/// # Errors
-/// What is no share.
-pub(crate) fn leave_out(given: f32) -> Result<f32, Failure> {
-    match given {
-        share if (0.0..1.0).contains(&share) => Ok(share),
-        share => Err(Failure::Input(format!("leave_out: {share} is not at least 0 and less than 1"))),
+    /// The options for such a field.
+    pub(crate) fn options(&self, about: &About) -> Result<RenderOptions, Failure> {
+        let (options, share) = (render_options(self.size, &self.background)?, self.leave_out);
+        if !(0.0..1.0).contains(&share) {
+            return Err(Failure::Input(format!("leave_out: {share} is not at least 0 and less than 1")));
+        }
+        let early_termination = if about.ends_rays { DEFAULT_EARLY_TERMINATION } else { 0.0 };
+        let options = RenderOptions { leave_out: share, early_termination, ..options };
+        Ok(match rows::named(about.name) {
+            Some(row) => row.bounded(options),
+            None => options,
+        })
     }
+}
+
+/// The options of pictures of a size, over a background.
+pub(crate) fn render_options(size: Option<(u32, u32)>, background: &str) -> Result<RenderOptions, Failure> {
+    let sides = 1..=16_384;
+    if let Some((width, height)) = size.filter(|(width, height)| !sides.contains(width) || !sides.contains(height)) {
+        return Err(Failure::Input(format!("size: {width}x{height}; width and height are from 1 to 16384")));
+    }
+    let background = background.parse().map_err(|error: BackgroundError| Failure::Input(error.to_string()))?;
+    Ok(RenderOptions { size: size.map(Into::into), background, ..RenderOptions::default() })
+}
+
+/// Opens the device of this name.
+pub(crate) fn device(name: &str) -> Result<AnyDevice, Failure> {
+    Ok(choice::open(&name.parse::<DeviceChoice>()?, &DeviceOptions::default())?.device)
 }
 
 /// The sources and targets of what renders photographs that are held out.
-///
-/// # Errors
-/// A number of views that there cannot be.
 pub(crate) fn held_out(
     targets: Option<String>,
     sources: Option<String>,

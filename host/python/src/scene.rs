@@ -8,13 +8,12 @@ use crate::given_weights::{GivenWeights, Raised, raised};
 use crate::interrupt::{interruptible, watched};
 use crate::optimise::{Optimisation, PyGaussians};
 use crate::render::Order;
-use crate::request::{Request, held_out};
+use crate::request::{Pictures, Request, held_out};
 use crate::weights::{PyWeights, Schemes, weigh};
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
-use std::sync::Arc;
 use viewfuse::scene::few_shot::view_list;
 use viewfuse::scene::{MaskChoice, Scene, UnknownMasks};
 
@@ -137,11 +136,10 @@ impl PyScene {
     ) -> PyResult<Vec<PyFrame>> {
         let request = Request::of("render", selection)?;
         let (device, background) = (device.to_owned(), background.to_owned());
-        let errors = Raised::default();
-        let raised_by_weights = Arc::clone(&errors);
-        let order = Order { request, weights, raised: errors, size, model, device, background, leave_out, seed };
+        let pictures = Pictures { size, model, device, background, leave_out, seed };
+        let order = Order { request, weights, raised: Raised::default(), pictures };
         let rendered = watched(py, progress, |progress| order.carry_out(&self.scene, progress));
-        raised(&raised_by_weights)?;
+        raised(&order.raised)?;
         let (sources, frames) = rendered?;
         frames.into_iter().map(|frame| to_python(py, &self.scene, &sources, frame)).collect()
     }
@@ -167,12 +165,10 @@ impl PyScene {
     ) -> PyResult<Vec<PyScore>> {
         let selection = held_out(targets, sources, views)?;
         let (device, background) = (device.to_owned(), background.to_owned());
-        let errors = Raised::default();
-        let raised_by_weights = Arc::clone(&errors);
-        let evaluation =
-            Evaluation { selection, weights, raised: errors, size, model, device, background, leave_out, seed };
+        let pictures = Pictures { size, model, device, background, leave_out, seed };
+        let evaluation = Evaluation { selection, weights, raised: Raised::default(), pictures };
         let scores = watched(py, progress, |progress| evaluation.carry_out(&self.scene, progress));
-        raised(&raised_by_weights)?;
+        raised(&evaluation.raised)?;
         scores
     }
 

@@ -216,6 +216,16 @@ class Pictures(unittest.TestCase):
         np.testing.assert_array_equal(frame.picture, decoded(files["005.png"]))
         expected, low, high = frame.expected
         self.assertTrue(low < expected < high)
+        self.assertIsNone(frame.beyond)
+
+    def test_a_picture_whose_score_cannot_be_expected_says_why(self):
+        scene = viewfuse.Scene(ROOM)
+        pose = scene.poses[5].copy()
+        pose[:3, 3] *= 20
+        (frame,) = scene.render(poses=pose[None], size=SMALL)
+        why, times = frame.beyond
+        self.assertEqual((frame.expected, why), (None, "far"))
+        self.assertGreater(times, 1)
 
     def test_masks_mean_what_is_said(self):
         self.assertEqual(len(viewfuse.open(ROOM, masks="none")), len(viewfuse.open(ROOM)))
