@@ -21,6 +21,8 @@ use std::path::Path;
 use viewfuse_field::options::{Given, OpenError};
 use viewfuse_field::rows::ROWS;
 use viewfuse_field::{AnyField, Omission, VIEWS};
+use viewfuse_scene::{READERS, looked_for};
+use viewfuse_weighting::{Weighting, WeightingChoice};
 
 /// The field, and what its exact pictures depend on.
 #[derive(Args)]
@@ -54,6 +56,25 @@ fn omissions() -> Vec<PossibleValue> {
     };
     let of_rows = ROWS.iter().flat_map(|row| row.omissions.iter().map(|own| value(row.title, own)));
     [value("all", &VIEWS)].into_iter().chain(of_rows).collect()
+}
+
+/// Help of a scene that is looked for in any of the layouts.
+pub(crate) fn scene_help() -> String {
+    format!("The scene: {}", looked_for(&READERS))
+}
+
+/// The scheme of `--weights`; `None` where the scene is to decide: a network's pictures take too long to try out schemes
+/// unasked, and Gaussians show the same under all of them.
+pub(crate) fn chosen_scheme(
+    given: Option<&WeightingChoice>,
+    model: &ModelOptions,
+    gaussians: Option<&Path>,
+) -> anyhow::Result<Option<Weighting>> {
+    Ok(match given {
+        Some(WeightingChoice::Given(spec)) => Some(spec.open()?),
+        None if model.label().is_some() || gaussians.is_some() => Some(Weighting::default_scheme()),
+        Some(WeightingChoice::Auto) | None => None,
+    })
 }
 
 impl NetworkOptions {

@@ -7,7 +7,7 @@ mod stream;
 mod summary;
 mod write;
 
-use super::model::{Flags, ModelOptions, SEQUENCE};
+use super::model::{Flags, ModelOptions, SEQUENCE, chosen_scheme, scene_help};
 use super::options::{BoundOptions, DeviceOptions, PictureOptions, SourceOptions};
 use super::path::PathOptions;
 use super::posed::PoseOption;
@@ -22,7 +22,7 @@ use std::process::ExitCode;
 use viewfuse_field::AnyField;
 use viewfuse_field::auto;
 use viewfuse_field::gaussians::GivenGaussians;
-use viewfuse_scene::{READERS, Scene, looked_for};
+use viewfuse_scene::Scene;
 use viewfuse_weighting::{Weighting, WeightingChoice};
 
 #[derive(Args)]
@@ -80,20 +80,11 @@ pub(crate) struct Arguments {
     output: PathBuf,
 }
 
-fn scene_help() -> String {
-    format!("The scene: {}", looked_for(&READERS))
-}
-
 impl Arguments {
     /// The weighting; `None` where the scene is to decide.
     fn weighting(&self) -> anyhow::Result<Option<Weighting>> {
-        Ok(match &self.weights {
-            Some(WeightingChoice::Given(spec)) => Some(spec.open()?),
-            // A network's pictures take too long to try out schemes unasked; Gaussians show the same under all of them.
-            None if self.model.label().is_some() || self.gaussians.is_some() => Some(Weighting::default_scheme()),
-            None if self.fast => Some(auto::usual()),
-            Some(WeightingChoice::Auto) | None => None,
-        })
+        let chosen = chosen_scheme(self.weights.as_ref(), &self.model, self.gaussians.as_deref())?;
+        Ok(chosen.or_else(|| self.fast.then(auto::usual)))
     }
 
     /// The field that renders the scene.

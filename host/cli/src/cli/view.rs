@@ -1,6 +1,6 @@
 //! `viewfuse view`.
 
-use super::model::ModelOptions;
+use super::model::{ModelOptions, chosen_scheme, scene_help};
 use super::options::{BoundOptions, DeviceOptions, PictureOptions, SourceOptions};
 use super::posed::PoseOption;
 use super::printing::{say, warn_of};
@@ -14,7 +14,6 @@ use viewfuse_device::choice::Chosen;
 use viewfuse_field::AnyField;
 use viewfuse_field::gaussians::GivenGaussians;
 use viewfuse_job::shell::quoted;
-use viewfuse_scene::{READERS, looked_for};
 use viewfuse_view::{Commands, ViewError, Viewed, Viewer};
 use viewfuse_weighting::{Weighting, WeightingChoice};
 
@@ -59,19 +58,10 @@ pub(crate) struct Arguments {
 /// Options that only this command has, or that the page gives anew.
 const NOT_OF_RENDER: [&str; 6] = ["port", "no-browser", "weights", "sources", "views", "pose"];
 
-fn scene_help() -> String {
-    format!("The scene: {}", looked_for(&READERS))
-}
-
 /// `given` are the options on the command line, by long name, each with its value if it takes one.
 pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> anyhow::Result<ExitCode> {
-    let (weighting, chooses) = match &arguments.weights {
-        Some(WeightingChoice::Given(spec)) => (spec.open()?, false),
-        Some(WeightingChoice::Auto) => (Weighting::default_scheme(), true),
-        // As `render`: a network's pictures take too long to try out schemes unasked, and Gaussians show the same under
-        // all.
-        None => (Weighting::default_scheme(), arguments.model.label().is_none() && arguments.gaussians.is_none()),
-    };
+    let scheme = chosen_scheme(arguments.weights.as_ref(), &arguments.model, arguments.gaussians.as_deref())?;
+    let (chooses, weighting) = (scheme.is_none(), scheme.unwrap_or_else(Weighting::default_scheme));
     let (folder, scene) = arguments.pose.open(&arguments.scene, &arguments.picture.masks)?;
     warn_of(&scene);
     let field = match &arguments.gaussians {
