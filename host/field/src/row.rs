@@ -116,9 +116,6 @@ impl Row {
     }
 
     /// Refuses what the field does not have, and values that it does not take.
-    ///
-    /// # Errors
-    /// [`OpenError::Refused`].
     pub(crate) fn check(&self, given: &Given) -> Result<(), OpenError> {
         let is = || format!("is a {}", self.title);
         let knows = |name: &str| name == VIEWS.name || self.omissions.iter().any(|own| own.name == name);

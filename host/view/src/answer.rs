@@ -61,9 +61,6 @@ struct LayerPart {
 }
 
 /// The bytes of an answer: of a full picture if there is a record of it.
-///
-/// # Errors
-/// If the picture cannot be encoded.
 pub(crate) fn bytes(
     frame: &Frame,
     coverage: &Coverage,
@@ -108,9 +105,6 @@ pub(crate) fn bytes(
 }
 
 /// A picture as JPEG, for thumbnails and coarse pictures.
-///
-/// # Errors
-/// If it cannot be encoded.
 pub(crate) fn jpeg(picture: &RgbImage) -> Result<Vec<u8>, ImageError> {
     let mut bytes = Vec::new();
     picture.write_with_encoder(JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY))?;

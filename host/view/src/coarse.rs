@@ -37,9 +37,6 @@ pub(crate) fn reduced(images: &SourceImages, side: u32, scene: &Scene) -> Result
 
 /// Takes small sources to the device for coarse pictures. Where the scene's files do not state the depth range, it is
 /// searched on even smaller ones: the first picture must not wait for more.
-///
-/// # Errors
-/// [`RenderError`].
 pub(crate) fn stage<'a>(
     scene: &'a Scene,
     album: &'a Album<'a>,

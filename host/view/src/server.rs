@@ -86,9 +86,6 @@ enum Route<'a> {
 
 impl Server {
     /// Listens on a port of the loopback interface; 0 for any.
-    ///
-    /// # Errors
-    /// [`ListenError`].
     pub(crate) fn listen(port: u16) -> Result<Server, ListenError> {
         let failed = |cause| ListenError::Port { port, cause };
         let listener = TcpListener::bind(SocketAddr::from((Ipv4Addr::LOCALHOST, port))).map_err(failed)?;

@@ -72,9 +72,6 @@ impl Example {
 
 /// Mixes the pictures of each of these mixtures, as far as it is tried; the best one is the last. Nothing if there are
 /// too few sources.
-///
-/// # Errors
-/// [`RenderError`].
 pub(super) fn mixed(
     held_out: &mut HeldOutSources<'_>,
     weighting: &Weighting,

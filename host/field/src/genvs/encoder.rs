@@ -62,9 +62,6 @@ struct Aspp<D: Device> {
 
 impl<D: Device> Encoder<D> {
     /// Loads it, for images of at least `side` rows and columns.
-    ///
-    /// # Errors
-    /// If the checkpoint cannot be read, or the device has no memory left.
     pub(super) fn load(
         loader: &Loader<'_, D>,
         sizes: &architecture::Encoder,
@@ -103,9 +100,6 @@ impl<D: Device> Encoder<D> {
 
     /// The last layer's input, for an image (red, green, blue in `[-1, 1]`) whose rows and columns are multiples of
     /// [`SIDE_STEP`].
-    ///
-    /// # Errors
-    /// If the device is lost or has no memory left.
     pub(super) fn encode(
         &self,
         scratch: &mut Scratch<'_, D>,
@@ -145,9 +139,6 @@ impl<D: Device> Encoder<D> {
     }
 
     /// The last layer: some rows of the volume from the result of [`Encoder::encode`].
-    ///
-    /// # Errors
-    /// If the device is lost.
     pub(super) fn fill_rows(
         &self,
         device: &D,

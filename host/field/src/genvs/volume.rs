@@ -37,9 +37,6 @@ enum Nodes<D: Device> {
 
 impl<D: Device> Volume<D> {
     /// Encodes an image up to the last layer.
-    ///
-    /// # Errors
-    /// If the device is lost or has no memory left.
     pub(super) fn encode(
         device: &D,
         encoder: &Encoder<D>,
@@ -72,9 +69,6 @@ impl<D: Device> Volume<D> {
     }
 
     /// Computes missing rows. Returns how many.
-    ///
-    /// # Errors
-    /// If the device is lost.
     pub(super) fn fill(&mut self, device: &D, encoder: &Encoder<D>, rows: Range<u32>) -> Result<u32, DeviceError> {
         let filled = self.filled.clone();
         let Nodes::Whole { deep, image } = &mut self.nodes else { return Ok(0) };
@@ -105,9 +99,6 @@ impl<D: Device> Volume<D> {
     }
 
     /// Packs the volume, all of whose rows are computed, into half precision (f16), and drops the last layer's input.
-    ///
-    /// # Errors
-    /// If the device is lost or has no memory left.
     pub(super) fn pack(&mut self, device: &D) -> Result<(), DeviceError> {
         let Nodes::Whole { image, .. } = &self.nodes else { return Ok(()) };
         let number_count = self.number_count();
@@ -118,9 +109,6 @@ impl<D: Device> Volume<D> {
     }
 
     /// Interpolates every feature at points, by [`VolumeBlock`].
-    ///
-    /// # Errors
-    /// If the device is lost.
     pub(super) fn gather(
         &self,
         device: &D,
@@ -136,9 +124,6 @@ impl<D: Device> Volume<D> {
     }
 
     /// Its features as `f32`.
-    ///
-    /// # Errors
-    /// If the device is lost.
     pub(super) fn values(&self, device: &D) -> Result<Vec<f32>, DeviceError> {
         match &self.nodes {
             Nodes::Whole { image, .. } => device.download(&image.values),

@@ -22,9 +22,6 @@ enum Nodes<D: Device> {
 
 impl<D: Device> Grid<D> {
     /// Takes `number_count` values; with `half` they are packed into half precision.
-    ///
-    /// # Errors
-    /// If the device is lost or has no memory left.
     pub(super) fn new(
         device: &D,
         values: D::Buffer<f32>,
@@ -47,9 +44,6 @@ impl<D: Device> Grid<D> {
     }
 
     /// Interpolates every channel at points, by [`GatherBlock`], and adds the residual.
-    ///
-    /// # Errors
-    /// If the device is lost.
     pub(super) fn gather(
         &self,
         device: &D,
