@@ -15,7 +15,7 @@ use viewfuse::field::render::{DEFAULT_EARLY_TERMINATION, RenderOptions};
 use viewfuse::field::{About, AnyField, rows};
 use viewfuse::nn::checkpoint::Checkpoint;
 use viewfuse::scene::few_shot::{FewShot, PathChoice, Selection, SelectionFault, Target};
-use viewfuse::scene::photographs::BackgroundError;
+use viewfuse::scene::photographs::BackgroundChoice;
 use viewfuse::scene::{Scene, SceneFrame};
 
 /// The arguments that choose sources and targets, which several methods take as keywords.
@@ -131,7 +131,7 @@ pub(crate) fn render_options(size: Option<(u32, u32)>, background: &str) -> Resu
     if let Some((width, height)) = size.filter(|(width, height)| !sides.contains(width) || !sides.contains(height)) {
         return Err(Failure::Input(format!("size: {width}x{height}; width and height are from 1 to 16384")));
     }
-    let background = background.parse().map_err(|error: BackgroundError| Failure::Input(error.to_string()))?;
+    let background = background.parse::<BackgroundChoice>().map_err(|error| Failure::Input(error.to_string()))?;
     Ok(RenderOptions { size: size.map(Into::into), background, ..RenderOptions::default() })
 }
 
