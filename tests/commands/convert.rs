@@ -4,6 +4,7 @@ use super::{BINARY, done};
 use std::collections::BTreeMap;
 use std::path::Path;
 use viewfuse::field::pixelnerf::test_networks::deterministic_of_width as formula_of_width;
+use viewfuse::field::{genvs, pixelnerf};
 use viewfuse::job::progress::Silent;
 use viewfuse::nn::checkpoint::{Checkpoint, Precision, TensorShape};
 use viewfuse_tests::command::{self, Outcome, assert_refused, assert_wrong_arguments, files_below, toy};
@@ -106,6 +107,11 @@ fn an_unknown_max_pool_is_told() {
         let arguments = format!("convert a.safetensors c.safetensors --set {value}");
         assert_wrong_arguments(BINARY, path, &arguments, &["--set", "for example viewfuse.first_pool=0"]);
     }
+    let keys = [&pixelnerf::KEYS[..], &genvs::KEYS[..]].concat();
+    let refusal = format!("nothing reads the key viewfuse.first_pol; those that exist are {}", keys.join(", "));
+    let misspelled = "convert a.safetensors c.safetensors --set viewfuse.first_pol=0";
+    assert_wrong_arguments(BINARY, path, misspelled, &["--set", &refusal]);
+    assert!(!path.join("c.safetensors").exists());
 }
 
 fn learned_attention_becomes_a_header() {

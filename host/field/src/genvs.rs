@@ -24,7 +24,7 @@ mod volume;
 pub use architecture::MLP;
 pub use architecture::{
     ASPP_RATES, Architecture, Block, COLOUR_CHANNELS, Convolution, Denoiser, DenoiserLevel, DenoiserStep, Encoder,
-    Estimate, Level, Resampling, group_count,
+    Estimate, KEYS, Level, Resampling, group_count,
 };
 pub use feature_image::{LAST_LENGTH, cast_block, ray_length};
 pub(crate) use open::ROW;

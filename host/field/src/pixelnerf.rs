@@ -22,7 +22,7 @@ pub mod test_networks;
 mod variants;
 mod visibility;
 
-pub use architecture::{Architecture, Level, Pass};
+pub use architecture::{Architecture, KEYS, Level, Pass};
 pub(crate) use open::ROW;
 pub use options::{MIN_OPACITY, MIN_SHARE, Omissions, PixelNerfOptions, Sampling};
 

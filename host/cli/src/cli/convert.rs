@@ -7,7 +7,7 @@ use anyhow::{bail, ensure};
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use viewfuse_field::pixelnerf::Architecture;
+use viewfuse_field::{genvs, pixelnerf};
 use viewfuse_job::files::{check_writable, write_whole};
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::{Checkpoint, Precision};
@@ -36,10 +36,18 @@ pub(crate) struct Arguments {
     set: Vec<(String, String)>,
 }
 
+/// All keys that `--set` takes: those that a reader of checkpoints looks at.
+fn keys() -> impl Iterator<Item = &'static str> {
+    pixelnerf::KEYS.into_iter().chain(genvs::KEYS)
+}
+
 /// A value of `--set`.
 fn setting(text: &str) -> Result<(String, String), String> {
     let parts = text.split_once('=').filter(|(key, value)| !key.is_empty() && !value.is_empty());
     let (key, value) = parts.ok_or("a key and a value, for example viewfuse.first_pool=0")?;
+    if !keys().any(|known| known == key) {
+        return Err(format!("nothing reads the key {key}; those that exist are {}", Vec::from_iter(keys()).join(", ")));
+    }
     Ok((key.to_owned(), value.to_owned()))
 }
 
@@ -86,7 +94,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let mut checkpoint = Checkpoint::open(&arguments.input)?;
     arguments.set.iter().for_each(|(key, value)| checkpoint.set(key, value));
     let progress = Terminal::new("converting");
-    Architecture::assumption(&checkpoint).iter().for_each(|assumption| progress.warn(assumption));
+    pixelnerf::Architecture::assumption(&checkpoint).iter().for_each(|assumption| progress.warn(assumption));
     let precision = if arguments.half { Precision::Half } else { Precision::Kept };
     let written = checkpoint.write_safetensors(output, precision, &progress)?;
     drop(progress);

@@ -25,6 +25,8 @@ pub const COLOUR_CHANNELS: usize = 3;
 
 /// The metadata key of the images' side in a network without denoiser.
 pub(super) const IMAGE_SIDE: &str = "viewfuse.image_side";
+/// All keys of a checkpoint's metadata that are looked at.
+pub const KEYS: [&str; 2] = [denoiser::ESTIMATE, IMAGE_SIDE];
 /// The sides of an image are multiples of this, the encoder's output stride.
 const ENCODER_STRIDE: usize = 16;
 

@@ -47,10 +47,12 @@ const SOURCE_SIDE: u32 = 128;
 /// The largest side that a checkpoint may tell.
 const MAX_SIDE: f32 = 65536.0;
 
-/// Keys of the metadata.
 const FIRST_POOL: &str = "viewfuse.first_pool";
+const FREQUENCY: &str = "viewfuse.frequency";
 const PIXEL_CENTRE: &str = "viewfuse.pixel_centre";
 const SIDE: &str = "viewfuse.source_side";
+/// All keys of a checkpoint's metadata that are looked at.
+pub const KEYS: [&str; 4] = [FIRST_POOL, FREQUENCY, PIXEL_CENTRE, SIDE];
 
 /// The two point networks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -256,7 +258,7 @@ impl Architecture {
     pub fn metadata(&self) -> BTreeMap<String, String> {
         let number = |key: &str, value: f32| (key.to_owned(), value.to_string());
         BTreeMap::from([
-            number("viewfuse.frequency", self.frequency),
+            number(FREQUENCY, self.frequency),
             number(FIRST_POOL, if self.has_pool { 1.0 } else { 0.0 }),
             number(PIXEL_CENTRE, self.pixel_centre),
             number(SIDE, self.source_side as f32),
@@ -298,7 +300,7 @@ fn has_pool(sizes: &Sizes<'_>) -> Result<bool, CheckpointError> {
 fn frequency(sizes: &Sizes<'_>, octaves: usize) -> Result<f32, CheckpointError> {
     const TABLE: &str = "code._freqs";
     let published = Architecture::published().frequency;
-    let Some(shape) = sizes.shape(TABLE) else { return sizes.number("viewfuse.frequency", published) };
+    let Some(shape) = sizes.shape(TABLE) else { return sizes.number(FREQUENCY, published) };
     // Each frequency stands twice, for sine and cosine.
     if shape.iter().try_fold(1_usize, |count, side| count.checked_mul(*side)) != Some(2 * octaves) {
         return Err(sizes.refuse(format!("{TABLE} has the shape {shape:?} instead of 2 x {octaves} numbers")));

@@ -126,7 +126,7 @@ pub enum DenoiserStep {
 }
 
 /// The metadata key of [`Estimate`]: the name of one that is not the published one.
-const ESTIMATE: &str = "viewfuse.estimate";
+pub(super) const ESTIMATE: &str = "viewfuse.estimate";
 const FROM_COLOURS: &str = "colours";
 
 impl Estimate {
