@@ -192,7 +192,7 @@ fn numbers_without_sense_are_refused() {
     for value in ["0", "1", "100000"] {
         wrong("pixelnerf", &format!("--coarse {value}"), &["--coarse", "from 2 to 1024"]);
     }
-    wrong("pixelnerf", "--fine 100000", &["--fine", "from 1 to 1024"]);
+    wrong("pixelnerf", "--fine 100000", &["--fine", "from 0 to 1024"]);
     for value in ["0", "5", "3.5"] {
         wrong("pixelnerf", &format!("--levels {value}"), &["--levels", "from 1 to 4"]);
     }

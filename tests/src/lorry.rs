@@ -19,7 +19,7 @@ pub fn orbit(side: u32) -> Orbit {
 /// If the side is 0.
 pub fn photographs(count: u32, side: u32) -> SourceImages {
     let cameras = orbit(side).spiral(count, [-0.4, 0.8]).expect("cameras off the pole");
-    sources(&toy::lorry().expect("the lorry"), &cameras)
+    sources(&toy::lorry(), &cameras)
 }
 
 /// A camera that is none of the sources.

@@ -37,7 +37,7 @@ enum Command {
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let run = || match arguments.command {
-        Command::Train(arguments) => train::run(&arguments),
+        Command::Train(arguments) => train::run(arguments),
         Command::Scenes(arguments) => scenes::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
     };

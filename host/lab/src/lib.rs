@@ -7,6 +7,7 @@
 //! command  the command `viewfuse-lab`
 //! ```
 #![forbid(unsafe_code)]
+#![allow(missing_docs, reason = "no library for users: what a name says is not said again")]
 
 mod command;
 pub mod report;

@@ -39,43 +39,20 @@ use viewfuse_scene::SceneError;
 /// Why there is no report.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// A folder is not that of an evaluation.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// The pictures of an evaluation cannot be read.
     #[error(transparent)]
     Gallery(#[from] GalleryError),
-    /// A file cannot be read.
     #[error("{}: cannot be read: {cause}", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        cause: std::io::Error,
-    },
-    /// A file does not have the expected content.
+    Read { path: PathBuf, cause: std::io::Error },
     #[error("{}: is not a record of viewfuse {command}: {cause}", path.display())]
-    Json {
-        /// The file.
-        path: PathBuf,
-        /// The command that writes such files.
-        command: &'static str,
-        /// What is wrong with it.
-        cause: serde_json::Error,
-    },
-    /// A file is no curve of a training.
+    Json { path: PathBuf, command: &'static str, cause: serde_json::Error },
     #[error("{}: is not the curve of a training", path.display())]
-    NoCurve {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A picture cannot be decoded.
+    NoCurve { path: PathBuf },
     #[error(transparent)]
     Picture(#[from] SceneError),
-    /// A figure cannot be drawn.
     #[error(transparent)]
     Plot(#[from] PlotError),
-    /// A figure cannot be drawn.
     #[error("a figure cannot be drawn: {0}")]
     Figure(String),
 }
@@ -89,7 +66,6 @@ pub struct Report {
     pub evaluations: Vec<Evaluation>,
     /// Sweeps of run time.
     pub sweeps: Vec<Sweep>,
-    /// Trainings.
     pub trainings: Vec<Training>,
 }
 

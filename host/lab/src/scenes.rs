@@ -69,7 +69,7 @@ pub mod transforms;
 pub use folder::{WriteError, write_scene};
 pub use kinds::car;
 pub use light::Light;
-pub use object::{Object, ObjectError};
+pub use object::Object;
 pub use orbit::Orbit;
 pub use part::Part;
 pub use placement::Placement;

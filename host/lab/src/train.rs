@@ -46,13 +46,12 @@ mod state;
 mod weighting_learner;
 mod weights;
 
-pub use attention::Embedding;
-pub use augmentation::Augmentation;
-pub use genvs_learner::{GenvsSettings, MAX_LEVEL_SHARE, train_genvs};
-pub use pixelnerf_learner::{PixelNerfSettings, train_pixelnerf};
-pub use run::{Outcome, Schedule};
+pub(crate) use augmentation::Augmentation;
+pub(crate) use genvs_learner::{GenvsSettings, train_genvs};
+pub(crate) use pixelnerf_learner::{PixelNerfSettings, train_pixelnerf};
+pub(crate) use run::{Outcome, Schedule, Task, side};
 pub use state::check_state;
-pub use weighting_learner::{WeightingSettings, train_weighting};
+pub(crate) use weighting_learner::{WeightingSettings, train_weighting};
 
 use std::path::PathBuf;
 use viewfuse_core::camera::PinholeError;
@@ -69,97 +68,32 @@ struct Readme;
 /// Why training failed.
 #[derive(Debug, thiserror::Error)]
 pub enum TrainError {
-    /// A scene could not be read.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// Training takes square pictures.
     #[error("{}: view '{view}' is {width}x{height}; training takes square pictures", path.display())]
-    NotSquare {
-        /// The scene.
-        path: PathBuf,
-        /// The view.
-        view: String,
-        /// Its width.
-        width: u32,
-        /// Its height.
-        height: u32,
-    },
-    /// A scene has too few views for sources and a target view.
+    NotSquare { path: PathBuf, view: String, width: u32, height: u32 },
     #[error("{}: has {view_count} photographs; {least_views} are needed, for the sources and a target", path.display())]
-    FewViews {
-        /// The scene.
-        path: PathBuf,
-        /// Its photographs.
-        view_count: usize,
-        /// How many are needed.
-        least_views: usize,
-    },
-    /// A setting is out of its range.
+    FewViews { path: PathBuf, view_count: usize, least_views: usize },
     #[error("the setting {name} is {value}; {allowed}")]
-    Setting {
-        /// Its name.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// The allowed values.
-        allowed: &'static str,
-    },
-    /// There are no scenes.
+    Setting { name: &'static str, value: f64, allowed: &'static str },
     #[error("there are no scenes to {purpose}")]
-    NoScenes {
-        /// Their purpose.
-        purpose: &'static str,
-    },
-    /// The size of the pictures is invalid.
+    NoScenes { purpose: &'static str },
     #[error("{}: cannot be resampled: {error}", path.display())]
-    Pinhole {
-        /// The scene.
-        path: PathBuf,
-        /// The problem.
-        error: PinholeError,
-    },
-    /// A checkpoint could not be read.
+    Pinhole { path: PathBuf, error: PinholeError },
     #[error(transparent)]
     Parameters(#[from] CheckpointError),
-    /// A checkpoint cannot be used for training.
     #[error("{}: {reason}", path.display())]
-    Checkpoint {
-        /// The file.
-        path: PathBuf,
-        /// The problem.
-        reason: String,
-    },
-    /// The folder holds a run with other settings.
+    Checkpoint { path: PathBuf, reason: String },
     #[error("{}: holds a run with other settings: {difference}; give another folder, or the same settings to continue", path.display())]
-    OtherRun {
-        /// The file with the run's state.
-        path: PathBuf,
-        /// The difference.
-        difference: String,
-    },
-    /// The run's state is invalid.
+    OtherRun { path: PathBuf, difference: String },
     #[error("{}: is not the state of a training run: {reason}", path.display())]
-    State {
-        /// The file.
-        path: PathBuf,
-        /// The problem.
-        reason: String,
-    },
-    /// The loss or a parameter became NaN or infinite.
+    State { path: PathBuf, reason: String },
     #[error("step {step}: the {what} is not finite; the state before it is kept")]
-    NotFinite {
-        /// The step.
-        step: u32,
-        /// The value that is not finite.
-        what: String,
-    },
-    /// An output could not be written.
+    NotFinite { step: u32, what: String },
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// The library of automatic differentiation reported an error.
     #[error("the training graph: {0}")]
     Graph(#[from] candle_core::Error),
-    /// The work was cancelled.
     #[error("{0}")]
     Interrupted(#[from] Interrupted),
 }

@@ -164,7 +164,7 @@ fn blender_on_a_scene_in_its_layout() {
     train.retain(|(view, _)| [2, 16, 26, 55, 73, 75, 86, 93].contains(view));
     let mut test: Vec<_> = (0..).zip(spiral_views(&sphere, 200).expect("cameras")).collect();
     test.retain(|(view, _)| [0, 3, 40, 104].contains(view));
-    let lorry = lorry().expect("a lorry");
+    let lorry = lorry();
     let angle = 2.0 * (f64::from(sphere.pinhole.width()) / 2.0 / f64::from(sphere.pinhole.focal()[0])).atan();
     for (split, views) in [("train", train), ("val", test[1..2].to_vec()), ("test", test)] {
         let frame = |(number, camera): &(u32, Camera)| {

@@ -104,7 +104,7 @@ fn moving_and_scaling_the_world_changes_next_to_nothing() {
 
     // A turn that is no multiple of a quarter gives the object another box, hence other planes and steps: another
     // picture of the same quality.
-    let truth = scenes::sources(&lorry().expect("the lorry"), &[camera]);
+    let truth = scenes::sources(&lorry(), &[camera]);
     let psnr = |picture: &Rendered| {
         let over_white = truth.images[0].texels.iter().map(|t| [0, 1, 2].map(|c| t[c] + 1.0 - t[3]));
         let squares =

@@ -41,7 +41,7 @@ pub(crate) fn ball() -> Object {
     let texture = Texture::Mottle { colours, cell: Vec3::splat(0.06), seed: 3 };
     let finish = Finish { texture, gloss: 0.0 };
     let part = Part { shape: Shape::Sphere { radius: RADIUS }, placement: Placement::at(0.0, 0.0, 0.0), finish };
-    Object::new(vec![part]).expect("a sound ball")
+    Object::new(vec![part])
 }
 
 /// The ball from 16 sides.
@@ -57,7 +57,7 @@ pub(crate) fn lorry_views(side: u32) -> SourceImages {
         .step_by(3)
         .map(|camera| Camera { pinhole: orbit(side).pinhole, ..camera })
         .collect();
-    sources(&lorry().expect("the lorry"), &cameras)
+    sources(&lorry(), &cameras)
 }
 
 /// The picture shows something and something else.

@@ -34,7 +34,7 @@ fn poses_are_exact_and_pictures_are_those_of_the_object() {
         ("cars_test/000000", 2_000_000, spiral),
     ] {
         assert_poses(&out.join(folder), &cameras);
-        let object = car(11, index).expect("a car");
+        let object = car(11, index);
         let stored = image::open(out.join(folder).join("rgb/000001.png")).expect("a picture").into_rgba8();
         assert!(stored == render_with(&object, &cameras[1], RAYS_PER_SIDE), "{folder} shows another object");
         let scene = Scene::open(out.join(folder)).expect("a scene");

@@ -1,19 +1,14 @@
-//! Cars: every one is sound, fits into its pictures, and is another one.
+//! Cars: every one fits into its pictures, and is another one.
 
 use image::RgbaImage;
-use viewfuse_core::Vec3;
 use viewfuse_lab::scenes::cameras::{random_views, sphere};
-use viewfuse_lab::scenes::kinds::{MAX_RADIUS, car};
-use viewfuse_lab::scenes::{Light, Object, ObjectError, Orbit, render_with};
+use viewfuse_lab::scenes::kinds::{MAX_RADIUS, car as object};
+use viewfuse_lab::scenes::{Light, Object, Orbit, render_with};
 
 const SIDE: u32 = 64;
 
-fn object(seed: u64, index: u32) -> Object {
-    car(seed, index).unwrap_or_else(|error| panic!("car {index} of seed {seed}: {error}"))
-}
-
 #[test]
-fn every_object_is_sound_and_fits_into_its_pictures() {
+fn every_object_fits_into_its_pictures() {
     // A ball that touches the picture's edge: its sine is that of half the field of view.
     let widest = 1.3 * (64.0_f32 / 131.25).atan().sin();
     assert!(MAX_RADIUS < widest, "{MAX_RADIUS} is cut off at {widest}");
@@ -84,11 +79,7 @@ fn cars_face_along_x_and_stand_upright() {
 }
 
 #[test]
-fn lamps_differ_and_must_be_usable() {
+fn lamps_differ() {
     let lights: Vec<Light> = (0..20).map(|index| *object(7, index).light()).collect();
     assert!(lights.iter().enumerate().all(|(index, light)| !lights[..index].contains(light)));
-    let dark = Light { key: Vec3::ZERO, ..Light::default() };
-    assert_eq!(object(7, 0).under(dark), Err(ObjectError::Light));
-    let negative = Light { around: [-0.1, 0.5], ..Light::default() };
-    assert_eq!(object(7, 0).under(negative), Err(ObjectError::Light));
 }

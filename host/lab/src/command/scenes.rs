@@ -139,7 +139,7 @@ fn run_photograph(arguments: &PhotographArguments) -> anyhow::Result<ExitCode> {
 fn run_toy(out: &Path) -> anyhow::Result<ExitCode> {
     let cameras = [toy::training_cameras()?, toy::test_cameras()?].concat();
     let progress = Terminal::new("making the scene");
-    write_scene(out, &toy::lorry()?, &cameras, render::RAYS_PER_SIDE, &progress)?;
+    write_scene(out, &toy::lorry(), &cameras, render::RAYS_PER_SIDE, &progress)?;
     drop(progress);
     say(format_args!("{}: {} views", out.display(), cameras.len()))?;
     Ok(ExitCode::SUCCESS)

@@ -22,9 +22,6 @@ pub struct Evaluation {
 
 impl Evaluation {
     /// Reads a folder.
-    ///
-    /// # Errors
-    /// [`ReportError`].
     pub fn open(path: &Path) -> Result<Evaluation, ReportError> {
         let folder = RunFolder::open(path)?;
         let finished = folder.finished()?;

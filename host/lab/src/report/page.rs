@@ -7,9 +7,6 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:";
 
 /// The page as HTML.
-///
-/// # Errors
-/// [`ReportError`] if a picture is missing or a figure cannot be drawn.
 pub fn page(report: &Report) -> Result<String, ReportError> {
     let Report { title, evaluations, sweeps, trainings } = report;
     // Heading and body of every section; its place is its address on the page.

@@ -34,9 +34,6 @@ pub struct Sweep {
 
 impl Sweep {
     /// Reads `pareto.json`, or a folder that holds it.
-    ///
-    /// # Errors
-    /// [`ReportError`].
     pub fn open(path: &Path) -> Result<Sweep, ReportError> {
         let path = if path.is_dir() { path.join("pareto.json") } else { path.to_path_buf() };
         let json = |cause| ReportError::Json { path: path.clone(), command: "pareto", cause };

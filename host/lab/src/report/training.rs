@@ -15,9 +15,6 @@ pub struct Training {
 
 impl Training {
     /// Reads a folder, which must hold at least one of the two files.
-    ///
-    /// # Errors
-    /// [`ReportError`].
     pub fn open(folder: &Path) -> Result<Training, ReportError> {
         let [record, curve] = ["record.json", "curve.svg"].map(|name| folder.join(name));
         let parsed = |path: &Path| {

@@ -23,9 +23,6 @@ const SHARE_FROM_BELOW: f32 = 0.1;
 const HIGHEST_SINE: f32 = 0.999_999;
 
 /// The sphere of cameras with square pictures of `side` pixels.
-///
-/// # Errors
-/// [`PinholeError`] if `side` is no usable size.
 pub fn sphere(side: u32) -> Result<Orbit, PinholeError> {
     let scale = side as f32 / 128.0;
     let pinhole = Pinhole::new([131.25 * scale; 2], [64.0 * scale; 2], side, side)?;
@@ -34,9 +31,6 @@ pub fn sphere(side: u32) -> Result<Orbit, PinholeError> {
 
 /// Random cameras for one object: nine of ten spread evenly over the upper half of the sphere, the others over the
 /// lower one. Each depends on the seed, the object's index and its own index alone.
-///
-/// # Errors
-/// [`PoseError`]; none for a sphere of [`sphere`].
 pub fn random_views(sphere: &Orbit, seed: u64, object: u32, count: u32) -> Result<Vec<Camera>, PoseError> {
     // The numbers that describe objects have a kind there, which is small.
     let key = threefry_2x32([seed as u32, (seed >> 32) as u32], [object, u32::MAX]);
@@ -56,9 +50,6 @@ pub fn random_views(sphere: &Orbit, seed: u64, object: u32, count: u32) -> Resul
 /// The spiral on which SRN's test views stand: with `t` from 0 to 1, elevation `t pi / 2` and azimuth `20 (1 - t)`
 /// radians. So say the poses of the published scenes, which have 251 views; the last one, at the pole, is here beside
 /// it.
-///
-/// # Errors
-/// [`PoseError`]; none for a sphere of [`sphere`].
 pub fn spiral_views(sphere: &Orbit, count: u32) -> Result<Vec<Camera>, PoseError> {
     (0..count)
         .map(|view| {

@@ -13,7 +13,6 @@
 use crate::scenes::cameras::{random_views, sphere, spiral_views};
 use crate::scenes::folder::{self, write_views};
 use crate::scenes::kinds::car;
-use crate::scenes::object::ObjectError;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::io;
@@ -78,72 +77,27 @@ pub struct Made {
 /// Why a collection was not made, or not to the end.
 #[derive(Debug, thiserror::Error)]
 pub enum MakeError {
-    /// What is there was made otherwise.
     #[error(
         "{}: what is there was made with other settings ({there}; asked for: {wanted}); give the same settings or another folder",
         path.display()
     )]
-    OtherSettings {
-        /// The file with the settings.
-        path: PathBuf,
-        /// What it says.
-        there: String,
-        /// What was asked for.
-        wanted: String,
-    },
-    /// There are scenes, but nothing says what they were made with.
+    OtherSettings { path: PathBuf, there: String, wanted: String },
     #[error("{}: exists, but {} does not, which says what it was made with; give another folder", path.display(), settings.display())]
-    NoSettings {
-        /// A folder that is in the way.
-        path: PathBuf,
-        /// The file looked for.
-        settings: PathBuf,
-    },
-    /// The settings could not be read.
+    NoSettings { path: PathBuf, settings: PathBuf },
     #[error("{}: cannot be read", path.display())]
-    Read {
-        /// The file with the settings.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// The settings could not be understood.
+    Read { path: PathBuf, source: io::Error },
     #[error("{}: not the settings of a collection", path.display())]
-    Parse {
-        /// The file with the settings.
-        path: PathBuf,
-        /// Why.
-        source: serde_json::Error,
-    },
-    /// The settings could not be written.
+    Parse { path: PathBuf, source: serde_json::Error },
     #[error(transparent)]
     Settings(#[from] files::WriteError),
-    /// A scene could not be written.
     #[error(transparent)]
     Scene(#[from] folder::WriteError),
-    /// An object is not sound.
-    #[error("object {index}")]
-    Object {
-        /// Which.
-        index: u32,
-        /// Why.
-        source: ObjectError,
-    },
-    /// The size of the pictures is unusable.
     #[error("pictures of {size} x {size} pixels")]
-    Size {
-        /// What was asked for.
-        size: u32,
-        /// Why.
-        source: PinholeError,
-    },
-    /// A camera is unusable.
+    Size { size: u32, source: PinholeError },
     #[error("a camera is unusable")]
     Camera(#[from] PoseError),
-    /// More objects than names.
     #[error("a folder holds at most {MAX_OBJECT_COUNT} objects, not {0}")]
     Count(u32),
-    /// The work was stopped.
     #[error("{0}")]
     Interrupted(#[from] Interrupted),
 }
@@ -164,9 +118,6 @@ struct Job {
 
 /// Makes what is missing of a collection in `out`, on all threads. A scene appears whole or not at all, and what is
 /// there is kept: after an interruption the same call goes on.
-///
-/// # Errors
-/// [`MakeError`]; scenes that were finished before stay.
 pub fn make(out: &Path, settings: &Settings, counts: ObjectCounts, progress: &dyn Progress) -> Result<Made, MakeError> {
     let sets = [("train", counts.train, false), ("val", counts.validation, true), ("test", counts.test, true)];
     if let Some((_, count, _)) = sets.iter().find(|(_, count, _)| *count > MAX_OBJECT_COUNT) {
@@ -193,7 +144,7 @@ pub fn make(out: &Path, settings: &Settings, counts: ObjectCounts, progress: &dy
     progress.expect(jobs.iter().map(cameras_of).sum());
     jobs.par_iter().try_for_each(|job| {
         progress.check()?;
-        let object = car(settings.seed, job.index).map_err(|source| MakeError::Object { index: job.index, source })?;
+        let object = car(settings.seed, job.index);
         let random: Vec<Camera>;
         let cameras = if job.on_spiral {
             &spiral

@@ -26,72 +26,30 @@ pub const MAX_VIEW_COUNT: usize = 1_000_000;
 /// Why a scene folder was not written. Nothing stands at its path then that was not there before.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
-    /// Something stands there already.
     #[error("{path}: exists already and is not overwritten", path = .path.display())]
-    Exists {
-        /// The folder asked for.
-        path: PathBuf,
-    },
-    /// The path does not end in a name.
+    Exists { path: PathBuf },
     #[error("{path}: does not name a folder", path = .path.display())]
-    NoName {
-        /// The folder asked for.
-        path: PathBuf,
-    },
-    /// There are no cameras, or more than [`MAX_VIEW_COUNT`].
+    NoName { path: PathBuf },
     #[error("{path}: a scene has 1 to {MAX_VIEW_COUNT} views, not {count}", path = .path.display())]
-    ViewCount {
-        /// The folder asked for.
-        path: PathBuf,
-        /// How many cameras were given.
-        count: usize,
-    },
-    /// The layout has one set of intrinsics for all views, with one focal length for both axes.
+    ViewCount { path: PathBuf, count: usize },
     #[error(
         "{path}: view {view} has intrinsics that this layout cannot hold beside the first view's",
         path = .path.display()
     )]
-    Intrinsics {
-        /// The folder asked for.
-        path: PathBuf,
-        /// Index of the first camera that does not fit.
-        view: usize,
-    },
-    /// The work was stopped.
+    Intrinsics { path: PathBuf, view: usize },
     #[error("{0}")]
     Interrupted(#[from] Interrupted),
-    /// The file system refused.
     #[error("{path}: cannot be written", path = .path.display())]
-    Io {
-        /// What was being written.
-        path: PathBuf,
-        /// Why it was refused.
-        source: io::Error,
-    },
-    /// The photograph could not be stored.
+    Io { path: PathBuf, source: io::Error },
     #[error("{path}: cannot be stored as a JPEG", path = .path.display())]
-    Jpeg {
-        /// What was being written.
-        path: PathBuf,
-        /// What the encoder said.
-        source: image::ImageError,
-    },
-    /// The picture could not be stored.
+    Jpeg { path: PathBuf, source: image::ImageError },
     #[error("{path}: cannot be stored as a PNG", path = .path.display())]
-    Png {
-        /// What was being written.
-        path: PathBuf,
-        /// What the encoder or the file system said.
-        source: image::ImageError,
-    },
+    Png { path: PathBuf, source: image::ImageError },
 }
 
 /// Renders `object` from every camera and writes the scene to `folder`, which must not exist; its parent is created
 /// where it is missing. Views are named by the index of their camera. A pixel is the mean of `rays_per_side` squared
 /// rays ([`render_with`]). It checks `progress` between the views and stops if it says so.
-///
-/// # Errors
-/// [`WriteError`], always with the path.
 pub fn write_scene(
     folder: &Path,
     object: &Object,
@@ -104,9 +62,6 @@ pub fn write_scene(
 }
 
 /// As [`write_scene`], for a caller that expects the views: only their steps are told.
-///
-/// # Errors
-/// [`WriteError`].
 pub(crate) fn write_views(
     folder: &Path,
     object: &Object,
@@ -133,9 +88,6 @@ pub(crate) fn write_views(
 
 /// Creates a folder that must not exist, filled by `fill` under another name beside it and then renamed; its parent is
 /// created where it is missing.
-///
-/// # Errors
-/// What `fill` says, or [`WriteError`] if something stands there or the file system refuses.
 pub(crate) fn create_whole(
     folder: &Path,
     fill: impl FnOnce(&Path) -> Result<(), WriteError>,

@@ -11,6 +11,7 @@
 
 use crate::scenes::lamp::{across, on_disc};
 use crate::scenes::scenery::Scenery;
+use crate::scenes::shade::{TEXTURE_DEPTH, to_the_32nd};
 use crate::scenes::texture::light_from_display;
 use crate::scenes::trace::{Hit, first, is_blocked};
 use viewfuse_core::Vec3;
@@ -19,9 +20,6 @@ use viewfuse_core::math::{max, sqrt};
 
 /// Rays leave a surface from this far above it, in world units.
 const LIFT: f32 = 2.0e-3;
-
-/// The texture is read this far below the surface, in world units, as in [`crate::scenes::shade`].
-const TEXTURE_DEPTH: f32 = 1.0e-3;
 
 /// Surfaces farther away than this, in world units, take away none of the light from around.
 pub const AROUND_REACH: f32 = 2.2;
@@ -83,13 +81,4 @@ fn from_around(scenery: &Scenery, start: Vec3, normal: Vec3, pair: [f32; 2]) -> 
     let bounced = light_from_display(part.finish.texture.colour(point_local)) * BOUNCE;
     let open = distance / AROUND_REACH;
     light * (bounced + (Vec3::ONE - bounced) * open)
-}
-
-/// By repeated squaring: a power function would not be the same everywhere.
-fn to_the_32nd(x: f32) -> f32 {
-    let x2 = x * x;
-    let x4 = x2 * x2;
-    let x8 = x4 * x4;
-    let x16 = x8 * x8;
-    x16 * x16
 }

@@ -14,7 +14,7 @@ pub(crate) mod draws;
 mod livery;
 pub(crate) mod paint;
 
-use crate::scenes::object::{Object, ObjectError};
+use crate::scenes::object::Object;
 use build::Build;
 use draws::Draws;
 use viewfuse_core::Vec3;
@@ -28,23 +28,20 @@ const CHAIRS: u32 = 1;
 
 /// The car with this seed and index: a saloon, hatchback, van, pick-up, sports or race car, about half of them without
 /// wheels.
-///
-/// # Errors
-/// [`ObjectError`] if a part is unusable; none for cars as they are.
-pub fn car(seed: u64, index: u32) -> Result<Object, ObjectError> {
+pub fn car(seed: u64, index: u32) -> Object {
     object(seed, CARS, index, cars::car)
 }
 
 /// The chair with this seed and index.
-pub(crate) fn chair(seed: u64, index: u32) -> Result<Object, ObjectError> {
+pub(crate) fn chair(seed: u64, index: u32) -> Object {
     object(seed, CHAIRS, index, chairs::chair)
 }
 
-fn object(seed: u64, kind: u32, index: u32, add: fn(&mut Draws, &mut Build)) -> Result<Object, ObjectError> {
+fn object(seed: u64, kind: u32, index: u32, add: fn(&mut Draws, &mut Build)) -> Object {
     let mut draws = Draws::new(seed, kind, index);
     let mut build = Build::default();
     add(&mut draws, &mut build);
-    Object::new(build.parts)?.under(paint::light(&mut draws))
+    Object::new(build.parts).under(paint::light(&mut draws))
 }
 
 /// Linear blend.

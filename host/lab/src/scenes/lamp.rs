@@ -24,13 +24,6 @@ impl Lamp {
         let [x, y] = on_disc([u, v]);
         self.centre + (right * x + up * y) * self.radius
     }
-
-    /// Whether every number is finite, the light not negative, radius and reach positive.
-    pub fn is_sound(&self) -> bool {
-        let positive = |length: f32| length > 0.0 && length <= f32::MAX;
-        let light = self.light.is_finite() && self.light.cmpge(Vec3::ZERO).all();
-        self.centre.is_finite() && light && positive(self.radius) && positive(self.reach)
-    }
 }
 
 /// A point of the unit disc for two numbers in `[0, 1)`: even numbers give an even disc.

@@ -29,14 +29,3 @@ impl Default for Light {
         }
     }
 }
-
-impl Light {
-    /// Whether every number is finite, no direction is 0 and no light negative.
-    pub fn is_sound(&self) -> bool {
-        let amount = |light: f32| (0.0..=f32::MAX).contains(&light);
-        let direction = |towards: Vec3| towards.is_finite() && towards.length() > 0.0;
-        direction(self.key)
-            && direction(self.fill)
-            && [self.key_light, self.fill_light, self.around[0], self.around[1]].into_iter().all(amount)
-    }
-}

@@ -28,7 +28,7 @@ pub use stone::Stone;
 pub use wallpaper::{Motif, Wallpaper};
 pub use wood::Wood;
 
-use crate::scenes::noise::{blend, layered};
+use crate::scenes::noise::layered;
 use viewfuse_core::Vec3;
 
 /// Which two local coordinates a flat pattern is drawn with.
@@ -59,76 +59,26 @@ impl Plane {
     }
 }
 
-/// What a surface is made of.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Material {
-    /// Planks or solid wood with grain.
-    Wood(Wood),
-    /// Bricks, stones or tiles between joints.
-    Masonry(Masonry),
-    /// Printed wallpaper.
-    Wallpaper(Wallpaper),
-    /// Woven cloth, checked or striped.
-    Cloth(Cloth),
-    /// A knotted rug with borders and a medallion.
-    Rug(Rug),
-    /// Printed letters: a page, a poster, the faces of a toy block.
-    Letters(Letters),
-    /// A picture to hang on a wall.
-    Painting(Painting),
-    /// The back of a book, and its pages.
-    Spine(Spine),
-    /// Painted pottery.
-    Glaze(Glaze),
-    /// Anything with blotches: marble, plaster, soil, leaves.
-    Stone(Stone),
-}
-
-impl Material {
-    /// The display colour at a point in local coordinates.
-    pub fn colour(&self, point_local: Vec3) -> Vec3 {
-        match self {
-            Material::Wood(wood) => wood.colour(point_local),
-            Material::Masonry(masonry) => masonry.colour(point_local),
-            Material::Wallpaper(wallpaper) => wallpaper.colour(point_local),
-            Material::Cloth(cloth) => cloth.colour(point_local),
-            Material::Rug(rug) => rug.colour(point_local),
-            Material::Letters(letters) => letters.colour(point_local),
-            Material::Painting(painting) => painting.colour(point_local),
-            Material::Spine(spine) => spine.colour(point_local),
-            Material::Glaze(glaze) => glaze.colour(point_local),
-            Material::Stone(stone) => stone.colour(point_local),
+macro_rules! materials {
+    ($($Material:ident),+) => {
+        /// What a surface is made of.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub enum Material {
+            $($Material($Material),)+
         }
-    }
 
-    /// Whether colours and sizes are finite and sizes positive.
-    pub fn is_sound(&self) -> bool {
-        match self {
-            Material::Wood(wood) => wood.is_sound(),
-            Material::Masonry(masonry) => masonry.is_sound(),
-            Material::Wallpaper(wallpaper) => wallpaper.is_sound(),
-            Material::Cloth(cloth) => cloth.is_sound(),
-            Material::Rug(rug) => rug.is_sound(),
-            Material::Letters(letters) => letters.is_sound(),
-            Material::Painting(painting) => painting.is_sound(),
-            Material::Spine(spine) => spine.is_sound(),
-            Material::Glaze(glaze) => glaze.is_sound(),
-            Material::Stone(stone) => stone.is_sound(),
+        impl Material {
+            /// The display colour at a point in local coordinates.
+            pub fn colour(&self, point_local: Vec3) -> Vec3 {
+                match self {
+                    $(Material::$Material(material) => material.colour(point_local),)+
+                }
+            }
         }
-    }
+    };
 }
 
-/// Smallest size of anything in a material, in world units: far below a pixel, far above rounding errors.
-pub const SMALLEST_SIZE: f32 = 1.0e-4;
-
-/// Whether every length is finite and at least [`SMALLEST_SIZE`].
-fn sizes<const N: usize>(lengths: [f32; N]) -> bool {
-    lengths.into_iter().all(|length| (SMALLEST_SIZE..=f32::MAX).contains(&length))
-}
-
-fn finite<const N: usize>(colours: [Vec3; N]) -> bool {
-    colours.into_iter().all(|colour| colour.is_finite())
-}
+materials!(Wood, Masonry, Wallpaper, Cloth, Rug, Letters, Painting, Spine, Glaze, Stone);
 
 /// A colour with the small unevenness of everything that was made or used: `strength` of it, in spots of `size`.
 fn worn(colour: Vec3, p: Vec3, size: f32, strength: f32, seed: u32) -> Vec3 {
@@ -138,9 +88,4 @@ fn worn(colour: Vec3, p: Vec3, size: f32, strength: f32, seed: u32) -> Vec3 {
 /// Softly 1 inside and 0 outside of an edge at 0; `width` is that of the transition.
 fn inside(distance: f32, width: f32) -> f32 {
     (0.5 - distance / width).clamp(0.0, 1.0)
-}
-
-/// A colour over another one where `amount` is 1.
-fn over(ground: Vec3, colour: Vec3, amount: f32) -> Vec3 {
-    blend(ground, colour, amount)
 }

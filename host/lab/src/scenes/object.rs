@@ -5,40 +5,7 @@ use crate::scenes::part::{Bounds, Part};
 use viewfuse_core::Vec3;
 use viewfuse_core::math::{max, min};
 
-/// Farthest that a part may reach from the world's origin: coordinates there are exact to about the distance at which a
-/// ray counts as arrived.
-pub const MAX_DISTANCE: f32 = 100.0;
-
-/// Why parts are not an object. Parts count from 0.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum ObjectError {
-    /// There is nothing to see.
-    #[error("the object has no parts")]
-    Empty,
-    /// A size is not positive and finite, or a rounding is larger than what it rounds.
-    #[error("part {part} has an unusable size or rounding")]
-    Shape {
-        /// Which part.
-        part: usize,
-    },
-    /// A colour, a gloss or a texture's size is not usable.
-    #[error("part {part} has an unusable colour, gloss or texture size")]
-    Finish {
-        /// Which part.
-        part: usize,
-    },
-    /// A lamp's direction or strength is not usable.
-    #[error("the light has an unusable direction or strength")]
-    Light,
-    /// A part's place is not finite or farther away than [`MAX_DISTANCE`].
-    #[error("part {part} is not within {MAX_DISTANCE} of the origin")]
-    Place {
-        /// Which part.
-        part: usize,
-    },
-}
-
-/// A union of parts, checked when built.
+/// A union of parts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Object {
     parts: Vec<Part>,
@@ -66,39 +33,19 @@ fn farthest_corner(part: &Part) -> f32 {
 
 impl Object {
     /// The union of these parts. Where two surfaces coincide, the earlier part shows.
-    ///
-    /// # Errors
-    /// [`ObjectError`] if there is no part, or names the first one with an unusable size, finish or place.
-    pub fn new(parts: Vec<Part>) -> Result<Object, ObjectError> {
-        if parts.is_empty() {
-            return Err(ObjectError::Empty);
-        }
-        let mut bounding_radius = 0.0;
-        let mut bounding_radii = Vec::with_capacity(parts.len());
-        for (index, part) in parts.iter().enumerate() {
-            if !part.shape.is_sound() {
-                return Err(ObjectError::Shape { part: index });
-            }
-            if !part.finish.is_sound() {
-                return Err(ObjectError::Finish { part: index });
-            }
-            let reach = part.placement.origin_world().length() + part.shape.bounding_radius();
-            if !(reach <= MAX_DISTANCE) {
-                return Err(ObjectError::Place { part: index });
-            }
-            bounding_radius = max(bounding_radius, min(reach, farthest_corner(part)));
-            bounding_radii.push(part.shape.bounding_radius());
-        }
+    pub fn new(parts: Vec<Part>) -> Object {
+        let bounding_radii: Vec<f32> = parts.iter().map(|part| part.shape.bounding_radius()).collect();
+        let reach =
+            |(part, radius): (&Part, &f32)| min(part.placement.origin_world().length() + radius, farthest_corner(part));
+        let bounding_radius = parts.iter().zip(&bounding_radii).map(reach).fold(0.0, max);
         let bounds = Bounds::new(&parts);
-        Ok(Object { parts, bounds, bounding_radii, bounding_radius, light: Light::default() })
+        Object { parts, bounds, bounding_radii, bounding_radius, light: Light::default() }
     }
 
     /// The same object under other lamps.
-    ///
-    /// # Errors
-    /// [`ObjectError::Light`].
-    pub fn under(self, light: Light) -> Result<Object, ObjectError> {
-        if light.is_sound() { Ok(Object { light, ..self }) } else { Err(ObjectError::Light) }
+    #[must_use]
+    pub fn under(self, light: Light) -> Object {
+        Object { light, ..self }
     }
 
     /// The lamps that it stands under.

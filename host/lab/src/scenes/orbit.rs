@@ -20,9 +20,6 @@ pub struct Orbit {
 impl Orbit {
     /// The camera at an azimuth (radians, from world x towards y) and an elevation above the plane `z = 0` given by its
     /// sine.
-    ///
-    /// # Errors
-    /// [`PoseError`] if it would stand at a pole, where up is undefined, or outside the finite.
     pub fn camera(&self, azimuth: f32, sine_of_elevation: f32) -> Result<Camera, PoseError> {
         let (sine, cosine) = sin_cos(azimuth);
         let level = sqrt(1.0 - sine_of_elevation * sine_of_elevation);
@@ -32,9 +29,6 @@ impl Orbit {
 
     /// `count` cameras spread evenly over the zone between two elevations given by their sines: each stands in the
     /// middle of its own band of equal area, and turns on by the golden angle from one to the next.
-    ///
-    /// # Errors
-    /// As [`Orbit::camera`].
     pub fn spiral(&self, count: u32, sines_of_elevation: [f32; 2]) -> Result<Vec<Camera>, PoseError> {
         let [low, high] = sines_of_elevation;
         (0..count)

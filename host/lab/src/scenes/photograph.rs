@@ -7,6 +7,7 @@
 
 use crate::scenes::illumination::{Chances, illuminate};
 use crate::scenes::noise::fractions;
+use crate::scenes::render::to_byte;
 use crate::scenes::scenery::Scenery;
 use crate::scenes::texture::display_from_light;
 use crate::scenes::trace::{first, trace};
@@ -100,9 +101,4 @@ fn pressed(light: f32) -> f32 {
     }
     let beyond = (light - SHOULDER) / (1.0 - SHOULDER);
     SHOULDER + (1.0 - SHOULDER) * beyond / (1.0 + beyond)
-}
-
-/// Nearest of the 256 levels; the conversion saturates.
-fn to_byte(display: f32) -> u8 {
-    (display * 255.0 + 0.5) as u8
 }

@@ -16,9 +16,6 @@ use viewfuse_core::math::{abs, clamp, max, min, sqrt};
 /// Most corners of an outline.
 pub const MAX_CORNER_COUNT: usize = 32;
 
-/// Shortest edge of an outline, in world units: shorter ones have no direction in `f32`.
-pub const SHORTEST_EDGE: f32 = 1.0e-4;
-
 /// Farther away than this from the box around a prism, in world units, the distance to the box is near enough.
 const FAR: f32 = 0.02;
 
@@ -74,8 +71,6 @@ impl Edges {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prism {
     edges: [Edges; MAX_CORNER_COUNT / EDGES_TOGETHER],
-    shortest_edge: f32,
-    /// As asked for; [`Prism::is_sound`] refuses one that is too large.
     corner_count: usize,
     width: Width,
     /// Largest `|x|`, `|y|` and `|z|`.
@@ -89,9 +84,8 @@ impl Prism {
     /// on all sides. The outline must not cross itself.
     pub fn new(corners: &[[f32; 2]], width: Width) -> Prism {
         let mut edges = [Edges::NOTHING; MAX_CORNER_COUNT / EDGES_TOGETHER];
-        let mut shortest_edge = f32::MAX;
         let mut reach = [0.0_f32; 2];
-        for (index, &[x, z]) in corners.iter().enumerate().take(MAX_CORNER_COUNT) {
+        for (index, &[x, z]) in corners.iter().enumerate() {
             let (edges, lane) = (&mut edges[index / EDGES_TOGETHER], index % EDGES_TOGETHER);
             let end = corners[(index + 1) % corners.len()];
             let along = [end[0] - x, end[1] - z];
@@ -99,7 +93,6 @@ impl Prism {
             (edges.start_x[lane], edges.start_z[lane]) = (x, z);
             [edges.along_x[lane], edges.along_z[lane]] = along;
             edges.inverse_square[lane] = 1.0 / squared_length;
-            shortest_edge = min(shortest_edge, sqrt(squared_length));
             reach = [max(reach[0], abs(x)), max(reach[1], abs(z))];
         }
         let half_box = Vec3::new(reach[0] + width.rounding, width.half_width, reach[1] + width.rounding);
@@ -108,7 +101,7 @@ impl Prism {
         // the largest singular value of the two, for the steepest change there is.
         let slope_squared = width.lean * width.lean + end_slope * end_slope;
         let steepest = 0.5 * (2.0 + slope_squared + sqrt(slope_squared * (slope_squared + 4.0)));
-        Prism { edges, shortest_edge, corner_count: corners.len(), width, half_box, scale: 1.0 / sqrt(steepest) }
+        Prism { edges, corner_count: corners.len(), width, half_box, scale: 1.0 / sqrt(steepest) }
     }
 
     /// Half of the extent along each axis of a box around the local origin that holds the prism.
@@ -146,7 +139,7 @@ impl Prism {
     fn outline_distance(&self, x: f32, z: f32) -> f32 {
         let mut nearest = [f32::MAX; EDGES_TOGETHER];
         let mut crossings = [0_u32; EDGES_TOGETHER];
-        let count = self.corner_count.min(MAX_CORNER_COUNT).div_ceil(EDGES_TOGETHER);
+        let count = self.corner_count.div_ceil(EDGES_TOGETHER);
         for edges in &self.edges[..count] {
             for lane in 0..EDGES_TOGETHER {
                 let (along_x, along_z) = (edges.along_x[lane], edges.along_z[lane]);
@@ -162,22 +155,5 @@ impl Prism {
         }
         let distance = sqrt(nearest.into_iter().fold(f32::MAX, min));
         if crossings.into_iter().fold(0, |sum, crossing| sum ^ crossing) == 1 { -distance } else { distance }
-    }
-
-    /// Whether there are 3 to [`MAX_CORNER_COUNT`] corners, no edge is shorter than [`SHORTEST_EDGE`], every number
-    /// is finite, and the width stays positive and larger than the rounding.
-    pub fn is_sound(&self) -> bool {
-        let Width { half_width, waist, lean, shoulder, nose, rounding } = self.width;
-        let slopes = lean >= 0.0 && nose >= 0.0 && (0.0..self.half_box.x).contains(&shoulder);
-        let narrowest = half_width - lean * max(self.half_box.z - waist, 0.0) - nose;
-        (3..=MAX_CORNER_COUNT).contains(&self.corner_count)
-            && self.shortest_edge >= SHORTEST_EDGE
-            && self.half_box.is_finite()
-            && waist.is_finite()
-            && self.scale > 0.0
-            && slopes
-            && rounding >= 0.0
-            && narrowest >= rounding
-            && half_width > 0.0
     }
 }

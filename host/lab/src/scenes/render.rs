@@ -80,6 +80,6 @@ fn pixel(object: &Object, camera: &Camera, rays_per_side: u32, [column, row]: [u
 }
 
 /// Nearest of the 256 levels; the conversion saturates.
-fn to_byte(display: f32) -> u8 {
+pub(super) fn to_byte(display: f32) -> u8 {
     (display * 255.0 + 0.5) as u8
 }

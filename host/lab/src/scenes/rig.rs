@@ -46,9 +46,6 @@ impl Hand {
 }
 
 /// `count` cameras on the arc.
-///
-/// # Errors
-/// [`PoseError`] if a camera would stand in the subject or straight above it; none for a sensible walk.
 pub fn cameras(walk: &Walk, pinhole: Pinhole, count: u32, seed: u64) -> Result<Vec<Camera>, PoseError> {
     let key = [seed as u32, (seed >> 32) as u32 ^ 0x5249_4753];
     let steps = max(count as f32 - 1.0, 1.0);

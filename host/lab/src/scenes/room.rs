@@ -16,7 +16,7 @@ use crate::scenes::kinds::draws::Draws;
 use crate::scenes::lamp::Lamp;
 use crate::scenes::material::Material;
 use crate::scenes::rig::Walk;
-use crate::scenes::scenery::{Scenery, SceneryError};
+use crate::scenes::scenery::Scenery;
 use crate::scenes::texture::{Finish, Texture};
 use viewfuse_core::Vec3;
 
@@ -42,22 +42,19 @@ const ROOM: u32 = 100;
 pub const WALK: Walk = Walk { subject: Vec3::new(0.0, 0.12, 0.34), distance: 3.1, heights: [0.95, 1.6] };
 
 /// The room with this seed and index.
-///
-/// # Errors
-/// [`SceneryError`] if something is unusable; none for rooms as they are.
-pub fn room(seed: u64, index: u32) -> Result<Scenery, SceneryError> {
+pub fn room(seed: u64, index: u32) -> Scenery {
     let mut draws = Draws::new(seed, ROOM, index);
     let mut build = Build::default();
     let window = shell::shell(&mut draws, &mut build);
     furniture::furniture(&mut draws, &mut build);
     hangings::hangings(&mut draws, &mut build);
-    things::things(&mut draws, &mut build)?;
+    things::things(&mut draws, &mut build);
     let first_glowing = build.parts.len();
     shell::outside(&mut draws, &mut build, window);
     let lamps = lamps(&mut draws);
     let dim = draws.between(0.36, 0.46);
     let around = [Vec3::new(1.0, 0.9, 0.78) * (0.7 * dim), Vec3::new(0.92, 0.96, 1.0) * dim];
-    Ok(Scenery::new(build.parts, lamps, around)?.glowing_from(first_glowing))
+    Scenery::new(build.parts, lamps, around).glowing_from(first_glowing)
 }
 
 /// A warm lamp above the table, to one side, and a cool one on the other side: the first throws the sharper shadows.

@@ -2,28 +2,11 @@
 
 use crate::scenes::lamp::Lamp;
 use crate::scenes::noise::blend;
-use crate::scenes::object::{Object, ObjectError};
+use crate::scenes::object::Object;
 use crate::scenes::part::Part;
 use viewfuse_core::Vec3;
 
-/// Why parts and lamps are not scenery.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum SceneryError {
-    /// The parts are not an object.
-    #[error(transparent)]
-    Object(#[from] ObjectError),
-    /// A lamp's place, size or light is not usable. Lamps count from 0.
-    #[error("lamp {lamp} has an unusable place, size or light")]
-    Lamp {
-        /// Which lamp.
-        lamp: usize,
-    },
-    /// The light from around is not finite or negative.
-    #[error("the light from around is unusable")]
-    Around,
-}
-
-/// Parts all around, and light. Checked when built.
+/// Parts all around, and light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scenery {
     object: Object,
@@ -36,18 +19,9 @@ pub struct Scenery {
 
 impl Scenery {
     /// Parts, lamps, and the light that comes from straight below and straight above where nothing is near.
-    ///
-    /// # Errors
-    /// [`SceneryError`] names what is unusable.
-    pub fn new(parts: Vec<Part>, lamps: Vec<Lamp>, around: [Vec3; 2]) -> Result<Scenery, SceneryError> {
-        if let Some(lamp) = lamps.iter().position(|lamp| !lamp.is_sound()) {
-            return Err(SceneryError::Lamp { lamp });
-        }
-        if !around.into_iter().all(|light| light.is_finite() && light.cmpge(Vec3::ZERO).all()) {
-            return Err(SceneryError::Around);
-        }
+    pub fn new(parts: Vec<Part>, lamps: Vec<Lamp>, around: [Vec3; 2]) -> Scenery {
         let first_glowing = parts.len();
-        Ok(Scenery { object: Object::new(parts)?, lamps, around, first_glowing })
+        Scenery { object: Object::new(parts), lamps, around, first_glowing }
     }
 
     /// The same, where the parts from this index on are shown in their own colours whatever the lamps say: what is seen
@@ -62,7 +36,6 @@ impl Scenery {
         &self.object
     }
 
-    /// The lamps.
     pub fn lamps(&self) -> &[Lamp] {
         &self.lamps
     }

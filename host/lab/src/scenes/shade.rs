@@ -21,7 +21,7 @@ use viewfuse_core::math::{clamp, max};
 const LIFT: f32 = 1.0e-3;
 /// The texture is read this far below the surface, in world units, so that a face that coincides with the border of two
 /// cells shows one of them and not rounding errors.
-const TEXTURE_DEPTH: f32 = 1.0e-3;
+pub(super) const TEXTURE_DEPTH: f32 = 1.0e-3;
 /// Spacing of the four points above the surface that look for a nook, in world units.
 const NOOK_STEP: f32 = 0.02;
 
@@ -67,7 +67,7 @@ fn openness(object: &Object, point: Vec3, normal: Vec3) -> f32 {
 }
 
 /// By repeated squaring: a power function would not be the same everywhere.
-fn to_the_32nd(x: f32) -> f32 {
+pub(super) fn to_the_32nd(x: f32) -> f32 {
     let x2 = x * x;
     let x4 = x2 * x2;
     let x8 = x4 * x4;

@@ -18,10 +18,7 @@ use viewfuse_core::math::{abs, max, min, sqrt};
 )]
 pub enum Shape {
     /// A ball.
-    Sphere {
-        /// Its radius.
-        radius: f32,
-    },
+    Sphere { radius: f32 },
     /// A ball that is stretched along the axes.
     Ellipsoid {
         /// Half of its extent along each axis.
@@ -36,9 +33,7 @@ pub enum Shape {
     },
     /// An upright cylinder with rounded rims.
     Cylinder {
-        /// Its radius.
         radius: f32,
-        /// Half of its height.
         half_height: f32,
         /// Radius of the rims, at most the radius and the half height.
         rounding: f32,
@@ -47,7 +42,6 @@ pub enum Shape {
     Torus {
         /// Distance of the tube's centre line from the axis.
         ring_radius: f32,
-        /// Radius of the tube.
         tube_radius: f32,
     },
     /// An upright cylinder that ends in half balls.
@@ -120,24 +114,6 @@ impl Shape {
             }
             Shape::Capsule { half_length, radius } => Vec3::new(radius, radius, half_length + radius),
             Shape::Prism(ref prism) => prism.half_box(),
-        }
-    }
-
-    /// Whether every size is finite and positive, and no rounding is larger than what it rounds.
-    pub fn is_sound(&self) -> bool {
-        let size = |length: f32| length > 0.0 && length <= f32::MAX;
-        match *self {
-            Shape::Sphere { radius } => size(radius),
-            Shape::Ellipsoid { radii } => size(radii.x) && size(radii.y) && size(radii.z),
-            Shape::Block { half_size: h, rounding } => {
-                size(h.x) && size(h.y) && size(h.z) && rounding >= 0.0 && rounding <= min(min(h.x, h.y), h.z)
-            }
-            Shape::Cylinder { radius, half_height, rounding } => {
-                size(radius) && size(half_height) && rounding >= 0.0 && rounding <= min(radius, half_height)
-            }
-            Shape::Torus { ring_radius, tube_radius } => size(ring_radius) && size(tube_radius),
-            Shape::Capsule { half_length, radius } => size(radius) && (0.0..=f32::MAX).contains(&half_length),
-            Shape::Prism(ref prism) => prism.is_sound(),
         }
     }
 }

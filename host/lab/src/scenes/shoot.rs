@@ -2,7 +2,7 @@
 
 use crate::scenes::noise::words;
 use crate::scenes::photograph::{depth, photograph};
-use crate::scenes::scenery::{Scenery, SceneryError};
+use crate::scenes::scenery::Scenery;
 use crate::scenes::{rig, room};
 use image::RgbImage;
 use viewfuse_core::camera::{Camera, Pinhole, PinholeError};
@@ -11,20 +11,10 @@ use viewfuse_core::pose::PoseError;
 /// Why there are no photographs.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ShootError {
-    /// The size of the pictures is unusable.
     #[error("pictures of {} x {} pixels: {source}", size[0], size[1])]
-    Size {
-        /// What was asked for.
-        size: [u32; 2],
-        /// Why.
-        source: PinholeError,
-    },
-    /// A camera is unusable.
+    Size { size: [u32; 2], source: PinholeError },
     #[error("a camera is unusable: {0}")]
     Camera(#[from] PoseError),
-    /// The scenery is unusable.
-    #[error(transparent)]
-    Scenery(#[from] SceneryError),
 }
 
 /// Focal length as a part of the pictures' longer side.
@@ -36,7 +26,6 @@ const SAMPLE_SEED: u64 = 17;
 /// Pictures of the sample are so large.
 const SAMPLE_SIZE: [u32; 2] = [320, 240];
 
-/// Views of the sample.
 const SAMPLE_VIEW_COUNT: u32 = 11;
 
 /// A scenery and the cameras in it. Pictures and depths are made when asked for, each alike whatever was asked before.
@@ -49,9 +38,6 @@ pub struct Shoot {
 
 /// A room and `count` cameras on an arc in front of its table, drawn for a seed, with pictures of `[width, height]`
 /// pixels.
-///
-/// # Errors
-/// [`ShootError`]; none for a size that a camera can have.
 pub fn generate(seed: u64, size: [u32; 2], count: u32) -> Result<Shoot, ShootError> {
     let [width, height] = size;
     let focal = FOCAL * width.max(height) as f32;
@@ -59,13 +45,10 @@ pub fn generate(seed: u64, size: [u32; 2], count: u32) -> Result<Shoot, ShootErr
     let pinhole =
         Pinhole::new([focal; 2], principal, width, height).map_err(|source| ShootError::Size { size, source })?;
     let cameras = rig::cameras(&room::WALK, pinhole, count, seed)?;
-    Ok(Shoot { scenery: room::room(seed, 0)?, cameras, seed: seed as u32 })
+    Ok(Shoot { scenery: room::room(seed, 0), cameras, seed: seed as u32 })
 }
 
 /// The repository's sample of a room, as `tests/data/room` has it: 11 views of 320 x 240 pixels on an arc.
-///
-/// # Errors
-/// None with the constants of this file.
 pub fn sample() -> Result<Shoot, ShootError> {
     generate(SAMPLE_SEED, SAMPLE_SIZE, SAMPLE_VIEW_COUNT)
 }

@@ -9,12 +9,6 @@ use viewfuse_core::Vec3;
 use viewfuse_core::math::{angle_from_components, floor_to_i32, sqrt};
 use viewfuse_core::random::threefry_2x32;
 
-/// Smallest size of a texture's cells, in world units: a hundred times the rounding error of a coordinate.
-pub const SMALLEST_CELL: f32 = 1.0e-5;
-
-/// Most slices of each colour: far more than a picture can show.
-pub const MAX_PAIR_COUNT: u32 = 1 << 12;
-
 /// How many boxes [`Texture::Patches`] has.
 pub const PATCH_COUNT: usize = 10;
 
@@ -25,7 +19,6 @@ pub struct Patch {
     pub from: Vec3,
     /// Its highest corner.
     pub to: Vec3,
-    /// Its colour.
     pub colour: Vec3,
 }
 
@@ -74,7 +67,6 @@ pub enum Texture {
         cell: f32,
         /// Radius of a ball as a fraction of the cell, at most 0.5: a ball never leaves its cell.
         radius: f32,
-        /// Which of the random patterns.
         seed: u32,
     },
     /// Boxes of other colours in one colour: lines, panels, numbers.
@@ -90,7 +82,6 @@ pub enum Texture {
         colours: [Vec3; 2],
         /// Size of a blotch along each axis: unequal ones give a grain.
         cell: Vec3,
-        /// Which of the random patterns.
         seed: u32,
     },
     /// What things in rooms and outdoors are made of.
@@ -109,31 +100,6 @@ pub struct Finish {
     pub texture: Texture,
     /// Strength of the highlight, 0 (matt) to about 0.3 (varnish).
     pub gloss: f32,
-}
-
-impl Finish {
-    /// Whether the gloss is finite and not negative, and the texture's colours and sizes are finite, its sizes at least
-    /// [`SMALLEST_CELL`] and the radius of spots in `(0, 0.5]`.
-    pub fn is_sound(&self) -> bool {
-        let size = |length: f32| (SMALLEST_CELL..=f32::MAX).contains(&length);
-        let both = |colours: [Vec3; 2]| colours[0].is_finite() && colours[1].is_finite();
-        let texture = match self.texture {
-            Texture::Plain { colour } => colour.is_finite(),
-            Texture::Checker { colours, size: edge } => both(colours) && size(edge),
-            Texture::Stripes { colours, across, width } => both(colours) && across.is_finite() && size(width),
-            Texture::Slices { colours, pair_count } => both(colours) && pair_count <= MAX_PAIR_COUNT,
-            Texture::Spots { colours, cell, radius, .. } => {
-                both(colours) && size(cell) && radius > 0.0 && radius <= 0.5
-            }
-            Texture::Patches { ground, ref patches } => {
-                let finite = |patch: &Patch| patch.from.is_finite() && patch.to.is_finite() && patch.colour.is_finite();
-                ground.is_finite() && patches.iter().all(finite)
-            }
-            Texture::Mottle { colours, cell, .. } => both(colours) && size(cell.x) && size(cell.y) && size(cell.z),
-            Texture::Material { ref material, shift } => material.is_sound() && shift.is_finite(),
-        };
-        texture && (0.0..=f32::MAX).contains(&self.gloss)
-    }
 }
 
 impl Texture {

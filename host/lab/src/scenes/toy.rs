@@ -7,7 +7,7 @@
 
 mod load;
 
-use crate::scenes::object::{Object, ObjectError};
+use crate::scenes::object::Object;
 use crate::scenes::orbit::Orbit;
 use crate::scenes::part::Part;
 use crate::scenes::placement::Placement;
@@ -47,26 +47,18 @@ const TEST_PLACES: [[f32; 2]; 4] = [[0.7, 0.5], [2.15, 0.4], [4.1, 0.7], [5.55, 
 /// Why the sample scene cannot be described; with the constants of this file it always can.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ToyError {
-    /// The intrinsics are unusable.
     #[error("the sample's intrinsics are unusable: {0}")]
     Pinhole(PinholeError),
-    /// A camera is unusable.
     #[error("a camera of the sample is unusable: {0}")]
     Pose(PoseError),
 }
 
 /// The views to build on: 20 on a spiral.
-///
-/// # Errors
-/// None with the constants of this file.
 pub fn training_cameras() -> Result<Vec<Camera>, ToyError> {
     orbit()?.spiral(TRAINING_VIEW_COUNT, ZONE).map_err(ToyError::Pose)
 }
 
 /// The views to test on: 4, none of them near a training view.
-///
-/// # Errors
-/// None with the constants of this file.
 pub fn test_cameras() -> Result<Vec<Camera>, ToyError> {
     let orbit = orbit()?;
     TEST_PLACES.iter().map(|&[azimuth, sine]| orbit.camera(azimuth, sine).map_err(ToyError::Pose)).collect()
@@ -79,10 +71,7 @@ fn orbit() -> Result<Orbit, ToyError> {
 }
 
 /// The toy lorry.
-///
-/// # Errors
-/// None with the constants of this file.
-pub fn lorry() -> Result<Object, ObjectError> {
+pub fn lorry() -> Object {
     let mut parts = Vec::new();
     running_gear(&mut parts);
     cab(&mut parts);

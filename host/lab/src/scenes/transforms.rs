@@ -40,9 +40,6 @@ struct Frame {
 
 /// Takes all photographs of a shoot and writes them to `folder`, which must not exist. A pixel is the mean of
 /// `rays_per_side` squared rays. It checks `progress` between the views and stops if it says so.
-///
-/// # Errors
-/// [`WriteError`], always with the path.
 pub fn write_shoot(
     folder: &Path,
     shoot: &Shoot,
@@ -75,9 +72,6 @@ pub fn write_shoot(
 }
 
 /// A photograph as the bytes of a JPEG file of [`JPEG_QUALITY`].
-///
-/// # Errors
-/// What the encoder says.
 pub fn jpeg(photograph: &RgbImage) -> Result<Vec<u8>, image::ImageError> {
     let mut bytes = Vec::new();
     JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY).encode_image(photograph)?;

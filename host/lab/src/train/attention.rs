@@ -4,18 +4,19 @@
 use super::TrainError;
 use super::parameters::{Parameters, fan_in, random};
 use candle_core::{D, DType, Device, Result, Tensor};
+use clap::ValueEnum;
 use serde::Serialize;
 use viewfuse_core::attention::{EMBEDDING, HIDDEN, POSE_FEATURES, pose_features};
 use viewfuse_core::pose::Pose;
 use viewfuse_nn::checkpoint::TensorShape;
 
 /// The embedding of poses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
-pub enum Embedding {
-    /// Fourier features of the centre and the view direction, three layers.
+pub(crate) enum Embedding {
+    // Fourier features of the centre and the view direction, three layers.
     Fourier,
-    /// The 16 entries of the pose, two layers.
+    // The 16 entries of the pose, two layers.
     Flat,
 }
 

@@ -3,45 +3,53 @@
 use super::TrainError;
 use super::batch::SourceDraw;
 use super::draw::{Draw, Purpose};
+use super::run::number;
+use clap::Args;
+use clap::builder::RangedU64ValueParser;
 use serde::{Serialize, Serializer};
 use viewfuse_core::weighting::Scheme;
-use viewfuse_weighting::sources::MAX_SOURCES;
+use viewfuse_weighting::{WeightingError, WeightingSpec};
 
 /// What differs from step to step, so that a network works with more than one kind of sources: of each list one is
 /// drawn.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Augmentation {
-    /// Numbers of sources, at least 1.
-    pub sources: Vec<usize>,
-    /// Sides of the sources' pictures, pixels, multiples of 16 up to the settings' side. Empty: that side. Rays are
-    /// always of pictures of the settings' side. A GeNVS has pictures of one side only: its volumes are made for it.
-    pub sides: Vec<u32>,
-    /// Each source shows a square somewhere in its photograph, of at least this share of its side and at most the
-    /// whole, above 0; 1: always the whole.
-    pub least_crop: f32,
-    /// Weighting schemes. With any other than the mean, an object has one target view in a step, as weights are for
-    /// one. Validation has the first of the list.
+#[derive(Args, Clone, Debug, Default, PartialEq, Serialize)]
+pub(crate) struct Augmentation {
+    /// Numbers of sources; each step draws one of the list [default: 1,2,3,3,3,3,4,6 for a PixelNeRF, 1,2,3,3 for a
+    /// GeNVS]
+    #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = RangedU64ValueParser::<usize>::new().range(1..=256))]
+    pub(crate) sources: Vec<usize>,
+    // Sides of the sources' pictures, pixels, multiples of 16 up to the settings' side. Empty: that side. Rays are
+    // always of pictures of the settings' side. A GeNVS has pictures of one side only: its volumes are made for it.
+    #[arg(skip)]
+    pub(crate) sides: Vec<u32>,
+    /// Let each source show only a square of its photograph, somewhere in it, of at least this share of its side
+    #[arg(long, value_name = "SHARE", default_value_t = 1.0, value_parser =
+        number(|share: &f32| *share > 0.0 && *share <= 1.0, "a number above 0, at most 1, is needed"))]
+    pub(crate) least_crop: f32,
+    /// The views' weights: a formula, mean, error:alpha=1, ...; of several, each step draws one, and validation has the
+    /// first [default: mean]
+    // With any other than the mean, an object has one target view in a step, as weights are for one.
+    #[arg(long = "weights", value_name = "SCHEME", value_parser = formula)]
     #[serde(serialize_with = "texts")]
-    pub schemes: Vec<Scheme>,
+    pub(crate) schemes: Vec<Scheme>,
+}
+
+fn formula(text: &str) -> Result<Scheme, String> {
+    let spec: WeightingSpec = text.parse().map_err(|error: WeightingError| error.to_string())?;
+    spec.formula()
+        .ok_or_else(|| "networks are trained with formulas only (`train weighting` trains attention)".to_owned())
 }
 
 impl Augmentation {
-    /// Whole photographs at the settings' side with equal weights, and these numbers of sources.
-    fn whole(sources: &[usize]) -> Augmentation {
-        Augmentation { sources: sources.to_vec(), sides: Vec::new(), least_crop: 1.0, schemes: vec![Scheme::MEAN] }
-    }
-
-    /// The default of a PixelNeRF, as published but for the number of sources: mostly three, so that the network works
-    /// with few sources, sometimes one or more, so that it works with any weights.
-    #[must_use]
-    pub fn pixelnerf() -> Augmentation {
-        Augmentation::whole(&[1, 2, 3, 3, 3, 3, 4, 6])
-    }
-
-    /// The default of a GeNVS: as [`Augmentation::pixelnerf`], with one to three sources.
-    #[must_use]
-    pub fn genvs() -> Augmentation {
-        Augmentation::whole(&[1, 2, 3, 3])
+    /// The same with these numbers of sources and equal weights where none are said.
+    pub(crate) fn or(mut self, sources: &[usize]) -> Augmentation {
+        if self.sources.is_empty() {
+            self.sources = sources.to_vec();
+        }
+        if self.schemes.is_empty() {
+            self.schemes.push(Scheme::MEAN);
+        }
+        self
     }
 
     /// The largest number of sources.
@@ -49,24 +57,16 @@ impl Augmentation {
         self.sources.iter().copied().max().unwrap_or(1)
     }
 
-    /// Refuses empty lists and numbers out of range, for pictures of this side.
+    /// Refuses sources larger than pictures of this side.
     pub(crate) fn check(&self, side: u32) -> Result<(), TrainError> {
-        let refuse = |name, value, allowed| Err(TrainError::Setting { name, value, allowed });
-        if let Some(count) = self.sources.iter().find(|count| !(1..=MAX_SOURCES).contains(*count)) {
-            return refuse("sources", *count as f64, "it must be from 1 to 256");
+        match self.sides.iter().find(|size| **size > side) {
+            None => Ok(()),
+            Some(wrong) => Err(TrainError::Setting {
+                name: "sides",
+                value: f64::from(*wrong),
+                allowed: "it must be a multiple of 16 from 16 to the side",
+            }),
         }
-        if self.sources.is_empty() || self.schemes.is_empty() {
-            let name = if self.sources.is_empty() { "sources" } else { "schemes" };
-            return refuse(name, 0.0, "at least one is needed");
-        }
-        let fits = |size: &u32| (16..=side).contains(size) && size.is_multiple_of(16);
-        if let Some(wrong) = self.sides.iter().find(|size| !fits(size)) {
-            return refuse("sides", f64::from(*wrong), "it must be a multiple of 16 from 16 to the side");
-        }
-        if !(self.least_crop > 0.0 && self.least_crop <= 1.0) {
-            return refuse("least_crop", f64::from(self.least_crop), "it must be above 0 and at most 1");
-        }
-        Ok(())
     }
 
     /// The sources of a step, and its scheme.

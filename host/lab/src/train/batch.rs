@@ -46,6 +46,24 @@ impl SourceDraw {
         let place = |which| draw.below(Purpose::Crops, 3 * index + which, (whole - size + 1) as usize) as u32;
         Cut { left: place(1), top: place(2), size, side: self.side.unwrap_or(whole) }
     }
+
+    /// The cameras of some views of an object, the batch's number `index`, as its sources; adds their pictures.
+    pub(crate) fn sources(
+        self,
+        scene: &TrainingScene,
+        draw: &Draw,
+        index: usize,
+        views: &[usize],
+        pictures: &mut Vec<f32>,
+    ) -> Result<Vec<Camera>> {
+        let source = |(place, &view): (usize, &usize)| {
+            let cut = self.cut(draw, index * views.len() + place, scene.pictures[view].width());
+            let (camera, picture) = scene.source(view, cut).map_err(Error::wrap)?;
+            pictures.extend(inputs(&picture));
+            Ok(camera)
+        };
+        views.iter().enumerate().map(source).collect()
+    }
 }
 
 /// Sources and target rays of some objects.
@@ -113,14 +131,8 @@ impl Batch {
             let side = scene.pictures[0].width();
             let order = draw.choose(Purpose::Sources, index, scene.cameras.len(), scene.cameras.len());
             let (views, others) = order.split_at(drawn.count.min(order.len() - 1));
-            let mut sources = Vec::with_capacity(views.len());
-            for (place, &view) in views.iter().enumerate() {
-                let cut = drawn.cut(draw, index * views.len() + place, side);
-                let (camera, picture) = scene.source(view, cut).map_err(Error::wrap)?;
-                pictures.extend(inputs(&picture));
-                source_side = picture.width() as usize;
-                sources.push(camera);
-            }
+            let sources = drawn.sources(scene, draw, index, views, &mut pictures)?;
+            source_side = sources[0].pinhole.width() as usize;
             let mut rays = Vec::with_capacity(ray_count);
             for ray in 0..ray_count {
                 let number = |which: usize| (index * ray_count + ray) * 4 + which;

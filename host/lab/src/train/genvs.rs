@@ -61,9 +61,6 @@ impl Genvs {
     }
 
     /// A trained network, which is not changed.
-    ///
-    /// # Errors
-    /// [`TrainError`] if the checkpoint is of another family, has no denoiser, or is for pictures of another side.
     pub(crate) fn frozen(checkpoint: &Checkpoint, side: u32, dtype: DType) -> std::result::Result<Genvs, TrainError> {
         let architecture = Architecture::of(checkpoint)?;
         let refuse = |reason: String| Err(TrainError::Checkpoint { path: checkpoint.path().to_path_buf(), reason });
@@ -182,9 +179,6 @@ impl Genvs {
     }
 
     /// The network of a checkpoint, to be trained further: with a new denoiser of this kind, or with its own.
-    ///
-    /// # Errors
-    /// As [`Genvs::frozen`].
     pub(crate) fn continued(
         checkpoint: &Checkpoint,
         side: u32,

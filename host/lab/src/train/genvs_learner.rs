@@ -14,41 +14,60 @@ use super::draw::{Draw, Purpose};
 use super::genvs::{Genvs, ViewCounts, Views, colours, each};
 use super::parameters::{Contents, Parameters};
 use super::pixelnerf_learner::decibels;
-use super::run::{self, Learner, Outcome, Schedule, Validated};
+use super::run::{self, Learner, Outcome, Plan, Task, Validated, count, number, share, side};
 use super::scenes::{Data, TrainingScene};
 use candle_core::{DType, Device, Result, Tensor};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
-use std::path::{Path, PathBuf};
 use viewfuse_core::depths::CoarseBlock;
 use viewfuse_core::schedule::{NoiseSchedule, Preconditioning, SIGMA_DATA};
 use viewfuse_field::genvs::{Architecture, Estimate};
-use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::Checkpoint;
 
 /// The settings of a run besides its schedule and scenes.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct GenvsSettings {
-    /// Channels of the denoiser's first level; see [`Architecture::narrow`]. A network that continues from a file has
-    /// the file's.
-    pub width: usize,
-    /// Side of the pictures.
-    pub side: u32,
-    /// Objects of a step.
-    pub objects: usize,
-    /// Targets of each. One in steps with another scheme than the mean, see [`Augmentation::schemes`].
-    pub targets: usize,
-    /// Samples of a ray, as many as in renders: samples shade themselves, so another number changes the brightness.
-    pub samples: u32,
-    /// Share of the pictures that have the largest noise level, from 0 to 1.
-    pub share_of_largest: f32,
-    /// What a new denoiser's estimate is relative to.
-    pub estimate: Estimate,
-    /// Whether a network that continues from a file begins with a new denoiser. Otherwise it keeps the file's.
-    pub new_denoiser: bool,
-    /// What differs from step to step. Sides are those of the settings: [`Augmentation::sides`] is empty.
-    pub augmentation: Augmentation,
+#[derive(Args, Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct GenvsSettings {
+    /// Channels of the denoiser's first level, a multiple of 4
+    // See [`Architecture::narrow`]. A network that continues from a file has the file's.
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = number(
+        |width: &usize| (1..=1024).contains(width) && width.is_multiple_of(4), "a multiple of 4 from 4 to 1024 is needed"))]
+    width: usize,
+    /// Side of the pictures, pixels, a multiple of 16
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = side())]
+    side: u32,
+    /// Objects of a step
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = count())]
+    objects: usize,
+    /// Targets of each object; one in steps with weights other than the mean
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = count())]
+    targets: usize,
+    /// Samples of a ray: as many as in renders
+    // Samples shade themselves, so another number changes the brightness.
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..=4096))]
+    samples: u32,
+    /// Share of the pictures that have the largest noise level, 0 to 1
+    #[arg(long = "largest-share", value_name = "SHARE", default_value_t = MAX_LEVEL_SHARE, value_parser = share::<f32>())]
+    share_of_largest: f32,
+    /// What a new denoiser's estimate is relative to: the colours of the feature image, or nothing, as published
+    #[arg(long, default_value = "colours", value_parser = estimate())]
+    estimate: Estimate,
+    /// With --from: begin with a new denoiser
+    #[arg(long, requires = "from")]
+    new_denoiser: bool,
+    #[arg(skip)]
+    pub(crate) augmentation: Augmentation,
 }
 
+fn estimate() -> impl TypedValueParser<Value = Estimate> {
+    PossibleValuesParser::new(["colours", "published"]).map(|name| match name.as_str() {
+        "colours" => Estimate::FromColours,
+        _ => Estimate::Published,
+    })
+}
+
+/// Numbers of sources, fewer than a PixelNeRF's: volumes take more memory.
+const SOURCES: [usize; 4] = [1, 2, 3, 3];
 /// Mean and deviation of the logarithm of noise levels, as published.
 const LEVELS: [f32; 2] = [-1.2, 1.2];
 /// Weight of the first features' squared error: that of the picture's at the largest level.
@@ -60,28 +79,15 @@ const VALIDATION_SOURCES: usize = 3;
 const MAX_VOLUMES: usize = 1 << 30;
 
 /// The default of [`GenvsSettings::share_of_largest`].
-pub const MAX_LEVEL_SHARE: f32 = 0.25;
+pub(super) const MAX_LEVEL_SHARE: f32 = 0.25;
 
 struct GenvsLearner {
     network: Genvs,
-    scenes: Vec<TrainingScene>,
-    validation: Vec<TrainingScene>,
+    data: Data,
     settings: GenvsSettings,
 }
 
 impl GenvsSettings {
-    /// Refuses numbers with which nothing is computed.
-    fn check(&self) -> std::result::Result<(), TrainError> {
-        let refuse = |name, value, allowed| Err(TrainError::Setting { name, value, allowed });
-        if !(0.0..=1.0).contains(&self.share_of_largest) {
-            return refuse("share_of_largest", f64::from(self.share_of_largest), "it must be from 0 to 1");
-        }
-        if let Some(side) = self.augmentation.sides.first() {
-            return refuse("sides", f64::from(*side), "a GeNVS's volumes are made for pictures of one side");
-        }
-        self.augmentation.check(self.side)
-    }
-
     /// Refuses steps whose volumes alone take more than 4 GiB.
     fn check_volumes(&self, architecture: &Architecture) -> std::result::Result<(), TrainError> {
         let Architecture { image_side, ref encoder, .. } = *architecture;
@@ -95,40 +101,32 @@ impl GenvsSettings {
     }
 }
 
-/// Trains a GeNVS in `folder`, or continues there: from scratch, or from a trained network.
-///
-/// # Errors
-/// [`TrainError`].
-pub fn train_genvs(
-    settings: &GenvsSettings,
+/// Trains a GeNVS, or continues: from scratch, or from a trained network.
+pub(crate) fn train_genvs(
+    mut settings: GenvsSettings,
     from: Option<&Checkpoint>,
-    schedule: &Schedule,
-    [scenes, validation]: [&[PathBuf]; 2],
-    folder: &Path,
-    progress: &dyn Progress,
+    task: &Task<'_>,
 ) -> std::result::Result<Outcome, TrainError> {
-    settings.check()?;
+    settings.augmentation = settings.augmentation.or(&SOURCES);
     let mut architecture = Architecture::narrow(settings.side as usize, settings.width);
-    let estimate = settings.estimate;
+    let (estimate, seed) = (settings.estimate, task.schedule.seed);
     architecture.denoiser.iter_mut().for_each(|denoiser| denoiser.estimate = estimate);
     let network = match from {
         Some(checkpoint) => {
             let new_denoiser = settings.new_denoiser.then_some(estimate);
-            Genvs::continued(checkpoint, settings.side, new_denoiser, DType::F32, schedule.seed)?
+            Genvs::continued(checkpoint, settings.side, new_denoiser, DType::F32, seed)?
         }
-        None => Genvs::new(architecture, DType::F32, schedule.seed)?,
+        None => Genvs::new(architecture, DType::F32, seed)?,
     };
     settings.check_volumes(&network.architecture)?;
     let least_views = settings.augmentation.most_sources() + settings.targets.max(1);
-    let least_views = least_views.max(VALIDATION_SOURCES + 1);
-    let data = Data::open([scenes, validation], settings.side, least_views, progress)?;
-    let denoiser = network.architecture.denoiser.as_ref();
-    let width = denoiser.map_or(settings.width, |denoiser| denoiser.base_channels);
-    let estimate = denoiser.map_or(estimate, |denoiser| denoiser.estimate);
-    let settings = GenvsSettings { width, estimate, ..settings.clone() };
-    let record = run::settings("genvs", &settings, schedule, &data, from)?;
-    let learner = GenvsLearner { network, scenes: data.training, validation: data.validation, settings };
-    run::run(&learner, schedule, &record, "PSNR dB of one call", folder, progress)
+    let data = Data::open(task.scenes, settings.side, least_views.max(VALIDATION_SOURCES + 1), task.progress)?;
+    if let Some(denoiser) = &network.architecture.denoiser {
+        (settings.width, settings.estimate) = (denoiser.base_channels, denoiser.estimate);
+    }
+    let learner = GenvsLearner { network, data, settings };
+    let plan = Plan { model: "genvs", score_name: "PSNR dB of one call", settings: &learner.settings, from };
+    run::run(&learner, &plan, task)
 }
 
 /// Noisy pictures.
@@ -214,12 +212,16 @@ impl Learner for GenvsLearner {
         &self.network.parameters
     }
 
+    fn data(&self) -> &Data {
+        &self.data
+    }
+
     fn loss(&self, draw: &Draw) -> Result<Tensor> {
         let GenvsSettings { objects, targets, samples, share_of_largest, ref augmentation, .. } = self.settings;
         let (sources, scheme) = augmentation.drawn(draw);
         let targets = if Targets::of(scheme) == Targets::One { 1 } else { targets };
         let views = ViewCounts { sources, targets };
-        let views = Views::draw(&self.scenes, draw, objects, views, self.network.parameters.dtype())?;
+        let views = Views::draw(&self.data.training, draw, objects, views, self.network.parameters.dtype())?;
         let samples = CoarseBlock { seed: [draw.seed as u32, draw.step], sample_count: samples, jitter: 1.0 };
         loss(&self.network, &views, &views.weights(scheme)?, &samples, share_of_largest, draw)
     }
@@ -227,7 +229,7 @@ impl Learner for GenvsLearner {
     fn validate(&self) -> Result<Validated> {
         let views = ViewCounts { sources: SourceDraw::whole(VALIDATION_SOURCES), targets: 1 };
         let weigh = |views: &Views| views.weights(self.settings.augmentation.schemes[0]);
-        let [score, colour_score] = scores(&self.network, &self.validation, views, self.settings.samples, &weigh)?;
+        let [score, colour_score] = scores(&self.network, &self.data.validation, views, self.settings.samples, &weigh)?;
         Ok(Validated { score, remark: format!("features {colour_score:.3} dB") })
     }
 

@@ -18,7 +18,7 @@ pub(super) fn orbit(side: u32) -> Orbit {
 
 pub(super) fn photographs(count: u32, side: u32) -> SourceImages {
     let cameras = orbit(side).spiral(count, [-0.4, 0.8]).expect("cameras off the pole");
-    sources(&toy::lorry().expect("the lorry"), &cameras)
+    sources(&toy::lorry(), &cameras)
 }
 
 /// A training scene of toy photographs.

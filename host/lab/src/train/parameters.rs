@@ -42,9 +42,6 @@ impl Parameters {
     }
 
     /// One of them.
-    ///
-    /// # Errors
-    /// [`candle_core::Error`] if there is none of this name.
     pub(crate) fn get(&self, name: &str) -> candle_core::Result<&Tensor> {
         match self.variables.get(name) {
             Some(variable) => Ok(variable.as_tensor()),
@@ -58,9 +55,6 @@ impl Parameters {
     }
 
     /// Their values.
-    ///
-    /// # Errors
-    /// [`candle_core::Error`], never on the CPU.
     pub(crate) fn values(&self) -> candle_core::Result<Vec<(TensorShape, Vec<f32>)>> {
         let one = |(name, variable): (&str, &Var)| {
             let shape = TensorShape { name: name.to_owned(), shape: variable.dims().to_vec() };

@@ -70,10 +70,6 @@ impl PixelNerf {
     }
 
     /// A trained network, which is not changed.
-    ///
-    /// # Errors
-    /// [`TrainError`] if the checkpoint is of another family, has a second point network, or batch norms with
-    /// statistics.
     pub(crate) fn frozen(checkpoint: &Checkpoint, dtype: DType) -> std::result::Result<PixelNerf, TrainError> {
         let architecture = Architecture::of(checkpoint)?;
         let refuse = |reason: String| TrainError::Checkpoint { path: checkpoint.path().to_path_buf(), reason };
@@ -98,9 +94,6 @@ impl PixelNerf {
     /// The network of a checkpoint, to be trained further, with `levels` levels of the trunk if it has fewer. New
     /// levels are as in a new network, and the point network's weights for them are zero: what it says is the same at
     /// first.
-    ///
-    /// # Errors
-    /// As [`PixelNerf::frozen`].
     pub(crate) fn continued(
         checkpoint: &Checkpoint,
         levels: usize,

@@ -6,73 +6,61 @@ use super::batch::{Batch, BatchSize, SourceDraw, Targets};
 use super::draw::Draw;
 use super::parameters::{Contents, Parameters};
 use super::pixelnerf::{PixelNerf, SampleCounts};
-use super::run::{self, Learner, Outcome, Schedule, Validated};
+use super::run::{self, Learner, Outcome, Plan, Task, Validated, count, number, side};
 use super::scenes::{Data, TrainingScene};
 use candle_core::{DType, Result, Tensor};
+use clap::Args;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
 use viewfuse_field::pixelnerf::architecture::Architecture;
-use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::Checkpoint;
 
 /// The settings of a run besides its schedule and scenes.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct PixelNerfSettings {
-    /// Width of the point network; the trunk's width follows from it. A network that continues from a file has the
-    /// file's.
-    pub width: usize,
-    /// Levels of the trunk behind its first convolution, 1 to 4; see [`Architecture::with_levels`]. `None`: 3, or those
-    /// of the file that a network continues from. More than the file's are added, and change nothing at first.
-    pub levels: Option<usize>,
-    /// Side of the pictures, which the network is then given when it renders.
-    pub side: u32,
-    /// Objects of a step.
-    pub objects: usize,
-    /// Rays of each.
-    pub rays: usize,
-    /// Samples of a ray in the first pass.
-    pub coarse: usize,
-    /// Samples that the second pass adds.
-    pub fine: usize,
-    /// What differs from step to step.
-    pub augmentation: Augmentation,
+#[derive(Args, Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct PixelNerfSettings {
+    /// Width of the point network
+    // The trunk's width follows from it. A network that continues from a file has the file's.
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = count())]
+    width: usize,
+    /// Levels of the trunk, 1 to 4: with more, a pixel's features depend on more of the photograph. More than those of
+    /// the file of --from are added [default: 3, or those of the file]
+    // See [`Architecture::with_levels`]; those that are added change nothing at first.
+    #[arg(long, value_name = "N", value_parser =
+        number(|levels: &usize| (1..=4).contains(levels), "a whole number from 1 to 4 is needed"))]
+    levels: Option<usize>,
+    /// Side of the pictures, pixels, a multiple of 16
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = side())]
+    side: u32,
+    /// Objects of a step
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = count())]
+    objects: usize,
+    /// Rays of each object
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = count())]
+    rays: usize,
+    /// Samples of a ray in the first pass
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser =
+        number(|samples: &usize| (2..=1024).contains(samples), "a whole number from 2 to 1024 is needed"))]
+    coarse: usize,
+    /// Samples that the second pass adds
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser =
+        number(|samples: &usize| *samples <= 1024, "a whole number from 0 to 1024 is needed"))]
+    fine: usize,
+    #[arg(skip)]
+    pub(crate) augmentation: Augmentation,
 }
 
-/// Levels of a new network's trunk, and the most: those of the published trunk.
+/// Levels of a new network's trunk: those of the published trunk.
 const LEVELS: usize = 3;
-const MAX_LEVELS: usize = 4;
-/// Largest width, side and count of the settings.
-const MAX_SETTING: usize = 1024;
+/// Mostly three sources, so that the network works with few of them, sometimes one or more, so that it works with any
+/// weights. Published: always the same number.
+const SOURCES: [usize; 8] = [1, 2, 3, 3, 3, 3, 4, 6];
 /// Most samples of a step times the width: so many numbers a layer has, of 4 bytes.
 const MAX_LAYER: usize = 1 << 28;
 
 impl PixelNerfSettings {
-    /// Refuses numbers with which nothing is computed, or that no memory holds.
+    /// Refuses numbers that no memory holds.
     fn check(&self) -> std::result::Result<(), TrainError> {
-        let &PixelNerfSettings { width, levels, side, objects, rays, coarse, fine, ref augmentation } = self;
-        let levels = levels.unwrap_or(LEVELS);
-        let numbers = [
-            ("width", width, 1, "it must be from 1 to 1024"),
-            ("side", side as usize, 16, "it must be from 16 to 1024 pixels"),
-            ("objects", objects, 1, "it must be from 1 to 1024"),
-            ("rays", rays, 1, "it must be from 1 to 1024"),
-            ("coarse", coarse, 2, "it must be from 2 to 1024"),
-            ("fine", fine, 0, "it must be from 0 to 1024"),
-        ];
-        if let Some(&(name, value, _, allowed)) =
-            numbers.iter().find(|(_, value, least, _)| !(*least..=MAX_SETTING).contains(value))
-        {
-            return Err(TrainError::Setting { name, value: value as f64, allowed });
-        }
-        if !(1..=MAX_LEVELS).contains(&levels) {
-            return Err(TrainError::Setting {
-                name: "levels",
-                value: levels as f64,
-                allowed: "it must be from 1 to 4",
-            });
-        }
-        let layer = objects * rays * (coarse + fine) * width;
-        if layer > MAX_LAYER {
+        let &PixelNerfSettings { width, side, objects, rays, coarse, fine, ref augmentation, .. } = self;
+        if objects * rays * (coarse + fine) * width > MAX_LAYER {
             let allowed = "objects times rays times samples times width must be at most 2^28";
             return Err(TrainError::Setting { name: "objects", value: objects as f64, allowed });
         }
@@ -87,37 +75,31 @@ const VALIDATION_SAMPLES: SampleCounts = SampleCounts { coarse: 64, fine: 32 };
 
 struct PixelNerfLearner {
     network: PixelNerf,
-    scenes: Vec<TrainingScene>,
-    validation: Vec<TrainingScene>,
+    data: Data,
     settings: PixelNerfSettings,
 }
 
-/// Trains a PixelNeRF in `folder`, or continues there: from scratch, or from a trained network.
-///
-/// # Errors
-/// [`TrainError`].
-pub fn train_pixelnerf(
-    settings: &PixelNerfSettings,
+/// Trains a PixelNeRF, or continues: from scratch, or from a trained network.
+pub(crate) fn train_pixelnerf(
+    mut settings: PixelNerfSettings,
     from: Option<&Checkpoint>,
-    schedule: &Schedule,
-    [scenes, validation]: [&[PathBuf]; 2],
-    folder: &Path,
-    progress: &dyn Progress,
+    task: &Task<'_>,
 ) -> std::result::Result<Outcome, TrainError> {
+    settings.augmentation = settings.augmentation.or(&SOURCES);
     settings.check()?;
     let most_sources = settings.augmentation.most_sources();
-    let data = Data::open([scenes, validation], settings.side, most_sources + 1, progress)?;
+    let data = Data::open(task.scenes, settings.side, most_sources + 1, task.progress)?;
     let architecture = Architecture { has_fine: false, pixel_centre: 0.5, ..Architecture::small(settings.width) };
+    let (levels, seed) = (settings.levels, task.schedule.seed);
     let mut network = match from {
-        Some(checkpoint) => PixelNerf::continued(checkpoint, settings.levels.unwrap_or(1), DType::F32, schedule.seed)?,
-        None => PixelNerf::new(architecture.with_levels(settings.levels.unwrap_or(LEVELS)), DType::F32, schedule.seed)?,
+        Some(checkpoint) => PixelNerf::continued(checkpoint, levels.unwrap_or(1), DType::F32, seed)?,
+        None => PixelNerf::new(architecture.with_levels(levels.unwrap_or(LEVELS)), DType::F32, seed)?,
     };
     network.architecture.source_side = settings.side;
-    let Architecture { width, ref levels, .. } = network.architecture;
-    let settings = PixelNerfSettings { width, levels: Some(levels.len()), ..settings.clone() };
-    let record = run::settings("pixelnerf", &settings, schedule, &data, from)?;
-    let learner = PixelNerfLearner { network, scenes: data.training, validation: data.validation, settings };
-    run::run(&learner, schedule, &record, "PSNR dB", folder, progress)
+    (settings.width, settings.levels) = (network.architecture.width, Some(network.architecture.levels.len()));
+    let learner = PixelNerfLearner { network, data, settings };
+    let plan = Plan { model: "pixelnerf", score_name: "PSNR dB", settings: &learner.settings, from };
+    run::run(&learner, &plan, task)
 }
 
 /// Ten times the logarithm of one over the mean square.
@@ -152,12 +134,16 @@ impl Learner for PixelNerfLearner {
         &self.network.parameters
     }
 
+    fn data(&self) -> &Data {
+        &self.data
+    }
+
     fn loss(&self, draw: &Draw) -> Result<Tensor> {
         let PixelNerfSettings { objects, rays, coarse, fine, .. } = self.settings;
         let (drawn, scheme) = self.settings.augmentation.drawn(draw);
         let targets = Targets::of(scheme);
         let size = BatchSize { objects, rays };
-        let batch = Batch::draw(&self.scenes, draw, size, drawn, targets, self.network.parameters.dtype())?;
+        let batch = Batch::draw(&self.data.training, draw, size, drawn, targets, self.network.parameters.dtype())?;
         let colours = self.network.render(&batch, &batch.weights(scheme)?, draw, SampleCounts { coarse, fine })?;
         (colours - &batch.truth)?.sqr()?.mean_all()
     }
@@ -165,7 +151,7 @@ impl Learner for PixelNerfLearner {
     fn validate(&self) -> Result<Validated> {
         let scheme = self.settings.augmentation.schemes[0];
         let weigh = |batch: &Batch| batch.weights(scheme);
-        let score = score(&self.network, &self.validation, VALIDATION_SOURCES, Targets::of(scheme), &weigh)?;
+        let score = score(&self.network, &self.data.validation, VALIDATION_SOURCES, Targets::of(scheme), &weigh)?;
         Ok(Validated { score, remark: String::new() })
     }
 

@@ -17,8 +17,10 @@ use super::parameters::{Contents, Parameters};
 use super::scenes::{Data, STAGES};
 use super::state::{self, Learned, Progressed};
 use candle_core::Tensor;
+use clap::Args;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::time::Instant;
 use viewfuse_job::digest::sha256_of;
 use viewfuse_job::files::{check_writable, write_whole};
@@ -26,20 +28,59 @@ use viewfuse_job::progress::{Progress, Silent};
 use viewfuse_nn::checkpoint::{Checkpoint, Precision};
 
 /// Length and learning rate of a run.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Schedule {
-    /// Steps of the run.
-    pub steps: u32,
-    /// Learning rate after the first hundred steps, over which it rises; from there it falls along a cosine to
-    /// 3 % of it.
-    pub rate: f64,
-    /// Seed of every random draw.
-    pub seed: u64,
-    /// Steps from one validation to the next.
-    pub validate_every: u32,
-    /// Seconds between writing the state; changes no number.
+#[derive(Args, Clone, Copy, Debug, PartialEq, Serialize)]
+pub(crate) struct Schedule {
+    /// Steps of the run
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) steps: u32,
+    /// Learning rate; it rises over the first hundred steps and falls along a cosine
+    #[arg(long, value_name = "RATE", default_value_t = 1.0e-3, value_parser = share::<f64>())]
+    rate: f64,
+    /// Seed of every random draw
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) seed: u64,
+    /// Steps from one validation to the next
+    #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..))]
+    validate_every: u32,
+    /// Seconds between writing the state
+    // It changes no number.
     #[serde(skip)]
-    pub write_every: f64,
+    #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser =
+        number(|seconds: &f64| (0.0..=86_400.0).contains(seconds), "a number of seconds from 0 to 86400 is needed"))]
+    write_every: f64,
+}
+
+/// What every run takes.
+pub(crate) struct Task<'a> {
+    pub(crate) schedule: &'a Schedule,
+    /// Training and validation scenes.
+    pub(crate) scenes: [&'a [PathBuf]; 2],
+    pub(crate) folder: &'a Path,
+    pub(crate) progress: &'a dyn Progress,
+}
+
+/// A parser of numbers: of those that fit. `needed` says which do.
+pub(crate) fn number<T: FromStr>(
+    fits: impl Fn(&T) -> bool + Clone,
+    needed: &'static str,
+) -> impl Fn(&str) -> Result<T, String> + Clone {
+    move |text| text.parse().ok().filter(|number| fits(number)).ok_or_else(|| needed.to_owned())
+}
+
+/// A parser of numbers from 0 to 1.
+pub(crate) fn share<T: FromStr + PartialOrd + From<u8>>() -> impl Fn(&str) -> Result<T, String> + Clone {
+    number(|share: &T| (T::from(0)..=T::from(1)).contains(share), "a number from 0 to 1 is needed")
+}
+
+/// A parser of the numbers of a step.
+pub(crate) fn count() -> impl Fn(&str) -> Result<usize, String> + Clone {
+    number(|count: &usize| (1..=1024).contains(count), "a whole number from 1 to 1024 is needed")
+}
+
+/// A parser of the sides of pictures.
+pub(crate) fn side() -> impl Fn(&str) -> Result<u32, String> + Clone {
+    let fits = |side: &u32| (1..=1024).contains(side) && side.is_multiple_of(16);
+    number(fits, "a multiple of 16 from 16 to 1024 is needed")
 }
 
 /// Names of files in the folder of a run.
@@ -59,21 +100,8 @@ const MAX_GRADIENT: f64 = 1.0;
 const AVERAGING: f64 = 0.999;
 
 impl Schedule {
-    /// Refuses numbers with which nothing would be learned, or never written.
-    fn check(&self) -> Result<(), TrainError> {
-        let Schedule { rate, write_every, .. } = *self;
-        if !(0.0..=1.0).contains(&rate) {
-            return Err(TrainError::Setting { name: "rate", value: rate, allowed: "it must be from 0 to 1" });
-        }
-        if !(write_every >= 0.0) {
-            let allowed = "it must be at least 0 seconds";
-            return Err(TrainError::Setting { name: "write_every", value: write_every, allowed });
-        }
-        Ok(())
-    }
-
     /// Learning rate of a step.
-    pub fn rate_at(&self, step: u32) -> f64 {
+    fn rate_at(&self, step: u32) -> f64 {
         let rising = f64::from(step + 1) / f64::from(WARM_UP);
         let done = f64::from(step) / f64::from(self.steps.max(1));
         let falling = LAST_RATE + (1.0 - LAST_RATE) * 0.5 * (1.0 + (std::f64::consts::PI * done).cos());
@@ -81,31 +109,12 @@ impl Schedule {
     }
 }
 
-/// The inputs that a run's numbers depend on: a run continues only if all of them are the same. Files are identified by
-/// their content, not by their path.
-pub(crate) fn settings(
-    model: &str,
-    own: &impl Serialize,
-    schedule: &Schedule,
-    data: &Data,
-    checkpoint: Option<&Checkpoint>,
-) -> Result<serde_json::Value, TrainError> {
-    let unreadable = |path: &Path, cause: &std::io::Error| TrainError::Checkpoint {
-        path: path.to_path_buf(),
-        reason: format!("cannot be read: {cause}"),
-    };
-    let digest = |path: &Path| sha256_of(path).map_err(|cause| unreadable(path, &cause));
-    let checkpoint = checkpoint.map(|checkpoint| digest(checkpoint.path())).transpose()?;
-    Ok(serde_json::json!({
-        "model": model, "settings": own, "schedule": schedule, "checkpoint": checkpoint,
-        "scenes": data.training.len(), "validation_scenes": data.validation.len(), "data": data.digest(),
-    }))
-}
-
 /// A trainable model.
 pub(crate) trait Learner {
-    /// Its parameters.
     fn parameters(&self) -> &Parameters;
+
+    /// What it learns from, and is validated on.
+    fn data(&self) -> &Data;
 
     /// The loss of a step.
     fn loss(&self, draw: &Draw) -> candle_core::Result<Tensor>;
@@ -127,26 +136,50 @@ pub(crate) struct Validated {
 
 /// The outcome of a run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outcome {
+pub(crate) struct Outcome {
     /// The trained parameters.
-    pub model: PathBuf,
+    pub(crate) model: PathBuf,
     /// Seconds of all steps, those of earlier parts of the run included.
-    pub seconds: f64,
+    pub(crate) seconds: f64,
     /// Step and score of every validation.
-    pub scores: Vec<(u32, f64)>,
+    pub(crate) scores: Vec<(u32, f64)>,
+}
+
+/// What a run is, besides its [`Task`].
+pub(crate) struct Plan<'a, S> {
+    pub(crate) model: &'static str,
+    pub(crate) score_name: &'static str,
+    pub(crate) settings: &'a S,
+    pub(crate) from: Option<&'a Checkpoint>,
+}
+
+impl<S: Serialize> Plan<'_, S> {
+    /// The inputs that a run's numbers depend on: a run continues only if all of them are the same. Files are identified
+    /// by their content, not by their path.
+    fn record(&self, schedule: &Schedule, data: &Data) -> Result<serde_json::Value, TrainError> {
+        let digest = |checkpoint: &Checkpoint| {
+            let path = checkpoint.path();
+            sha256_of(path).map_err(|cause| TrainError::Checkpoint {
+                path: path.to_path_buf(),
+                reason: format!("cannot be read: {cause}"),
+            })
+        };
+        let checkpoint = self.from.map(digest).transpose()?;
+        Ok(serde_json::json!({
+            "model": self.model, "settings": self.settings, "schedule": schedule, "checkpoint": checkpoint,
+            "scenes": data.training.len(), "validation_scenes": data.validation.len(), "data": data.digest(),
+        }))
+    }
 }
 
 /// Trains, or continues, until all steps are done. On cancellation it writes its state first.
-pub(crate) fn run(
+pub(crate) fn run<S: Serialize>(
     learner: &dyn Learner,
-    schedule: &Schedule,
-    settings: &serde_json::Value,
-    score_name: &str,
-    folder: &Path,
-    progress: &dyn Progress,
+    plan: &Plan<'_, S>,
+    &Task { schedule, folder, progress, .. }: &Task<'_>,
 ) -> Result<Outcome, TrainError> {
-    schedule.check()?;
-    let run = Run { learner, schedule, settings, score_name, folder };
+    let settings = &plan.record(schedule, learner.data())?;
+    let run = Run { learner, schedule, settings, score_name: plan.score_name, folder };
     for file in [run.state(), run.model(), folder.join(CURVE), folder.join(NUMBERS), folder.join(RECORD)] {
         check_writable(&file)?;
     }

@@ -24,9 +24,6 @@ pub(crate) struct Data {
 
 impl Data {
     /// Reads both lists, `[training, validation]`.
-    ///
-    /// # Errors
-    /// [`TrainError::NoScenes`] if one is empty, otherwise as [`TrainingScene::open_all`].
     pub(crate) fn open(
         lists: [&[PathBuf]; 2],
         side: u32,
@@ -67,7 +64,6 @@ pub(crate) struct Cut {
 /// One object with all its views.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TrainingScene {
-    /// Its path.
     pub(crate) path: PathBuf,
     /// Cameras of the pictures at this size.
     pub(crate) cameras: Vec<Camera>,
@@ -85,9 +81,6 @@ pub(crate) struct TrainingScene {
 
 impl TrainingScene {
     /// Reads all photographs of a scene at `side` x `side`.
-    ///
-    /// # Errors
-    /// [`TrainError`] if the scene or a photograph cannot be read, or if the pictures are not square.
     pub(crate) fn open(path: &PathBuf, side: u32, progress: &dyn Progress) -> Result<TrainingScene, TrainError> {
         let scene = Scene::open(path)?;
         let (mut cameras, mut pictures) = (Vec::new(), Vec::new());
@@ -122,9 +115,6 @@ impl TrainingScene {
     }
 
     /// Reads several scenes, on all cores.
-    ///
-    /// # Errors
-    /// As [`TrainingScene::open`], and [`TrainError::FewViews`] where one has fewer than `least_views`.
     pub(crate) fn open_all(
         paths: &[PathBuf],
         side: u32,
@@ -151,9 +141,6 @@ impl TrainingScene {
     }
 
     /// A part of a view as a source: its camera and its picture.
-    ///
-    /// # Errors
-    /// [`PinholeError`] if the part is empty or so small that its focal length has no meaning.
     pub(crate) fn source(&self, view: usize, cut: Cut) -> Result<(Camera, RgbImage), PinholeError> {
         let Cut { left, top, size, side } = cut;
         let (camera, picture) = (self.cameras[view], &self.pictures[view]);

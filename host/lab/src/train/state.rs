@@ -112,9 +112,6 @@ pub(crate) fn write(
 }
 
 /// Loads the state into the parameters and moments, if there is one. A run of more steps goes on from one of fewer.
-///
-/// # Errors
-/// [`TrainError::OtherRun`] if it has other settings, [`TrainError::State`] if it is invalid.
 pub(crate) fn read(path: &Path, settings: &Value, learned: &Learned<'_>) -> Result<Option<Progressed>, TrainError> {
     let wrong = |reason: String| TrainError::State { path: path.to_path_buf(), reason };
     let bytes = match read_at_most(path, LONGEST_STATE) {
@@ -176,9 +173,6 @@ fn parse<'a>(path: &Path, bytes: &'a [u8]) -> Result<Saved<'a>, TrainError> {
 }
 
 /// Checks that a file is the state of a training run, whatever its settings are; returns its number of steps.
-///
-/// # Errors
-/// [`TrainError::State`].
 pub fn check_state(path: &Path) -> Result<u32, TrainError> {
     let bytes = read_at_most(path, LONGEST_STATE)
         .map_err(|cause| TrainError::State { path: path.to_path_buf(), reason: cause.to_string() })?;

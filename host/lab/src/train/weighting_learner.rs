@@ -10,34 +10,36 @@ use super::TrainError;
 use super::attention::{Attention, Embedding};
 use super::draw::{Draw, Purpose};
 use super::parameters::{Contents, Parameters};
-use super::run::{self, Learner, Outcome, Schedule, Validated};
+use super::run::{self, Learner, Outcome, Plan, Task, Validated, count, side};
 use super::scenes::{Data, TrainingScene};
 use candle_core::{DType, Result, Tensor};
+use clap::Args;
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 use viewfuse_core::camera::Camera;
 use viewfuse_core::pose::Pose;
 use viewfuse_field::rows::row_of;
-use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::Checkpoint;
 
 /// The settings of a run besides its schedule, its scenes and the network.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct WeightingSettings {
-    /// The embedding of poses.
-    pub embedding: Embedding,
-    /// Side of the pictures.
-    pub side: u32,
-    /// Objects of a step, each with one target.
-    pub objects: usize,
-    /// Rays of each target; a GeNVS takes whole pictures.
-    pub rays: usize,
+#[derive(Args, Clone, Copy, Debug, PartialEq, Serialize)]
+pub(crate) struct WeightingSettings {
+    /// Embedding of poses
+    #[arg(long, value_enum, default_value = "fourier")]
+    embedding: Embedding,
+    /// Side of the pictures, pixels
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = side())]
+    side: u32,
+    /// Objects of a step, each with one target
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = count())]
+    objects: usize,
+    /// Rays of each target; with a GeNVS a target is a whole picture
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = count())]
+    rays: usize,
 }
 
 /// The numbers of sources of a step, one of which is drawn.
 const SOURCE_COUNTS: [usize; 4] = [3, 4, 6, 8];
-/// Sources in validation.
 const VALIDATION_SOURCES: usize = 6;
 /// A fixed network.
 trait Frozen {
@@ -73,23 +75,17 @@ const NETWORKS: [(&str, Open); 2] = [("pixelnerf", pixelnerf::open), ("genvs", g
 struct WeightingLearner {
     attention: Attention,
     network: Box<dyn Frozen>,
-    scenes: Vec<TrainingScene>,
-    validation: Vec<TrainingScene>,
+    data: Data,
     settings: WeightingSettings,
 }
 
-/// Trains the weighting for a network in `folder`, or continues there.
-///
-/// # Errors
-/// [`TrainError`].
-pub fn train_weighting(
-    settings: &WeightingSettings,
-    checkpoint: &Checkpoint,
-    schedule: &Schedule,
-    [scenes, validation]: [&[PathBuf]; 2],
-    folder: &Path,
-    progress: &dyn Progress,
+/// Trains the weighting for a network, or continues.
+pub(crate) fn train_weighting(
+    settings: WeightingSettings,
+    network: Option<&Checkpoint>,
+    task: &Task<'_>,
 ) -> std::result::Result<Outcome, TrainError> {
+    let Some(checkpoint) = network else { unreachable!("the command line asks for a network") };
     let row = row_of(checkpoint)?;
     let Some((_, open)) = NETWORKS.into_iter().find(|(name, _)| *name == row.name) else {
         let reason = format!("a weighting cannot be trained for a {}", row.title);
@@ -97,17 +93,11 @@ pub fn train_weighting(
     };
     let network = open(checkpoint, settings.side)?;
     let least_views = SOURCE_COUNTS.into_iter().max().unwrap_or(1) + 1;
-    let data = Data::open([scenes, validation], settings.side, least_views, progress)?;
-    let attention = Attention::new(settings.embedding, DType::F32, schedule.seed)?;
-    let record = run::settings("weighting", settings, schedule, &data, Some(checkpoint))?;
-    let learner = WeightingLearner {
-        attention,
-        network,
-        scenes: data.training,
-        validation: data.validation,
-        settings: *settings,
-    };
-    run::run(&learner, schedule, &record, "PSNR dB", folder, progress)
+    let data = Data::open(task.scenes, settings.side, least_views, task.progress)?;
+    let attention = Attention::new(settings.embedding, DType::F32, task.schedule.seed)?;
+    let learner = WeightingLearner { attention, network, data, settings };
+    let plan = Plan { model: "weighting", score_name: "PSNR dB", settings: &learner.settings, from: Some(checkpoint) };
+    run::run(&learner, &plan, task)
 }
 
 impl ViewWeights<'_> {
@@ -129,15 +119,19 @@ impl Learner for WeightingLearner {
         &self.attention.parameters
     }
 
+    fn data(&self) -> &Data {
+        &self.data
+    }
+
     fn loss(&self, draw: &Draw) -> Result<Tensor> {
         let source_count = SOURCE_COUNTS[draw.below(Purpose::SourceCount, 0, SOURCE_COUNTS.len())];
         let (dtype, weights) = (self.attention.parameters.dtype(), ViewWeights::Learned(&self.attention));
-        let step = Step { scenes: &self.scenes, draw, settings: &self.settings, weights, dtype };
+        let step = Step { scenes: &self.data.training, draw, settings: &self.settings, weights, dtype };
         self.network.loss(&step, source_count)
     }
 
     fn validate(&self) -> Result<Validated> {
-        let score = |weights| self.network.score(&self.validation, VALIDATION_SOURCES, weights);
+        let score = |weights| self.network.score(&self.data.validation, VALIDATION_SOURCES, weights);
         let (own, mean) = (score(ViewWeights::Learned(&self.attention))?, score(ViewWeights::Equal)?);
         Ok(Validated { score: own, remark: format!("{:+.3} dB against equal weights", own - mean) })
     }

@@ -18,7 +18,6 @@ struct Chair {
     /// Upper side of the seat, and half of its thickness.
     top: f32,
     half_thickness: f32,
-    /// Half of the height of all.
     half_height: f32,
     frame: Finish,
     /// Whether the seat is a disc. What stands below it then stands closer together.

@@ -1,6 +1,6 @@
 //! Woven cloth: warp and weft, each with its own sequence of coloured threads.
 
-use super::{Plane, finite, sizes};
+use super::Plane;
 use crate::scenes::noise::{blend, fractions, layered, smooth};
 use viewfuse_core::Vec3;
 use viewfuse_core::math::floor_to_i32;
@@ -18,7 +18,6 @@ pub struct Cloth {
     pub thread: f32,
     /// Whether only the threads along the second coordinate change: stripes, no checks.
     pub striped: bool,
-    /// Which cloth.
     pub seed: u32,
 }
 
@@ -26,7 +25,6 @@ pub struct Cloth {
 const BAND_COUNT: i32 = 9;
 
 impl Cloth {
-    /// The colour at a point.
     pub(super) fn colour(&self, p: Vec3) -> Vec3 {
         let [right, up, through] = self.plane.coordinates(p);
         let warp = self.band(right, 1);
@@ -52,9 +50,5 @@ impl Cloth {
         let [choice, tint, ..] = fractions(self.seed, [band, which, 21]);
         let colour = if choice < 0.46 { 0 } else { 1 + usize::from(choice > 0.76) };
         self.colours[colour] * (0.9 + 0.2 * tint)
-    }
-
-    pub(super) fn is_sound(&self) -> bool {
-        finite(self.colours) && sizes([self.repeat, self.thread])
     }
 }

@@ -1,7 +1,7 @@
 //! Painted pottery: rings of motifs around the upright axis.
 
-use super::{finite, inside, over, sizes, worn};
-use crate::scenes::noise::{fractions, layered};
+use super::{inside, worn};
+use crate::scenes::noise::{blend, fractions, layered};
 use core::f32::consts::TAU;
 use viewfuse_core::Vec3;
 use viewfuse_core::math::{abs, angle_from_components, floor_to_i32, sqrt};
@@ -15,15 +15,10 @@ pub struct Glaze {
     pub band: f32,
     /// Motifs around the axis.
     pub count: u32,
-    /// Which pottery.
     pub seed: u32,
 }
 
-/// Most motifs around the axis.
-const MAX_COUNT: u32 = 256;
-
 impl Glaze {
-    /// The colour at a point.
     pub(super) fn colour(&self, p: Vec3) -> Vec3 {
         // Painted by hand: rings waver a little.
         let place = p.z / self.band + 0.16 * (layered(p / self.band, self.seed ^ 3, 2) - 0.5);
@@ -50,13 +45,9 @@ impl Glaze {
             _ => inside(0.32 - up, soft).max(inside(up - 0.3 + 0.3 * vary, soft)),
         };
         let line = inside(0.5 - abs(up - 0.5) - 0.04, 0.04);
-        let colour = over(over(back, paint, amount), self.colours[3], line);
+        let colour = blend(blend(back, paint, amount), self.colours[3], line);
         let speck = layered(p / 0.035, self.seed ^ 82, 2);
-        let colour = over(colour, self.colours[3], ((speck - 0.72) * 6.0).clamp(0.0, 0.7));
+        let colour = blend(colour, self.colours[3], ((speck - 0.72) * 6.0).clamp(0.0, 0.7));
         worn(colour, p, 0.15, 0.2, self.seed ^ 83)
-    }
-
-    pub(super) fn is_sound(&self) -> bool {
-        finite(self.colours) && sizes([self.band]) && (1..=MAX_COUNT).contains(&self.count)
     }
 }

@@ -1,7 +1,7 @@
 //! Printed letters.
 
 use super::font::{GLYPH_COUNT, GLYPH_SIZE, has_dot};
-use super::{Plane, finite, sizes, worn};
+use super::{Plane, worn};
 use crate::scenes::noise::fractions;
 use viewfuse_core::Vec3;
 use viewfuse_core::math::{abs, floor_to_i32, max};
@@ -32,12 +32,10 @@ pub struct Letters {
     pub half: [f32; 2],
     /// Height of a small letter with the space above it; a cube needs none.
     pub line: f32,
-    /// Which text.
     pub seed: u32,
 }
 
 impl Letters {
-    /// The colour at a point.
     pub(super) fn colour(&self, p: Vec3) -> Vec3 {
         let colour = match self.setting {
             Setting::Page => {
@@ -132,9 +130,5 @@ impl Letters {
         let dot = [(u + 0.52) / 1.04 * width as f32, (v + 0.62) / 1.24 * height as f32];
         let hit = has_dot((glyph * GLYPH_COUNT as f32) as u32, floor_to_i32(dot[0]), floor_to_i32(dot[1]));
         if hit { ink } else { paper }
-    }
-
-    pub(super) fn is_sound(&self) -> bool {
-        self.paper.is_finite() && finite(self.inks) && sizes(self.half) && sizes([self.line])
     }
 }

@@ -1,6 +1,6 @@
 //! Bricks, stones and tiles between joints.
 
-use super::{Plane, finite, over, sizes};
+use super::Plane;
 use crate::scenes::noise::{blend, fractions, layered};
 use viewfuse_core::Vec3;
 use viewfuse_core::math::{abs, floor_to_i32, min};
@@ -20,12 +20,10 @@ pub struct Masonry {
     pub joint: f32,
     /// By what part of its length each course is moved against the one below: 0.5 for bricks, 0 for tiles.
     pub bond: f32,
-    /// Which bricks.
     pub seed: u32,
 }
 
 impl Masonry {
-    /// The colour at a point.
     pub(super) fn colour(&self, p: Vec3) -> Vec3 {
         let [right, up, through] = self.plane.coordinates(p);
         let waver =
@@ -45,11 +43,6 @@ impl Masonry {
         let face = fired * (0.72 + 0.3 * grain + 0.22 * c) * (0.8 + 0.36 * stain);
         let sand = layered(place / 0.03, self.seed ^ 3, 2);
         let mortar = self.mortar * (0.8 + 0.3 * sand);
-        over(face, mortar, (0.5 - from_joint / (0.4 * self.joint)).clamp(0.0, 1.0))
-    }
-
-    pub(super) fn is_sound(&self) -> bool {
-        let bond = (0.0..=1.0).contains(&self.bond);
-        finite(self.bricks) && self.mortar.is_finite() && sizes(self.size) && sizes([self.joint]) && bond
+        blend(face, mortar, (0.5 - from_joint / (0.4 * self.joint)).clamp(0.0, 1.0))
     }
 }

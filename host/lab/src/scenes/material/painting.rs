@@ -1,6 +1,6 @@
 //! Pictures to hang on a wall: landscapes and abstract ones.
 
-use super::{Plane, inside, over, sizes, worn};
+use super::{Plane, inside, worn};
 use crate::scenes::noise::{blend, fractions, layered};
 use viewfuse_core::Vec3;
 use viewfuse_core::math::{abs, floor_to_i32, max, min, sqrt};
@@ -10,9 +10,7 @@ use viewfuse_core::math::{abs, floor_to_i32, max, min, sqrt};
 pub struct Painting {
     /// Half of its width and height.
     pub half: [f32; 2],
-    /// Its plane.
     pub plane: Plane,
-    /// Which painting.
     pub seed: u32,
 }
 
@@ -57,7 +55,6 @@ impl Painting {
         (fractions(seed, [0, 0, 60])[1] * 4.0) as usize & 3
     }
 
-    /// The colour at a point.
     pub(super) fn colour(&self, p: Vec3) -> Vec3 {
         let [right, up, _] = self.plane.coordinates(p);
         let (x, y) = (right / self.half[1], up / self.half[1]);
@@ -76,9 +73,9 @@ impl Painting {
         let cloud = layered(Vec3::new(1.6 * x, 4.0 * y, 9.0 * a), self.seed ^ 63, 4);
         let [above, below] = SKIES[palette];
         let mut colour = blend(below, above, height);
-        colour = over(colour, Vec3::new(0.97, 0.94, 0.88), ((cloud - 0.5) * 3.2).clamp(0.0, 0.85));
+        colour = blend(colour, Vec3::new(0.97, 0.94, 0.88), ((cloud - 0.5) * 3.2).clamp(0.0, 0.85));
         let (dx, dy) = (x - 0.9 * (b - 0.5), y - 0.3 - 0.35 * c);
-        colour = over(colour, Vec3::new(1.0, 0.93, 0.7), inside(sqrt(dx * dx + dy * dy) - 0.13, 0.03));
+        colour = blend(colour, Vec3::new(1.0, 0.93, 0.7), inside(sqrt(dx * dx + dy * dy) - 0.13, 0.03));
         let [near, far] = LANDS[palette];
         for hill in 0..5 {
             let nearness = hill as f32 / 4.0;
@@ -87,7 +84,7 @@ impl Painting {
             let line = 0.25 - 0.95 * nearness + 0.9 * (profile - 0.5);
             let ground = layered(Vec3::new(5.0 * x, 9.0 * y, hill as f32), self.seed ^ 65, 3);
             let land = blend(far, near, nearness) * (0.6 + 0.8 * ground);
-            colour = over(colour, land, inside(y - line, 0.02));
+            colour = blend(colour, land, inside(y - line, 0.02));
         }
         colour
     }
@@ -109,12 +106,8 @@ impl Painting {
                 2 => max(abs(dx) - size, abs(dy) - 0.5 * size),
                 _ => min(max(abs(dx) - 0.03, abs(dy) - 1.4 * size), max(abs(dy) - 0.03, abs(dx) - 1.4 * size)),
             };
-            colour = over(colour, paint(e) * (0.8 + 0.3 * f), inside(distance, 0.02));
+            colour = blend(colour, paint(e) * (0.8 + 0.3 * f), inside(distance, 0.02));
         }
         colour
-    }
-
-    pub(super) fn is_sound(&self) -> bool {
-        sizes(self.half)
     }
 }

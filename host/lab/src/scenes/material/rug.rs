@@ -1,6 +1,5 @@
 //! A knotted rug: borders, a field with scattered motifs, a medallion in the middle.
 
-use super::{finite, sizes};
 use crate::scenes::noise::{blend, fractions, layered};
 use viewfuse_core::Vec3;
 use viewfuse_core::math::{abs, floor_to_i32, max, min};
@@ -14,7 +13,6 @@ pub struct Rug {
     pub half: [f32; 2],
     /// Size of a motif.
     pub motif: f32,
-    /// Which rug.
     pub seed: u32,
 }
 
@@ -22,7 +20,6 @@ pub struct Rug {
 const KNOTS: f32 = 12.0;
 
 impl Rug {
-    /// The colour at a point.
     pub(super) fn colour(&self, p: Vec3) -> Vec3 {
         // Every knot has one colour: edges are stepped.
         let knot = self.motif / KNOTS;
@@ -90,9 +87,5 @@ impl Rug {
         };
         let hit = if c < 0.5 { u + v < 0.33 && min(u, v) < 0.11 } else { max(u, v) < 0.24 && u + v > 0.13 };
         if hit { ink } else { field }
-    }
-
-    pub(super) fn is_sound(&self) -> bool {
-        finite(self.colours) && sizes(self.half) && sizes([self.motif])
     }
 }

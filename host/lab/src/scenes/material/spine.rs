@@ -1,6 +1,6 @@
 //! Books, as they stand on a shelf or lie on a table.
 
-use super::{finite, sizes, worn};
+use super::worn;
 use crate::scenes::material::font::{GLYPH_COUNT, has_dot};
 use crate::scenes::noise::{blend, fractions};
 use viewfuse_core::Vec3;
@@ -13,7 +13,6 @@ pub struct Spine {
     pub colours: [Vec3; 3],
     /// Half of its thickness, depth and height.
     pub half: [f32; 3],
-    /// Which book.
     pub seed: u32,
 }
 
@@ -21,7 +20,6 @@ pub struct Spine {
 const PAPER: Vec3 = Vec3::new(0.88, 0.84, 0.72);
 
 impl Spine {
-    /// The colour at a point.
     pub(super) fn colour(&self, p: Vec3) -> Vec3 {
         let [half_x, half_y, half_z] = self.half;
         let [cover, band, ink] = self.colours;
@@ -58,9 +56,5 @@ impl Spine {
             colour = blend(cover, band, 0.6);
         }
         worn(worn(colour, p, 0.025, 0.16, self.seed ^ 1), p, 0.4, 0.25, self.seed ^ 2)
-    }
-
-    pub(super) fn is_sound(&self) -> bool {
-        finite(self.colours) && sizes(self.half)
     }
 }

@@ -1,6 +1,5 @@
 //! Blotches and veins: marble, plaster, soil, grass, leaves.
 
-use super::{finite, over, sizes};
 use crate::scenes::noise::{blend, layered};
 use viewfuse_core::Vec3;
 use viewfuse_core::math::abs;
@@ -16,12 +15,10 @@ pub struct Stone {
     pub veined: f32,
     /// Size of the largest blotches along each axis.
     pub cell: Vec3,
-    /// Which stone.
     pub seed: u32,
 }
 
 impl Stone {
-    /// The colour at a point.
     pub(super) fn colour(&self, p: Vec3) -> Vec3 {
         let place = p / self.cell;
         let amount = layered(place, self.seed, 5);
@@ -29,11 +26,6 @@ impl Stone {
         let vein = 1.0 - 9.0 * abs(layered(warped, self.seed ^ 41, 3) - 0.5);
         let fine = layered(place * 11.0, self.seed ^ 42, 2);
         let colour = blend(self.colours[0], self.colours[1], (2.4 * (amount - 0.5) + 0.5).clamp(0.0, 1.0));
-        over(colour * (0.74 + 0.5 * fine), self.vein, self.veined * vein.clamp(0.0, 1.0))
-    }
-
-    pub(super) fn is_sound(&self) -> bool {
-        let veined = (0.0..=1.0).contains(&self.veined);
-        finite(self.colours) && self.vein.is_finite() && veined && sizes(self.cell.to_array())
+        blend(colour * (0.74 + 0.5 * fine), self.vein, self.veined * vein.clamp(0.0, 1.0))
     }
 }

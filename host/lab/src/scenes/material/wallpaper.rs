@@ -1,6 +1,6 @@
 //! Wallpaper: flowers, stripes or a trellis, printed.
 
-use super::{Plane, finite, inside, over, sizes, worn};
+use super::{Plane, inside, worn};
 use crate::scenes::noise::{blend, fractions, layered};
 use viewfuse_core::Vec3;
 use viewfuse_core::math::{abs, floor_to_i32, min, sin_cos, sqrt};
@@ -29,7 +29,6 @@ pub struct Wallpaper {
     pub plane: Plane,
     /// From one flower to the next.
     pub repeat: f32,
-    /// Which paper.
     pub seed: u32,
 }
 
@@ -37,7 +36,6 @@ pub struct Wallpaper {
 const SOFT: f32 = 0.03;
 
 impl Wallpaper {
-    /// The colour at a point.
     pub(super) fn colour(&self, p: Vec3) -> Vec3 {
         let [right, up, _] = self.plane.coordinates(p);
         let (x, y) = (right / self.repeat, up / self.repeat);
@@ -48,8 +46,8 @@ impl Wallpaper {
                 let place = abs(band - floor_to_i32(band) as f32 - 0.5);
                 let broad = inside(place - 0.26, SOFT);
                 let line = inside(abs(place - 0.31) - 0.018, SOFT);
-                let striped = over(self.ground, blend(self.ground, self.inks[2], 0.4), broad);
-                self.flowers(over(striped, self.inks[2], line), x - 0.5, y, 0.72)
+                let striped = blend(self.ground, blend(self.ground, self.inks[2], 0.4), broad);
+                self.flowers(blend(striped, self.inks[2], line), x - 0.5, y, 0.72)
             }
             Motif::Trellis => {
                 let (a, b) = (0.6 * (x + y), 0.6 * (x - y));
@@ -64,7 +62,7 @@ impl Wallpaper {
                     [floor_to_i32(a), floor_to_i32(b), 1],
                     0.36,
                 );
-                over(bloom, self.inks[2], line)
+                blend(bloom, self.inks[2], line)
             }
         };
         let age = layered(Vec3::new(right, up, 0.0) / 1.3, self.seed ^ 77, 3);
@@ -78,7 +76,7 @@ impl Wallpaper {
         let column = floor_to_i32(x);
         let (sine, _) = sin_cos(2.6 * y + 3.0 * column as f32);
         let stem = x - column as f32 - 0.5 - 0.2 * sine;
-        colour = over(colour, self.inks[2], inside(abs(stem) - 0.016, SOFT));
+        colour = blend(colour, self.inks[2], inside(abs(stem) - 0.016, SOFT));
         let leaf_row = floor_to_i32(y * 2.0);
         let [turn, side, size, _] = fractions(self.seed, [column, leaf_row, 7]);
         let side = if side < 0.5 { -1.0 } else { 1.0 };
@@ -86,7 +84,7 @@ impl Wallpaper {
         let (s, c) = sin_cos(side * (0.5 + 0.8 * turn));
         let (u, v) = (lx * c + ly * s, ly * c - lx * s);
         let leaf = sqrt(u * u * 3.2 + v * v * 14.0) - (0.2 + 0.12 * size) * scale;
-        colour = over(colour, self.inks[2] * (0.8 + 0.4 * size), inside(leaf, SOFT));
+        colour = blend(colour, self.inks[2] * (0.8 + 0.4 * size), inside(leaf, SOFT));
         // A flower in each cell; every second column is half a cell higher.
         let drop = if column & 1 == 0 { 0.0 } else { 0.5 };
         let row = floor_to_i32(y + drop);
@@ -115,12 +113,8 @@ impl Wallpaper {
         let heart = inside(radius - 0.2 * size, SOFT);
         let swap = usize::from(b > 0.6);
         let ink = self.inks[swap] * (0.85 + 0.25 * c);
-        let colour = over(ground, ink, petals);
-        let colour = over(colour, blend(ink, self.ground, 0.45), inner);
-        over(colour, self.inks[1 - swap], heart)
-    }
-
-    pub(super) fn is_sound(&self) -> bool {
-        self.ground.is_finite() && finite(self.inks) && sizes([self.repeat])
+        let colour = blend(ground, ink, petals);
+        let colour = blend(colour, blend(ink, self.ground, 0.45), inner);
+        blend(colour, self.inks[1 - swap], heart)
     }
 }

@@ -1,6 +1,6 @@
 //! Wood: planks with rings, fibres and joints.
 
-use super::{Plane, finite, over, sizes};
+use super::Plane;
 use crate::scenes::noise::{blend, fractions, layered, smooth};
 use viewfuse_core::Vec3;
 use viewfuse_core::math::{abs, floor_to_i32, min, sqrt};
@@ -18,12 +18,10 @@ pub struct Wood {
     pub plank: f32,
     /// Length of a plank.
     pub length: f32,
-    /// Which wood.
     pub seed: u32,
 }
 
 impl Wood {
-    /// The colour at a point.
     pub(super) fn colour(&self, p: Vec3) -> Vec3 {
         let coordinates = self.plane.coordinates(p);
         let [along, across, through] = if self.turned { self.plane.turned(coordinates) } else { coordinates };
@@ -53,10 +51,6 @@ impl Wood {
         let from_side = (0.5 - beside_joint) * self.plank;
         let from_end = (0.5 - abs(place - piece as f32 - 0.5)) * self.length;
         let gap = min(from_side, from_end);
-        over(wood, self.colours[1] * 0.3, (1.0 - gap / 0.016).clamp(0.0, 1.0))
-    }
-
-    pub(super) fn is_sound(&self) -> bool {
-        finite(self.colours) && sizes([self.plank, self.length])
+        blend(wood, self.colours[1] * 0.3, (1.0 - gap / 0.016).clamp(0.0, 1.0))
     }
 }

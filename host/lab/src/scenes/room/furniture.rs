@@ -3,7 +3,7 @@
 use super::{FLOOR, HALF_LENGTH, HALF_WIDTH, TABLE, of, palette, pattern_seed, shifted};
 use crate::scenes::kinds::build::{Build, place};
 use crate::scenes::kinds::draws::Draws;
-use crate::scenes::material::{Material, Plane, Spine, Stone};
+use crate::scenes::material::{Material, Plane, Spine};
 use crate::scenes::placement::Placement;
 use crate::scenes::shape::Shape;
 use crate::scenes::texture::{Finish, rgb};
@@ -136,14 +136,14 @@ fn plant(draws: &mut Draws, build: &mut Build, [x, y]: [f32; 2]) {
         let at = Placement::at(x + 0.7 * lean * middle * cosine, y + 0.7 * lean * middle * sine, FLOOR + 0.75 + middle)
             .turned_about_z(turn)
             .turned_about_y(lean);
-        let leaf = Stone {
-            colours: [green * draws.between(0.45, 0.65), green * draws.between(0.9, 1.2)],
-            vein: rgb(206, 216, 140),
-            veined: 0.7,
-            cell: Vec3::new(0.1, 0.12, 0.4),
-            seed: pattern_seed(draws),
-        };
+        let leaf = palette::stone(
+            [green * draws.between(0.45, 0.65), green * draws.between(0.9, 1.2)],
+            rgb(206, 216, 140),
+            0.7,
+            Vec3::new(0.1, 0.12, 0.4),
+            draws,
+        );
         let radii = Vec3::new(0.035, draws.between(0.1, 0.17), length);
-        build.add(Shape::Ellipsoid { radii }, at, of(Material::Stone(leaf), 0.06));
+        build.add(Shape::Ellipsoid { radii }, at, of(leaf, 0.06));
     }
 }

@@ -97,6 +97,11 @@ pub(crate) fn same_wood(material: Material, plane: Plane, turned: bool) -> Mater
     }
 }
 
+/// Blotches of these two colours and of this size, with veins.
+pub(crate) fn stone(colours: [Vec3; 2], vein: Vec3, veined: f32, cell: Vec3, draws: &mut Draws) -> Material {
+    Material::Stone(Stone { colours, vein, veined, cell, seed: pattern_seed(draws) })
+}
+
 /// What walls are covered with: mostly wallpaper, also bricks, boards and plaster.
 pub(crate) fn wall(draws: &mut Draws, plane: Plane) -> Material {
     match draws.below(8) {
@@ -115,13 +120,11 @@ pub(crate) fn wall(draws: &mut Draws, plane: Plane) -> Material {
         _ => {
             let [light, _, dark, _] = draws.one_of(PAPERS);
             let cell = Vec3::splat(draws.between(0.5, 1.1));
-            let (vein, seed) = (dark * 0.7, pattern_seed(draws));
-            Material::Stone(Stone { colours: [light, light * 0.62 + dark * 0.2], vein, veined: 0.35, cell, seed })
+            stone([light, light * 0.62 + dark * 0.2], dark * 0.7, 0.35, cell, draws)
         }
     }
 }
 
-/// Bricks.
 pub(crate) fn brick(draws: &mut Draws, plane: Plane) -> Material {
     let [light, dark, mortar] = draws.one_of(BRICKS);
     let size = [draws.between(0.56, 0.72), draws.between(0.2, 0.26)];

@@ -3,7 +3,7 @@
 use super::{CEILING, FLOOR, HALF_LENGTH, HALF_WIDTH, of, palette, pattern_seed, shifted};
 use crate::scenes::kinds::build::{Build, place};
 use crate::scenes::kinds::draws::Draws;
-use crate::scenes::material::{Cloth, Material, Painting, Plane, Rug, Stone};
+use crate::scenes::material::{Cloth, Material, Painting, Plane, Rug};
 use crate::scenes::shape::Shape;
 use crate::scenes::texture::rgb;
 use viewfuse_core::Vec3;
@@ -26,14 +26,9 @@ pub(super) fn shell(draws: &mut Draws, build: &mut Build) -> Window {
     let (middle, half_high) = (0.5 * (FLOOR + CEILING), 0.5 * (CEILING - FLOOR));
     let floor = of(palette::floor(draws), 0.05);
     build.block([0.0, 0.0, FLOOR - 0.1], [HALF_WIDTH + 0.3, HALF_LENGTH + 0.3, 0.1], 0.0, floor);
-    let plaster = Stone {
-        colours: [rgb(236, 232, 222), rgb(206, 200, 190)],
-        vein: rgb(180, 172, 160),
-        veined: 0.2,
-        cell: Vec3::splat(0.8),
-        seed: pattern_seed(draws),
-    };
-    let ceiling = of(Material::Stone(plaster), 0.0);
+    let plaster =
+        palette::stone([rgb(236, 232, 222), rgb(206, 200, 190)], rgb(180, 172, 160), 0.2, Vec3::splat(0.8), draws);
+    let ceiling = of(plaster, 0.0);
     build.block([0.0, 0.0, CEILING + 0.1], [HALF_WIDTH + 0.3, HALF_LENGTH + 0.3, 0.1], 0.0, ceiling);
 
     for side in [-1.0, 1.0] {
@@ -75,7 +70,7 @@ fn window_frame(draws: &mut Draws, build: &mut Build, Window { x, z }: Window) {
     let material = if painted {
         let colours = [rgb(238, 236, 228), rgb(204, 202, 194)];
         let cell = Vec3::new(0.1, 0.1, 0.5);
-        Material::Stone(Stone { colours, vein: colours[1] * 0.8, veined: 0.3, cell, seed: pattern_seed(draws) })
+        palette::stone(colours, colours[1] * 0.8, 0.3, cell, draws)
     } else {
         palette::wood(draws, Plane::Front, true, 0.3, 3.0)
     };
@@ -141,14 +136,14 @@ pub(super) fn outside(draws: &mut Draws, build: &mut Build, Window { x, .. }: Wi
         let size = draws.between(0.5, 1.1);
         let at = [middle + draws.between(-3.0, 2.5), draws.between(7.0, 10.0), FLOOR + draws.between(0.4, 1.9)];
         let green = draws.one_of([rgb(96, 140, 62), rgb(130, 160, 78), rgb(70, 120, 70), rgb(150, 150, 70)]);
-        let leaves = Stone {
-            colours: [green * 0.5, green],
-            vein: draws.one_of([rgb(230, 226, 150), rgb(226, 120, 120), rgb(60, 90, 40)]),
-            veined: 0.6,
-            cell: Vec3::splat(0.35),
-            seed: pattern_seed(draws),
-        };
-        build.ellipsoid(at, [size, 0.8 * size, 0.9 * size], of(Material::Stone(leaves), 0.0));
+        let leaves = palette::stone(
+            [green * 0.5, green],
+            draws.one_of([rgb(230, 226, 150), rgb(226, 120, 120), rgb(60, 90, 40)]),
+            0.6,
+            Vec3::splat(0.35),
+            draws,
+        );
+        build.ellipsoid(at, [size, 0.8 * size, 0.9 * size], of(leaves, 0.0));
     }
 }
 

@@ -7,7 +7,7 @@ use crate::scenes::kinds::build::Build;
 use crate::scenes::kinds::draws::Draws;
 use crate::scenes::kinds::{car, chair};
 use crate::scenes::material::{Letters, Material, Plane, Setting, Stone};
-use crate::scenes::object::{Object, ObjectError};
+use crate::scenes::object::Object;
 use crate::scenes::placement::Placement;
 use crate::scenes::shape::Shape;
 use crate::scenes::texture::{Finish, Texture, rgb};
@@ -40,10 +40,7 @@ enum Thing {
 }
 
 /// Adds three tall and three low things, no two of a kind.
-///
-/// # Errors
-/// [`ObjectError`] of the car or the chair; none for them as they are.
-pub(crate) fn things(draws: &mut Draws, build: &mut Build) -> Result<(), ObjectError> {
+pub(crate) fn things(draws: &mut Draws, build: &mut Build) {
     let mut tall = [Thing::Vase, Thing::Blocks, Thing::Books, Thing::Chair];
     let mut low = [Thing::Car, Thing::Ball, Thing::Mug, Thing::Fruit];
     shuffle(draws, &mut tall);
@@ -61,12 +58,12 @@ pub(crate) fn things(draws: &mut Draws, build: &mut Build) -> Result<(), ObjectE
             Thing::Blocks => blocks(draws, build, at),
             Thing::Books => books(draws, build, at),
             Thing::Chair => {
-                let chair = chair(u64::from(draws.below(1 << 22)), 0)?;
+                let chair = chair(u64::from(draws.below(1 << 22)), 0);
                 let turn = -FRAC_PI_2 + draws.between(-0.7, 0.7);
                 object(draws, build, at, &chair, turn);
             }
             Thing::Car => {
-                let car = car(u64::from(draws.below(1 << 22)), 0)?;
+                let car = car(u64::from(draws.below(1 << 22)), 0);
                 let turn = draws.one_of([-0.5, 0.45, 2.6, -2.7]) + draws.between(-0.25, 0.25);
                 object(draws, build, at, &car, turn);
             }
@@ -75,7 +72,6 @@ pub(crate) fn things(draws: &mut Draws, build: &mut Build) -> Result<(), ObjectE
             Thing::Fruit => fruit(draws, build, at),
         }
     }
-    Ok(())
 }
 
 fn shuffle<T>(draws: &mut Draws, things: &mut [T]) {
@@ -150,13 +146,7 @@ fn ball(draws: &mut Draws, build: &mut Build, [x, y]: [f32; 2]) {
     } else {
         let colour = palette::paint(draws);
         let colours = [colour, palette::other_paint(draws, colour)];
-        Material::Stone(Stone {
-            colours,
-            vein: rgb(244, 236, 214),
-            veined: 0.8,
-            cell: Vec3::splat(0.2),
-            seed: pattern_seed(draws),
-        })
+        palette::stone(colours, rgb(244, 236, 214), 0.8, Vec3::splat(0.2), draws)
     };
     let at =
         Placement::at(x, y, radius).turned_about_x(draws.between(-1.0, 1.0)).turned_about_y(draws.between(-0.8, 0.8));

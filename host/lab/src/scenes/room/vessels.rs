@@ -3,7 +3,7 @@
 use super::{of, palette, pattern_seed};
 use crate::scenes::kinds::build::{Build, place};
 use crate::scenes::kinds::draws::Draws;
-use crate::scenes::material::{Glaze, Material, Stone};
+use crate::scenes::material::{Glaze, Material};
 use crate::scenes::placement::Placement;
 use crate::scenes::shape::Shape;
 use crate::scenes::texture::{Finish, rgb};
@@ -50,9 +50,7 @@ pub(super) fn vase(draws: &mut Draws, build: &mut Build, [x, y]: [f32; 2]) {
 }
 
 fn leaves(draws: &mut Draws, green: Vec3) -> Material {
-    let colours = [green * 0.55, green];
-    let seed = pattern_seed(draws);
-    Material::Stone(Stone { colours, vein: rgb(214, 222, 150), veined: 0.5, cell: Vec3::splat(0.08), seed })
+    palette::stone([green * 0.55, green], rgb(214, 222, 150), 0.5, Vec3::splat(0.08), draws)
 }
 
 /// A heart and petals around it, facing up and out a little.
@@ -65,22 +63,10 @@ fn blossom(draws: &mut Draws, build: &mut Build, head: Vec3) {
         rgb(238, 138, 80),
         rgb(108, 130, 206),
     ]);
-    let petal = Stone {
-        colours: [colour * 0.68, colour],
-        vein: colour * 0.45,
-        veined: 0.6,
-        cell: Vec3::new(0.04, 0.05, 0.08),
-        seed: pattern_seed(draws),
-    };
-    let petal = of(Material::Stone(petal), 0.0);
-    let heart = Stone {
-        colours: [rgb(120, 70, 30), rgb(236, 184, 60)],
-        vein: rgb(90, 50, 24),
-        veined: 0.5,
-        cell: Vec3::splat(0.02),
-        seed: pattern_seed(draws),
-    };
-    build.ellipsoid(head.to_array(), [0.045; 3], of(Material::Stone(heart), 0.0));
+    let petal = palette::stone([colour * 0.68, colour], colour * 0.45, 0.6, Vec3::new(0.04, 0.05, 0.08), draws);
+    let petal = of(petal, 0.0);
+    let heart = palette::stone([rgb(120, 70, 30), rgb(236, 184, 60)], rgb(90, 50, 24), 0.5, Vec3::splat(0.02), draws);
+    build.ellipsoid(head.to_array(), [0.045; 3], of(heart, 0.0));
     let (count, reach) = (6_u8, draws.between(0.07, 0.1));
     for index in 0..count {
         let turn = TAU * f32::from(index) / f32::from(count);
@@ -115,14 +101,14 @@ pub(super) fn mug(draws: &mut Draws, build: &mut Build, [x, y]: [f32; 2]) {
 
 /// Fruit in a woven basket: rings on top of each other.
 pub(super) fn fruit(draws: &mut Draws, build: &mut Build, [x, y]: [f32; 2]) {
-    let straw = Stone {
-        colours: [rgb(150, 104, 54), rgb(216, 176, 112)],
-        vein: rgb(90, 60, 30),
-        veined: 0.6,
-        cell: Vec3::new(0.05, 0.05, 0.03),
-        seed: pattern_seed(draws),
-    };
-    let straw = of(Material::Stone(straw), 0.03);
+    let straw = palette::stone(
+        [rgb(150, 104, 54), rgb(216, 176, 112)],
+        rgb(90, 60, 30),
+        0.6,
+        Vec3::new(0.05, 0.05, 0.03),
+        draws,
+    );
+    let straw = of(straw, 0.03);
     for ring in 0..4_u8 {
         let up = f32::from(ring);
         let shape = Shape::Torus { ring_radius: 0.2 + 0.026 * up, tube_radius: 0.028 };
@@ -132,23 +118,19 @@ pub(super) fn fruit(draws: &mut Draws, build: &mut Build, [x, y]: [f32; 2]) {
     for index in 0..7_u8 {
         let colour =
             draws.one_of([rgb(214, 66, 48), rgb(232, 146, 46), rgb(176, 196, 74), rgb(236, 206, 84), rgb(150, 40, 58)]);
-        let skin = Stone {
-            colours: [colour, colour * 0.7 + rgb(210, 150, 60) * 0.3],
-            vein: rgb(248, 224, 150),
-            veined: 0.35,
-            cell: Vec3::new(0.06, 0.06, 0.2),
-            seed: pattern_seed(draws),
-        };
+        let skin = palette::stone(
+            [colour, colour * 0.7 + rgb(210, 150, 60) * 0.3],
+            rgb(248, 224, 150),
+            0.35,
+            Vec3::new(0.06, 0.06, 0.2),
+            draws,
+        );
         let radius = draws.between(0.085, 0.105);
         let (out, up) = if index < 5 { (0.13, 0.13) } else { (0.05, 0.25) };
         let (sine, cosine) = sin_cos(TAU * (f32::from(index) / if index < 5 { 5.0 } else { 2.0 }) + 0.4);
         let at = Placement::at(x + out * cosine, y + out * sine, up)
             .turned_about_x(sqrt(draws.unit()))
             .turned_about_y(draws.unit());
-        build.add(
-            Shape::Ellipsoid { radii: Vec3::new(radius, radius, 0.93 * radius) },
-            at,
-            of(Material::Stone(skin), 0.18),
-        );
+        build.add(Shape::Ellipsoid { radii: Vec3::new(radius, radius, 0.93 * radius) }, at, of(skin, 0.18));
     }
 }

@@ -7,7 +7,7 @@ use super::super::batch::SourceDraw;
 use super::super::draw::{Draw, Purpose};
 use super::super::scenes::{TrainingScene, inputs};
 use super::super::weights;
-use candle_core::{DType, Device, Error, Result, Tensor};
+use candle_core::{DType, Device, Result, Tensor};
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_core::weighting::Scheme;
 use viewfuse_field::learned::default_near_far;
@@ -60,13 +60,7 @@ impl Views {
         for (index, scene) in objects.iter().enumerate() {
             let order = draw.choose(Purpose::Sources, index, scene.cameras.len(), sources.count + targets);
             let (own, others) = order.split_at(sources.count);
-            let mut cameras = Vec::with_capacity(own.len());
-            for (place, &view) in own.iter().enumerate() {
-                let cut = sources.cut(draw, index * own.len() + place, scene.pictures[view].width());
-                let (camera, picture) = scene.source(view, cut).map_err(Error::wrap)?;
-                pictures.extend(inputs(&picture));
-                cameras.push(camera);
-            }
+            let cameras = sources.sources(scene, draw, index, own, &mut pictures)?;
             others.iter().for_each(|view| truth.extend(inputs(&scene.pictures[*view])));
             lists.0.push(default_near_far(&cameras));
             lists.2.push(cameras.iter().map(|camera| camera.block(0)).collect());
