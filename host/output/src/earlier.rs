@@ -66,9 +66,9 @@ pub(crate) fn recorded_targets(folder: &Path) -> Option<Vec<String>> {
     Some(record.frames.into_iter().map(|frame| frame.target).collect())
 }
 
-/// The background of the record in a folder, red green blue in `[0, 1]`; `Some(None)` if there was none, `None` without
-/// a record.
-pub(crate) fn recorded_background(folder: &Path) -> Option<Option<[f32; 3]>> {
+/// The background that the run of a folder used, red green blue in `[0, 1]`; `Some(None)` if it had none, `None` if the
+/// folder has no record.
+pub fn recorded_background(folder: &Path) -> Option<Option<[f32; 3]>> {
     let record: WrittenRecord = serde_json::from_slice(&bytes_of_record(folder)?).ok()?;
     let WrittenBackground { asked, used } = record.background?;
     let is_none = asked == BackgroundChoice::None.to_string();

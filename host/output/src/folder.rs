@@ -1,6 +1,8 @@
 //! Checks of an output folder before work begins: what a run would destroy there, and targets whose files have one
 //! name.
 
+pub use crate::earlier::recorded_background;
+
 use crate::earlier::{earlier_files, earlier_run, files_of, recorded_targets, was_interrupted};
 use crate::record::{FrameRecord, RECORD, SUFFIXES};
 use crate::video::VideoFormat;
@@ -62,12 +64,6 @@ impl Hinted for OutputError {
             _ => None,
         }
     }
-}
-
-/// The background that the run of a folder used, red green blue in `[0, 1]`; `Some(None)` if it had none, `None` if the
-/// folder has no record.
-pub fn recorded_background(folder: &Path) -> Option<Option<[f32; 3]>> {
-    crate::earlier::recorded_background(folder)
 }
 
 /// What a render is about to write to a folder.

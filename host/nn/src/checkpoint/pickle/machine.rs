@@ -48,14 +48,7 @@ impl Machine {
             // A frame only tells how much Python may read ahead.
             0x95 => _ = input.array::<8>()?,
             b'.' => return self.pop(opcode).map(Some),
-            _ => self.scalar(opcode, input)?,
-        }
-        Ok(None)
-    }
-
-    /// Executes an opcode that adds a number, a text or a constant, or any other.
-    fn scalar(&mut self, opcode: u8, input: &mut Input<'_>) -> Result<(), Fault> {
-        match opcode {
+            // Numbers, texts and constants.
             b'N' => self.push(NONE)?,
             0x88 => self.push(TRUE)?,
             0x89 => self.push(FALSE)?,
@@ -74,14 +67,7 @@ impl Machine {
             b'C' => self.bytes(input, 1)?,
             b'B' => self.bytes(input, 4)?,
             0x8e | 0x96 => self.bytes(input, 8)?,
-            _ => self.container(opcode, input)?,
-        }
-        Ok(())
-    }
-
-    /// Executes an opcode that makes or fills a list, a tuple, a set or a dictionary, or any other.
-    fn container(&mut self, opcode: u8, input: &mut Input<'_>) -> Result<(), Fault> {
-        match opcode {
+            // Lists, tuples, sets and dictionaries, made or filled.
             b']' => self.add(Value::List(Vec::new()))?,
             b'}' => self.add(Value::Dict(Vec::new()))?,
             0x8f => self.add(Value::Set(Vec::new()))?,
@@ -113,14 +99,7 @@ impl Machine {
                 let pairs = self.pop_marked(opcode)?;
                 self.set_items(opcode, &pairs)?;
             }
-            _ => self.stacked(opcode, input)?,
-        }
-        Ok(())
-    }
-
-    /// Executes an opcode of the stack or of the memo, or any other.
-    fn stacked(&mut self, opcode: u8, input: &mut Input<'_>) -> Result<(), Fault> {
-        match opcode {
+            // The stack and the memo.
             b'(' => {
                 bounded("marks", self.marks.len())?;
                 self.marks.push(self.stack.len() as u32);
@@ -136,17 +115,7 @@ impl Machine {
             b'q' => self.remember(opcode, input.byte()?.into())?,
             b'r' => self.remember(opcode, u32::from_le_bytes(input.array()?))?,
             0x94 => self.remember(opcode, self.memo.len() as u32)?,
-            _ => self.object(opcode, input)?,
-        }
-        Ok(())
-    }
-
-    /// Executes an opcode that names, calls or fills an object.
-    ///
-    /// # Errors
-    /// [`Fault::Opcode`] if it is none of any kind.
-    fn object(&mut self, opcode: u8, input: &mut Input<'_>) -> Result<(), Fault> {
-        match opcode {
+            // Objects, named, called or filled.
             b'c' => {
                 let module = self.line(input)?;
                 let name = self.line(input)?;
@@ -184,7 +153,7 @@ impl Machine {
             }
             _ => return Err(Fault::Opcode(opcode)),
         }
-        Ok(())
+        Ok(None)
     }
 
     fn push(&mut self, id: Id) -> Result<(), Fault> {
