@@ -1,6 +1,6 @@
 //! Fusing views against `f64`, and compositing thin, opaque and useless samples.
 
-use viewfuse::check::compare::Comparator;
+use crate::assert_near;
 use viewfuse::check::poses::Random;
 use viewfuse_core::composite::{Composite, Compositor};
 use viewfuse_core::fuse::{VisibleFusion, fuse_views, fuse_visible};
@@ -33,15 +33,13 @@ fn fusion_is_the_weighted_sum() {
             }
         }
         // A product, S additions of parts of a convex combination; the visible mean adds a product and a division.
-        let tolerance = Comparator { absolute: (S as f64 + 1.0) * size / 16_777_216.0, relative: 0.0 };
-        tolerance.compare_varying(&fuse_views(&weights, &latents), &sum).unwrap_or_else(|e| panic!("{e}"));
+        assert_near(&fuse_views(&weights, &latents), &sum, (S as f64 + 1.0) * size, 0.0);
         let fused = fuse_visible(&weights, &visibility, &latents, [9.0; C]);
         if seen == 0.0 {
             assert_eq!(fused, [9.0; C]);
             continue;
         }
-        let tolerance = Comparator { absolute: (2.0 * S as f64 + 4.0) * size / 16_777_216.0, relative: 0.0 };
-        tolerance.compare_varying(&fused, &visible.map(|v| v / seen)).unwrap_or_else(|e| panic!("{e}"));
+        assert_near(&fused, &visible.map(|v| v / seen), (2.0 * S as f64 + 4.0) * size, 0.0);
     }
 }
 
@@ -72,9 +70,8 @@ fn two_thousand_thin_samples_are_not_lost() {
     let (actual, _) = composite(&samples, [0.0; 3]);
     let opacity = -(-2000.0 * f64::from(1.0e-7_f32)).exp_m1();
     // One by one each would round to 0 or 2^-24; kept as a sum they are right to half a step of the transmittance.
-    let tolerance = Comparator { absolute: 1.5e-7, relative: 0.0 };
-    tolerance.compare_varying(&actual.channels, &[opacity, 0.5 * opacity, 0.0]).unwrap_or_else(|e| panic!("{e}"));
-    tolerance.compare(&[actual.opacity], &[opacity]).unwrap_or_else(|e| panic!("{e}"));
+    let [red, green, blue] = actual.channels;
+    assert_near(&[red, green, blue, actual.opacity], &[opacity, 0.5 * opacity, 0.0, opacity], 2.5, 0.0);
     assert!((actual.depth - 2.0).abs() < 2.0e-6, "{}", actual.depth);
 }
 

@@ -1,6 +1,6 @@
 //! Normalisation, SiLU and softmax at their ends: values far from 0, constant ones, infinite ones.
 
-use viewfuse::check::compare::relative_units;
+use crate::relative_units;
 use viewfuse::check::poses::Random;
 use viewfuse::device::Device;
 use viewfuse::device::cpu::Cpu;

@@ -1,6 +1,6 @@
 //! The elementary functions against `f64`: dense sweeps, extremes, and the errors that their documentation states.
 
-use viewfuse::check::compare::unit_in_last_place;
+use viewfuse::check::agreement::unit_in_last_place;
 use viewfuse::check::poses::Random;
 use viewfuse_core::math;
 

@@ -1,8 +1,9 @@
 //! The noise schedule, the factors around the network and the second-order step: against the published levels, against
 //! `f64`, at the extremes, and on a problem with a closed-form solution.
 
+use crate::{assert_near, relative_units};
 use serde_json::Value;
-use viewfuse::check::compare::{Comparator, relative_units, unit_in_last_place};
+use viewfuse::check::agreement::unit_in_last_place;
 use viewfuse::check::poses::Random;
 use viewfuse_core::schedule::{
     HeunStep, MAX_LEVEL, NoiseSchedule, Preconditioning, SIGMA_DATA, SMALLEST_LEVEL, ScheduleError,
@@ -17,9 +18,7 @@ fn the_published_levels() {
         let numbers = reference["levels"][count.to_string()].as_array().expect("levels");
         let expected: Vec<f64> = numbers.iter().filter_map(Value::as_f64).collect();
         let actual: Vec<f32> = (0..count).map(|index| schedule.level(index, count)).collect();
-        let tolerance = Comparator { absolute: 0.0, relative: 1.0e-6 };
-        let worst = tolerance.compare_varying(&actual, &expected).unwrap_or_else(|error| panic!("{count}: {error}"));
-        println!("{count} levels: at most {:.1e} off", (f64::from(worst.actual) / worst.expected - 1.0).abs());
+        assert_near(&actual, &expected, 0.0, 1.0e-6);
     }
 }
 

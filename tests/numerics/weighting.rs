@@ -1,6 +1,6 @@
 //! Every formula weighting against `f64` on the same poses, with the derived bound, and what must not change it.
 
-use viewfuse::check::compare::relative_units;
+use crate::relative_units;
 use viewfuse::check::oracle::{Matrix, WidePose, evaluate, normalised, schemes};
 use viewfuse::check::poses::{Random, looking_at_origin, pose_of, ring, rotation_about};
 use viewfuse_core::pose::Pose;

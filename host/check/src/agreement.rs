@@ -4,7 +4,6 @@
 //! elements (those that depend on rounding) are disagreements, for any bounds.
 
 use super::bounded::Bounded;
-use super::compare::unit_in_last_place;
 use std::fmt;
 
 /// The largest share of undecided elements: those that depend on rounding.
@@ -78,6 +77,12 @@ impl Differences {
             self.ulps = self.ulps.max(difference / unit_in_last_place(expected));
         }
     }
+}
+
+/// Distance between `f32` numbers at the size of `x`; the smallest normal binade's below it.
+pub fn unit_in_last_place(x: f64) -> f64 {
+    let exponent = x.abs().max(f64::from(f32::MIN_POSITIVE)).log2().floor();
+    (exponent - 23.0).exp2()
 }
 
 /// `|actual - expected|`; infinite if either is NaN.

@@ -1,6 +1,7 @@
 //! Projections and grid look-ups in `f64`, with bounds on the error of `f32`.
 
 use super::bounded::{Bounded, ROUNDING};
+use super::ray_oracle::any;
 use viewfuse_core::camera::CameraBlock;
 
 /// A point or a direction.
@@ -72,20 +73,14 @@ pub fn project(camera: &CameraBlock, point_world: Vector) -> BoundedProjection {
 /// Whether a point that is projected to these image coordinates is in front of the camera and inside its image; the
 /// border counts. `None` if an error of a number may change the answer.
 pub fn inside(camera: &CameraBlock, in_front: Option<bool>, x: Bounded, y: Bounded) -> Option<bool> {
-    let answers = [
-        in_front,
-        x.below(Bounded::ZERO).map(|out| !out),
-        y.below(Bounded::ZERO).map(|out| !out),
-        Bounded::from(camera.width).below(x).map(|out| !out),
-        Bounded::from(camera.height).below(y).map(|out| !out),
+    let is_out = [
+        in_front.map(|front| !front),
+        x.below(Bounded::ZERO),
+        y.below(Bounded::ZERO),
+        Bounded::from(camera.width).below(x),
+        Bounded::from(camera.height).below(y),
     ];
-    if answers.contains(&Some(false)) {
-        Some(false)
-    } else if answers.contains(&None) {
-        None
-    } else {
-        Some(true)
-    }
+    any(is_out.into_iter()).map(|out| !out)
 }
 
 /// Nodes of one axis of a grid around a coordinate, within its error.

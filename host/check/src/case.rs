@@ -37,34 +37,22 @@ pub trait Case: Dispatch {
     fn expected(&self) -> Vec<Option<Bounded>>;
 
     /// Runs one of several dispatches. A case whose arrays share a buffer has its own way.
-    ///
-    /// # Errors
-    /// If the device is lost.
     fn run_one<D: Device>(&self, device: &D, loaded: &mut Self::Loaded<D>, index: usize) -> Result<(), DeviceError> {
         self.dispatch(device, loaded, index)
     }
 
     /// The outputs that begin with one of several dispatches. A case whose outputs are no plain numbers has its own
     /// way.
-    ///
-    /// # Errors
-    /// If the device is lost.
     fn read_one<D: Device>(device: &D, loaded: &Self::Loaded<D>, index: usize) -> Result<Vec<f32>, DeviceError> {
         Self::download(device, loaded, index)
     }
 
     /// Runs all dispatches.
-    ///
-    /// # Errors
-    /// If the device is lost.
     fn run<D: Device>(device: &D, inputs: &[Self], loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         inputs.iter().enumerate().try_for_each(|(index, dispatch)| dispatch.run_one(device, loaded, index))
     }
 
     /// The outputs of all dispatches, concatenated.
-    ///
-    /// # Errors
-    /// If the device is lost.
     fn read<D: Device>(device: &D, inputs: &[Self], loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let mut values = Vec::new();
         for index in 0..inputs.len() {
@@ -74,9 +62,6 @@ pub trait Case: Dispatch {
     }
 
     /// Upload, dispatch and download on a device.
-    ///
-    /// # Errors
-    /// If the device fails.
     fn results<D: Device>(device: &D, inputs: &[Self]) -> Result<Vec<f32>, DeviceError> {
         let mut loaded = Self::upload(device, inputs)?;
         Self::run(device, inputs, &mut loaded)?;

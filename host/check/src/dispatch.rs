@@ -31,9 +31,6 @@ pub trait HostArray {
     type Loaded<D: Device>;
 
     /// Takes it to a device.
-    ///
-    /// # Errors
-    /// If the device has no memory left.
     fn upload<D: Device>(&self, device: &D) -> Result<Self::Loaded<D>, DeviceError>;
 }
 
@@ -87,11 +84,18 @@ trait Floats: Element {
     fn floats(values: Vec<Self>) -> Vec<f32>;
 }
 
-impl Floats for f32 {
-    fn floats(values: Vec<f32>) -> Vec<f32> {
-        values
-    }
+/// Of types that hold nothing but numbers of `f32`.
+macro_rules! floats {
+    ($($Type:ty),+) => { $(
+        impl Floats for $Type {
+            fn floats(values: Vec<$Type>) -> Vec<f32> {
+                bytemuck::cast_slice(&values).to_vec()
+            }
+        }
+    )+ };
 }
+
+floats!(f32, TargetRay, GaussianBlock, ProjectedGaussian, SplatGradient);
 
 impl<const N: usize> Floats for [f32; N]
 where
@@ -108,51 +112,11 @@ impl Floats for u32 {
     }
 }
 
-impl Floats for TargetRay {
-    fn floats(values: Vec<TargetRay>) -> Vec<f32> {
-        let all = |TargetRay { origin: [a, b, c], near, direction: [d, e, f], far }| [a, b, c, near, d, e, f, far];
-        values.into_iter().flat_map(all).collect()
-    }
-}
-
 /// Numbers of samples are small enough to be exact.
 impl Floats for RayPoint {
     fn floats(values: Vec<RayPoint>) -> Vec<f32> {
         let all = |RayPoint { position: [a, b, c], length, direction: [d, e, f], sample }| {
             [a, b, c, length, d, e, f, sample as f32]
-        };
-        values.into_iter().flat_map(all).collect()
-    }
-}
-
-impl Floats for GaussianBlock {
-    fn floats(values: Vec<GaussianBlock>) -> Vec<f32> {
-        let all = |own: GaussianBlock| {
-            let ([x, y, z], [a, b, c], [red, green, blue]) = (own.position, own.log_scales, own.colour);
-            let [w, i, j, k] = own.rotation;
-            [x, y, z, own.opacity, a, b, c, own.padding, w, i, j, k, red, green, blue, own.padding_end]
-        };
-        values.into_iter().flat_map(all).collect()
-    }
-}
-
-impl Floats for ProjectedGaussian {
-    fn floats(values: Vec<ProjectedGaussian>) -> Vec<f32> {
-        let all = |own: ProjectedGaussian| {
-            let ([x, y], [xx, xy, yy], [red, green, blue]) = (own.mean, own.conic, own.colour);
-            let ([right, down], [first, second]) = (own.extent, own.padding_end);
-            let rest = [red, green, blue, own.padding_colour, right, down, first, second];
-            [[x, y, own.depth, own.opacity, xx, xy, yy, own.padding], rest].concat()
-        };
-        values.into_iter().flat_map(all).collect()
-    }
-}
-
-impl Floats for SplatGradient {
-    fn floats(values: Vec<SplatGradient>) -> Vec<f32> {
-        let all = |own: SplatGradient| {
-            let ([x, y], [xx, xy, yy], [red, green, blue]) = (own.along, own.squares, own.colour);
-            [own.opacity, x, y, own.padding, xx, xy, yy, own.unused, red, green, blue, own.behind]
         };
         values.into_iter().flat_map(all).collect()
     }
@@ -171,21 +135,12 @@ pub trait Dispatch: Clone + Send + Sync + 'static {
     fn element_count(&self) -> usize;
 
     /// Takes the arrays of several dispatches to a device.
-    ///
-    /// # Errors
-    /// If the device has no memory left.
     fn upload<D: Device>(device: &D, dispatches: &[Self]) -> Result<Self::Loaded<D>, DeviceError>;
 
     /// Runs one of them.
-    ///
-    /// # Errors
-    /// If the device is lost.
     fn dispatch<D: Device>(&self, device: &D, loaded: &mut Self::Loaded<D>, index: usize) -> Result<(), DeviceError>;
 
     /// The outputs that begin with one of them, in the order of the row; none if it continues those of the one before.
-    ///
-    /// # Errors
-    /// If the device is lost.
     fn download<D: Device>(device: &D, loaded: &Self::Loaded<D>, index: usize) -> Result<Vec<f32>, DeviceError>;
 }
 

@@ -31,6 +31,10 @@ fn plus(a: Vector, b: Vector) -> Vector {
     [0, 1, 2].map(|axis| a[axis] + b[axis])
 }
 
+fn joined(rows: [[Bounded; 4]; 4]) -> [Bounded; 16] {
+    std::array::from_fn(|index| rows[index / 4][index % 4])
+}
+
 fn two() -> Bounded {
     Bounded::from(2.0_f32)
 }
@@ -111,26 +115,15 @@ pub fn project(gaussian: &GaussianBlock, camera: &CameraBlock, near: f32) -> Opt
     let determinant = dot(cross, cross) + dilation * (uu + vv) + dilation * dilation;
     let reach = (two() * (Bounded::from(255.0_f32) * opacity).ln()).greater(Bounded::ZERO);
     let extent = [(reach * (uu + dilation)).square_root(), (reach * (vv + dilation)).square_root()];
+    let conic = [(vv + dilation) / determinant, -uv / determinant, (uu + dilation) / determinant, Bounded::ZERO];
     let [red, green, blue] = gaussian.colour.map(Bounded::from);
-    let zero = Bounded::ZERO;
-    Some([
-        mean[0],
-        mean[1],
-        place[2],
-        opacity,
-        (vv + dilation) / determinant,
-        -uv / determinant,
-        (uu + dilation) / determinant,
-        zero,
-        red,
-        green,
-        blue,
-        zero,
-        extent[0],
-        extent[1],
-        zero,
-        zero,
-    ])
+    let place = [mean[0], mean[1], place[2], opacity];
+    Some(joined([
+        place,
+        conic,
+        [red, green, blue, Bounded::ZERO],
+        [extent[0], extent[1], Bounded::ZERO, Bounded::ZERO],
+    ]))
 }
 
 /// A splat at a pixel.
@@ -295,25 +288,8 @@ pub fn project_gradient(
     let rotation = by_quaternion(&ellipse, across.map(|(by_axis, _)| by_axis));
     let opacity = sums[0] * (Bounded::ONE - splat.opacity.into());
     let scales = across.map(|(_, by_scale)| by_scale);
-    let [w, a, b, c] = rotation;
-    Some([
-        position[0],
-        position[1],
-        position[2],
-        opacity,
-        scales[0],
-        scales[1],
-        scales[2],
-        zero,
-        w,
-        a,
-        b,
-        c,
-        sums[6],
-        sums[7],
-        sums[8],
-        zero,
-    ])
+    let four = |[a, b, c]: Vector, last| [a, b, c, last];
+    Some(joined([four(position, opacity), four(scales, zero), rotation, [sums[6], sums[7], sums[8], zero]]))
 }
 
 fn by_axes(ellipse: &Ellipse, splat: &ProjectedGaussian, sums: &[Bounded; 9]) -> [Vector; 2] {

@@ -6,7 +6,7 @@
 //! (the side of a threshold) is undecided; such elements must be few.
 //!
 //! ```text
-//! compare, bounded, agreement   differences of numbers, and whether they are within their bounds
+//! bounded, agreement            differences of numbers, and whether they are within their bounds
 //! half                          half precision from its definition
 //! oracle,                       expected outputs in f64
 //!   camera_oracle, hull_oracle,
@@ -32,7 +32,6 @@ pub mod bounded;
 pub mod camera_oracle;
 pub mod case;
 pub mod cases;
-pub mod compare;
 pub mod compositing_oracle;
 pub mod dispatch;
 pub mod gaussian_oracle;

@@ -166,7 +166,7 @@ pub fn is_sampled(
 }
 
 /// Whether any is true; `None` if it depends on undecided ones.
-fn any(answers: impl Iterator<Item = Option<bool>>) -> Option<bool> {
+pub(crate) fn any(answers: impl Iterator<Item = Option<bool>>) -> Option<bool> {
     let answers: Vec<Option<bool>> = answers.collect();
     if answers.contains(&Some(true)) {
         Some(true)

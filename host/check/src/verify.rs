@@ -12,6 +12,7 @@ mod weighting;
 
 use file::File;
 use safetensors::SafeTensors;
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use viewfuse_device::Device;
 use viewfuse_device::cpu::Cpu;
@@ -150,8 +151,8 @@ impl Report {
 /// Most bytes of a file of reference values.
 const LONGEST_FILE: u64 = 4 << 30;
 
-/// Compares a field with a file. Returns the names of the known tensors; none if the file has another content.
-type Part<D> = fn(&File<'_>, &D, &mut Report, &dyn Progress) -> Result<Vec<String>, VerifyError>;
+/// Compares a field with a file; nothing if the file has another content.
+type Part<D> = fn(&File<'_>, &D, &mut Report, &dyn Progress) -> Result<(), VerifyError>;
 
 /// The parts of the learned fields, by the names of their rows.
 fn parts<D: Device>() -> [(&'static str, Part<D>); 2] {
@@ -176,16 +177,17 @@ pub fn verify<D: Device>(path: &Path, device: &D, progress: &dyn Progress) -> Re
             let mut report = Report { path: path.to_path_buf(), quantities: Vec::new(), not_covered: Vec::new() };
             // The header was read once already.
             let metadata = SafeTensors::read_metadata(&bytes).ok().and_then(|(_, header)| header.metadata().clone());
-            let file = File { path, tensors: &tensors, metadata: metadata.unwrap_or_default() };
-            let mut covered = attention::verify(path, &tensors, &mut report)?;
-            covered.extend(metrics::verify(&file, device, &mut report)?);
+            let metadata = metadata.unwrap_or_default();
+            let file = File { path, tensors: &tensors, metadata, covered: RefCell::default() };
+            attention::verify(&file, &mut report)?;
+            metrics::verify(&file, device, &mut report)?;
             for (_, verify) in parts::<D>() {
-                covered.extend(verify(&file, device, &mut report, progress)?);
+                verify(&file, device, &mut report, progress)?;
             }
-            let mut rest: Vec<&str> =
-                tensors.names().into_iter().filter(|name| !covered.iter().any(|c| c == name)).collect();
-            rest.sort_unstable();
-            report.not_covered.extend(rest.into_iter().map(str::to_owned));
+            let covered = file.covered.into_inner();
+            report.not_covered =
+                tensors.names().into_iter().filter(|name| !covered.contains(*name)).map(str::to_owned).collect();
+            report.not_covered.sort_unstable();
             report
         }
         Err(safetensors) => match serde_json::from_slice(&bytes) {

@@ -149,11 +149,6 @@ impl World {
         if whole.row_count < 10 { whole } else { SweepBlock { first_row: 3, row_count: whole.row_count - 5, ..whole } }
     }
 
-    /// Changes a view's focal length by 1 %.
-    pub fn change_focal(&mut self) {
-        self.views[1].intrinsics[0] *= 1.01;
-    }
-
     /// Changes the texels of all views but the first by 1 %.
     pub fn change_texels(&mut self) {
         change_texels(&mut self.texels[self.views[1].first_texel as usize..]);

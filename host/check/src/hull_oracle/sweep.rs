@@ -2,6 +2,7 @@
 
 use super::{NOWHERE, Scene, along, centre, look_up, project, radius, towards};
 use crate::bounded::{Bounded, ROUNDING};
+use crate::sweep_oracle::{cell, window};
 use viewfuse_kernels::visual_hull::hull::SWEPT_ALPHA;
 use viewfuse_kernels::visual_hull::sweep::{
     DEPTH_COST, MAX_DIFFERENCE, MAX_ROUGHNESS, NO_WITNESS, OUTSIDE, ROUGHNESS_COST, SEEN_BEHIND_ENTRY,
@@ -14,13 +15,6 @@ const OUT: Bounded = Bounded { value: OUTSIDE as f64, error: 0.0 };
 
 fn plane_depth(sweep: &SweepBlock, plane: u32) -> Bounded {
     Bounded::from(sweep.near) + (Bounded::from(plane) + Bounded::from(0.5)) * Bounded::from(sweep.plane_step)
-}
-
-/// The pixel of a coordinate, if it does not depend on rounding.
-fn cell(coordinate: Bounded, count: u32) -> Option<usize> {
-    let index = |value: f64| value.floor().clamp(0.0, f64::from(count - 1)) as usize;
-    let low = index(coordinate.value - coordinate.error);
-    (low == index(coordinate.value + coordinate.error)).then_some(low)
 }
 
 /// Mean absolute difference between a pixel's colour and the other views' colours at its point on a plane; a share of
@@ -92,15 +86,10 @@ pub fn match_cost(
     Some(Bounded { error: mean.error + (votes.len() + 2) as f64 * ROUNDING * mean.value, ..mean })
 }
 
-/// The coordinates of a window along an axis.
-fn window(at: u32, count: u32) -> std::ops::RangeInclusive<u32> {
-    at.saturating_sub(WINDOW_REACH)..=(at + WINDOW_REACH).min(count - 1)
-}
-
 /// Sum and count of the costs inside the hull over a row of the window.
 pub fn sum_row(sweep: &SweepBlock, width: u32, costs: &[f32], pixel: u32, plane: u32) -> [Option<Bounded>; 2] {
     let row_start = pixel - pixel % width;
-    let inside = window(pixel % width, width)
+    let inside = window(pixel % width, WINDOW_REACH, width)
         .map(|column| costs[((row_start + column) * sweep.plane_count + plane) as usize])
         .filter(|cost| *cost >= 0.0);
     let (sum, count) = inside.fold((Bounded::ZERO, 0_u32), |(sum, count), cost| (sum + cost.into(), count + 1));
@@ -114,8 +103,8 @@ pub fn mean_column(sweep: &SweepBlock, width: u32, costs: &[f32], pixel: u32, pl
     if cost(column, row) < 0.0 {
         return Some(OUT);
     }
-    let rows = window(row, sweep.row_count);
-    let all = rows.flat_map(|row| window(column, width).map(move |column| cost(column, row)));
+    let rows = window(row, WINDOW_REACH, sweep.row_count);
+    let all = rows.flat_map(|row| window(column, WINDOW_REACH, width).map(move |column| cost(column, row)));
     let inside: Vec<f32> = all.filter(|cost| *cost >= 0.0).collect();
     let sum = inside.iter().fold(Bounded::ZERO, |sum, cost| sum + (*cost).into());
     Some(sum / Bounded::from(inside.len() as u32))

@@ -77,7 +77,7 @@ pub fn census_cost(
 }
 
 /// The coordinates of a window along an axis.
-fn window(at: u32, reach: u32, count: u32) -> std::ops::RangeInclusive<u32> {
+pub(crate) fn window(at: u32, reach: u32, count: u32) -> std::ops::RangeInclusive<u32> {
     at.saturating_sub(reach)..=(at + reach).min(count - 1)
 }
 

@@ -102,7 +102,7 @@ fn view_evidence(
 }
 
 /// The pixel of a coordinate inside the image, if it does not depend on rounding.
-pub(super) fn cell(coordinate: Bounded, count: u32) -> Option<usize> {
+pub(crate) fn cell(coordinate: Bounded, count: u32) -> Option<usize> {
     let index = |value: f64| value.floor().clamp(0.0, f64::from(count - 1)) as usize;
     let low = index(coordinate.value - coordinate.error);
     (low == index(coordinate.value + coordinate.error)).then_some(low)

@@ -1,10 +1,10 @@
 //! The `attention_*` tensors of `genvs_srn.safetensors`: weights of the attention weighters, with deterministic
 //! initialisation.
 
+use super::file::File;
 use super::{Measure, Quantity, Report, VerifyError};
-use safetensors::{Dtype, SafeTensors};
+use safetensors::tensor::{Dtype, TensorView};
 use std::convert::Infallible;
-use std::path::Path;
 use viewfuse_core::attention::{EMBEDDING, PoseEmbedding, published_cross_attention};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::sources::Sources;
@@ -15,18 +15,19 @@ use viewfuse_weighting::sources::{MAX_SOURCES, SourceWeights};
 const TOLERANCE: f64 = 1.0e-5;
 const EMBEDDING_TENSOR: &str = "attention_embedding.paper_fourier";
 
-/// Compares the file's quantities; returns the names of the used tensors.
-pub(super) fn verify(path: &Path, file: &SafeTensors<'_>, report: &mut Report) -> Result<Vec<String>, VerifyError> {
-    let content = |place: &str, message: String| VerifyError::Content {
-        path: path.to_path_buf(),
-        place: format!("tensor '{place}'"),
-        message,
-    };
-    if file.tensor("attention_src").is_err() || file.tensor("attention_tgt").is_err() {
-        return Ok(Vec::new());
+/// Compares the file's quantities.
+pub(super) fn verify(file: &File<'_>, report: &mut Report) -> Result<(), VerifyError> {
+    if !file.has("attention_src") || !file.has("attention_tgt") {
+        return Ok(());
     }
+    let content = |name: &str, message: String| file.wrong(&format!("tensor '{name}'"), message);
+    let has = |name: &str, count: usize| {
+        let numbers =
+            |view: &TensorView<'_>| view.dtype() == Dtype::F32 && view.shape().iter().product::<usize>() == count;
+        file.tensors.tensor(name).is_ok_and(|view| numbers(&view))
+    };
     let poses = |name: &str| -> Result<Vec<Pose>, VerifyError> {
-        let values = floats(file, name).ok_or_else(|| content(name, "must be F32 [pose, 4, 4]".into()))?;
+        let values = file.floats(name).map_err(|_| content(name, "must be F32 [pose, 4, 4]".into()))?;
         values
             .chunks_exact(16)
             .map(|m| {
@@ -39,8 +40,8 @@ pub(super) fn verify(path: &Path, file: &SafeTensors<'_>, report: &mut Report) -
     let sources =
         Sources::<MAX_SOURCES>::new(&source_poses).map_err(|error| content("attention_src", error.to_string()))?;
     let targets = poses("attention_tgt")?;
-    let mut covered = vec!["attention_src".to_owned(), "attention_tgt".to_owned()];
-    if let Some(reference) = floats(file, EMBEDDING_TENSOR).filter(|values| values.len() == EMBEDDING * targets.len()) {
+    if has(EMBEDDING_TENSOR, EMBEDDING * targets.len()) {
+        let reference = file.floats(EMBEDDING_TENSOR)?;
         let Ok(model) = AttentionModel::fourier(&mut prefixed(""));
         if let AttentionModel::Fourier(embedding) = model {
             let mut quantity = Quantity::new("attention: embedding of paper_fourier", Measure::Absolute, TOLERANCE);
@@ -49,18 +50,17 @@ pub(super) fn verify(path: &Path, file: &SafeTensors<'_>, report: &mut Report) -
                 quantity.compare_all(ours, expected.iter().copied().map(f64::from), &format!("target {index}"));
             }
             report.quantities.push(quantity);
-            covered.push(EMBEDDING_TENSOR.to_owned());
         }
     }
     for (variant, model) in variants() {
         let name = format!("attention_weights.{variant}");
-        if file.tensor(&name).is_err() {
+        if !file.has(&name) {
             continue;
         }
-        let count = source_poses.len() * targets.len();
-        let reference = floats(file, &name)
-            .filter(|values| values.len() == count)
-            .ok_or_else(|| content(&name, format!("must be F32 [{}, {}]", source_poses.len(), targets.len())))?;
+        if !has(&name, source_poses.len() * targets.len()) {
+            return Err(content(&name, format!("must be F32 [{}, {}]", source_poses.len(), targets.len())));
+        }
+        let reference = file.floats(&name)?;
         let weigh = |target: &Pose| -> SourceWeights {
             match &model {
                 Some(model) => model.weigh(&sources, target),
@@ -78,9 +78,8 @@ pub(super) fn verify(path: &Path, file: &SafeTensors<'_>, report: &mut Report) -
             }
         }
         report.quantities.push(quantity);
-        covered.push(name);
     }
-    Ok(covered)
+    Ok(())
 }
 
 /// Parameters by deterministic initialisation, their names behind a prefix.
@@ -101,10 +100,4 @@ fn variants() -> [(&'static str, Option<AttentionModel>); 5] {
         ("learned_cross_attention", Some(learned)),
         ("relative_pose_self_attention", Some(pose_self)),
     ]
-}
-
-/// The values of a tensor of `f32`, or `None` if it is another.
-fn floats(file: &SafeTensors<'_>, name: &str) -> Option<Vec<f32>> {
-    let view = file.tensor(name).ok().filter(|view| view.dtype() == Dtype::F32)?;
-    Some(view.data().chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
 }

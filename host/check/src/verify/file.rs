@@ -3,7 +3,8 @@
 use super::{Measure, Quantity, VerifyError};
 use safetensors::tensor::Dtype;
 use safetensors::{SafeTensors, tensor::TensorView};
-use std::collections::HashMap;
+use std::cell::RefCell;
+use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::pose::Pose;
@@ -23,6 +24,8 @@ pub(super) struct File<'a> {
     pub(super) path: &'a Path,
     pub(super) tensors: &'a SafeTensors<'a>,
     pub(super) metadata: HashMap<String, String>,
+    /// Names of the tensors that were read, or that need not be.
+    pub(super) covered: RefCell<BTreeSet<String>>,
 }
 
 impl File<'_> {
@@ -36,12 +39,23 @@ impl File<'_> {
         VerifyError::Content { path: self.path.to_path_buf(), place: name.to_owned(), message: message.into() }
     }
 
+    /// Whether there is a tensor of this name.
+    pub(super) fn has(&self, name: &str) -> bool {
+        self.tensors.tensor(name).is_ok()
+    }
+
+    /// Says that a tensor is known.
+    pub(super) fn cover(&self, name: &str) {
+        self.covered.borrow_mut().insert(name.to_owned());
+    }
+
     /// A tensor of this type.
     pub(super) fn view(&self, name: &str, dtype: Dtype) -> Result<TensorView<'_>, VerifyError> {
         let view = self.tensors.tensor(name).map_err(|error| self.wrong(name, error.to_string()))?;
         if view.dtype() != dtype {
             return Err(self.wrong(name, format!("holds {:?} instead of {dtype:?}", view.dtype())));
         }
+        self.cover(name);
         Ok(view)
     }
 
@@ -49,6 +63,12 @@ impl File<'_> {
     pub(super) fn floats(&self, name: &str) -> Result<Vec<f32>, VerifyError> {
         let view = self.view(name, Dtype::F32)?;
         Ok(view.data().chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
+    }
+
+    /// The numbers of a tensor of `f64`.
+    pub(super) fn doubles(&self, name: &str) -> Result<Vec<f64>, VerifyError> {
+        let view = self.view(name, Dtype::F64)?;
+        Ok(view.data().as_chunks::<8>().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
     }
 
     /// Exactly `count` numbers.

@@ -32,9 +32,9 @@ pub(super) fn verify<D: Device>(
     device: &D,
     report: &mut Report,
     progress: &dyn Progress,
-) -> Result<Vec<String>, VerifyError> {
-    if file.tensors.tensor("volume_value").is_err() || file.tensors.tensor("denoise_sigma").is_err() {
-        return Ok(Vec::new());
+) -> Result<(), VerifyError> {
+    if !file.has("volume_value") || !file.has("denoise_sigma") {
+        return Ok(());
     }
     let architecture = match file.metadata("member") {
         None => Architecture::published(),
@@ -52,35 +52,28 @@ pub(super) fn verify<D: Device>(
     }
     let mut reference = Reference::new(&field, device, &sources, progress).map_err(|error| failed(full(&error)))?;
     let mut comparison = Comparison { file, reference: &mut reference, side };
-    let mut known: Vec<String> = ["images", "src_poses", "tgt_pose", "focal_normalized"].map(str::to_owned).to_vec();
-    known.extend(comparison.volumes(report)?);
-    known.extend(comparison.points(report)?);
-    known.extend(comparison.features(&sources.images.iter().map(|image| image.camera).collect::<Vec<_>>(), report)?);
-    known.extend(comparison.denoiser(report)?);
-    known.extend(comparison.sample(report)?);
-    known.extend(levels(file, report)?);
-    Ok(known)
+    comparison.volumes(report)?;
+    comparison.points(report)?;
+    comparison.features(&sources.images.iter().map(|image| image.camera).collect::<Vec<_>>(), report)?;
+    comparison.denoiser(report)?;
+    comparison.sample(report)?;
+    levels(file, report)
 }
 
 /// Noise levels of schedules.
-fn levels(file: &File<'_>, report: &mut Report) -> Result<Vec<String>, VerifyError> {
-    let names = file.tensors.names().into_iter().filter(|name| name.starts_with("sigma_steps."));
-    let mut names: Vec<String> = names.map(str::to_owned).collect();
+fn levels(file: &File<'_>, report: &mut Report) -> Result<(), VerifyError> {
+    let mut names = file.tensors.names();
+    names.retain(|name| name.starts_with("sigma_steps."));
     names.sort_unstable();
-    for name in &names {
-        let expected = doubles(file, name)?;
+    for name in names {
+        let expected = file.doubles(name)?;
         let count = expected.len() as u32;
         let ours = (0..count).map(|index| f64::from(NoiseSchedule::published().level(index, count)));
         let mut quantity = Quantity::new(format!("GeNVS {count} noise levels"), Measure::Relative, 1.0e-6);
         quantity.compare_all(ours, expected.iter().copied(), name);
         report.quantities.push(quantity);
     }
-    Ok(names)
-}
-
-fn doubles(file: &File<'_>, name: &str) -> Result<Vec<f64>, VerifyError> {
-    let view = file.view(name, Dtype::F64)?;
-    Ok(view.data().as_chunks::<8>().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
+    Ok(())
 }
 
 /// A device's network and the file.
@@ -116,7 +109,7 @@ impl<D: Device> Comparison<'_, '_, D> {
         (0..values.len()).map(|at| values[at % channels * pixels + at / channels]).collect()
     }
 
-    fn volumes(&mut self, report: &mut Report) -> Result<Vec<String>, VerifyError> {
+    fn volumes(&mut self, report: &mut Report) -> Result<(), VerifyError> {
         let encoder = &self.reference.architecture().encoder;
         let (features, depths, pixels) = (encoder.feature_count, encoder.volume_depth, self.side * self.side);
         let view_len = features * depths * pixels;
@@ -138,17 +131,17 @@ impl<D: Device> Comparison<'_, '_, D> {
         }
         let expected = self.file.many("volume_value", indices.len())?;
         report.quantities.push(compared("GeNVS volumes".to_owned(), &ours, &expected, 1.0e-4, true));
-        Ok(["volume_index", "volume_value"].map(str::to_owned).to_vec())
+        Ok(())
     }
 
-    fn points(&self, report: &mut Report) -> Result<Vec<String>, VerifyError> {
+    fn points(&self, report: &mut Report) -> Result<(), VerifyError> {
         let ours = self.reference.points(&self.file.floats("mlp_in")?).map_err(|error| self.failed(&error))?;
         let expected = self.file.many("mlp_out", ours.len())?;
         report.quantities.push(compared("GeNVS densities and features".to_owned(), &ours, &expected, 1.0e-5, false));
-        Ok(["mlp_in", "mlp_out"].map(str::to_owned).to_vec())
+        Ok(())
     }
 
-    fn features(&mut self, sources: &[Camera], report: &mut Report) -> Result<Vec<String>, VerifyError> {
+    fn features(&mut self, sources: &[Camera], report: &mut Report) -> Result<(), VerifyError> {
         let rows = self.file.rows::<16>("tgt_pose")?;
         let pose = self.file.pose("tgt_pose", &rows[0])?;
         let poses: Vec<_> = sources.iter().map(|camera| camera.pose).collect();
@@ -157,10 +150,10 @@ impl<D: Device> Comparison<'_, '_, D> {
         let target = Camera { pose, pinhole: sources[0].pinhole };
         let plane = 2.0 * target.pinhole.focal()[1] / self.side as f32;
         let features = self.reference.architecture().encoder.feature_count;
-        let mut names = vec!["feature_image_index".to_owned()];
+        let mut is_known = false;
         for (theirs, ours) in WEIGHTINGS {
             let name = format!("feature_image_value.{theirs}");
-            if self.file.tensors.tensor(&name).is_err() {
+            if !self.file.has(&name) {
                 continue;
             }
             let weighting = Weighting::open(ours).map_err(|_| self.file.wrong(&name, "is no weighting of ours"))?;
@@ -174,11 +167,13 @@ impl<D: Device> Comparison<'_, '_, D> {
             let picked = self.picked("feature_image_index", &image, |index| self.place(index, features))?;
             let expected = self.file.many(&name, picked.len())?;
             report.quantities.push(compared(format!("GeNVS feature image, {ours}"), &picked, &expected, 1.0e-4, false));
-            names.push(name);
+            is_known = true;
         }
-        match names.len() {
-            1 => Err(self.file.wrong("feature_image_index", "has no feature_image_value of a weighting that we know")),
-            _ => Ok(names),
+        match is_known {
+            false => {
+                Err(self.file.wrong("feature_image_index", "has no feature_image_value of a weighting that we know"))
+            }
+            true => Ok(()),
         }
     }
 
@@ -200,18 +195,16 @@ impl<D: Device> Comparison<'_, '_, D> {
         Ok(self.by_pixel(&latents, COLOUR_CHANNELS))
     }
 
-    fn denoiser(&self, report: &mut Report) -> Result<Vec<String>, VerifyError> {
+    fn denoiser(&self, report: &mut Report) -> Result<(), VerifyError> {
         let (condition, latents) = (self.condition()?, self.latents()?);
-        let mut names = ["denoise_index", "denoise_sigma", "latents"].map(str::to_owned).to_vec();
-        names.push(format!("feature_image_full.{WHOLE}"));
-        let given: Vec<String> = self.file.tensors.names().into_iter().map(str::to_owned).collect();
+        let given = self.file.tensors.names();
         let levels = self.file.floats("denoise_sigma")?;
         if levels.is_empty() {
             return Err(self.file.wrong("denoise_sigma", "is empty"));
         }
         for level in levels {
             // The names have the levels as numbers of their own.
-            let is_of_level = |name: &&String| {
+            let is_of_level = |name: &&&str| {
                 let number = name.strip_prefix("denoise_value.").and_then(|number| number.parse::<f32>().ok());
                 number.is_some_and(|number| (number - level).abs() <= 1.0e-6 * level)
             };
@@ -228,24 +221,21 @@ impl<D: Device> Comparison<'_, '_, D> {
             let expected = self.file.many(name, picked.len())?;
             let what = format!("GeNVS denoised at level {level}");
             report.quantities.push(compared(what, &picked, &expected, 1.0e-3, false));
-            names.push(name.clone());
         }
-        Ok(names)
+        Ok(())
     }
 
-    fn sample(&self, report: &mut Report) -> Result<Vec<String>, VerifyError> {
-        let names = self.file.tensors.names().into_iter();
-        let names = names.filter_map(|name| Some((name, name.strip_prefix("sample_")?.strip_suffix("_steps")?)));
-        let names: Vec<(String, u32)> =
-            names.filter_map(|(name, count)| Some((name.to_owned(), count.parse().ok()?))).collect();
-        for (name, level_count) in &names {
-            let steps = Steps::Fixed { sampler: Sampler::Heun, level_count: *level_count };
+    fn sample(&self, report: &mut Report) -> Result<(), VerifyError> {
+        let count = |name: &str| name.strip_prefix("sample_")?.strip_suffix("_steps")?.parse::<u32>().ok();
+        for name in self.file.tensors.names() {
+            let Some(level_count) = count(name) else { continue };
+            let steps = Steps::Fixed { sampler: Sampler::Heun, level_count };
             let plan = Plan { steps, ..Plan::published(0) };
             let picture = self
                 .reference
                 .sampled(&self.latents()?, &self.condition()?, [self.side as u32; 2], &plan)
                 .map_err(|error| self.failed(&error))?;
-            let expected: Vec<f32> = doubles(self.file, name)?.into_iter().map(|value| value as f32).collect();
+            let expected: Vec<f32> = self.file.doubles(name)?.into_iter().map(|value| value as f32).collect();
             if expected.len() != picture.len() {
                 return Err(self.file.wrong(name, format!("has not {} numbers", picture.len())));
             }
@@ -253,6 +243,6 @@ impl<D: Device> Comparison<'_, '_, D> {
             let what = format!("GeNVS picture, {level_count} steps of heun");
             report.quantities.push(compared(what, &picture, &expected, 5.0e-3, true));
         }
-        Ok(names.into_iter().map(|(name, _)| name).collect())
+        Ok(())
     }
 }

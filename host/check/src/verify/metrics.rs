@@ -33,51 +33,38 @@ const LPIPS_PREFIX: &str = "lpips_";
 const FRECHET: [(&str, &str); 2] =
     [("frechet", "Frechet distance"), ("frechet_lowrank", "Frechet distance, few points")];
 
-/// Compares the file's quantities; returns the names of the used tensors.
-pub(super) fn verify<D: Device>(file: &File<'_>, device: &D, report: &mut Report) -> Result<Vec<String>, VerifyError> {
-    let tensors = file.tensors;
-    let mut covered = Vec::new();
-    if tensors.tensor("pred").is_ok() && tensors.tensor("truth").is_ok() {
-        covered.extend(Pairs::read(file)?.verify(device, report)?);
+/// Compares the file's quantities.
+pub(super) fn verify<D: Device>(file: &File<'_>, device: &D, report: &mut Report) -> Result<(), VerifyError> {
+    if file.has("pred") && file.has("truth") {
+        Pairs::read(file)?.verify(device, report)?;
     }
-    for (name, title) in FRECHET {
-        if tensors.tensor(name).is_ok() {
-            covered.extend(frechet(file, name, title, report)?);
-        }
-    }
-    Ok(covered)
-}
-
-/// The numbers of a tensor.
-fn doubles(file: &File<'_>, name: &str) -> Result<Vec<f64>, VerifyError> {
-    let view = file.view(name, Dtype::F64)?;
-    Ok(view.data().as_chunks::<8>().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
+    FRECHET.iter().filter(|(name, _)| file.has(name)).try_for_each(|(name, title)| frechet(file, name, title, report))
 }
 
 /// A build without the feature `fid` computes no distances of sets.
 #[cfg(not(feature = "fid"))]
-fn frechet(file: &File<'_>, name: &str, _title: &str, _report: &mut Report) -> Result<Vec<String>, VerifyError> {
+fn frechet(file: &File<'_>, name: &str, _title: &str, _report: &mut Report) -> Result<(), VerifyError> {
     let reason = "is a Frechet distance, which needs a build with the feature `fid`";
     Err(file.wrong(name, reason.to_owned()))
 }
 
 /// The distance of the sets `NAME_x` and `NAME_y`.
 #[cfg(feature = "fid")]
-fn frechet(file: &File<'_>, name: &str, title: &str, report: &mut Report) -> Result<Vec<String>, VerifyError> {
+fn frechet(file: &File<'_>, name: &str, title: &str, report: &mut Report) -> Result<(), VerifyError> {
     let names = ["x", "y"].map(|set| format!("{name}_{set}"));
     let set = |name: &str| {
         let view = file.view(name, Dtype::F64)?;
         let &[_, dimension] = view.shape() else {
             return Err(file.wrong(name, format!("has the shape {:?} instead of [point, number]", view.shape())));
         };
-        Features::new(dimension, doubles(file, name)?).map_err(|error| file.wrong(name, error.to_string()))
+        Features::new(dimension, file.doubles(name)?).map_err(|error| file.wrong(name, error.to_string()))
     };
     let ours = frechet_distance(&set(&names[0])?, &set(&names[1])?);
     let ours = ours.map_err(|error| file.wrong(&names[0], error.to_string()))?;
     let mut quantity = Quantity::new(title, Measure::Relative, NETWORK_TOLERANCE);
-    quantity.compare_all([ours], doubles(file, name)?, name);
+    quantity.compare_all([ours], file.doubles(name)?, name);
     report.quantities.push(quantity);
-    Ok(names.into_iter().chain([name.to_owned()]).collect())
+    Ok(())
 }
 
 /// The pairs of pictures.
@@ -91,20 +78,17 @@ impl<'a> Pairs<'a> {
         let pictures = |name: &str| {
             let wrong = |message: String| file.wrong(&format!("tensor '{name}'"), message);
             let view = file.tensors.tensor(name).map_err(|error| wrong(error.to_string()))?;
-            let &[count, height, width, 3] = view.shape() else {
-                return Err(wrong(format!(
-                    "must be U8 [pair, row, column, 3], not {:?} {:?}",
-                    view.dtype(),
-                    view.shape()
-                )));
+            let sizes = match *view.shape() {
+                [count, height, width, 3] if view.dtype() == Dtype::U8 && count * height * width > 0 => {
+                    Some([height, width])
+                }
+                _ => None,
             };
-            if view.dtype() != Dtype::U8 || count * height * width == 0 {
-                return Err(wrong(format!(
-                    "must be U8 [pair, row, column, 3], not {:?} {:?}",
-                    view.dtype(),
-                    view.shape()
-                )));
-            }
+            let [height, width] = sizes.ok_or_else(|| {
+                let (dtype, shape) = (view.dtype(), view.shape());
+                wrong(format!("must be U8 [pair, row, column, 3], not {dtype:?} {shape:?}"))
+            })?;
+            file.cover(name);
             let picture = |levels: &[u8]| RgbImage::from_raw(width as u32, height as u32, levels.to_vec());
             let pictures: Option<Vec<RgbImage>> = view.data().chunks_exact(height * width * 3).map(picture).collect();
             pictures.ok_or_else(|| wrong("is too large".to_owned()))
@@ -117,8 +101,7 @@ impl<'a> Pairs<'a> {
         Ok(Pairs { file, pairs: predictions.into_iter().zip(truths).map(|(p, t)| [p, t]).collect() })
     }
 
-    fn verify<D: Device>(&self, device: &D, report: &mut Report) -> Result<Vec<String>, VerifyError> {
-        let mut covered: Vec<String> = ["pred", "truth"].map(str::to_owned).to_vec();
+    fn verify<D: Device>(&self, device: &D, report: &mut Report) -> Result<(), VerifyError> {
         let uniform = |p: &RgbImage, t: &RgbImage| ssim(p, t, t.width() as usize, t.height() as usize, 3);
         let plain: [(&str, &str, &Score<'_>); 3] = [
             ("psnr", "PSNR", &|p, t| Ok(psnr(p, t))),
@@ -126,31 +109,29 @@ impl<'a> Pairs<'a> {
             ("ssim_gaussian", "SSIM (Gaussian)", &|p, t| Ok(ssim_gaussian(p, t).unwrap_or(f64::NAN))),
         ];
         for (name, title, score) in plain {
-            covered.extend(self.compare(name, Quantity::new(title, Measure::Relative, TOLERANCE), score, report)?);
+            self.compare(name, Quantity::new(title, Measure::Relative, TOLERANCE), score, report)?;
         }
         for kind in LpipsTrunk::ALL {
             let name = kind.metric().replace('-', "_");
-            if self.file.tensors.tensor(&name).is_err() {
+            if !self.file.has(&name) {
                 continue;
             }
-            let (heads, names) = self.prefixed(LPIPS_PREFIX);
+            let heads = self.prefixed(LPIPS_PREFIX);
             let lpips = Lpips::new(device, kind, &by_formula(&kind.steps(), ""), &heads);
             let lpips = lpips.map_err(|error| self.failed(&name, &error))?;
             let score: &Score<'_> = &|p, t| lpips.distance(device, p, t).map_err(|error| self.failed(&name, &error));
             let quantity = Quantity::new(format!("LPIPS ({kind})"), Measure::Relative, NETWORK_TOLERANCE);
-            covered.extend(self.compare(&name, quantity, score, report)?);
-            covered.extend(names);
+            self.compare(&name, quantity, score, report)?;
         }
-        if self.file.tensors.tensor("dists").is_ok() {
-            let (weights, names) = self.prefixed("dists_");
+        if self.file.has("dists") {
+            let weights = self.prefixed("dists_");
             let trunk = by_formula(&vgg16(Pooling::L2), "vgg16.");
             let dists = Dists::new(device, &trunk, &weights).map_err(|error| self.failed("dists", &error))?;
             let score: &Score<'_> = &|p, t| dists.distance(device, p, t).map_err(|error| self.failed("dists", &error));
             let quantity = Quantity::new("DISTS", Measure::Absolute, DISTS_STEPS);
-            covered.extend(self.compare("dists", quantity, score, report)?);
-            covered.extend(names);
+            self.compare("dists", quantity, score, report)?;
         }
-        Ok(covered)
+        Ok(())
     }
 
     /// Compares the score of every pair with the reference, if the file has one.
@@ -160,33 +141,32 @@ impl<'a> Pairs<'a> {
         mut quantity: Quantity,
         score: &Score<'_>,
         report: &mut Report,
-    ) -> Result<Option<String>, VerifyError> {
-        if self.file.tensors.tensor(name).is_err() {
-            return Ok(None);
+    ) -> Result<(), VerifyError> {
+        if !self.file.has(name) {
+            return Ok(());
         }
-        let reference = doubles(self.file, name)?;
+        let reference = self.file.doubles(name)?;
         if reference.len() != self.pairs.len() {
             return Err(self.file.wrong(name, format!("must be F64 [{}]", self.pairs.len())));
         }
         let ours: Vec<f64> = self.pairs.iter().map(|[p, t]| score(p, t)).collect::<Result<_, _>>()?;
         quantity.compare_all(ours, reference, name);
         report.quantities.push(quantity);
-        Ok(Some(name.to_owned()))
+        Ok(())
     }
 
     /// The file's tensors of `f32` of this prefix as a checkpoint without it, flat heads in the shape that they are
-    /// published with; and all their names.
-    fn prefixed(&self, prefix: &str) -> (Checkpoint, Vec<String>) {
-        let mut names = Vec::new();
+    /// published with.
+    fn prefixed(&self, prefix: &str) -> Checkpoint {
         let mut heads = Vec::new();
         for (name, view) in self.file.tensors.iter() {
             let Some(own) = name.strip_prefix(prefix).filter(|_| view.dtype() == Dtype::F32) else { continue };
             let shape = if view.shape().len() == 1 { vec![1, view.shape()[0], 1, 1] } else { view.shape().to_vec() };
             let values = view.data().as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
             heads.push((TensorShape { name: own.to_owned(), shape }, values));
-            names.push(name.to_owned());
+            self.file.cover(name);
         }
-        (Checkpoint::in_memory(&self.file.path.display().to_string(), heads, BTreeMap::new()), names)
+        Checkpoint::in_memory(&self.file.path.display().to_string(), heads, BTreeMap::new())
     }
 
     fn failed(&self, name: &str, error: &MetricError) -> VerifyError {
