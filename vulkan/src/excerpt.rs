@@ -129,9 +129,9 @@ mod tests {
             for form in Form::ALL.into_iter().filter(|form| *form == Form::Single || kernel.is_tiled()) {
                 let module =
                     excerpt(if form.needs_subgroups() { &subgroups } else { &kernels }, kernel.entry_point(form));
-                let of = |wanted| instructions(&module).filter(move |(code, _)| *code == wanted);
-                assert_eq!(of(ENTRY_POINT).count(), 1, "{} {}", kernel.name(), form.name());
-                for (_, capability) in of(CAPABILITY) {
+                let coded = |wanted| instructions(&module).filter(move |(code, _)| *code == wanted);
+                assert_eq!(coded(ENTRY_POINT).count(), 1, "{} {}", kernel.name(), form.name());
+                for (_, capability) in coded(CAPABILITY) {
                     let is_asked_for = OF_ALL.contains(&capability[1])
                         || form.needs_subgroups() && OF_SUBGROUPS.contains(&capability[1]);
                     assert!(is_asked_for, "{} {}: capability {}", kernel.name(), form.name(), capability[1]);

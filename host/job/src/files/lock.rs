@@ -8,7 +8,9 @@ use std::time::{Duration, Instant};
 
 /// A folder that no other process locks until this is dropped, or the process ends.
 #[derive(Debug)]
-pub struct FolderLock(Option<File>);
+pub struct FolderLock {
+    _file: Option<File>,
+}
 
 impl FolderLock {
     /// Locks a folder. File systems without locks, and systems that do not open folders, still work: then nothing is
@@ -17,11 +19,11 @@ impl FolderLock {
     /// # Errors
     /// [`WriteError::Busy`] while another process has locked it.
     pub fn take(folder: &Path) -> Result<FolderLock, WriteError> {
-        let Ok(file) = File::open(folder) else { return Ok(FolderLock(None)) };
+        let Ok(file) = File::open(folder) else { return Ok(FolderLock { _file: None }) };
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => Err(WriteError::Busy(folder.to_path_buf())),
-            Err(TryLockError::Error(_)) => Ok(FolderLock(None)),
-            Ok(()) => Ok(FolderLock(Some(file))),
+            Err(TryLockError::Error(_)) => Ok(FolderLock { _file: None }),
+            Ok(()) => Ok(FolderLock { _file: Some(file) }),
         }
     }
 
@@ -53,16 +55,14 @@ mod tests {
     fn one_at_a_time() {
         let folder = tempfile::tempdir().expect("a folder");
         let first = FolderLock::take(folder.path()).expect("free");
-        assert!(first.0.is_some() && FolderLock::take(folder.path()).is_err());
-        let still = FolderLock::wait(folder.path(), Duration::from_millis(20));
-        assert!(still.is_err(), "another one has it for longer");
+        assert!(first._file.is_some() && FolderLock::take(folder.path()).is_err());
+        assert!(FolderLock::wait(folder.path(), Duration::from_millis(20)).is_err(), "another one has it for longer");
         let waiting = std::thread::scope(|scope| {
             let waiting = scope.spawn(|| FolderLock::wait(folder.path(), Duration::from_secs(60)));
             drop(first);
             waiting.join().expect("no panic")
         });
-        assert!(waiting.expect("it became free").0.is_some());
-        assert!(FolderLock::take(folder.path()).expect("free again").0.is_some());
-        assert!(!FolderLock::take(&folder.path().join("missing")).expect("nothing to lock").0.is_some());
+        assert!(waiting.expect("it became free")._file.is_some());
+        assert!(FolderLock::take(&folder.path().join("missing")).expect("nothing to lock")._file.is_none());
     }
 }
