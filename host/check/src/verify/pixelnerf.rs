@@ -50,7 +50,7 @@ pub(super) fn verify<D: Device>(
     let mapped = Comparison { file, suffix: ", latent layers on the grid" };
     mapped.points(&mut reference, report)?;
     mapped.rays(&mut reference, report)?;
-    ["tgt_pose", "weights", "poses"].map(|name| file.cover(name));
+    ["tgt_pose", "weights", "poses"].into_iter().for_each(|name| file.cover(name));
     Ok(())
 }
 

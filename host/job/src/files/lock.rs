@@ -40,11 +40,6 @@ impl FolderLock {
             }
         }
     }
-
-    /// Whether there is a lock.
-    pub fn is_held(&self) -> bool {
-        self.0.is_some()
-    }
 }
 
 #[cfg(all(test, unix))]
