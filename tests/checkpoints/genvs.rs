@@ -56,7 +56,6 @@ impl Tensors {
     #[track_caller]
     fn refused(self, part: &str) {
         let message = Architecture::of(&self.checkpoint()).expect_err("must be refused").to_string();
-        println!("{message}");
         assert!(message.starts_with("it: ") && !message.contains('\n') && message.len() < 1200, "{message}");
         assert!(message.contains(part), "no {part:?} in: {message}");
     }
@@ -98,7 +97,6 @@ fn the_published_network() {
 fn the_small_network() {
     let small = Architecture::small();
     let count = small.parameter_count();
-    println!("the small network has {count} numbers");
     assert!((1_000_000..5_000_000).contains(&count), "{count}");
     assert_listed(&small, "genvs_small_tensors.txt");
     // All kinds of tensors of the published one are there.

@@ -1,6 +1,6 @@
 //! `--max-error` and `--max-time`.
 
-use super::{BINARY, done};
+use super::{BINARY, done, read_json};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -18,8 +18,7 @@ viewfuse_tests::trials![
 const NETWORK: &str = "--targets 20,21 --views 3 --size 32x32 --model body:16 --device cpu";
 
 fn frames(folder: &Path) -> Vec<Value> {
-    let record: Value =
-        serde_json::from_slice(&fs::read(folder.join("out/run.json")).expect("a record")).expect("JSON");
+    let record = read_json(folder.join("out/run.json"));
     record["frames"].as_array().expect("frames").clone()
 }
 

@@ -80,10 +80,6 @@ fn the_lorry_as_points() {
         outside += usize::from(is_outside);
     }
     let (inside, alike) = (1.0 - outside as f64 / checked as f64, close as f64 / compared as f64);
-    println!(
-        "{} points, {inside:.4} of them inside of all silhouettes, {alike:.3} of {compared} colours alike",
-        points.len()
-    );
     assert!(inside > 0.95, "{inside}");
     assert!(compared > 2 * points.len() && alike > 0.6, "{alike} of {compared}");
 }

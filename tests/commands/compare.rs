@@ -1,6 +1,6 @@
 //! `viewfuse compare`.
 
-use super::{BINARY, assert_near, done};
+use super::{BINARY, assert_near, done, read_json};
 use image::DynamicImage;
 use image::metadata::Orientation;
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, f32_bytes, safetensors, toy};
@@ -57,8 +57,7 @@ fn scores_are_those_of_render() {
             "render toy --targets 20..23 --sources 0..7 --size 48x48 --weights mean --device cpu {more} -o {out}"
         );
         done(folder.path(), &render);
-        let record = std::fs::read(folder.path().join(out).join("run.json")).expect("a record");
-        let record: serde_json::Value = serde_json::from_slice(&record).expect("JSON");
+        let record = read_json(folder.path().join(out).join("run.json"));
         let scores = |name: &str| -> Vec<f64> {
             record["frames"]
                 .as_array()
@@ -124,10 +123,9 @@ fn pictures_are_compared_upright() {
         }
     }
     for tag in 2..=8 {
-        for pair in [format!("plain turned-{tag}"), format!("turned-{tag} plain")] {
-            let printed = done(folder.path(), &format!("compare {pair} --device cpu"));
-            assert!(printed.starts_with("2 pictures\n") && number(&printed, "psnr", 2) > 25.0, "{pair}: {printed}");
-        }
+        let pair = if tag % 2 == 0 { format!("plain turned-{tag}") } else { format!("turned-{tag} plain") };
+        let printed = done(folder.path(), &format!("compare {pair} --device cpu"));
+        assert!(printed.starts_with("2 pictures\n") && number(&printed, "psnr", 2) > 25.0, "{pair}: {printed}");
     }
 }
 

@@ -1,7 +1,7 @@
 //! `viewfuse devices`, the option `--device`, and `check` of all devices. What is there is asked of the library: on a
 //! machine without Vulkan it is the CPU alone.
 
-use super::{BINARY, done};
+use super::{BINARY, done, read_json};
 use serde_json::{Value, json};
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, files_below, toy};
 use viewfuse_tests::devices::vulkan_devices;
@@ -93,8 +93,7 @@ fn the_device_is_in_the_record() {
         let arguments = format!("render toy --targets 20 --views 3 --size 16x16 --device {device} -o out");
         let printed = done(scene.path(), &arguments);
         assert!(printed.lines().any(|line| line.starts_with("device: ") && line.ends_with(", requested")), "{printed}");
-        let text = std::fs::read(scene.path().join("out/run.json")).expect("a run record");
-        let record: Value = serde_json::from_slice(&text).expect("JSON");
+        let record = read_json(scene.path().join("out/run.json"));
         assert!(record["device"].as_str().is_some_and(|device| device.starts_with(&name)), "{record}");
         assert_eq!(record["device_reason"], "requested");
         // Devices that count say what their kernels took.

@@ -1,6 +1,7 @@
 //! What documents show beside commands that `readme.rs` runs to their end: the viewer, commands on photographs of a
 //! person, and trainings that take hours.
 
+use super::readme::with_few_pictures;
 use super::{BINARY, lab};
 use std::fs;
 use viewfuse_tests::command::{self, command, killed_when, toy};
@@ -19,7 +20,8 @@ pub(super) fn run(line: &str) -> bool {
     } else if let Some(arguments) = line.strip_prefix("viewfuse ") {
         let scene = toy();
         fs::rename(scene.file("toy"), scene.file("photographs")).expect("photographs");
-        command::done(BINARY, scene.path(), arguments);
+        let few = with_few_pictures(arguments.split(' ').map(str::to_owned));
+        command::done(BINARY, scene.path(), &few.join(" "));
     } else {
         return false;
     }

@@ -1,6 +1,6 @@
 //! Output folders that hold something already: a person's own files, an earlier run, a run that is not finished yet.
 
-use super::{BINARY, done};
+use super::{BINARY, done, read_json};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -11,6 +11,7 @@ use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![
     a_file_with_the_name_of_a_journal_is_left_alone,
+    #[cfg(unix)]
     links_pipes_and_devices_are_no_journals,
     a_journal_that_was_cut_anywhere_is_continued,
     two_runs_do_not_mix_in_one_folder,
@@ -84,9 +85,6 @@ fn links_pipes_and_devices_are_no_journals() {
         assert_refused(BINARY, folder.path(), arguments, &[name]);
     }
 }
-
-#[cfg(not(unix))]
-fn links_pipes_and_devices_are_no_journals() {}
 
 /// A kill may cut a journal in the middle of its first line.
 fn a_journal_that_was_cut_anywhere_is_continued() {
@@ -173,9 +171,7 @@ fn a_target_is_added_to_a_run_of_the_same_settings() {
     let render = |more: &str, output: &str| {
         format!("render toy --sources 0..3 --size 24x24 --device cpu --weights mean --no-sheets {more} -o {output}")
     };
-    let record = |output: &str| -> Value {
-        serde_json::from_slice(&fs::read(path.join(output).join("run.json")).expect("a record")).expect("JSON")
-    };
+    let record = |output: &str| -> Value { read_json(path.join(output).join("run.json")) };
     let targets = |record: &Value| -> Vec<String> {
         let frames = record["frames"].as_array().expect("frames");
         frames.iter().map(|frame| frame["target"].as_str().expect("a name").to_owned()).collect()

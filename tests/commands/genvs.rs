@@ -1,6 +1,6 @@
 //! `viewfuse` with a GeNVS.
 
-use super::{BINARY, done, texts};
+use super::{BINARY, done, read_json, texts};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -17,9 +17,7 @@ viewfuse_tests::trials![
     options_reach_the_run,
     exact_leaves_nothing_out,
     frames_start_from_the_ones_before,
-    the_seed_decides,
     files_of_either_network,
-    evaluates_schemes,
     sweeps_samplers_and_what_is_left_out,
 ];
 
@@ -28,7 +26,7 @@ const RENDER: &str = "render toy --targets 20 --views 2 --size 16x16 --device cp
 /// What a run with these options says of itself.
 fn record(folder: &Path, options: &str) -> Value {
     done(folder, &format!("{RENDER} {options}"));
-    serde_json::from_slice(&fs::read(folder.join("out/run.json")).expect("a run record")).expect("JSON")
+    read_json(folder.join("out/run.json"))
 }
 
 fn picture(folder: &Path, options: &str) -> Vec<u8> {
@@ -57,8 +55,7 @@ fn a_picture_of_any_size_a_sheet_and_a_record_without_depth() {
     assert_eq!(names_in(&folder.join("out")), ["000020.png", "000020_sheet.png", "run.json"]);
     let picture = image::open(folder.join("out/000020.png")).expect("a picture").to_rgb8();
     assert_eq!(picture.dimensions(), (21, 20));
-    let record: Value =
-        serde_json::from_slice(&fs::read(folder.join("out/run.json")).expect("a record")).expect("JSON");
+    let record = read_json(folder.join("out/run.json"));
     assert_eq!((&record["field"], &record["model"]), (&"genvs".into(), &"genvs:small".into()));
     assert_eq!((&record["seed"], &record["size"]), (&5.into(), &[21, 20][..].into()));
     assert_eq!((&record["early_termination"], &record["frames"][0]["depth_step"]), (&0.0.into(), &Value::Null));
@@ -120,8 +117,7 @@ fn frames_start_from_the_ones_before() {
         let arguments =
             "render toy --orbit 3,full --views 2 --size 16x16 --model genvs:small --compute calls --steps 6";
         done(scene.path(), &format!("{arguments} {options} --device cpu -o out"));
-        let text = fs::read(scene.path().join("out/run.json")).expect("a run record");
-        let record: Value = serde_json::from_slice(&text).expect("JSON");
+        let record = read_json(scene.path().join("out/run.json"));
         let first = fs::read(scene.path().join("out/orbit-000.png")).expect("a picture");
         let last = fs::read(scene.path().join("out/orbit-002.png")).expect("a picture");
         (record["denoising"].clone(), first, last)
@@ -132,15 +128,6 @@ fn frames_start_from_the_ones_before() {
     let saved = reused["saved_calls"].as_u64().expect("a count");
     assert!(reused["reuse"] == 2.0 && saved > 0 && reused["calls"] == 18 - saved, "{reused}");
     assert!(first == same_first && last != other_last);
-}
-
-fn the_seed_decides() {
-    let scene = toy();
-    let render = |options: &str| picture(scene.path(), &format!("--model genvs:small --steps 3 {options}"));
-    let first = render("");
-    assert!(first == render("--seed 0"), "two runs differ");
-    assert!(first == render("--threads 1"), "one thread gives another picture");
-    assert!(first != render("--seed 1"), "the seed counts for nothing");
 }
 
 /// Which network a file holds is said by its tensors, not by its name.
@@ -173,18 +160,6 @@ fn files_of_either_network() {
     assert_refused(BINARY, folder, "render toy --targets 20 --model other.safetensors -o new", &parts);
 }
 
-fn evaluates_schemes() {
-    let scene = toy();
-    let schemes = "--weights mean --weights distance:power=3";
-    let network = "--model genvs:small --steps 2 --size 16x16 --device cpu";
-    let printed =
-        done(scene.path(), &format!("evaluate toy --targets 20 --sources 0,5 {schemes} {network} -o scores.csv"));
-    assert!(printed.contains("distance:power=3"), "{printed}");
-    let scores = fs::read_to_string(scene.path().join("scores.csv")).expect("scores");
-    // A line of names, three baselines, two schemes.
-    assert_eq!(scores.lines().count(), 6, "{scores}");
-}
-
 fn sweeps_samplers_and_what_is_left_out() {
     let scene = toy();
     let folder = scene.path();
@@ -196,8 +171,7 @@ fn sweeps_samplers_and_what_is_left_out() {
     let Outcome { code, stdout: printed, stderr } = Outcome::of(sweep);
     assert_eq!((code, stderr.as_str()), (Some(0), ""));
     assert_eq!(names_in(&folder.join("out")), ["pareto.csv", "pareto.json", "pareto.svg"]);
-    let record: Value =
-        serde_json::from_slice(&fs::read(folder.join("out/pareto.json")).expect("a record")).expect("JSON");
+    let record = read_json(folder.join("out/pareto.json"));
     assert_eq!((&record["field"], &record["size"]), (&"genvs".into(), &[16, 16][..].into()));
     let points = record["devices"][0]["points"].as_array().expect("points");
     let words: Vec<&str> = points.iter().map(|point| point["setting"].as_str().expect("words")).collect();

@@ -13,7 +13,9 @@ viewfuse_tests::trials![
     nothing_controls_the_terminal,
     names_control_the_terminal_in_no_command,
     lists_that_are_no_lists_are_wrong_arguments,
+    #[cfg(unix)]
     standard_error_may_be_full_or_closed,
+    #[cfg(unix)]
     devices_without_an_end,
 ];
 
@@ -175,9 +177,6 @@ fn standard_error_may_be_full_or_closed() {
     }
 }
 
-#[cfg(not(unix))]
-fn standard_error_may_be_full_or_closed() {}
-
 /// `/dev/zero` has no end: what reads files reads a limited number of bytes.
 #[cfg(unix)]
 fn devices_without_an_end() {
@@ -217,6 +216,3 @@ fn devices_without_an_end() {
         assert!(stderr.starts_with("viewfuse: ") && stderr.lines().count() == 1, "{arguments}: {stderr}");
     }
 }
-
-#[cfg(not(unix))]
-fn devices_without_an_end() {}

@@ -1,6 +1,6 @@
 //! `viewfuse inspect`: a good scene raises no warning, a bad one its own.
 
-use super::{done, numbers, texts};
+use super::{done, numbers, read_json, texts};
 use serde_json::Value;
 use viewfuse_tests::command::{change_poses, names_in, run, toy};
 use viewfuse_tests::scenes::Folder;
@@ -8,11 +8,8 @@ use viewfuse_tests::scenes::Folder;
 viewfuse_tests::trials![
     a_good_scene,
     draws_the_cameras,
-    flipped_axes,
-    cameras_without_a_common_point,
-    a_scene_in_other_units,
+    bad_poses_are_told,
     a_scene_in_a_map,
-    two_views_from_one_place,
     a_background_of_many_colours_is_a_fault_only_of_an_object,
     what_the_cameras_cover,
     the_quality_is_what_photographs_that_are_left_out_have,
@@ -105,26 +102,41 @@ fn draws_the_cameras() {
     assert!(serde_json::from_str::<Value>(&json).is_ok(), "{json}");
 }
 
-fn flipped_axes() {
-    let scene = toy();
-    change_poses(&scene, |_, matrix| [1, 2, 5, 6, 9, 10].iter().for_each(|&at| matrix[at] = -matrix[at]));
-    assert_warns(&scene, "24 of 24 cameras look away from the point", 1);
-}
+/// A change of pose number so many, a row-major matrix.
+type Change = fn(usize, &mut [f64; 16]);
 
-fn cameras_without_a_common_point() {
-    let scene = toy();
-    change_poses(&scene, |view, matrix| {
-        matrix[3] += 1.3 * ((7 * view % 5) as f64 - 2.0);
-        matrix[7] += 1.1 * ((3 * view % 5) as f64 - 2.0);
-        matrix[11] += 0.9 * ((11 * view % 7) as f64 - 3.0);
-    });
-    assert_warns(&scene, "the cameras do not look at a common point", 1);
-}
+/// What is wrong with the poses, the warning that says so, and how many more there may be.
+const BAD_POSES: [(Change, &str, usize); 3] = [
+    (
+        |_, matrix| [1, 2, 5, 6, 9, 10].iter().for_each(|&at| matrix[at] = -matrix[at]),
+        "24 of 24 cameras look away from the point",
+        1,
+    ),
+    (
+        |view, matrix| {
+            matrix[3] += 1.3 * ((7 * view % 5) as f64 - 2.0);
+            matrix[7] += 1.1 * ((3 * view % 5) as f64 - 2.0);
+            matrix[11] += 0.9 * ((11 * view % 7) as f64 - 3.0);
+        },
+        "the cameras do not look at a common point",
+        1,
+    ),
+    (
+        |_, matrix| [3, 7, 11].iter().for_each(|&at| matrix[at] *= 1.0e3),
+        "the cameras are 1.300e3 units from what they look at",
+        0,
+    ),
+];
 
-fn a_scene_in_other_units() {
+fn bad_poses_are_told() {
+    for (change, warning, others) in BAD_POSES {
+        let scene = toy();
+        change_poses(&scene, change);
+        assert_warns(&scene, warning, others);
+    }
     let scene = toy();
-    change_poses(&scene, |_, matrix| [3, 7, 11].iter().for_each(|&at| matrix[at] *= 1.0e3));
-    assert_warns(&scene, "the cameras are 1.300e3 units from what they look at", 0);
+    std::fs::copy(scene.path().join("toy/pose/000003.txt"), scene.path().join("toy/pose/000007.txt")).expect("a copy");
+    assert_warns(&scene, "views '000003' and '000007' have the same pose", 1);
 }
 
 /// In the coordinates of a map: what is changed when it is opened is said, and is no reason for a warning.
@@ -138,12 +150,6 @@ fn a_scene_in_a_map() {
     let printed = done(scene.path(), "inspect toy");
     let says = |line: &str| line.starts_with("frame      the file's (") && line.contains("is the origin");
     assert!(printed.lines().any(says), "{printed}");
-}
-
-fn two_views_from_one_place() {
-    let scene = toy();
-    std::fs::copy(scene.path().join("toy/pose/000003.txt"), scene.path().join("toy/pose/000007.txt")).expect("a copy");
-    assert_warns(&scene, "views '000003' and '000007' have the same pose", 1);
 }
 
 /// Puts clutter behind the object of some photographs, which have no alpha channel then.
@@ -227,18 +233,12 @@ fn the_quality_is_what_photographs_that_are_left_out_have() {
     assert!(done(scene.path(), "inspect toy --quality").contains("\nexpected   not measured: toy: the silhouettes"));
 }
 
-fn run_record(folder: &Folder, output: &str) -> Value {
-    let bytes = std::fs::read(folder.path().join(output).join("run.json")).expect("a run record");
-    serde_json::from_slice(&bytes).expect("JSON")
-}
-
 fn what_is_left_out_is_said_and_recorded() {
     let (folder, room) = (Folder::new(), viewfuse_tests::places::data("room"));
     for name in names_in(&room.join("images")) {
         std::fs::copy(room.join("images").join(&name), folder.file(&format!("room/images/{name}"))).expect("a copy");
     }
-    let text = std::fs::read(room.join("transforms.json")).expect("a file");
-    let mut transforms: Value = serde_json::from_slice(&text).expect("JSON");
+    let mut transforms = read_json(room.join("transforms.json"));
     let frames = transforms["frames"].as_array_mut().expect("frames");
     let count = frames.len();
     frames[2]["file_path"] = "images/999.jpg".into();
@@ -257,7 +257,7 @@ fn what_is_left_out_is_said_and_recorded() {
     assert!(verbose.lines().any(|line| line.starts_with("not read   ") && line.ends_with(": aabb_scale")), "{verbose}");
     let render = "render room --targets 005 --size 32x24 --device cpu --weights mean --no-sheets -o out";
     let outcome = run(env!("CARGO_BIN_EXE_viewfuse"), folder.path(), render);
-    let record = run_record(&folder, "out");
+    let record = read_json(folder.path().join("out/run.json"));
     for warning in &warnings {
         assert!(texts(&record["warnings"]).iter().any(|line| line.contains(warning)), "{}", record["warnings"]);
         let said = outcome.stderr.lines().filter(|line| line.contains("warning: ") && line.contains(warning));
@@ -273,10 +273,10 @@ fn conventions_are_said_and_recorded() {
         std::fs::read(scene.path().join(output).join("000020.png")).expect("a picture")
     };
     let plain = render("plain");
-    assert_eq!(texts(&run_record(&scene, "plain")["conventions"]), Vec::<&str>::new());
+    assert_eq!(texts(&read_json(scene.path().join("plain/run.json"))["conventions"]), Vec::<&str>::new());
     scene.write("toy/intrinsics.txt", "131.25 0 64 0\n0 131.25 64 0\n0 0 1 0\n0 0 0 1\n");
     assert!(render("matrix") == plain, "the same camera gives another picture");
     let convention = "intrinsics.txt: K alone, for the photographs' size (NSVF)";
-    assert_eq!(texts(&run_record(&scene, "matrix")["conventions"]), [convention]);
+    assert_eq!(texts(&read_json(scene.path().join("matrix/run.json"))["conventions"]), [convention]);
     assert!(done(scene.path(), "inspect toy").contains(&format!("\nread as    {convention}\n")));
 }

@@ -130,6 +130,13 @@ fn done(folder: &Path, arguments: &str) -> String {
     command::done(binary(arguments), folder, arguments)
 }
 
+/// What a file of JSON holds.
+#[track_caller]
+fn read_json(path: impl AsRef<Path>) -> Value {
+    let bytes = fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.as_ref().display()));
+    serde_json::from_slice(&bytes).unwrap_or_else(|error| panic!("{}: {error}", path.as_ref().display()))
+}
+
 /// The numbers of a JSON list.
 #[track_caller]
 fn numbers(list: &Value) -> Vec<f64> {

@@ -1,9 +1,7 @@
 //! `--masks`: what masks and alpha channels hide takes no part in pictures and scores.
 
-use super::{BINARY, done};
+use super::{BINARY, done, read_json};
 use image::{DynamicImage, GrayImage, ImageFormat, Luma, Rgb, RgbImage, Rgba, RgbaImage};
-use serde_json::Value;
-use std::fs;
 use viewfuse_tests::command::{Outcome, assert_refused, assert_wrong_arguments, run, sample};
 use viewfuse_tests::scenes::Folder;
 
@@ -36,8 +34,7 @@ fn rendered(folder: &Folder, more: &str) -> (f64, String) {
     let render = "render room --targets 5 --size 160x120 --weights error:alpha=1 --device cpu --no-sheets -o out";
     let Outcome { code, stderr, .. } = run(BINARY, folder.path(), &format!("{render} --replace {more}"));
     assert_eq!(code, Some(0), "{stderr}");
-    let record = fs::read(folder.path().join("out/run.json")).expect("a record");
-    let record: Value = serde_json::from_slice(&record).expect("JSON");
+    let record = read_json(folder.path().join("out/run.json"));
     (record["frames"][0]["psnr"].as_f64().expect("a score"), stderr)
 }
 

@@ -1,8 +1,7 @@
 //! What a render takes of memory.
 
-use super::BINARY;
+use super::{BINARY, read_json};
 use libtest_mimic::Trial;
-use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use std::process::Stdio;
@@ -50,8 +49,7 @@ fn more_samples_take_no_more() {
     // All points of the rays with more samples would take at least 70 MB more.
     let (few, many) = (render(32), render(512));
     assert!(many < few + (24 << 10), "{few} KiB became {many} KiB");
-    let record = fs::read(scene.path().join("out/run.json")).expect("a run record");
-    let record: Value = serde_json::from_slice(&record).expect("JSON");
+    let record = read_json(scene.path().join("out/run.json"));
     let estimate = record["memory_estimate"].as_u64().expect("an estimate") >> 10;
     assert!(
         few > estimate / 2 && many < 3 * estimate / 2 + (16 << 10),

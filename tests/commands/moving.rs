@@ -1,6 +1,6 @@
 //! Videos and animated pictures of paths: their content by other readers, and runs that are killed and continued.
 
-use super::{BINARY, done};
+use super::{BINARY, done, read_json};
 use image::codecs::webp::WebPDecoder;
 use image::{AnimationDecoder, Rgb, RgbImage};
 use libtest_mimic::Trial;
@@ -168,9 +168,7 @@ fn a_run_that_was_killed_twice_ends_with_the_same_bytes() {
         assert!(whole == cut, "{name} differs");
     }
     // The record is complete, and in the order of the path.
-    let record = |run: &str| -> Value {
-        serde_json::from_slice(&fs::read(folder.join(run).join("run.json")).expect("a record")).expect("JSON")
-    };
+    let record = |run: &str| -> Value { read_json(folder.join(run).join("run.json")) };
     let targets = |record: &Value| -> Vec<Value> {
         record["frames"].as_array().expect("frames").iter().map(|frame| frame["target"].clone()).collect()
     };
@@ -248,16 +246,13 @@ fn an_ffmpeg_gets_the_video_or_there_is_y4m() {
         return;
     }
     // A program of that name that keeps what it reads, and says how it was called.
-    let script = "#!/bin/sh\nfor last; do :; done\nexec /bin/cat > \"$last\"\n";
-    fs::write(programs.join("ffmpeg"), script).expect("a program");
-    let made = Command::new("chmod").arg("+x").arg(programs.join("ffmpeg")).status().expect("chmod runs");
-    assert!(made.success());
+    scene.script("programs/ffmpeg", "for last; do :; done\nexec /bin/cat > \"$last\"\n");
     let run = with_programs(folder, &programs, &format!("{PATH} --video mp4 -o out"));
     assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
     assert!(fs::read(folder.join("out/video.mp4")).expect("a video") == video, "the program got another video");
     assert!(!folder.join("out/video.y4m").exists(), "the video of the run before is left");
     // One that fails.
-    fs::write(programs.join("ffmpeg"), "#!/bin/sh\necho no such encoder >&2\nexit 3\n").expect("a program");
+    scene.script("programs/ffmpeg", "echo no such encoder >&2\nexit 3\n");
     let run = with_programs(folder, &programs, &format!("{PATH} --video mp4 -o out"));
     assert_eq!(run.code, Some(1));
     assert!(run.stderr.contains("video.mp4: ffmpeg could not write it: no such encoder"), "{}", run.stderr);
@@ -294,7 +289,7 @@ fn depths_and_opacity_for_other_programs() {
     let read: Vec<f32> = channel.sample_data.values_as_f32().collect();
     assert_eq!(read, depths);
     // The steps of the PNG, by the record.
-    let record: Value = serde_json::from_slice(&fs::read(out.join("run.json")).expect("a record")).expect("JSON");
+    let record = read_json(out.join("run.json"));
     let step = record["frames"][0]["depth_step"].as_f64().expect("a step");
     assert!(record["depth_units"]["depth"].as_str().is_some_and(|words| words.contains("units of the scene's files")));
     let levels = image::open(out.join("wide_depth.png")).expect("a map").to_luma16();
@@ -327,9 +322,7 @@ fn depths_and_opacity_for_other_programs() {
 fn camera_paths_from_files() {
     let scene = toy();
     let folder = scene.path();
-    let record = |run: &str| -> Value {
-        serde_json::from_slice(&fs::read(folder.join(run).join("run.json")).expect("a record")).expect("JSON")
-    };
+    let record = |run: &str| -> Value { read_json(folder.join(run).join("run.json")) };
     done(folder, "render toy --targets 20 --sources 0..11 --size 24x24 --device cpu --no-sheets -o view");
     let pose = record("view")["frames"][0]["world_from_camera"].clone();
     // The same camera by a table, and by nerfstudio's viewer with axes turned around.

@@ -20,7 +20,6 @@ viewfuse_tests::trials![
     after_a_kill_it_goes_on_from_the_file,
     options_of_the_field_are_those_of_the_command,
     what_it_refuses,
-    hostile_files_are_errors_of_every_command,
     a_page_holds_what_the_file_holds,
     without_a_view_that_is_kept_back_it_says_what_its_figure_is,
 ];
@@ -152,40 +151,6 @@ fn what_it_refuses() {
     assert_wrong_arguments(BINARY, folder.path(), &format!("{OPTIMISE} --count 0 -o toy.ply"), &["--count"]);
     assert_refused(BINARY, folder.path(), &format!("{OPTIMISE} --resume no.ply -o toy.ply"), &["no.ply"]);
     assert_refused(BINARY, folder.path(), &format!("{OPTIMISE} --left-out 99 -o toy.ply"), &["99"]);
-}
-
-/// What a file of Gaussians may not be, and a word of the message.
-fn hostile(whole: &[u8]) -> Vec<(Vec<u8>, &'static str)> {
-    let header = whole.windows(11).position(|part| part == b"end_header\n").expect("a header") + 11;
-    let text = String::from_utf8(whole[..header].to_vec()).expect("text");
-    let with = |from: &str, to: &str| [text.replacen(from, to, 1).as_bytes(), &whole[header..]].concat();
-    let count = text.lines().find(|line| line.starts_with("element vertex ")).expect("a count");
-    let mut infinite = whole.to_vec();
-    infinite[header..header + 4].copy_from_slice(&f32::NAN.to_le_bytes());
-    vec![
-        (Vec::new(), "evil.ply"),
-        (whole[..whole.len() - 5].to_vec(), "evil.ply"),
-        (with(count, "element vertex 4294967295"), "evil.ply"),
-        (with(count, "element vertex 99999999999999999999"), "evil.ply"),
-        (with("property float opacity", "property float other"), "opacity"),
-        (infinite, "evil.ply"),
-    ]
-}
-
-fn hostile_files_are_errors_of_every_command() {
-    let folder = toy();
-    done(folder.path(), &format!("{OPTIMISE} --iterations 4 -o toy.ply"));
-    let whole = fs::read(folder.path().join("toy.ply")).expect("a file");
-    for (bytes, word) in hostile(&whole) {
-        folder.write("evil.ply", &bytes);
-        for arguments in [
-            "render toy --gaussians evil.ply --targets 20 --size 16x16 --device cpu -o out",
-            "view toy --gaussians evil.ply --no-browser --device cpu",
-            &format!("{OPTIMISE} --resume evil.ply -o more.ply"),
-        ] {
-            assert_refused(BINARY, folder.path(), arguments, &["evil.ply", word]);
-        }
-    }
 }
 
 fn a_page_holds_what_the_file_holds() {

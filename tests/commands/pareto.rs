@@ -1,6 +1,6 @@
 //! `viewfuse pareto`.
 
-use super::{BINARY, done};
+use super::{BINARY, done, read_json};
 use serde_json::Value;
 use std::collections::HashMap;
 use std::fs;
@@ -20,7 +20,7 @@ const NETWORK: &str =
     "pareto toy --targets 20 --views 3 --size 24x24 --model body:16 --samples 16,8,8 --repeat 2 --device cpu";
 
 fn record(folder: &Path) -> Value {
-    serde_json::from_slice(&fs::read(folder.join("out/pareto.json")).expect("a record")).expect("JSON")
+    read_json(folder.join("out/pareto.json"))
 }
 
 /// Lines of the CSV file, by column.

@@ -9,10 +9,9 @@ mod helper;
 mod on_the_way;
 mod stopped;
 
-use super::BINARY;
+use super::{BINARY, read_json};
 use image::{DynamicImage, ImageFormat, RgbImage, imageops};
 use libtest_mimic::Trial;
-use serde_json::Value;
 use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
@@ -24,7 +23,7 @@ use viewfuse_tests::command::{
 };
 use viewfuse_tests::patience::wait_while_running;
 use viewfuse_tests::places::data;
-use viewfuse_tests::scenes::Folder;
+use viewfuse_tests::scenes::{FILM, Folder, ORIENTATION, with_exif};
 use viewfuse_tests::trials::{is_required, needing, trial};
 
 /// What lets tests fail that lack the program.
@@ -32,10 +31,6 @@ const REQUIRE: &str = "VIEWFUSE_REQUIRE_POSE";
 
 /// Focal length of the sample room in millimetres of a 35 mm camera: 294.4 pixels of 320 x 240, rounded as cameras do.
 const ROOM_FILM: u16 = 32;
-
-/// EXIF tags, both short numbers.
-const ORIENTATION: u16 = 0x0112;
-const FILM: u16 = 0xa405;
 
 /// Photographs of a set whose poses a played solver says.
 const COUNT_ALONE: usize = 5;
@@ -73,29 +68,6 @@ pub(crate) fn trials() -> Vec<Trial> {
 fn program() -> Option<PathBuf> {
     let beside = Path::new(BINARY).with_file_name(format!("viewfuse-openmvg{}", std::env::consts::EXE_SUFFIX));
     std::env::var_os("VIEWFUSE_OPENMVG").map(PathBuf::from).or(Some(beside)).filter(|path| path.is_file())
-}
-
-/// A JPEG file with short numbers as EXIF.
-fn with_exif(jpeg: &[u8], tags: &[(u16, u16)]) -> Vec<u8> {
-    let mut tiff = b"MM\0*\0\0\0\x08".to_vec();
-    let entry = |out: &mut Vec<u8>, tag: u16, kind: u16, value: [u8; 4]| {
-        out.extend([tag.to_be_bytes(), kind.to_be_bytes()].concat());
-        out.extend([0, 0, 0, 1]);
-        out.extend(value);
-    };
-    let short = |value: u16| [value.to_be_bytes(), [0, 0]].concat().try_into().expect("four bytes");
-    let (of_exif, of_image): (Vec<_>, Vec<_>) = tags.iter().partition(|(tag, _)| *tag == FILM);
-    // The first directory: its own tags, then where the second begins.
-    tiff.extend((of_image.len() as u16 + 1).to_be_bytes());
-    of_image.iter().for_each(|(tag, value)| entry(&mut tiff, *tag, 3, short(*value)));
-    let behind = (tiff.len() + 12 + 4) as u32;
-    entry(&mut tiff, 0x8769, 4, behind.to_be_bytes());
-    tiff.extend([0; 4]);
-    tiff.extend((of_exif.len() as u16).to_be_bytes());
-    of_exif.iter().for_each(|(tag, value)| entry(&mut tiff, *tag, 3, short(*value)));
-    tiff.extend([0; 4]);
-    let length = (2 + 6 + tiff.len()) as u16;
-    [&jpeg[..2], &[0xff, 0xe1], &length.to_be_bytes(), b"Exif\0\0", &tiff, &jpeg[2..]].concat()
 }
 
 /// The bytes of a photograph of the room.
@@ -154,10 +126,6 @@ fn worst_rotation(scene: &Scene) -> f32 {
     worst
 }
 
-fn json(path: &Path) -> Value {
-    serde_json::from_slice(&fs::read(path).expect("a file")).expect("JSON")
-}
-
 fn eight_photographs_to_a_picture() {
     let folder = bare(0..8);
     let said = posed(command(BINARY, folder.path(), "pose bare -o posed --seed 3"));
@@ -167,7 +135,7 @@ fn eight_photographs_to_a_picture() {
     assert!(scene.points.len() > 100, "{} points", scene.points.len());
     let worst = worst_rotation(&scene);
     assert!(worst < 1.5, "{worst} degrees");
-    let record = json(&folder.path().join("posed/pose.json"));
+    let record = read_json(folder.path().join("posed/pose.json"));
     let accepted = record["accepted"].as_array().expect("a list");
     assert_eq!(accepted.iter().filter(|photo| photo["verdict"] == "sure").count(), 8, "{record}");
     // Features are found in enlarged photographs; cameras are those of the photographs.
@@ -183,16 +151,8 @@ fn eight_photographs_to_a_picture() {
         folder.path(),
         "render posed --targets 3 -o out --size 160x120 --weights distance:power=2 --device cpu",
     ));
-    let psnr = json(&folder.path().join("out/run.json"))["frames"][0]["psnr"].as_f64().expect("a score");
+    let psnr = read_json(folder.path().join("out/run.json"))["frames"][0]["psnr"].as_f64().expect("a score");
     assert!(psnr > 21.0, "{psnr} dB");
-    // Once more: the same bytes, but for the times.
-    posed(command(BINARY, folder.path(), "pose bare -o again --seed 3"));
-    for (path, _) in files_below(&folder.path().join("posed")).into_iter().filter(|(path, _)| path.is_file()) {
-        let again = folder.path().join("again").join(path.strip_prefix(folder.path().join("posed")).expect("inside"));
-        if !path.ends_with("pose.json") {
-            assert_eq!(fs::read(&path).expect("a file"), fs::read(&again).expect("a file"), "{}", path.display());
-        }
-    }
 }
 
 fn what_does_not_belong_is_left_out_by_name() {

@@ -1,5 +1,5 @@
-//! The READMEs: their commands are run as they stand there, their links and those of the results' reports lead
-//! somewhere, and every published package has its own.
+//! The READMEs: their commands are run as they stand there, but for fewer pictures; their links and those of the
+//! results' reports lead somewhere, and every published package has its own.
 
 use super::{BINARY, examples, lab};
 use serde_json::Value;
@@ -37,7 +37,7 @@ fn commands() -> Vec<String> {
 }
 
 /// Lines of `sh` blocks that are not run here: how they begin, and why.
-const NOT_RUN: [(&str, &str); 17] = [
+const NOT_RUN: [(&str, &str); 20] = [
     ("#", "a comment"),
     ("git clone", "the network"),
     ("tests/run", "it runs this test"),
@@ -45,6 +45,9 @@ const NOT_RUN: [(&str, &str); 17] = [
     ("cargo build --profile firmware -p viewfuse-capi", "`embedded/capi.rs` runs it"),
     ("cc ", "`embedded/capi.rs` compiles the program"),
     ("tests/figures", "it writes the results"),
+    ("cargo run --release -- check", "`check.rs` runs it on the CPU, and `devices` on every device"),
+    ("cargo run --release -- verify tests/data/pixelnerf_small", "another command verifies it with others"),
+    ("cargo run --release -- verify tests/data/genvs_small", "the same"),
     ("cargo openmvg", "`tests/run` builds it, which takes minutes"),
     ("cargo run --release -- pose ", "`pose.rs` runs it where `viewfuse-openmvg` is"),
     ("cargo install", "it would change the machine"),
@@ -64,6 +67,21 @@ fn ours(line: &str) -> Option<(&'static str, &str)> {
         Some(arguments) => Some((lab(), arguments)),
         None => rest.strip_prefix("-- ").map(|arguments| (BINARY, arguments)),
     }
+}
+
+/// The same arguments for one target, or a path of three pictures.
+pub(super) fn with_few_pictures(words: impl Iterator<Item = String>) -> Vec<String> {
+    let mut option = String::new();
+    let few = |word: String| {
+        let few = match option.as_str() {
+            "--orbit" | "--frames" => "3".to_owned(),
+            "--targets" => word.split([',', '.']).next().unwrap_or_default().to_owned(),
+            _ => word.clone(),
+        };
+        option = word;
+        few
+    };
+    words.map(few).collect()
 }
 
 fn run(binary: &str, arguments: &[String]) -> String {
@@ -94,12 +112,7 @@ fn every_command_runs() {
             continue;
         };
         count += 1;
-        let mut arguments: Vec<String> = arguments.split_whitespace().map(in_folder).collect();
-        // `parity` has all seeds of all cases on every device.
-        if arguments == ["check"] {
-            arguments.extend(["--seeds", "1"].map(str::to_owned));
-        }
-        run(binary, &arguments);
+        run(binary, &with_few_pictures(arguments.split_whitespace().map(in_folder)));
     }
     assert!(count >= 20, "{count}");
     let files = ["000020.png", "room/002_sheet.png", "run.json", "car/000048.png", "orbit/video.webp", "cameras.png"];

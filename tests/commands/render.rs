@@ -1,6 +1,6 @@
 //! `viewfuse render`.
 
-use super::{BINARY, assert_near, done, numbers, texts};
+use super::{BINARY, assert_near, done, numbers, read_json, texts};
 use image::{ColorType, DynamicImage};
 use serde_json::Value;
 use std::fs;
@@ -15,15 +15,13 @@ viewfuse_tests::trials![
     cameras_of_a_map_stay_in_its_coordinates,
     the_same_run_makes_the_same_pictures,
     chooses_sources,
-    a_second_run_replaces_the_first,
     weights_change_the_picture,
     a_network_is_told_the_scale_it_gets,
     fast_tries_nothing,
 ];
 
 fn record(folder: &Path, output: &str) -> Value {
-    let text = fs::read_to_string(folder.join(output).join("run.json")).expect("a run record");
-    serde_json::from_str(&text).expect("JSON")
+    read_json(folder.join(output).join("run.json"))
 }
 
 fn picture(folder: &Path, file: &str) -> DynamicImage {
@@ -214,16 +212,6 @@ fn chooses_sources() {
     let spread = sources("--views 5");
     assert!(spread.len() == 5 && spread.windows(2).all(|pair| pair[0] < pair[1]) && !spread.contains(&20));
     assert_eq!(sources("--sources 3..6 --views 2").len(), 2);
-}
-
-fn a_second_run_replaces_the_first() {
-    let scene = toy();
-    let folder = scene.path();
-    done(folder, "render toy --targets 20 --size 64x64 -o out");
-    done(folder, "render toy --targets 20 --size 32x32 --weights mean -o out");
-    assert_eq!(names_in(&folder.join("out")), ["000020.png", "000020_depth.png", "000020_sheet.png", "run.json"]);
-    assert_eq!(picture(folder, "out/000020.png").width(), 32);
-    assert_eq!(record(folder, "out")["weighting"], "mean");
 }
 
 fn weights_change_the_picture() {

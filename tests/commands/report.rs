@@ -10,7 +10,7 @@ use libtest_mimic::Trial;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
-use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, names_in, toy};
+use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, files_below, toy};
 use viewfuse_tests::scenes::Folder;
 use viewfuse_tests::trials::trial;
 
@@ -27,8 +27,8 @@ pub(crate) fn trials() -> Vec<Trial> {
     ];
     let tests: [(&str, InBrowser); 3] = [
         ("report::browser::a_person_sees_what_was_measured", a_person_sees_what_was_measured),
-        ("report::browser::the_looks_at_the_page_can_fail", the_looks_at_the_page_can_fail),
         ("report::browser::light_and_dark", light_and_dark),
+        ("report::browser::the_looks_at_the_page_can_fail", the_looks_at_the_page_can_fail),
     ];
     trials.extend(browser::trials(tests));
     trials
@@ -38,16 +38,10 @@ pub(crate) fn trials() -> Vec<Trial> {
 fn runs() -> Folder {
     let folder = toy();
     let path = folder.path();
-    let copy = |name: &str| {
-        for kind in ["rgb", "pose"] {
-            for file in names_in(&path.join("toy").join(kind)) {
-                fs::copy(path.join("toy").join(kind).join(&file), folder.file(&format!("{name}/{kind}/{file}")))
-                    .expect("a copy");
-            }
-        }
-        fs::copy(path.join("toy/intrinsics.txt"), folder.file(&format!("{name}/intrinsics.txt"))).expect("a copy");
-    };
-    copy("lorry");
+    for (file, _) in files_below(&path.join("toy")).into_iter().filter(|(file, _)| file.is_file()) {
+        let inside = file.strip_prefix(path.join("toy")).expect("inside").display().to_string();
+        fs::copy(&file, folder.file(&format!("lorry/{inside}"))).expect("a copy");
+    }
     done(path, &format!("evaluate toy lorry --protocol count:sources=2+4+8 {SMALL} -o count"));
     done(path, &format!("evaluate toy lorry --protocol random {SMALL} --pictures 1 -o random"));
     done(path, "pareto toy --targets 20 --views 3 --size 16x16 --repeat 1 --device cpu -o sweep");
@@ -255,8 +249,8 @@ fn the_looks_at_the_page_can_fail(browser: &Browser) {
 }
 
 fn light_and_dark(browser: &Browser) {
-    let folder = runs();
-    done(folder.path(), REPORT);
+    let folder = small_run();
+    done(folder.path(), "report run -o page.html");
     let pictures = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report");
     fs::create_dir_all(&pictures).expect("a folder");
     for (name, width, is_dark) in

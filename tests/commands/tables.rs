@@ -1,6 +1,6 @@
 //! `viewfuse weights` and `viewfuse evaluate`: tables for people, JSON and CSV for programs.
 
-use super::{BINARY, assert_near, done, numbers, texts};
+use super::{BINARY, assert_near, done, numbers, read_json, texts};
 use serde_json::Value;
 use std::fs;
 use viewfuse::weighting::scheme_names;
@@ -128,8 +128,7 @@ fn auto_is_a_row_and_leaves_the_others_alone() {
     // The same choice as `render` makes without being told a scheme.
     let outcome = run(BINARY, scene.path(), &format!("render {job} -o out"));
     assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
-    let record = fs::read_to_string(scene.path().join("out/run.json")).expect("a record");
-    let record: Value = serde_json::from_str(&record).expect("JSON");
+    let record = read_json(scene.path().join("out/run.json"));
     assert_near(of(&both, "auto"), record["frames"][0]["psnr"].as_f64().expect("a score"), 1.0e-4);
 }
 

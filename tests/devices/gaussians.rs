@@ -16,6 +16,7 @@ use viewfuse::scene::few_shot::Selection;
 use viewfuse::scene::photographs::{SourceImages, to_rgb8};
 use viewfuse::weighting::Weighting;
 use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::metrics::psnr;
 use viewfuse_kernels::gaussians::{SplatBlock, TileBlock};
 use viewfuse_kernels::rows::GaussianBlock;
 use viewfuse_tests::places::data;
@@ -46,7 +47,8 @@ fn start() -> &'static (SourceImages, Vec<CloudPoint>) {
         let scene = Scene::open(data("toy")).expect("a scene");
         let selection = Selection { sources: Some("0..19/2".to_owned()), ..Selection::default() };
         let sources = selection.sources_without(&scene, &[], 2).expect("sources");
-        let (field, device, options) = (AnyField::default(), AnyDevice::Cpu(Cpu), RenderOptions::default());
+        let options = RenderOptions { size: Some([64; 2]), ..RenderOptions::default() };
+        let (field, device) = (AnyField::default(), AnyDevice::Cpu(Cpu));
         let renderer = field.on(&device);
         let album = open_album(&scene, sources.clone(), renderer.as_ref(), &options, &Silent).expect("photographs");
         let stage = Stage::prepare(&scene, &album, &sources, renderer.as_ref(), &options, &Silent);
@@ -139,10 +141,7 @@ fn score(own: &Optimised) -> f64 {
         let camera = images.images[index].camera.block(0);
         let rendered = splatter.rendered(&own.gaussians, own.gaussians.len(), &camera, 0.5).expect("a picture");
         let picture = to_rgb8(&rendered.colours, [rendered.width, rendered.height]);
-        let truth = images.picture(index);
-        let pairs = picture.as_raw().iter().zip(truth.as_raw());
-        let square: f64 = pairs.map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2)).sum();
-        -10.0 * (square / (255.0_f64.powi(2) * picture.as_raw().len() as f64)).log10()
+        psnr(picture.as_raw(), images.picture(index).as_raw())
     };
     (0..images.images.len()).map(of).sum::<f64>() / images.images.len() as f64
 }

@@ -187,7 +187,6 @@ fn a_c_program_gets_the_same_bits_as_core() {
     }
     assert!(expected.iter().flat_map(|(_, bits)| bits).all(|bits| f32::from_bits(*bits).is_finite()));
     let numbers: std::collections::BTreeSet<u32> = expected.iter().flat_map(|(_, bits)| bits).copied().collect();
-    println!("{} lines, {} different numbers, the same bits", expected.len(), numbers.len());
     assert!(numbers.len() > 1000, "{}", numbers.len());
     // What is compared can differ: one camera moves a little.
     inputs.sources[0][3] *= 1.01;

@@ -16,7 +16,7 @@ use viewfuse::scene::few_shot::{FewShot, Selection};
 use viewfuse::scene::photographs::Album;
 use viewfuse_lab::scenes::{generate, write_shoot};
 
-const SIZE: [u32; 2] = [96, 72];
+const SIZE: [u32; 2] = [64, 48];
 
 /// A room from an arc, views 0 to `count` - 1.
 fn room(folder: &Path, count: u32) -> Scene {
@@ -244,7 +244,7 @@ impl Progress for Asked {
 
 #[test]
 fn a_choice_is_kept_for_the_same_sources_and_options_alone() -> Result<(), Box<dyn Error>> {
-    const SMALL: [u32; 2] = [48, 36];
+    const SMALL: [u32; 2] = [36, 27];
     let scene = &SIX.scene;
     let folder = tempfile::tempdir()?;
     let field = TrainingFree { cache: Some(Cache::open(folder.path())?), ..TrainingFree::default() };

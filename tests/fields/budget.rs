@@ -13,6 +13,7 @@ use viewfuse::nn::checkpoint::Checkpoint;
 use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::{FewShot, Selection};
 use viewfuse::weighting::Weighting;
+use viewfuse_tests::fields::rms;
 use viewfuse_tests::places;
 
 /// The most pictures whose error exceeds its bound, as a share.
@@ -64,16 +65,16 @@ fn cases() -> Vec<Case> {
         let job = job(&scene, sources, targets);
         cases.push(Case { name: name.to_owned(), field, scene, job, side, bounds });
     };
-    for seed in [1, 2] {
-        for (sources, targets) in [("16,72,136", "48,104,160,200"), ("48,160,200", "16,88,136")] {
-            let (car, bounds) = ("car", &[30.0, 35.0, 40.0, 45.0][..]);
-            case("pixelnerf, cars", network("pixelnerf_cars.safetensors", seed), car, sources, targets, 48, bounds);
-            case("pixelnerf, body", network("body:16", seed), car, sources, targets, 32, bounds);
-            case("pixelnerf, mist", network("formula:16", seed), car, sources, targets, 24, bounds);
-        }
+    for (seed, sources, targets) in [(1, "16,72,136", "48,104,160,200"), (2, "48,160,200", "16,88,136")] {
+        let (car, bounds) = ("car", &[30.0, 35.0, 40.0, 45.0][..]);
+        case("pixelnerf, cars", network("pixelnerf_cars.safetensors", seed), car, sources, targets, 48, bounds);
+        case("pixelnerf, body", network("body:16", seed), car, sources, targets, 32, bounds);
+        case("pixelnerf, mist", network("formula:16", seed), car, sources, targets, 24, bounds);
         let bounds = &[28.0, 34.0, 40.0];
-        case("genvs, cars", network("genvs_cars.safetensors", seed), "car", "16,72,136", "48,160", 32, bounds);
+        case("genvs, cars", network("genvs_cars.safetensors", seed), car, "16,72,136", "48,160", 32, bounds);
     }
+    // A single pixel may have all of such an error.
+    case("pixelnerf, tight", network("body:16", 1), "toy", "0..19/7", "20,21", 32, &[48.0, 50.0]);
     let bounds = &[22.0, 25.0, 28.0, 31.0];
     case("sweep", AnyField::default(), "room", "all/2", "1,3,5,7", 96, bounds);
     case("sweep", AnyField::default(), "room", "0,2,3,5", "1,4", 96, bounds);
@@ -105,13 +106,6 @@ fn frames(case: &Case, renderer: &dyn Renderer, bound: Option<Bound>) -> Vec<Fra
     case.job.targets.iter().map(frame).collect()
 }
 
-/// Root mean square over pixels and channels.
-fn difference(a: &Frame, b: &Frame) -> f64 {
-    let square = |(a, b): (&[f32; 4], &[f32; 4])| (0..3).map(|c| f64::from(a[c] - b[c]).powi(2)).sum::<f64>();
-    let sum: f64 = a.colours.iter().zip(&b.colours).map(square).sum();
-    (sum / (3 * a.colours.len()) as f64).sqrt()
-}
-
 #[test]
 fn errors_stay_below_their_bounds() {
     let device = AnyDevice::Cpu(Cpu);
@@ -124,7 +118,7 @@ fn errors_stay_below_their_bounds() {
         for &decibels in case.bounds {
             let most = 10.0_f32.powf(-decibels / 20.0);
             for (picture, exact) in frames(&case, renderer.as_ref(), Some(Bound::Error(most))).iter().zip(&exact) {
-                let error = difference(picture, exact);
+                let error = rms(&picture.colours, &exact.colours);
                 let kept = picture.kept.as_ref().expect("a bound");
                 assert_eq!((kept.most_error, kept.is_kept), (Some(most), true), "{kept:?}");
                 assert!(error < MAX_EXCESS * f64::from(most), "{}, {decibels} dB: {error}, {kept:?}", case.name);
@@ -138,8 +132,7 @@ fn errors_stay_below_their_bounds() {
         }
     }
     let mean = overshoot.iter().sum::<f64>() / overshoot.len() as f64;
-    println!("{pictures} pictures, {missed} exceed their bound, on average {mean:.1} dB better than asked for");
-    assert!(pictures >= 200, "{pictures}");
+    assert!(pictures >= 100, "{pictures}");
     assert!(missed as f64 <= MAX_MISSED * pictures as f64, "{missed} of {pictures} exceed their bound");
     assert!(mean < 10.0, "bounds are not used: {mean} dB");
 }
@@ -155,8 +148,7 @@ fn no_corner_of_a_small_picture_is_lost() {
     let renderer = case.field.on(&device);
     let exact = frames(&case, renderer.as_ref(), None);
     let pictures = frames(&case, renderer.as_ref(), Some(Bound::Error(bound)));
-    let errors: Vec<f64> = pictures.iter().zip(&exact).map(|(a, b)| difference(a, b)).collect();
-    println!("{errors:.4?}");
+    let errors: Vec<f64> = pictures.iter().zip(&exact).map(|(a, b)| rms(&a.colours, &b.colours)).collect();
     assert!(errors.iter().all(|error| *error < MAX_EXCESS * f64::from(bound)), "{errors:?}");
 }
 

@@ -58,7 +58,6 @@ fn pictures_do_not_depend_on_the_number_of_threads() {
         assert_sound(&one);
         let mean = one.colours.iter().map(|colour| colour[0]).sum::<f32>() / one.colours.len() as f32;
         let spread = one.colours.iter().map(|colour| (colour[0] - mean).abs()).sum::<f32>() / one.colours.len() as f32;
-        println!("{}: colours are {spread:.4} from their mean", subject.name);
         assert!(spread > 1.0e-3, "{}: a picture of one colour", subject.name);
         for count in [2, 3] {
             assert!(one == with_threads(count), "{}: other bits with {count} threads", subject.name);
@@ -75,7 +74,6 @@ fn the_order_of_the_sources_is_only_rounding() {
         let one = subject.picture();
         let reversed = with(images.iter().rev().cloned().collect()).expect("a picture");
         let same = share_within(&one.colours, &reversed.colours, 2.0e-3);
-        println!("{}: {same:.4} of the pixels within 2e-3, sources in reverse", subject.name);
         assert!(same >= 0.99, "{}: only {same} of the pixels are the same", subject.name);
         // With each other's cameras they show something else, or nothing.
         let next = images.iter().cycle().skip(1);

@@ -6,13 +6,14 @@ use viewfuse::device::cpu::Cpu;
 use viewfuse::field::auto;
 use viewfuse::field::budget::Bound;
 use viewfuse::field::gaussians::Recipe;
-use viewfuse::field::render::{Frame, RenderOptions, Stage, open_album};
+use viewfuse::field::render::{RenderOptions, Stage, open_album};
 use viewfuse::field::training_free::{Gaussians, TrainingFree};
 use viewfuse::field::{AnyField, Renderer};
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::{FewShot, Selection};
 use viewfuse::weighting::Weighting;
+use viewfuse_tests::fields::rms;
 use viewfuse_tests::places;
 
 const DEVICE: AnyDevice = AnyDevice::Cpu(Cpu);
@@ -51,11 +52,6 @@ fn hasty() -> AnyField {
     })
 }
 
-fn difference(a: &Frame, b: &Frame) -> f32 {
-    let square = |(a, b): (&[f32; 4], &[f32; 4])| (0..3).map(|channel| (a[channel] - b[channel]).powi(2)).sum::<f32>();
-    (a.colours.iter().zip(&b.colours).map(square).sum::<f32>() / (3 * a.colours.len()) as f32).sqrt()
-}
-
 #[test]
 fn cheaper_efforts_are_farther_from_the_exact_picture() {
     let weighting = Weighting::open("distance:power=2").expect("a scheme");
@@ -71,8 +67,7 @@ fn cheaper_efforts_are_farther_from_the_exact_picture() {
         };
         let last = efforts.len() - 1;
         let exact = frame(stage, last);
-        let errors: Vec<f32> = (0..last).map(|effort| difference(&frame(stage, effort), &exact)).collect();
-        println!("{errors:?}");
+        let errors: Vec<f64> = (0..last).map(|effort| rms(&frame(stage, effort).colours, &exact.colours)).collect();
         assert!(errors.iter().all(|error| *error > 1.0e-3), "an effort leaves nothing out: {errors:?}");
         assert!(errors[0] > errors[last - 1], "the cheapest is no farther than the dearest: {errors:?}");
         assert_eq!(frame(stage, last).colours, exact.colours, "the exact picture after others");
@@ -122,10 +117,9 @@ fn a_bound_on_the_error_is_kept_with_fewer_iterations() {
         let (first, second) = frame(most);
         for own in [&first, &second] {
             let kept = own.kept.as_ref().expect("a record of the bound");
-            let error = difference(own, &exact);
-            println!("{most}: {error} {kept:?}");
+            let error = rms(&own.colours, &exact.colours);
             assert!(kept.effort.contains("iterations") && kept.is_kept, "{kept:?}");
-            assert!(error > 1.0e-4 && error <= most, "{error} of {most}: {kept:?}");
+            assert!(error > 1.0e-4 && error <= f64::from(most), "{error} of {most}: {kept:?}");
         }
     }
 }

@@ -142,7 +142,6 @@ fn a_painted_wall_is_found_and_shown() {
     let mut depths = rendered.depths.clone();
     depths.sort_by(f32::total_cmp);
     let median = depths[depths.len() / 2];
-    println!("root mean square error {error}, median depth {median}");
     // A plane is off by at most half a step, 1.3 % of the depth here: less than half a pixel.
     assert!(error < 0.02, "{error}");
     assert!((median - WALL).abs() < 0.05 * WALL, "{median}");
@@ -157,7 +156,6 @@ fn exposures_are_made_equal() {
     let rendered = picture(&wall(gains), &target);
     // Equal weights: the picture has the geometric mean of the exposures, 1.
     let error = inner_error(&rendered.colours, &photograph(target, 1.0).texels, 72);
-    println!("root mean square error {error}");
     assert!(error < 0.03, "{error}");
 }
 
@@ -199,7 +197,6 @@ fn two_other_views_confirm_a_depth() {
     }
     confirmed.sort_by(f32::total_cmp);
     let median = confirmed[confirmed.len() / 2];
-    println!("{} points on the wall, median consistency {median}", confirmed.len());
     assert!(confirmed.len() > 3000 && median > 0.85, "{} {median}", confirmed.len());
 }
 
@@ -272,7 +269,6 @@ fn what_no_source_sees_is_filled_and_marked() {
             / count
     };
     let (unseen, seen) = (mean(0..16), mean(60..72));
-    println!("confidence where nothing is seen {unseen}, where something is {seen}");
     assert!(unseen < 0.05 && seen > 4.0 * unseen, "{unseen} {seen}");
 }
 
@@ -323,7 +319,6 @@ fn the_room_is_better_than_a_copy() {
         let copy: Vec<u8> = copy.pixels().flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
         let (ours, copied) =
             (psnr(frame.picture.as_raw(), truth.picture.as_raw()), psnr(&copy, truth.picture.as_raw()));
-        println!("{}: {ours:.2} dB, a copy {copied:.2} dB", frame.target.name);
         assert!(ours > copied + 4.0, "{}: {ours} dB, a copy {copied} dB", frame.target.name);
     }
 }

@@ -147,22 +147,10 @@ fn assert_same_pictures(field: &str, name: &str, [sources, target]: [&str; 2], s
 }
 
 #[test]
-fn training_free_pictures_of_an_object_are_the_same() {
+fn pictures_are_the_same() {
     assert_same_pictures("training-free", "toy", ["0..19/3", "20"], [32, 32]);
-}
-
-#[test]
-fn training_free_pictures_of_a_room_are_the_same() {
     assert_same_pictures("training-free", "room", ["0,1,3,4", "2"], [32, 24]);
-}
-
-#[test]
-fn pictures_of_a_pixelnerf_are_the_same() {
     assert_same_pictures("pixelnerf_cars.safetensors", "car", ["16,72,136", "48"], [24, 24]);
-}
-
-#[test]
-fn pictures_of_a_genvs_are_the_same() {
     assert_same_pictures("genvs_cars.safetensors", "car", ["16,72,136", "48"], [24, 24]);
 }
 

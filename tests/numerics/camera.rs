@@ -30,7 +30,6 @@ fn projection_undoes_the_ray() {
         assert!(seen.depth <= t * 1.000_001 && seen.depth > 0.5 * t);
     }
     // The point is rounded at the size of the centre and seen from half a unit away at a focal length of 131 pixels.
-    println!("ray and back: {worst:e} pixels");
     assert!(worst < 1.0e-3, "{worst}");
 }
 

@@ -92,7 +92,6 @@ fn values_far_from_0_are_normalised() {
             let inputs: Vec<f32> = (0..count).map(|_| (distance + random.normal()) as f32).collect();
             let ones = vec![1.0; block.channels as usize];
             let error = error(&inputs, &ones, &vec![0.0; ones.len()], &block);
-            println!("{distance:e} {pixels}x{groups}x{channels}: {error:.1e}");
             assert!(error <= tolerance, "{block:?} {distance}: {error}");
         }
     }
@@ -123,7 +122,6 @@ fn silu_at_its_ends() {
         let expected = f64::from(x) / (1.0 + (-f64::from(x)).exp());
         worst = worst.max(relative_units(silu(x), expected));
     }
-    println!("{worst:.2} units");
     assert!(worst <= 6.0, "{worst} units of 2^-24");
     for x in [-86.5, -87.0, -88.0, -100.0, -1.0e4, -1.0e30, f32::MIN, f32::NEG_INFINITY] {
         assert!(silu(x) <= 0.0 && silu(x) >= -3.0e-36, "{x}: {}", silu(x));

@@ -16,7 +16,6 @@ fn worst(cases: impl Iterator<Item = (f32, f64)>) -> (f32, f64) {
 
 #[track_caller]
 fn assert_below(what: &str, (at, error): (f32, f64), bound: f64) {
-    println!("{what}: at most {error:.4e} (at {at:e}), stated {bound:.4e}");
     assert!(error <= bound, "{what}: {error:e} at {at:e}, stated {bound:e}");
 }
 

@@ -47,7 +47,6 @@ fn levels_agree_with_f64_to_a_rounding() {
             }
         }
     }
-    println!("levels: at most {worst:.3} ULP off, below 1e-28 {worst_tiny:.3}");
     assert!(worst <= 0.6 && worst_tiny <= 3.0, "{worst} {worst_tiny}");
 }
 
@@ -95,7 +94,6 @@ fn preconditioning_agrees_with_f64() {
             *worst = worst.max(units);
         }
     }
-    println!("skip, output, input, noise: at most {worst:.2?} units of 2^-24 off");
     assert!(worst.iter().all(|units| units / 16_777_216.0 <= 4.0e-7), "{worst:?}");
 }
 
@@ -159,10 +157,6 @@ impl Normal {
         (variance * noisy + sigma * sigma * self.mean) / (variance + sigma * sigma)
     }
 
-    fn solution(self, start: f64, from: f64, to: f64) -> f64 {
-        self.mean + (start - self.mean) * to.hypot(self.deviation) / from.hypot(self.deviation)
-    }
-
     /// Our steps over all levels; with the last one, to 0, or without.
     fn sampled(self, start: f64, count: u32, with_last: bool) -> f32 {
         let schedule = NoiseSchedule::published();
@@ -221,20 +215,6 @@ fn the_steps_are_the_published_ones() {
                 worst = worst.max((f64::from(actual) - expected).abs() / (1.0 + expected.abs()));
             }
         }
-        println!(
-            "f32 state instead of f64, {count} levels: at most {worst:.1e} of a picture's value, bound {bound:.1e}"
-        );
         assert!(worst <= bound, "{count} levels: {worst:e}");
     }
-}
-
-#[test]
-fn the_order_is_two() {
-    let data = DATA[0];
-    let errors: Vec<f64> = [10, 20, 40, 80]
-        .map(|count| (f64::from(data.sampled(97.0, count, false)) - data.solution(97.0, 80.0, 0.002)).abs())
-        .to_vec();
-    let orders: Vec<f64> = errors.windows(2).map(|pair| (pair[0] / pair[1]).log2()).collect();
-    println!("errors at 10, 20, 40, 80 levels {errors:?}, orders {orders:.2?}");
-    assert!(orders.iter().all(|order| (1.7..2.6).contains(order)), "{orders:?}");
 }

@@ -166,10 +166,10 @@ fn what_a_reader_gives_is_checked() {
         assert_eq!(place, FilePlace::line(&path, 1));
         fault
     };
-    assert!(matches!(fault_of_line(with(1, "5")), SceneFault::Pose(_)));
-    assert!(matches!(fault_of_line(with(0, "-1")), SceneFault::Intrinsics(_)));
-    assert!(matches!(fault_of_line(with(4, "NaN")), SceneFault::File(FileFault::NotFinite(_))));
-    assert!(matches!(refused(String::new()).fault, SceneFault::NoViews(_)));
+    assert!(matches!(*fault_of_line(with(1, "5")), SceneFault::Pose(_)));
+    assert!(matches!(*fault_of_line(with(0, "-1")), SceneFault::Intrinsics(_)));
+    assert!(matches!(*fault_of_line(with(4, "NaN")), SceneFault::File(FileFault::NotFinite(_))));
+    assert!(matches!(*refused(String::new()).fault, SceneFault::NoViews(_)));
 }
 
 #[test]

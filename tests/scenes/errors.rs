@@ -1,30 +1,12 @@
 //! Bad scenes: each is refused with one line that names the file, and the line or key, that a person must open.
 
-use std::fs;
-
+use super::made::{assert_message, assert_refused};
 use serde_json::{Value, json};
-use viewfuse::scene::{Scene, SceneError};
+use std::fs;
+use viewfuse::scene::Scene;
 use viewfuse_tests::scenes::{self, Folder, MIDDLEBURY_K, middlebury_line, words};
 
 const POSE: [f64; 16] = scenes::WORLD_FROM_CAMERA;
-
-/// The error is one line that begins with the path (and line) and holds each of the parts.
-#[track_caller]
-fn assert_message(error: &SceneError, folder: &Folder, begins: &str, parts: &[&str]) {
-    let message = error.to_string();
-    let relative = message.strip_prefix(&folder.path().display().to_string()).unwrap_or_default();
-    assert!(relative.trim_start_matches('/').starts_with(begins), "{message:?} does not begin with {begins:?}");
-    assert!(!message.contains('\n') && message.len() < 600, "{message:?}");
-    for part in parts {
-        assert!(message.contains(part), "{message:?} does not hold {part:?}");
-    }
-}
-
-#[track_caller]
-fn assert_refused(folder: &Folder, begins: &str, parts: &[&str]) {
-    let error = Scene::open(folder.path()).expect_err("a bad scene");
-    assert_message(&error, folder, begins, parts);
-}
 
 #[track_caller]
 fn assert_srn_refused(name: &str, contents: &str, begins: &str, parts: &[&str]) {

@@ -1,9 +1,10 @@
 //! Small scenes in layouts of photogrammetry, made byte by byte. All cameras are that of [`scenes::WORLD_FROM_CAMERA`]
 //! unless a test moves them; photographs are 16 x 12.
 
-use viewfuse::scene::Scene;
+use viewfuse::scene::{Scene, SceneError};
 use viewfuse_core::Vec3;
 use viewfuse_tests::scenes::{Folder, POINT_WORLD};
+pub(super) use viewfuse_tests::scenes::{npy, npy_of};
 
 /// The rotation from world to camera, `w x y z`.
 pub(super) const QUATERNION: [f64; 4] = [0.5, -0.5, -0.5, -0.5];
@@ -29,8 +30,7 @@ pub(super) fn assert_pixel(scene: &Scene, view: usize, expected: [f64; 2]) {
 
 /// The error is one line that begins with the path in the folder and holds each of the parts.
 #[track_caller]
-pub(super) fn assert_refused(folder: &Folder, begins: &str, parts: &[&str]) {
-    let error = Scene::open(folder.path()).expect_err("a bad scene");
+pub(super) fn assert_message(error: &SceneError, folder: &Folder, begins: &str, parts: &[&str]) {
     let message = error.to_string();
     let relative = message.strip_prefix(&folder.path().display().to_string()).unwrap_or_default();
     assert!(relative.trim_start_matches('/').starts_with(begins), "{message:?} does not begin with {begins:?}");
@@ -38,6 +38,12 @@ pub(super) fn assert_refused(folder: &Folder, begins: &str, parts: &[&str]) {
     for part in parts {
         assert!(message.contains(part), "{message:?} does not hold {part:?}");
     }
+}
+
+/// The scene in the folder is refused so.
+#[track_caller]
+pub(super) fn assert_refused(folder: &Folder, begins: &str, parts: &[&str]) {
+    assert_message(&Scene::open(folder.path()).expect_err("a bad scene"), folder, begins, parts);
 }
 
 /// A camera of COLMAP's: number, model's number and name, parameters; for images of 32 x 24.
@@ -127,23 +133,6 @@ pub(super) fn colmap_text() -> Folder {
     folder.write("sparse/0/cameras.txt", cameras_text(&[pinhole()]));
     folder.write("sparse/0/images.txt", images_text(&IMAGES)).write("sparse/0/points3D.txt", points_text());
     folder
-}
-
-/// A `.npy` file of 64-bit numbers in C order.
-pub(super) fn npy(shape: &[usize], numbers: &[f64]) -> Vec<u8> {
-    npy_of("<f8", false, shape, &numbers.iter().copied().flat_map(f64::to_le_bytes).collect::<Vec<u8>>())
-}
-
-/// A `.npy` file of any kind.
-pub(super) fn npy_of(kind: &str, fortran: bool, shape: &[usize], data: &[u8]) -> Vec<u8> {
-    let shape: String = shape.iter().map(|side| format!("{side}, ")).collect();
-    let order = if fortran { "True" } else { "False" };
-    let header = format!("{{'descr': '{kind}', 'fortran_order': {order}, 'shape': ({shape}), }}\n");
-    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-    bytes.extend((header.len() as u16).to_le_bytes());
-    bytes.extend(header.bytes());
-    bytes.extend(data);
-    bytes
 }
 
 /// A row of `poses_bounds.npy` for photographs of 128 x 96 and a focal length of 160: at an eighth, 20.

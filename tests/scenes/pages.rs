@@ -34,7 +34,6 @@ fn told(page: &str) -> Value {
 #[test]
 fn a_page_of_forty_thousand_gaussians_is_small() {
     let page = page("many", &drawn(40_000, 0, 8));
-    println!("{} bytes", page.len());
     assert!((1_500_000..MAX_BYTES).contains(&page.len()), "{} bytes", page.len());
     assert!(!page.contains("{{"), "a value is missing");
     // Whatever it refers to is in it.

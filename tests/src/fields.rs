@@ -96,6 +96,19 @@ pub fn largest_difference(a: &[[f32; 4]], b: &[[f32; 4]]) -> f32 {
     largest(differences(a, b))
 }
 
+/// Root mean square of the differences of colours, over pixels and their three channels.
+#[track_caller]
+pub fn rms(a: &[[f32; 4]], b: &[[f32; 4]]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let square = |(a, b): (&[f32; 4], &[f32; 4])| (0..3).map(|c| f64::from(a[c] - b[c]).powi(2)).sum::<f64>();
+    (a.iter().zip(b).map(square).sum::<f64>() / (3 * a.len()) as f64).sqrt()
+}
+
+/// Colours that are laid over white.
+pub fn over_white(texels: &[[f32; 4]]) -> Vec<[f32; 4]> {
+    texels.iter().map(|texel| texel.map(|channel| channel + 1.0 - texel[3])).collect()
+}
+
 /// Share of pixels no channel of which differs by more than `bound`.
 #[track_caller]
 pub fn share_within(a: &[[f32; 4]], b: &[[f32; 4]], bound: f32) -> f64 {

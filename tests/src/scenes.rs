@@ -47,6 +47,17 @@ impl Folder {
         self
     }
 
+    /// Writes a script of the shell that can be called.
+    pub fn script(&self, name: &str, lines: &str) -> &Folder {
+        self.write(name, format!("#!/bin/sh\n{lines}"));
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            fs::set_permissions(self.file(name), fs::Permissions::from_mode(0o755)).expect("permissions");
+        }
+        self
+    }
+
     /// Writes an image of one colour.
     pub fn image(&self, name: &str, width: u32, height: u32) -> &Folder {
         RgbImage::from_pixel(width, height, Rgb([10, 20, 30])).save(self.file(name)).expect("an image");
@@ -60,18 +71,52 @@ impl Folder {
     }
 }
 
-/// A picture as a JPEG whose tag (EXIF) says how it must be turned to be upright.
+/// EXIF's tag of how a picture must be turned to be upright.
+pub const ORIENTATION: u16 = 0x0112;
+/// EXIF's tag of the focal length in millimetres of a 35 mm camera.
+pub const FILM: u16 = 0xa405;
+
+/// A JPEG file with short numbers as EXIF.
+pub fn with_exif(jpeg: &[u8], tags: &[(u16, u16)]) -> Vec<u8> {
+    let mut tiff = b"MM\0*\0\0\0\x08".to_vec();
+    let entry = |out: &mut Vec<u8>, tag: u16, kind: u16, value: [u8; 4]| {
+        out.extend([tag.to_be_bytes(), kind.to_be_bytes()].concat());
+        out.extend([0, 0, 0, 1]);
+        out.extend(value);
+    };
+    let short = |value: u16| [value.to_be_bytes(), [0, 0]].concat().try_into().expect("four bytes");
+    let (of_exif, of_image): (Vec<_>, Vec<_>) = tags.iter().partition(|(tag, _)| *tag == FILM);
+    // The first directory: its own tags, then where the second begins.
+    tiff.extend((of_image.len() as u16 + 1).to_be_bytes());
+    of_image.iter().for_each(|(tag, value)| entry(&mut tiff, *tag, 3, short(*value)));
+    let behind = (tiff.len() + 12 + 4) as u32;
+    entry(&mut tiff, 0x8769, 4, behind.to_be_bytes());
+    tiff.extend([0; 4]);
+    tiff.extend((of_exif.len() as u16).to_be_bytes());
+    of_exif.iter().for_each(|(tag, value)| entry(&mut tiff, *tag, 3, short(*value)));
+    tiff.extend([0; 4]);
+    let length = (2 + 6 + tiff.len()) as u16;
+    [&jpeg[..2], &[0xff, 0xe1], &length.to_be_bytes(), b"Exif\0\0", &tiff, &jpeg[2..]].concat()
+}
+
+/// A picture as a JPEG whose tag says how it must be turned to be upright.
 pub fn with_tag(picture: &DynamicImage, orientation: u8) -> Vec<u8> {
     let mut jpeg = Cursor::new(Vec::new());
     picture.write_to(&mut jpeg, ImageFormat::Jpeg).expect("a JPEG");
-    let mut exif = b"Exif\0\0II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0".to_vec();
-    exif.extend([orientation, 0, 0, 0, 0, 0, 0, 0]);
-    let mut bytes = jpeg.into_inner();
-    let mut segment = vec![0xff, 0xe1];
-    segment.extend((exif.len() as u16 + 2).to_be_bytes());
-    segment.extend(exif);
-    bytes.splice(2..2, segment);
-    bytes
+    with_exif(jpeg.get_ref(), &[(ORIENTATION, orientation.into())])
+}
+
+/// The checksum of a PNG's pieces.
+pub fn png_checksum(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(u32::MAX, |sum, byte| {
+        (0..8).fold(sum ^ u32::from(*byte), |sum, _| (sum >> 1) ^ (0xedb8_8320 & (sum & 1).wrapping_neg()))
+    })
+}
+
+/// A piece of a PNG.
+pub fn png_chunk(kind: &[u8], content: &[u8]) -> Vec<u8> {
+    let own = [kind, content].concat();
+    [&(content.len() as u32).to_be_bytes()[..], &own, &png_checksum(&own).to_be_bytes()].concat()
 }
 
 /// Numbers with blanks between them.
@@ -133,13 +178,26 @@ pub fn middlebury() -> Folder {
     folder
 }
 
+/// A `.npy` file of 64-bit numbers in C order.
+pub fn npy(shape: &[usize], numbers: &[f64]) -> Vec<u8> {
+    npy_of("<f8", false, shape, &numbers.iter().copied().flat_map(f64::to_le_bytes).collect::<Vec<u8>>())
+}
+
+/// A `.npy` file of any kind.
+pub fn npy_of(kind: &str, fortran: bool, shape: &[usize], data: &[u8]) -> Vec<u8> {
+    let shape: String = shape.iter().map(|side| format!("{side}, ")).collect();
+    let order = if fortran { "True" } else { "False" };
+    let header = format!("{{'descr': '{kind}', 'fortran_order': {order}, 'shape': ({shape}), }}\n");
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes());
+    bytes.extend(header.bytes());
+    bytes.extend(data);
+    bytes
+}
+
 /// The first bytes of a PNG whose header promises 100000 x 100000 pixels of 8-bit RGB.
 pub fn huge_png() -> Vec<u8> {
-    let mut bytes = b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR".to_vec();
     let side = 100_000_u32.to_be_bytes();
-    bytes.extend(side.into_iter().chain(side).chain([8, 2, 0, 0, 0]));
-    // Checksums take a table: they are given.
-    bytes.extend(0x2730_9c9f_u32.to_be_bytes());
-    bytes.extend(b"\0\0\0\0IDAT\x35\xaf\x06\x1e");
-    bytes
+    let header = png_chunk(b"IHDR", &[&side[..], &side, &[8, 2, 0, 0, 0]].concat());
+    [b"\x89PNG\r\n\x1a\n".as_slice(), &header, &png_chunk(b"IDAT", b"")].concat()
 }

@@ -25,13 +25,18 @@ pub fn needing(missing: Option<String>, is_required: bool, trial: Trial) -> Tria
     }
 }
 
-/// Makes `trials()` of functions in this module. A test that is not listed is dead code, which is a warning.
+/// Makes `trials()` of functions in this module, those with `#[cfg(..)]` before them where that holds. A test that is not
+/// listed is dead code, which is a warning.
 #[macro_export]
 macro_rules! trials {
-    ($($test:ident),* $(,)?) => {
+    ($($(#[$attribute:meta])? $test:ident),* $(,)?) => {
         /// The tests of this module.
         pub(crate) fn trials() -> Vec<libtest_mimic::Trial> {
-            vec![$($crate::trials::trial(concat!(module_path!(), "::", stringify!($test)), $test)),*]
+            let trials = [$(
+                $(#[$attribute])?
+                $crate::trials::trial(concat!(module_path!(), "::", stringify!($test)), $test),
+            )*];
+            trials.into()
         }
     };
 }

@@ -26,7 +26,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     /// Train a network, or the weighting of views for a network, on scenes.
-    Train(train::Arguments),
+    Train(Box<train::Arguments>),
     /// Generate scenes for training.
     Scenes(scenes::Arguments),
     /// Write an HTML page with evaluations, run times and trainings.
@@ -37,7 +37,7 @@ enum Command {
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let run = || match arguments.command {
-        Command::Train(arguments) => train::run(arguments),
+        Command::Train(arguments) => train::run(*arguments),
         Command::Scenes(arguments) => scenes::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
     };

@@ -2,7 +2,6 @@
 //! which poses are doubtful whenever their scene is opened.
 
 use super::bare;
-use super::colmap::executable;
 use crate::{BINARY, done};
 use libtest_mimic::Trial;
 use serde_json::json;
@@ -32,8 +31,7 @@ fn matched() -> Folder {
     let camera = json!({ "focal": 300, "principal": [160, 120], "k1": 0 });
     let solution = json!({ "solver": "played 1", "cameras": [camera], "photographs": vec![unposed; 5], "points": [], "pairs": pairs });
     folder.write("answer.json", json!({ "solution": solution }).to_string() + "\n");
-    folder.write("openmvg", "#!/bin/sh\nexec cat \"$(dirname \"$0\")/answer.json\"\n");
-    executable(&folder.path().join("openmvg"));
+    folder.script("openmvg", "exec cat \"$(dirname \"$0\")/answer.json\"\n");
     folder
 }
 

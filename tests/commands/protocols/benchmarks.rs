@@ -1,6 +1,6 @@
 //! Protocols of few-shot papers: the views they take, what they refuse, what is printed beside them.
 
-use crate::BINARY;
+use crate::{BINARY, read_json};
 use image::{GrayImage, Luma};
 use serde_json::{Value, json};
 use std::fs;
@@ -12,6 +12,7 @@ use viewfuse_core::camera::Camera;
 use viewfuse_lab::scenes::cameras::{random_views, sphere, spiral_views};
 use viewfuse_lab::scenes::{render_with, toy::lorry};
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, done, toy};
+use viewfuse_tests::scenes::{self, Folder, npy};
 
 viewfuse_tests::trials![
     llff_takes_every_eighth_view,
@@ -75,31 +76,27 @@ fn llff_takes_every_eighth_view() {
 /// Twenty photographs, numbered from 1 without zeros in front. `sorted` of Python makes of their names 1, 10, 11 .. 19, 2,
 /// 20, 3 .. 9, so that every eighth is 1, 17 and 6, and `linspace` takes of the others 10, 19 and 9.
 fn views_are_counted_as_the_published_loaders_sort_them() {
-    let sample = viewfuse_tests::scenes::transforms();
+    let sample = scenes::transforms();
     let matrix = &sample["frames"][0]["transform_matrix"];
-    let photographs = |folder: &viewfuse_tests::scenes::Folder| {
+    let photographs = |folder: &Folder| {
         (1..=20).for_each(|number| _ = folder.image(&format!("images/{number}.png"), 16, 12));
     };
-    let transforms = viewfuse_tests::scenes::Folder::new();
+    let transforms = Folder::new();
     photographs(&transforms);
     let frame = |number| json!({ "file_path": format!("images/{number}.png"), "transform_matrix": matrix });
     let mut file = sample.clone();
     file["frames"] = (1..=20).map(frame).collect();
     transforms.write("transforms.json", file.to_string());
-    let colmap = viewfuse_tests::scenes::Folder::new();
+    let colmap = Folder::new();
     photographs(&colmap);
     colmap.write("sparse/0/cameras.txt", "1 PINHOLE 16 12 20 24 7.5 6.5\n");
     let image = |number| format!("{number} 0.5 -0.5 -0.5 -0.5 -2 -3 -1 1 {number}.png\n\n");
     colmap.write("sparse/0/images.txt", (1..=20).map(image).collect::<String>());
-    let llff = viewfuse_tests::scenes::Folder::new();
+    let llff = Folder::new();
     photographs(&llff);
     // Axes down, right, backwards, the centre; height, width, focal length; near and far.
     let row = [0., 0., -1., 1., 12., 0., 1., 0., 2., 16., 1., 0., 0., 3., 20., 0.5, 9.5];
-    let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (20, 17), }\n";
-    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-    bytes.extend((header.len() as u16).to_le_bytes().into_iter().chain(header.bytes()));
-    bytes.extend((0..20).flat_map(|_| row).flat_map(f64::to_le_bytes));
-    llff.write("poses_bounds.npy", bytes);
+    llff.write("poses_bounds.npy", npy(&[20, 17], &row.repeat(20)));
     for (folder, layout) in [(transforms, "transforms"), (colmap, "colmap"), (llff, "llff")] {
         let scene = Scene::open(folder.path()).unwrap_or_else(|error| panic!("{error}"));
         let [job] = &jobs("llff:3", &scene)[..] else { panic!("one job") };
@@ -158,7 +155,7 @@ fn blender_takes_views_of_its_splits() {
 }
 
 fn blender_on_a_scene_in_its_layout() {
-    let folder = viewfuse_tests::scenes::Folder::new();
+    let folder = Folder::new();
     let sphere = sphere(48).expect("a sphere");
     let mut train: Vec<_> = (0..).zip(random_views(&sphere, 5, 0, 100).expect("cameras")).collect();
     train.retain(|(view, _)| [2, 16, 26, 55, 73, 75, 86, 93].contains(view));
@@ -244,8 +241,7 @@ fn tables_without_a_folder() {
     };
     assert!(rows(&text).len() == 3 && rows(&text) == rows(&kept), "{text}\n{kept}");
     assert!(kept.contains("1 jobs done; 1 of 1 are in kept"), "{kept}");
-    let record: Value =
-        serde_json::from_slice(&fs::read(scene.path().join("kept/run.json")).expect("a record")).expect("JSON");
+    let record = read_json(scene.path().join("kept/run.json"));
     assert_eq!((&record["protocol"], &record["scenes"][0]["size"]), (&"llff:3".into(), &json!([32, 32])));
     assert!(record["metric"].as_str().is_some_and(|metric| metric.starts_with("full: ")), "{record}");
 }

@@ -1,6 +1,6 @@
 //! The folder of an evaluation: killed, split, gone on with, refused.
 
-use crate::BINARY;
+use crate::{BINARY, read_json};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -229,7 +229,7 @@ fn pictures_show_sources_predictions_and_truth() {
     assert_eq!(described, ["job-00000.json", "job-00001.json"]);
     let jobs = finished(&folder.join("out"));
     for (name, job) in described.iter().zip(&jobs) {
-        let shown: Value = serde_json::from_slice(&fs::read(pictures.join(name)).expect("a file")).expect("JSON");
+        let shown = read_json(pictures.join(name));
         let open = |file: &Value| {
             let file = file.as_str().expect("a name");
             image::open(pictures.join(file)).unwrap_or_else(|error| panic!("{file}: {error}")).to_rgb8()

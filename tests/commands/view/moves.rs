@@ -135,7 +135,6 @@ fn many_moves_of_a_hand_take_no_memory(browser: &Browser) {
         count > 10.0
     });
     let after = memory(&program, &tab);
-    println!("{moves} moves: KiB of the program and bytes of the page, after a tenth {before:?}, at last {after:?}");
     assert!(after[0] < before[0] + 4096.0, "{before:?} KiB became {after:?} over {moves} moves");
     assert!(after[1] < before[1] + 4.0e6, "{before:?} bytes became {after:?} over {moves} moves");
     assert_eq!(tab.console(), [""; 0]);

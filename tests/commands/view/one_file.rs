@@ -170,7 +170,6 @@ fn a_page_shows_the_gaussians_of_core(browser: &Browser) {
         let picture = shown(&tab, [WIDTH, HEIGHT]);
         let (own, other) =
             (psnr(&picture, &expected(&scene, &cameras[view].1)), psnr(&picture, &expected(&scene, &cameras[4].1)));
-        println!("view {view}: {own:.2} dB, another view {other:.2} dB");
         assert!(own >= MIN_PSNR, "view {view}: {own} dB");
         assert!(other < 25.0, "any picture would do: {other} dB");
         assert!(weights(&tab).iter().enumerate().all(|(index, own)| *own == f64::from(u8::from(index == view))));

@@ -1,14 +1,13 @@
 //! The page in a browser: a hand, two hands on a phone, keys, menus, tabs, and what is taken elsewhere.
 
 use super::super::browser::{self, Browser, InBrowser};
-use super::super::{BINARY, assert_near, numbers};
+use super::super::{BINARY, assert_near, numbers, read_json};
 use super::devtools::{Chromium, Tab};
 use super::{FOLLOWED, NOTE_PICTURES, WEIGHTS, done_with_warnings, keep, room, weights};
 use image::{RgbImage, RgbaImage};
 use libtest_mimic::Trial;
 use serde_json::{Value, json};
 use std::fs;
-use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 use viewfuse_tests::command::{command, names_in, toy};
@@ -290,8 +289,7 @@ fn a_view_is_taken_elsewhere(browser: &Browser) {
     wait_until("no picture is saved", || names_in(&files).len() == 3 && files.join("run.json").exists());
     let of_page = image::open(files.join("view.png")).expect("a picture").to_rgb8();
     assert!(of_page == rendered, "another picture is saved");
-    let record = |path: &Path| -> Value { serde_json::from_slice(&fs::read(path).expect("a record")).expect("JSON") };
-    let (own, run) = (record(&files.join("run.json")), record(&folder.path().join("out/run.json")));
+    let (own, run) = (read_json(files.join("run.json")), read_json(folder.path().join("out/run.json")));
     for key in ["viewfuse", "device", "field", "weighting", "chosen", "size", "background", "sources", "depth_units"] {
         assert_eq!(own[key], run[key], "{key}");
     }
@@ -386,7 +384,7 @@ fn a_path_goes_through_keyframes(browser: &Browser) {
         assert!(written.iter().any(|own| own == name), "{name} is not in {written:?}");
     }
     // Around the subject: in the middle as far from it as at both ends, within the scene's own units.
-    let scene: Value = serde_json::from_slice(&fs::read(&saved).expect("the path")).expect("JSON");
+    let scene = read_json(saved);
     let about = tab.evaluate("({focus: shows.focus, origin: shows.scene.origin, scale: shows.scene.scale})");
     let (focus, origin) = (numbers(&about["focus"]), numbers(&about["origin"]));
     let scale = about["scale"].as_f64().expect("a number");
@@ -417,8 +415,7 @@ fn the_scheme_becomes_that_of_render(browser: &Browser) {
     let line = tab.text("document.getElementById('command').textContent");
     assert!(line.ends_with(" --weights auto -o out"), "{line}");
     done_with_warnings(folder.path(), &format!("render toy --targets 000020 {options} --device cpu -o out"));
-    let record = fs::read(folder.path().join("out/run.json")).expect("a record");
-    let record: Value = serde_json::from_slice(&record).expect("JSON");
+    let record = read_json(folder.path().join("out/run.json"));
     assert_eq!(record["weighting"], chosen.as_str());
     // What the person chooses is kept, and its command line names it.
     tab.evaluate(

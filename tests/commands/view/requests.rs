@@ -6,9 +6,7 @@ use image::codecs::webp::WebPDecoder;
 use image::{AnimationDecoder, DynamicImage};
 use libtest_mimic::Trial;
 use serde_json::{Value, json};
-use std::fs::{self, Permissions};
 use std::io::Cursor;
-use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::time::Duration;
 use viewfuse_tests::command::{assert_refused, command, files_below, names_in, toy};
@@ -181,16 +179,14 @@ fn one_video_at_a_time_for_who_waits() {
 fn a_video_is_mp4_where_ffmpeg_is() {
     let folder = Folder::new();
     // What comes in is what goes out, to the last argument.
-    let script = "#!/bin/sh\n[ \"$1\" = -version ] && exit\nfor last; do :; done\nexec /bin/cat > \"$last\"\n";
-    folder.write("ffmpeg", script);
-    fs::set_permissions(folder.path().join("ffmpeg"), Permissions::from_mode(0o755)).expect("permissions");
+    folder.script("ffmpeg", "[ \"$1\" = -version ] && exit\nfor last; do :; done\nexec /bin/cat > \"$last\"\n");
     let program = filming(folder.path());
     let scene = program.scene();
     assert_eq!(scene["video"]["format"], "mp4");
     let answer = video(&program, &path(&scene["start"], 2));
     assert!(answer.status == 200 && answer.head.contains("Content-Type: video/mp4"), "{}", answer.head);
     assert!(answer.body.starts_with(b"YUV4MPEG2 W64 H48 F24:1 "), "{}", String::from_utf8_lossy(&answer.body[..40]));
-    folder.write("ffmpeg", "#!/bin/sh\necho 'no such codec' >&2; exit 1\n");
+    folder.script("ffmpeg", "echo 'no such codec' >&2; exit 1\n");
     let answer = video(&program, &path(&scene["start"], 2));
     let said = String::from_utf8_lossy(&answer.body).into_owned();
     assert!(

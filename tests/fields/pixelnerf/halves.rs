@@ -23,7 +23,6 @@ fn pictures_hardly_change() {
             let [whole, halves] = both(latent_layers)
                 .map(|omissions| recorded(&field(leaving_out(omissions)), &sources, &Weights::mean(3), &target, 0.0).0);
             let difference = largest_difference(&whole.colours, &halves.colours);
-            println!("halves, layers on the grid: {latent_layers}: {difference:.1e}");
             // A fine sample may fall into the next part where two sums round apart.
             assert!(difference > 0.0 && difference < 1.0e-2, "{difference}");
         }

@@ -6,7 +6,7 @@ use viewfuse::field::{LeftOut, Rendered};
 use viewfuse::weighting::sources::MAX_SOURCES;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::weights::Weights;
-use viewfuse_tests::fields::line;
+use viewfuse_tests::fields::{line, rms};
 
 /// Transmittance at which rays end.
 const EARLY_TERMINATION: f32 = 1.0 / 256.0;
@@ -91,12 +91,6 @@ fn probes_stand_at_the_last_row_and_column_too() {
     }
 }
 
-/// Root mean square over the pixels and channels.
-fn rms(a: &Rendered, b: &Rendered) -> f64 {
-    let pairs = a.colours.iter().flatten().zip(b.colours.iter().flatten());
-    (pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>() / (4 * a.colours.len()) as f64).sqrt()
-}
-
 #[test]
 fn samples_between_nodes_converge_to_the_exact_picture() {
     let (sources, target) = (sources(3), target(32));
@@ -106,11 +100,10 @@ fn samples_between_nodes_converge_to_the_exact_picture() {
             let field = field(leaving_out(Omissions { nodes, ..Omissions::NONE }));
             let (picture, record) = recorded(&field, &sources, &Weights::mean(3), &target, EARLY_TERMINATION);
             let LeftOut { left_out, of, .. } = line(&record, "second-pass samples");
-            (rms(&picture, &reference), left_out as f64 / of as f64)
+            (rms(&picture.colours, &reference.colours), left_out as f64 / of as f64)
         };
         let found = [8, 16, 32, 64, 128].map(of);
         // The mist has a network of its own for the first pass, which places the exact picture's samples.
-        println!("{name}: {found:.4?}");
         assert!(found[1].0 < found[0].0 && found[4].0 < 0.6 * found[1].0, "{name}");
         assert!(found[4].0 < 0.012, "{name}");
         assert!(found[2].1 > 0.6, "{name}");
@@ -145,10 +138,7 @@ fn all_together_save_most_and_cost_little() {
     let reference = picture(&body(exact()), &sources, &target);
     let field = body(PixelNerfOptions::default());
     let (default, record) = recorded(&field, &sources, &Weights::mean(3), &target, EARLY_TERMINATION);
-    let squares =
-        default.colours.iter().flatten().zip(reference.colours.iter().flatten()).map(|(a, b)| (a - b).powi(2));
-    let psnr = -10.0 * (squares.map(f64::from).sum::<f64>() / (4 * default.colours.len()) as f64).log10();
-    println!("everything together: {psnr:.1} dB");
+    let psnr = -20.0 * rms(&default.colours, &reference.colours).log10();
     assert!(psnr > 50.0, "{psnr} dB");
     let unasked: u64 =
         ["first-pass samples", "second-pass samples"].iter().map(|what| line(&record, what).left_out).sum();

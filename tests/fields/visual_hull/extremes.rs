@@ -3,7 +3,7 @@
 use super::worlds::{Run, assert_shows_an_object, ball, ball_views};
 use viewfuse::field::training_free::NoObject;
 use viewfuse_lab::scenes::sources;
-use viewfuse_tests::fields::assert_sound;
+use viewfuse_tests::fields::{assert_sound, over_white, rms};
 use viewfuse_tests::lorry::{orbit, target};
 
 #[test]
@@ -26,10 +26,7 @@ fn a_target_that_is_a_source_looks_like_it() {
     let sources = ball_views(48);
     let picture = Run::default().picture(&sources, &sources.images[3].camera).expect("a picture");
     assert_sound(&picture);
-    let over_white = sources.images[3].texels.iter().map(|t| [0, 1, 2].map(|c| t[c] + (1.0 - t[3])));
-    let squares = picture.colours.iter().zip(over_white).flat_map(|(a, b)| [0, 1, 2].map(|c| (a[c] - b[c]).powi(2)));
-    let psnr = -10.0 * (squares.sum::<f32>() / (3 * picture.colours.len()) as f32).log10();
-    println!("a source from its own place: {psnr:.1} dB");
+    let psnr = -20.0 * rms(&picture.colours, &over_white(&sources.images[3].texels)).log10();
     assert!(psnr > 28.0, "{psnr} dB");
 }
 

@@ -4,6 +4,7 @@ use super::{OneFile, Target, Verdict, verdict};
 use image::{DynamicImage, ImageFormat, Rgba, RgbaImage};
 use std::io::Cursor;
 use viewfuse::scene::read_picture;
+use viewfuse_tests::scenes::png_checksum;
 
 pub(crate) struct Images(OneFile);
 
@@ -11,13 +12,6 @@ impl Images {
     pub(crate) fn new() -> Images {
         Images(OneFile::new("photograph"))
     }
-}
-
-/// The checksum of PNG's pieces.
-fn crc(bytes: &[u8]) -> u32 {
-    !bytes.iter().fold(u32::MAX, |crc, byte| {
-        (0..8).fold(crc ^ u32::from(*byte), |crc, _| (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg()))
-    })
 }
 
 impl Target for Images {
@@ -58,7 +52,7 @@ impl Target for Images {
         while bytes.starts_with(b"\x89PNG") && at + 12 <= bytes.len() {
             let length = u32::from_be_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]) as usize;
             let Some(end) = at.checked_add(8 + length).filter(|end| end + 4 <= bytes.len()) else { break };
-            let check = crc(&bytes[at + 4..end]);
+            let check = png_checksum(&bytes[at + 4..end]);
             bytes[end..end + 4].copy_from_slice(&check.to_be_bytes());
             at = end + 4;
         }

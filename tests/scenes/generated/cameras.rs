@@ -72,14 +72,3 @@ fn random_views_cover_the_upper_half_evenly_and_the_lower_one_rarely() {
         assert!(other.iter().zip(&fewer).all(|(a, b)| a != b), "another seed or object has other views");
     }
 }
-
-#[test]
-fn focal_length_goes_with_the_size() {
-    for (side, focal) in [(128, 131.25), (64, 65.625)] {
-        let pinhole = sphere(side).expect("a size").pinhole;
-        assert_eq!(pinhole.focal(), [focal; 2]);
-        assert_eq!(pinhole.principal(), [side as f32 / 2.0; 2]);
-        assert_eq!([pinhole.width(), pinhole.height()], [side; 2]);
-    }
-    assert!(sphere(0).is_err());
-}

@@ -20,13 +20,13 @@ pub struct SceneError {
     /// The file or folder that a person must open, and the place in it.
     pub place: FilePlace,
     /// What is wrong.
-    pub fault: SceneFault,
+    pub fault: Box<SceneFault>,
 }
 
 impl FilePlace {
     /// The error of what is wrong here.
     pub fn fault(self, fault: impl Into<SceneFault>) -> SceneError {
-        SceneError { place: self, fault: fault.into() }
+        SceneError { place: self, fault: Box::new(fault.into()) }
     }
 }
 
@@ -130,7 +130,7 @@ pub enum SceneFault {
 
 impl Hinted for SceneError {
     fn hint(&self) -> Option<Hint> {
-        match &self.fault {
+        match &*self.fault {
             SceneFault::BarePhotographs(_) => Some(Hint::Poses),
             SceneFault::UnclearMasks(_) => Some(Hint::Masks),
             SceneFault::Image(ImageFault::Unreadable(cause)) => match &**cause {
