@@ -75,7 +75,7 @@ const NAMING: [&str; 24] = [
     "optimise SCENE --sources 0,1,2 --left-out VIEW --size 16x16 --iterations 2 --device cpu -o NAME.ply",
     "render SCENE --targets VIEW --sources 0,1,2 --size 16x16 --device cpu -o NAME",
     "render SCENE --camera-path PATH --sources 0,1,2 --size 16x16 --device cpu -o path",
-    "evaluate SCENE SCENE --targets VIEW --sources 0,1,2 --size 16x16 --weights mean --device cpu",
+    "evaluate SCENE --targets VIEW --sources 0,1,2 --size 16x16 --weights mean --device cpu",
     "evaluate SCENE --targets VIEW --sources 0,1,2 --size 16x16 --weights mean --device cpu -o NAME.csv",
     "evaluate SCENE --protocol nearest:2 --targets-per-trial 1 --size 16x16 --weights mean --device cpu -o NAME-p",
     "pareto SCENE --targets VIEW --sources 0,1,2 --size 16x16 --repeat 1 --only exact --device cpu -o NAME-q",

@@ -12,7 +12,7 @@ use viewfuse::check::check_kernel;
 use viewfuse::check::measure::Role;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::job::progress::Progress;
-use viewfuse_tests::command::{command, toy};
+use viewfuse_tests::command::{command, toy, toy_twice};
 use viewfuse_tests::places::data;
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -79,8 +79,8 @@ const COMMANDS: [(&str, &[&str]); 13] = [
         &["reading photographs", "reading the sources", "mean, encoding", "mean, view 000021", "auto, view 000020"],
     ),
     (
-        "evaluate toy toy --targets 20 --sources 0..5 --size 16x16 --weights mean --device cpu",
-        &["toy: mean, view 000020", "toy: reading photographs", "toy: mean, view 000020"],
+        "evaluate toy again --targets 20 --sources 0..5 --size 16x16 --weights mean --device cpu",
+        &["toy: mean, view 000020", "again: reading photographs", "again: mean, view 000020"],
     ),
     (
         "evaluate toy --protocol random --trials 2 --targets-per-trial 1 --size 16x16 --weights mean --device cpu",
@@ -104,7 +104,7 @@ const COMMANDS: [(&str, &[&str]); 13] = [
 ];
 
 fn every_long_command_names_its_stages() {
-    let scene = toy();
+    let scene = toy_twice();
     let folder = scene.path();
     for (from, to) in [("weighting.json", "weighting.json"), ("pixelnerf_small.safetensors", "pixelnerf.safetensors")] {
         fs::copy(data(from), folder.join(to)).expect("a copy");

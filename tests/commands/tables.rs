@@ -4,7 +4,7 @@ use super::{BINARY, assert_near, done, numbers, read_json, texts};
 use serde_json::Value;
 use std::fs;
 use viewfuse::weighting::scheme_names;
-use viewfuse_tests::command::{names_in, run, toy};
+use viewfuse_tests::command::{names_in, run, toy, toy_twice};
 
 viewfuse_tests::trials![
     weights_as_a_table,
@@ -61,8 +61,7 @@ fn weights_as_json() {
 }
 
 fn evaluates_schemes_against_the_nearest_copy() {
-    let (scene, other) = (toy(), toy());
-    fs::rename(other.path().join("toy"), scene.path().join("again")).expect("a second scene");
+    let scene = toy_twice();
     let run = "evaluate toy again --targets 20,21 --size 64x64 --weights mean --weights error:alpha=1 -o scores.csv";
     let table = done(scene.path(), run);
     for title in ["toy: 2 targets", "again: 2 targets", "all 2 scenes: 4 targets"] {

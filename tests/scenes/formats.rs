@@ -107,6 +107,20 @@ fn a_jpeg_that_ends_before_its_picture_is_refused() {
     let cut = folder(None, &whole[..whole.len() - 40]);
     let error = open(&cut).photograph(0).expect_err("a part of a picture").to_string();
     assert!(error.ends_with("images/1.jpg: the file ends before the picture does"), "{error}");
+    // The end of a thumbnail is not the end, and the end may lie across two buffers of a reader.
+    let with_segment = |content: &[u8]| -> Vec<u8> {
+        let length = (content.len() as u16 + 2).to_be_bytes();
+        [&whole[..2], &[0xff, 0xe5], &length, content, &whole[2..]].concat()
+    };
+    let thumbnail = with_segment(&[0xff, 0xd9]);
+    open(&folder(None, &thumbnail)).photograph(0).expect("a photograph");
+    let cut = folder(None, &thumbnail[..thumbnail.len() - 40]);
+    open(&cut).photograph(0).expect_err("a part of a picture");
+    for total in 8190..8196 {
+        let padded = with_segment(&vec![0; total - whole.len() - 4]);
+        assert_eq!(padded.len(), total);
+        open(&folder(None, &padded)).photograph(0).expect("a photograph");
+    }
 }
 
 #[test]

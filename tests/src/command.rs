@@ -167,6 +167,13 @@ pub fn toy() -> Folder {
     sample("toy")
 }
 
+/// A folder with two scenes: a copy of the sample scene `toy`, and another one, `again`.
+pub fn toy_twice() -> Folder {
+    let (folder, other) = (toy(), toy());
+    fs::rename(other.path().join("toy"), folder.path().join("again")).expect("a second scene");
+    folder
+}
+
 /// A folder that holds a copy of a sample scene under its name.
 pub fn sample(name: &str) -> Folder {
     let folder = Folder::new();

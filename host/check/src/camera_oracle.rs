@@ -1,7 +1,6 @@
 //! Projections and grid look-ups in `f64`, with bounds on the error of `f32`.
 
 use super::bounded::{Bounded, ROUNDING};
-use super::ray_oracle::any;
 use viewfuse_core::camera::CameraBlock;
 
 /// A point or a direction.
@@ -121,4 +120,28 @@ pub fn bilinear(node: impl Fn(usize, usize) -> f32, columns: &Tents, rows: &Tent
     // Each of two mixtures rounds a difference, a product and a sum.
     let mixed = 2.0 * ROUNDING * (greatest - least) + ROUNDING * least.abs().max(greatest.abs());
     Bounded { value, error: (columns.error + rows.error) * (greatest - least) + mixed }
+}
+
+/// Whether any is true; `None` if it depends on undecided ones.
+pub(crate) fn any(answers: impl Iterator<Item = Option<bool>>) -> Option<bool> {
+    let answers: Vec<Option<bool>> = answers.collect();
+    if answers.contains(&Some(true)) {
+        Some(true)
+    } else if answers.contains(&None) {
+        None
+    } else {
+        Some(false)
+    }
+}
+
+/// The coordinates of a window along an axis.
+pub(crate) fn window(at: u32, reach: u32, count: u32) -> std::ops::RangeInclusive<u32> {
+    at.saturating_sub(reach)..=(at + reach).min(count - 1)
+}
+
+/// The pixel of a coordinate inside the image, if it does not depend on rounding.
+pub(crate) fn cell(coordinate: Bounded, count: u32) -> Option<usize> {
+    let index = |value: f64| value.floor().clamp(0.0, f64::from(count - 1)) as usize;
+    let low = index(coordinate.value - coordinate.error);
+    (low == index(coordinate.value + coordinate.error)).then_some(low)
 }

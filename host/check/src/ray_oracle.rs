@@ -4,7 +4,7 @@
 //! answers.
 
 use super::bounded::Bounded;
-use super::camera_oracle::{along, centre, point, towards};
+use super::camera_oracle::{along, any, centre, point, towards};
 use std::f64::consts::TAU;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::depths::{CoarseBlock, FineBlock, PROBABILITY_FLOOR};
@@ -163,18 +163,6 @@ pub fn is_sampled(
     // Into whichever part the sample falls.
     let answers = [answer(low), answer(high)];
     if answers[0] == answers[1] { answers[0] } else { None }
-}
-
-/// Whether any is true; `None` if it depends on undecided ones.
-pub(crate) fn any(answers: impl Iterator<Item = Option<bool>>) -> Option<bool> {
-    let answers: Vec<Option<bool>> = answers.collect();
-    if answers.contains(&Some(true)) {
-        Some(true)
-    } else if answers.contains(&None) {
-        None
-    } else {
-        Some(false)
-    }
 }
 
 /// Whether a ray's weights put samples in a part into the mask.

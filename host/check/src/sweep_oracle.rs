@@ -11,9 +11,7 @@ mod paths;
 mod picked;
 
 pub use blended::{Pixel, blend};
-pub(crate) use costs::window;
 pub use costs::{census_cost, row_sums, window_cost};
-pub(crate) use evidence::cell;
 pub use evidence::{Found, evidence};
 pub use front::{front_cost, plane_opacity};
 pub use paths::{follow_path, joined_cost};

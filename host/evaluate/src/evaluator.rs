@@ -4,7 +4,7 @@ use crate::baseline::plane::plane_depth;
 use crate::baseline::{BLENDED, Baseline, Shot};
 use crate::metrics::masked::MaskedTruth;
 use crate::metrics::{MetricError, Scorer};
-use crate::run_folder::{seconds, values};
+use crate::score_json::{seconds, values};
 use image::{GrayImage, RgbImage};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;

@@ -5,6 +5,7 @@
 //! ```text
 //! metrics      metrics of pictures
 //! baseline     baselines without a field: copies and warps of the nearest sources
+//! score_json   numbers of scores as JSON
 //! evaluator    each weighting scheme on views that are left out      Evaluator
 //! protocol     which views are sources, which are targets
 //! pareto       error against run time
@@ -21,6 +22,7 @@ pub mod metrics;
 pub mod pareto;
 pub mod protocol;
 pub mod run_folder;
+mod score_json;
 pub mod summary;
 
 pub use evaluator::*;

@@ -14,7 +14,6 @@ mod journal;
 mod settings;
 
 pub use journal::{Finished, JobJournal, Shard};
-pub(crate) use journal::{seconds, values};
 pub use settings::{SceneSettings, Settings};
 
 use std::collections::BTreeMap;

@@ -11,7 +11,7 @@ use viewfuse::scene::{Scene, View};
 use viewfuse_core::camera::Camera;
 use viewfuse_lab::scenes::cameras::{random_views, sphere, spiral_views};
 use viewfuse_lab::scenes::{render_with, toy::lorry};
-use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, done, toy};
+use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, done, toy, toy_twice};
 use viewfuse_tests::scenes::{self, Folder, npy};
 
 viewfuse_tests::trials![
@@ -240,14 +240,14 @@ fn tables_without_a_folder() {
         text.lines().filter(is_row).map(str::to_owned).collect()
     };
     assert!(rows(&text).len() == 3 && rows(&text) == rows(&kept), "{text}\n{kept}");
-    assert!(kept.contains("1 jobs done; 1 of 1 are in kept"), "{kept}");
+    assert!(kept.contains("1 job done; 1 of 1 are in kept"), "{kept}");
     let record = read_json(scene.path().join("kept/run.json"));
     assert_eq!((&record["protocol"], &record["scenes"][0]["size"]), (&"llff:3".into(), &json!([32, 32])));
     assert!(record["metric"].as_str().is_some_and(|metric| metric.starts_with("full: ")), "{record}");
 }
 
 fn json_is_the_table() {
-    let scene = toy();
+    let scene = toy_twice();
     let folder = scene.path();
     let whole = json(folder, "toy --protocol llff:3 --size 32x32");
     assert_eq!(whole["settings"]["protocol"], "llff:3");
@@ -263,10 +263,10 @@ fn json_is_the_table() {
     assert_eq!(table["comparisons"].as_array().map(Vec::len), Some(2 * 3));
     assert!(whole["published"]["withheld"].as_str().is_some_and(|why| why.contains("504x378")));
     // Without a protocol as well, a table a scene and one of all.
-    let plain = json(folder, "toy ./toy --targets 20,21 --size 32x32");
+    let plain = json(folder, "toy again --targets 20,21 --size 32x32");
     let titles: Vec<&str> =
         plain["tables"].as_array().expect("tables").iter().filter_map(|table| table["title"].as_str()).collect();
-    assert_eq!(titles, ["toy: 2 targets", "./toy: 2 targets", "all 2 scenes: 4 targets"]);
+    assert_eq!(titles, ["toy: 2 targets", "again: 2 targets", "all 2 scenes: 4 targets"]);
     assert_eq!(plain["tables"][2]["unit"], "scenes");
 }
 

@@ -7,6 +7,7 @@ use std::path::Path;
 use viewfuse_core::attention::POSE_FEATURES;
 use viewfuse_tests::command::{
     Outcome, assert_refused, assert_wrong_arguments, done, f32_bytes, killed_when, names_in, run, safetensors, toy,
+    toy_twice,
 };
 
 viewfuse_tests::trials![
@@ -124,7 +125,7 @@ fn a_killed_run_ends_in_the_same_numbers() {
 }
 
 fn other_settings_are_refused() {
-    let scene = toy();
+    let scene = toy_twice();
     let folder = scene.path();
     let first = RUN.replace("--trials 6", "--trials 1");
     done(BINARY, folder, &format!("{first} -o out"));
@@ -136,7 +137,7 @@ fn other_settings_are_refused() {
     refused(&first.replace("random", "random:sources=4"), &["protocol: random:sources=4 here, random:sources=3 there"]);
     refused(&format!("{first} --seed 3"), &["seed: 3 here, 0 there"]);
     refused(&format!("{first} --weights frobenius"), &["schemes: "]);
-    refused(&first.replace(" toy ", " toy ./toy "), &["scenes: toy, toy here, toy there"]);
+    refused(&first.replace(" toy ", " toy again "), &["scenes: toy, again here, toy there"]);
     refused(&format!("{first} --exact"), &["exact: true here, false there"]);
     // Threads, pictures and shards change no number.
     done(BINARY, folder, &format!("{first} --threads 1 --pictures 0 --shard 0/2 -o out"));

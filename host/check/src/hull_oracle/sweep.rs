@@ -2,7 +2,7 @@
 
 use super::{NOWHERE, Scene, along, centre, look_up, project, radius, towards};
 use crate::bounded::{Bounded, ROUNDING};
-use crate::sweep_oracle::{cell, window};
+use crate::camera_oracle::{cell, window};
 use viewfuse_kernels::visual_hull::hull::SWEPT_ALPHA;
 use viewfuse_kernels::visual_hull::sweep::{
     DEPTH_COST, MAX_DIFFERENCE, MAX_ROUGHNESS, NO_WITNESS, OUTSIDE, ROUGHNESS_COST, SEEN_BEHIND_ENTRY,

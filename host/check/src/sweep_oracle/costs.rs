@@ -2,6 +2,7 @@
 
 use super::{BoundedPlanes, exact};
 use crate::bounded::Bounded;
+use crate::camera_oracle::window;
 use viewfuse_kernels::plane_sweep::census::{
     CENSUS_SHARE, COLOUR_SHARE, CONTRAST, FULL_TEXTURE, GREY_STEPS, MAX_GREY, MIN_TOLD, OUTSIDE_COST, REACH,
     WEIGHT_STEPS,
@@ -74,11 +75,6 @@ pub fn census_cost(
         [costs[0][plane], costs[1][plane]] = cost(frustum, evidence, sum / all, texture / all);
     }
     costs
-}
-
-/// The coordinates of a window along an axis.
-pub(crate) fn window(at: u32, reach: u32, count: u32) -> std::ops::RangeInclusive<u32> {
-    at.saturating_sub(reach)..=(at + reach).min(count - 1)
 }
 
 /// Sums over a row's parts of the windows: `[window][cost times weight, weight]`.

@@ -2,6 +2,7 @@
 
 use super::{BEHIND, disparity, look_up, project_plane};
 use crate::bounded::Bounded;
+use crate::camera_oracle::cell;
 use crate::hull_oracle::bell;
 use viewfuse_kernels::plane_sweep::PLANES;
 use viewfuse_kernels::plane_sweep::evidence::{MAX_DIFFERENCE, MIN_ALPHA, UNSEEN, ViewPair};
@@ -99,13 +100,6 @@ fn view_evidence(
         Some(None)
     };
     ViewEvidence { colour, inside: Some(inside), doubt }
-}
-
-/// The pixel of a coordinate inside the image, if it does not depend on rounding.
-pub(crate) fn cell(coordinate: Bounded, count: u32) -> Option<usize> {
-    let index = |value: f64| value.floor().clamp(0.0, f64::from(count - 1)) as usize;
-    let low = index(coordinate.value - coordinate.error);
-    (low == index(coordinate.value + coordinate.error)).then_some(low)
 }
 
 fn mean([red, green, blue]: [Bounded; 3]) -> Bounded {

@@ -1,8 +1,8 @@
 //! Opacities of planes, and the preference for the first opaque one.
 
-use super::evidence::cell;
 use super::{BEHIND, disparity, project_plane};
 use crate::bounded::Bounded;
+use crate::camera_oracle::cell;
 use crate::hull_oracle::bell;
 use viewfuse_kernels::plane_sweep::front::{
     FREE_PLANES, FrontBlock, GUARD, HIDES_MOST, HIDES_NOTHING, MAX_HIDDEN, SEEN_THROUGH, TRANSPARENT,

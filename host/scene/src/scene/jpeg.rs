@@ -50,25 +50,3 @@ fn has_pair(mut reader: impl BufRead, pair: [u8; 2]) -> io::Result<bool> {
 fn if_ended(error: io::Error, answer: bool) -> io::Result<bool> {
     if error.kind() == ErrorKind::UnexpectedEof { Ok(answer) } else { Err(error) }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_end_of_a_thumbnail_is_not_the_end() {
-        let whole =
-            [&[0xff, 0xd8, 0xff, 0xe1, 0, 6, 0xff, 0xd9, 1, 1][..], &[0xff, 0xda, 0, 2, 7, 7, 0xff, 0xd9]].concat();
-        // Through buffers that end between any two bytes.
-        for buffer in 1..=whole.len() {
-            let has_end = |bytes: &[u8]| {
-                let mut reader = BufReader::with_capacity(buffer, io::Cursor::new(bytes.to_vec()));
-                reader.read_exact(&mut [0; 2]).expect("two bytes");
-                has_end(reader).expect("no error")
-            };
-            assert!(has_end(&whole));
-            assert!(!has_end(&whole[..whole.len() - 1]), "cut in the picture");
-            assert!(!has_end(&whole[..12]), "cut in the header");
-        }
-    }
-}
