@@ -123,6 +123,10 @@ fn attention_parameters_that_are_none() {
     folder.write("half.safetensors", safetensors(&[layer("query_layer.weight")]));
     refused("half.safetensors", &["half.safetensors: tensor 'key_layer.weight' is missing"]);
     let key = layer("key_layer.weight");
+    let flat = ("query_layer.weight", "F32", [3].as_slice(), f32_bytes([1.0; 3]));
+    folder.write("flat.safetensors", safetensors(&[flat, key.clone()]));
+    let wanted = format!("must be F32 [{N}, {N}], but is F32 [3]");
+    refused("flat.safetensors", &["flat.safetensors: tensor 'query_layer.weight'", &wanted]);
     let mut values = vec![0.1; N * N];
     values[5] = f32::NAN;
     let query = ("query_layer.weight", "F32", [N, N].as_slice(), f32_bytes(values));

@@ -190,21 +190,23 @@ impl<'a> SceneOptimisation<'a> {
         keep: &mut dyn FnMut(&GaussianScene) -> Result<(), WriteError>,
         scores: &mut Vec<(u32, f64)>,
     ) -> Result<(), OptimiseError> {
-        let of = optimisation.iteration_count();
-        while optimisation.done() < of && !progress.is_cancelled() {
+        let iteration_count = optimisation.iteration_count();
+        while optimisation.done() < iteration_count && !progress.is_cancelled() {
             optimisation.run_to(optimisation.done() + 1, &Silent).map_err(RenderError::from)?;
             progress.step();
             let done = optimisation.done();
-            if !done.is_multiple_of(SCORED) && done != of {
+            if !done.is_multiple_of(SCORED) && done != iteration_count {
                 continue;
             }
             let gaussians = optimisation.optimised().gaussians;
-            if done < of {
+            if done < iteration_count {
                 keep(&scene_of(&gaussians))?;
             }
             if !self.held_out.is_empty() {
                 let psnr = self.score(&gaussians, any, album, &self.held_out)?;
-                progress.note(&format!("iteration {done} of {of}: views left out have a PSNR of {psnr:.2} dB"));
+                progress.note(&format!(
+                    "iteration {done} of {iteration_count}: views left out have a PSNR of {psnr:.2} dB"
+                ));
                 scores.push((done, psnr));
             }
         }

@@ -127,10 +127,13 @@ fn refuse_equal_rows(choices: &[WeightingChoice]) -> anyhow::Result<()> {
 /// `values` are all options and their values as a person would write them.
 pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> anyhow::Result<ExitCode> {
     arguments.metrics.refuse_sets()?;
-    let mut choices: Vec<WeightingChoice> = or_every_scheme(&arguments.weights)?;
-    // Once in a table is enough.
-    let mut seen = HashSet::new();
-    choices.retain(|choice| seen.insert(format!("{choice:?}")));
+    let mut choices: Vec<WeightingChoice> = Vec::new();
+    for choice in or_every_scheme(&arguments.weights)? {
+        // Once in a table is enough.
+        if !choices.contains(&choice) {
+            choices.push(choice);
+        }
+    }
     refuse_equal_rows(&choices)?;
     let weightings: Vec<OpenedChoice> = choices.iter().map(WeightingChoice::open).collect::<Result<_, _>>()?;
     if let Some(protocol) = &arguments.protocol.protocol {
