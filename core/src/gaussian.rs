@@ -205,6 +205,33 @@ impl ProjectedGaussian {
     }
 }
 
+impl ProjectedGaussian {
+    /// Whether the opacity may reach [`MIN_ALPHA`] at a pixel's centre of these columns and rows (each first and last):
+    /// the least value that the exponent's quadratic form takes in their rectangle, against the one that the opacity at
+    /// the mean allows. Never false where [`ProjectedGaussian::alpha`] is above 0: the comparison has a margin of 1 % of
+    /// [`MIN_ALPHA`], and of eight roundings of the form's greatest terms in the rectangle.
+    #[inline]
+    pub fn reaches(&self, columns: [u32; 2], rows: [u32; 2]) -> bool {
+        let [xx, xy, yy] = self.conic;
+        let (left, right) = (columns[0] as f32 + 0.5 - self.mean[0], columns[1] as f32 + 0.5 - self.mean[0]);
+        let (top, bottom) = (rows[0] as f32 + 0.5 - self.mean[1], rows[1] as f32 + 0.5 - self.mean[1]);
+        // The nearest edge across and down; both 0 if the mean is inside.
+        let (dx, dy) = (clamp(0.0, left, right), clamp(0.0, top, bottom));
+        let form = |x: f32, y: f32| xx * x * x + yy * y * y + 2.0 * xy * x * y;
+        // Along each of these edges the least value is where the derivative vanishes, or at an end.
+        let across = form(dx, clamp(-xy * dx / yy, top, bottom));
+        let down = form(clamp(-xy * dy / xx, left, right), dy);
+        let least = match (dx == 0.0, dy == 0.0) {
+            (true, _) => down,
+            (false, true) => across,
+            (false, false) => min(across, down),
+        };
+        let (far_x, far_y) = (max(-left, right), max(-top, bottom));
+        let rounding = 1.0e-6 * (xx * far_x * far_x + yy * far_y * far_y);
+        !(least > 2.0 * ln(255.0 * self.opacity) + 0.02 + rounding)
+    }
+}
+
 /// The indices of projected Gaussians, nearest first, those of equal depth in their own order. Those that are not drawn
 /// come first and cover nothing. `order` has the length of `projected`; what is beyond the shorter of both is left
 /// alone.
@@ -263,7 +290,7 @@ pub const REST_COUNTS: [u32; 4] = [0, 3, 8, 15];
 pub fn colour_along(f_dc: [f32; 3], f_rest: &(impl Fetch<f32> + ?Sized), degree: u32, direction: Vec3) -> [f32; 3] {
     let length = norm3(direction.x, direction.y, direction.z);
     let unit = if length > 0.0 && has_finite_bits(length) { direction / length } else { Vec3::ZERO };
-    let basis = basis(unit);
+    let basis = harmonics(unit);
     let count = REST_COUNTS[degree.min(3) as usize] as usize;
     let mut colour = [0.0; 3];
     let mut channel = 0;
@@ -281,9 +308,10 @@ pub fn colour_along(f_dc: [f32; 3], f_rest: &(impl Fetch<f32> + ?Sized), degree:
     colour
 }
 
-/// The spherical harmonics of degrees 1 to 3 along a unit vector, with the signs and the order of the published code.
+/// The spherical harmonics of degrees 1 to 3 along a unit vector (the derivatives of [`colour_along`] by its
+/// coefficients, where the colour is above 0), with the signs and the order of the published code.
 #[inline]
-fn basis(unit: Vec3) -> [f32; 15] {
+pub fn harmonics(unit: Vec3) -> [f32; 15] {
     let Vec3 { x, y, z } = unit;
     let (xx, yy, zz) = (x * x, y * y, z * z);
     [

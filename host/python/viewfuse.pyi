@@ -138,6 +138,7 @@ class Scene:
         weights: Optional[str] = None,
         left_out: Optional[str] = None,
         towards: Optional[str] = None,
+        quality: str = "fast",
         sources: Optional[str] = None,
         views: Optional[int] = None,
         count: Optional[int] = None,
@@ -156,6 +157,7 @@ class Scene:
         weights: the scheme of the surfaces and of `towards`.
         left_out: views that are no sources, and are scored on the way.
         towards: views whose weights the iterations end with.
+        quality: "fast", or "standard" and "high" for minutes and some twenty photographs and more.
         count: most Gaussians. iterations: at each size of the sources.
         resume: a file of Gaussians to go on from, at the finest size.
         """

@@ -21,6 +21,8 @@ viewfuse_tests::trials![
     options_of_the_field_are_those_of_the_command,
     what_it_refuses,
     a_page_holds_what_the_file_holds,
+    more_quality_is_tried_on_sources_and_has_colours_by_direction,
+    few_photographs_and_a_short_time_have_fewer_iterations,
     without_a_view_that_is_kept_back_it_says_what_its_figure_is,
 ];
 
@@ -153,11 +155,56 @@ fn what_it_refuses() {
     assert_refused(BINARY, folder.path(), &format!("{OPTIMISE} --left-out 99 -o toy.ply"), &["99"]);
 }
 
+/// Held-out sources prefer the sharper recipe on the sample scene; the views that a person keeps back are none of them.
+fn more_quality_is_tried_on_sources_and_has_colours_by_direction() {
+    let folder = toy();
+    let text = done(folder.path(), &format!("{OPTIMISE} --left-out 20,21 --quality standard -o a.ply"));
+    let trial = text.lines().find(|line| line.contains("left out of a trial")).expect("a trial");
+    assert!(trial.starts_with("2 of 22 photographs") && trial.contains("standard is used"), "{trial}");
+    let about = text.lines().find(|line| line.contains(" iterations more, about ")).expect("a time");
+    assert!(about.ends_with(" s") || about.ends_with(" minutes"), "{about}");
+    let sharp = scores(&text);
+    let fast = scores(&done(folder.path(), &format!("{OPTIMISE} --left-out 20,21 -o b.ply")));
+    let (sharp, fast) = (sharp.last().expect("scores").1, fast.last().expect("scores").1);
+    assert!(sharp > fast + 0.5, "{sharp} and {fast} dB");
+    let (first, second) = (gaussians(&folder.path().join("a.ply")), gaussians(&folder.path().join("b.ply")));
+    assert_eq!((first.degree, second.degree), (3, 0));
+    // 48x48 pixels, three quarters of a Gaussian each.
+    assert_eq!(first.gaussians.len(), 1728, "the number rises to its limit");
+    // The last score is that of the file, harmonics included.
+    let rendered = done(folder.path(), "render toy --gaussians a.ply --targets 20,21 --size 48x48 --device cpu -o out");
+    let psnr = |line: &str| line.split("PSNR ").nth(1)?.split(" dB").next()?.parse::<f64>().ok();
+    let own: Vec<f64> = rendered.lines().filter_map(psnr).collect();
+    assert!(own.len() == 2 && (own.iter().sum::<f64>() / 2.0 - sharp).abs() < 0.02, "{rendered}\n{text}");
+    // It goes on from the file with its harmonics: the first score of few iterations is no worse.
+    let more = "--resume a.ply --left-out 20,21 --quality standard --iterations 40 -o c.ply";
+    let resumed = scores(&done(folder.path(), &format!("{OPTIMISE} {more}")));
+    assert!(resumed.last().expect("a score").1 > sharp - 0.5, "{resumed:?} after {sharp}");
+    assert_eq!(gaussians(&folder.path().join("c.ply")).degree, 3);
+}
+
+fn few_photographs_and_a_short_time_have_fewer_iterations() {
+    let folder = toy();
+    let few = done(folder.path(), &format!("{OPTIMISE} --sources 0..9 --quality standard -o a.ply"));
+    assert!(few.contains("10 photographs are too few for standard, from 12 on: fast\n"), "{few}");
+    assert!(few.contains(" after 240 of 240 iterations\n"), "{few}");
+    // The trial alone takes a second.
+    let short = done(folder.path(), &format!("{OPTIMISE} --quality standard --max-time 1s -o b.ply"));
+    assert!(short.contains(" after 220 of 220 iterations\n"), "{short}");
+    let wrong = format!("{OPTIMISE} --max-time 10m -o a.ply");
+    assert_wrong_arguments(BINARY, folder.path(), &wrong, &["--max-time is for --quality standard and high"]);
+    for (options, words) in
+        [("--quality best", "best is no quality"), ("--quality high --max-time soon", "soon is no time")]
+    {
+        assert_wrong_arguments(BINARY, folder.path(), &format!("{OPTIMISE} {options} -o a.ply"), &[words]);
+    }
+}
+
 fn a_page_holds_what_the_file_holds() {
     let folder = toy();
     let file = done(folder.path(), &format!("{OPTIMISE} -o toy.ply"));
     let Outcome { code, stdout, stderr } =
-        Outcome::of(command(BINARY, folder.path(), &format!("{OPTIMISE} -o toy.html")));
+        Outcome::of(command(BINARY, folder.path(), &format!("{OPTIMISE} --quality fast -o toy.html")));
     assert_eq!((code, stderr.as_str()), (Some(0), ""));
     assert_eq!(stdout.replace("toy.html", "toy.ply"), file);
     let page = fs::read_to_string(folder.path().join("toy.html")).expect("a page");

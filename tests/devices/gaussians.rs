@@ -102,7 +102,7 @@ fn derivatives<D: Device>(device: &D, own: &Optimised) -> Vec<GaussianBlock> {
     let picture = splatter.picture(&uploaded, own.gaussians.len(), &camera).expect("a picture");
     let by = |index: usize| [0, 1, 2, 3].map(|channel| ((index * 7 + channel * 5) % 11) as f32 / 5.0 - 1.0);
     let by_pixels: Vec<[f32; 4]> = (0..(camera.width * camera.height) as usize).map(by).collect();
-    splatter.gradients(&uploaded, &picture, &by_pixels).expect("derivatives").0
+    splatter.gradients(&uploaded, &picture, &by_pixels).expect("derivatives")
 }
 
 /// Some of a Gaussian's parameters.

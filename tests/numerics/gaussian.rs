@@ -4,6 +4,7 @@ use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock, Pinhole};
 use viewfuse_core::gaussian::{DILATION, GaussianBlock, ProjectedGaussian, axes, colour_along, opacity, project};
 use viewfuse_core::pose::Pose;
+use viewfuse_core::random::uniform;
 
 const NEAR: f32 = 0.1;
 
@@ -110,6 +111,35 @@ fn what_can_not_be_drawn_covers_nothing() {
     let aside = GaussianBlock { position: [-40.0, 0.0, 2.0], ..good };
     let [left, right, _, _] = project(&aside, &camera, NEAR).pixels(160, 90);
     assert_eq!((left, right), (0, 0));
+}
+
+/// Of every rectangle: where it is false no pixel has an opacity, and where all are far it is false.
+#[test]
+fn what_is_not_reached_has_no_opacity() {
+    let (mut refused, mut reached, mut needless) = (0, 0, 0);
+    for draw in 0..4000 {
+        let random = |sample: u32| uniform(7, draw, sample);
+        // From balls to needles of one to a thousand, at all angles, inside of the rectangle and far outside.
+        let (angle, long) = (std::f32::consts::TAU * random(0), 10.0_f32.powf(3.0 * random(1)));
+        let (sine, cosine) = angle.sin_cos();
+        let (first, second) = (1.0 / (long * long), 1.0 / (0.5 + random(2)));
+        let conic = [
+            first * cosine * cosine + second * sine * sine,
+            (first - second) * sine * cosine,
+            first * sine * sine + second * cosine * cosine,
+        ];
+        let mean = [12.0 + 80.0 * (random(3) - 0.5) * random(4), 12.0 + 80.0 * (random(5) - 0.5) * random(6)];
+        let splat = ProjectedGaussian { mean, conic, opacity: 0.004 + 0.99 * random(7), ..Default::default() };
+        let (columns, rows) = ([8, 8 + (8.0 * random(8)) as u32], [8, 8 + (8.0 * random(9)) as u32]);
+        let pixels = (rows[0]..=rows[1]).flat_map(|row| (columns[0]..=columns[1]).map(move |column| (column, row)));
+        let is_seen = pixels.into_iter().any(|(column, row)| splat.alpha(column as f32 + 0.5, row as f32 + 0.5) > 0.0);
+        let reaches = splat.reaches(columns, rows);
+        assert!(reaches || !is_seen, "{splat:?} {columns:?} {rows:?}");
+        (refused, reached) = (refused + u32::from(!reaches), reached + u32::from(reaches));
+        needless += u32::from(reaches && !is_seen);
+    }
+    // A needle may pass between pixels' centres.
+    assert!(refused > 1000 && reached > 500 && needless * 5 < reached, "{refused} {reached} {needless}");
 }
 
 /// The harmonics are orthonormal on the sphere: by a product rule that is exact for polynomials of the degree.

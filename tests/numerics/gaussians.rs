@@ -123,8 +123,8 @@ fn derivatives_are_those_of_differences() {
     let by_pixels: Vec<[f32; 4]> = pixels
         .map(|pixel| if counted[pixel as usize] { by_pixel(pixel % width, pixel / width) } else { [0.0; 4] })
         .collect();
-    let (mut gradients, tile_counts) = splatter.gradients(&uploaded, &picture, &by_pixels).expect("derivatives");
-    assert!(tile_counts.iter().all(|count| *count > 0));
+    let mut gradients = splatter.gradients(&uploaded, &picture, &by_pixels).expect("derivatives");
+    assert!(picture.lists.in_sight.iter().all(|in_sight| *in_sight));
     for index in 0..own.len() {
         let analytic = parameters(&mut gradients[index]).map(|value| f64::from(*value));
         let largest = analytic.iter().map(|value| value.abs()).fold(0.0, f64::max);
@@ -152,14 +152,32 @@ fn tiles_list_splats_front_to_back() {
     let own = gaussians();
     let splats: Vec<ProjectedGaussian> = own.iter().rev().map(rounded).collect();
     let block = TileBlock::new(SIZE[0], SIZE[1], BACKGROUND);
-    let Tiles { starts, entries } = Tiles::of(&block, &splats);
+    let Tiles { starts, entries, in_sight } = Tiles::of(&block, &splats);
+    assert!(in_sight.iter().all(|in_sight| *in_sight));
     assert_eq!(starts.len(), block.tile_count() as usize + 1);
     assert_eq!(starts.last().copied(), Some(entries.len() as u32));
+    let has_box_in = |splat: &ProjectedGaussian, [left, top]: [u32; 2]| {
+        let [first, end, top_row, bottom] = splat.pixels(SIZE[0], SIZE[1]);
+        first < left + 8 && end > left && top_row < top + 8 && bottom > top
+    };
+    let mut in_boxes = 0;
     for (tile, bounds) in starts.windows(2).enumerate() {
         let depths: Vec<f32> =
             entries[bounds[0] as usize..bounds[1] as usize].iter().map(|splat| splats[*splat as usize].depth).collect();
         assert!(depths.is_sorted(), "tile {tile}: {depths:?}");
+        // Each splat that is seen at a pixel of the tile.
+        let [left, top] = block.first_of(tile as u32);
+        let pixels = (top..top + 8).flat_map(|row| (left..left + 8).map(move |column| (column, row)));
+        let pixels: Vec<(u32, u32)> = pixels.filter(|(column, row)| *column < SIZE[0] && *row < SIZE[1]).collect();
+        let is_seen = |splat: &ProjectedGaussian| {
+            pixels.iter().any(|(column, row)| splat.alpha(*column as f32 + 0.5, *row as f32 + 0.5) > 0.0)
+        };
+        let listed = &entries[bounds[0] as usize..bounds[1] as usize];
+        let seen = (0..splats.len() as u32).filter(|index| is_seen(&splats[*index as usize]));
+        assert!(seen.clone().all(|index| listed.contains(&index)), "tile {tile} lacks a splat");
+        in_boxes += splats.iter().filter(|splat| has_box_in(splat, [left, top])).count();
     }
+    assert!(entries.len() < in_boxes, "{} entries of {in_boxes}: corners of boxes are listed", entries.len());
     assert!(entries.len() > own.len(), "they reach over several tiles");
 }
 
@@ -173,7 +191,7 @@ fn pictures_do_not_depend_on_the_number_of_threads() {
             let uploaded = Cpu.upload(&own).expect("memory");
             let picture = splatter.picture(&uploaded, own.len(), &camera()).expect("a picture");
             let by_pixels = vec![[0.3, -0.2, 0.1, 0.4]; (SIZE[0] * SIZE[1]) as usize];
-            let (gradients, _) = splatter.gradients(&uploaded, &picture, &by_pixels).expect("derivatives");
+            let gradients = splatter.gradients(&uploaded, &picture, &by_pixels).expect("derivatives");
             (Cpu.download(&picture.colours).expect("colours"), gradients)
         })
     };

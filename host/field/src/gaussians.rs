@@ -6,10 +6,13 @@
 //! picture    pictures and derivatives on a device
 //! residuals  what they leave of the photographs, carried to a target
 //! recipe     the settings, chosen by measurement
+//! quality    the recipes for sharper Gaussians
 //! level      the source views at the sizes of the pyramid
 //! loss       how far a picture is from a photograph, and its derivative
 //! start      the Gaussians to begin with: the sources' surfaces, and faint ones at random
+//! harmonics  colours by direction
 //! particles  Gaussians with the state of their optimisation: steps, pruning, splitting
+//! growth     more Gaussians where the photographs ask for them
 //! optimise   the loop
 //! covers     whether given Gaussians show what the sources show
 //! given      a scene of Gaussians that is there already, as a field
@@ -25,11 +28,14 @@
 
 mod covers;
 mod given;
+mod growth;
+mod harmonics;
 mod level;
 mod loss;
 mod optimise;
 mod particles;
 mod picture;
+mod quality;
 mod recipe;
 mod residuals;
 mod start;
@@ -38,6 +44,7 @@ mod tiles;
 pub use given::{GivenGaussians, behind, scene_of};
 pub use optimise::{Optimisation, Optimised, optimisation, optimised};
 pub use picture::{Splatted, Splatter};
+pub use quality::{Quality, RecipeOptions};
 pub use recipe::{MAX_COUNT, MAX_ITERATIONS, Recipe};
 pub use residuals::Residuals;
 pub use tiles::Tiles;

@@ -1,26 +1,37 @@
 //! A scene's photographs to Gaussians: which views are sources, the surfaces that the Gaussians begin with, scores of
 //! views that are held out on the way.
+//!
+//! ```text
+//! trial   which recipe and how many iterations: those that held-out sources prefer
+//! clock   how long the iterations take, and how many fit into a time
+//! ```
+
+mod clock;
+mod trial;
 
 use crate::AnyField;
-use crate::gaussians::{GivenGaussians, Optimisation, Recipe, behind, optimisation, scene_of};
-use crate::point_cloud::point_cloud;
+use crate::gaussians::{GivenGaussians, Optimisation, Quality, Recipe, RecipeOptions, behind, optimisation};
+use crate::point_cloud::{CloudPoint, point_cloud};
 use crate::render::{RenderError, RenderOptions, Stage, open_album};
-use viewfuse_core::Vec3;
+use clock::Clock;
+use std::time::Duration;
 use viewfuse_device::choice::AnyDevice;
 use viewfuse_job::files::WriteError;
 use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_job::progress::{Progress, Silent};
-use viewfuse_kernels::rows::GaussianBlock;
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{Selection, SelectionError, Target, target_of};
 use viewfuse_scene::gaussians::{GaussianFile, GaussianScene};
-use viewfuse_scene::photographs::Album;
+use viewfuse_scene::photographs::{Album, SourceImages};
 use viewfuse_scene::unit::RigUnit;
 use viewfuse_weighting::Weighting;
 use viewfuse_weighting::sources::SourcePoses;
 
-/// Iterations between two scores, and between two of what is kept on the way.
+/// Fewest iterations between two scores, and between two of what is kept on the way; there are at most
+/// [`MAX_SCORES`] of them.
 const SCORED: u32 = 40;
+/// Most scores, nearly.
+const MAX_SCORES: u32 = 20;
 /// Sources that are scored where no view is held out.
 const FIT_SOURCES: usize = 3;
 /// Iterations with the weights of [`SceneOptimisation::towards`].
@@ -53,6 +64,7 @@ impl Hinted for OptimiseError {
 }
 
 /// An optimisation and what it is of.
+#[derive(Clone)]
 pub struct SceneOptimisation<'a> {
     /// The scene.
     pub scene: &'a Scene,
@@ -66,8 +78,10 @@ pub struct SceneOptimisation<'a> {
     pub options: RenderOptions,
     /// The weighting of the surfaces, and for `towards`.
     pub weighting: Weighting,
-    /// The iterations and the number of Gaussians.
-    pub recipe: Recipe,
+    /// The quality, the iterations and the number of Gaussians.
+    pub recipe: RecipeOptions,
+    /// The time that it may take, if there is a limit: it has as many iterations as fit, beyond [`Quality::Fast`].
+    pub max_time: Option<Duration>,
     /// The Gaussians that it goes on from, with the iterations of the finest size.
     pub before: Option<GaussianFile>,
 }
@@ -90,7 +104,7 @@ pub struct EndedOptimisation {
 }
 
 impl<'a> SceneOptimisation<'a> {
-    /// Of a scene, with the default recipe. `held_out` and `towards` are lists of views; neither is a source.
+    /// Of a scene, with the default options. `held_out` and `towards` are lists of views; neither is a source.
     ///
     /// # Errors
     /// [`SelectionError`].
@@ -121,13 +135,15 @@ impl<'a> SceneOptimisation<'a> {
             towards,
             options: RenderOptions::default(),
             weighting: Weighting::default_scheme(),
-            recipe: Recipe::default(),
+            recipe: RecipeOptions::default(),
+            max_time: None,
             before: None,
         })
     }
 
     /// All iterations; once it is cancelled, as many as there are so far. `keep` gets the Gaussians on the way, every
-    /// so many iterations.
+    /// so many iterations. Beyond [`Quality::Fast`], some of the sources are first held out of trials, which choose the
+    /// recipe and its iterations; then all of them are used.
     ///
     /// # Errors
     /// [`OptimiseError`].
@@ -137,41 +153,47 @@ impl<'a> SceneOptimisation<'a> {
         progress: &dyn Progress,
         mut keep: impl FnMut(&GaussianScene) -> Result<(), WriteError>,
     ) -> Result<EndedOptimisation, OptimiseError> {
+        let mut clock = Clock::start(self.max_time);
         let field = AnyField::default();
         let renderer = field.on(device);
-        progress.stage("reading the photographs", 0..1, 10);
+        let is_sharp = self.recipe.quality != Quality::Fast;
+        // A trial has a tenth of the time, and sharp recipes nearly all of the rest.
+        let (reading, surfaces, trial, iterations) =
+            if is_sharp { (0..1, 1..2, 2..5, 5..30) } else { (0..3, 3..9, 9..9, 9..30) };
+        progress.stage("reading the photographs", reading, 30);
         let shown = self.sources.iter().chain(&self.held_out).copied();
         let album = open_album(self.scene, shown, renderer.as_ref(), &self.options, progress)?;
         let mut stage = Stage::prepare(self.scene, &album, &self.sources, renderer.as_ref(), &self.options, progress)?;
-        progress.stage("finding surfaces", 1..3, 10);
+        progress.stage("finding surfaces", surfaces, 30);
         let points = point_cloud(&mut stage, &self.weighting, Recipe::cloud(self.sources.len()), &Silent)?;
-        let begun = match device {
-            AnyDevice::Cpu(own) => optimisation(own, &stage.images, &points, self.recipe),
-            AnyDevice::Vulkan(own) => optimisation(own.as_ref(), &stage.images, &points, self.recipe),
-        };
-        let Some(mut optimisation) = begun.map_err(RenderError::from)? else {
-            return Err(OptimiseError::Few { scene: self.scene.path.display().to_string() });
-        };
+        let mut recipe = self.recipe.recipe(stage.images.has_silhouettes);
+        if is_sharp && self.before.is_none() {
+            progress.stage("trying recipes on sources left out", trial, 30);
+            recipe = self.tried(device, &album, recipe, progress)?;
+        }
+        let mut optimisation = self.begin(device, &stage.images, &points, recipe)?;
         if let Some(before) = &self.before {
             before.notes.iter().for_each(|note| progress.warn(note));
-            optimisation.resume(&before.scene.blocks(Vec3::ZERO));
+            optimisation.resume(&before.scene);
         }
-        progress.stage("optimising", 3..10, 10);
+        progress.stage("optimising", iterations, 30);
         let more = if self.towards.is_empty() { 0 } else { TOWARDS };
         progress.expect((optimisation.iteration_count() + more - optimisation.done()) as usize);
         let mut scores = Vec::new();
-        self.advance(optimisation.as_mut(), device, &album, progress, &mut keep, &mut scores)?;
+        let is_timed = is_sharp && recipe.grows;
+        let timed = is_timed.then_some(&mut clock);
+        self.advance(optimisation.as_mut(), device, &album, progress, timed, &mut keep, &mut scores)?;
         if more > 0 && !progress.is_cancelled() {
             optimisation.extend(more);
             optimisation.weigh(&self.weights()?);
-            self.advance(optimisation.as_mut(), device, &album, progress, &mut keep, &mut scores)?;
+            self.advance(optimisation.as_mut(), device, &album, progress, None, &mut keep, &mut scores)?;
         }
-        let gaussians = optimisation.optimised().gaussians;
+        let gaussians = optimisation.optimised().scene();
         let sources = &self.sources[..self.sources.len().min(FIT_SOURCES)];
         let is_alone = self.held_out.is_empty() && !progress.is_cancelled();
         let fit = is_alone.then(|| self.score(&gaussians, device, &album, sources)).transpose()?;
         Ok(EndedOptimisation {
-            gaussians: scene_of(&gaussians),
+            gaussians,
             background: behind(&stage.images),
             done: optimisation.done(),
             of: optimisation.iteration_count(),
@@ -180,27 +202,51 @@ impl<'a> SceneOptimisation<'a> {
         })
     }
 
-    /// All iterations, with scores and what is kept on the way; fewer if it is cancelled.
+    /// An optimisation at its beginning.
+    fn begin<'d>(
+        &self,
+        device: &'d AnyDevice,
+        images: &SourceImages,
+        points: &[CloudPoint],
+        recipe: Recipe,
+    ) -> Result<Box<dyn Optimisation + 'd>, OptimiseError> {
+        let begun = match device {
+            AnyDevice::Cpu(own) => optimisation(own, images, points, recipe),
+            AnyDevice::Vulkan(own) => optimisation(own.as_ref(), images, points, recipe),
+        };
+        let too_few = || OptimiseError::Few { scene: self.scene.path.display().to_string() };
+        begun.map_err(RenderError::from)?.ok_or_else(too_few)
+    }
+
+    /// All iterations, with scores and what is kept on the way; fewer if it is cancelled. With a clock, the time is
+    /// told that they will take, and they are as many as fit.
+    #[allow(clippy::too_many_arguments)]
     fn advance(
         &self,
         optimisation: &mut dyn Optimisation,
         any: &AnyDevice,
         album: &Album<'_>,
         progress: &dyn Progress,
+        mut clock: Option<&mut Clock>,
         keep: &mut dyn FnMut(&GaussianScene) -> Result<(), WriteError>,
         scores: &mut Vec<(u32, f64)>,
     ) -> Result<(), OptimiseError> {
-        let iteration_count = optimisation.iteration_count();
-        while optimisation.done() < iteration_count && !progress.is_cancelled() {
+        let mut every = scored_every(optimisation.iteration_count());
+        while optimisation.done() < optimisation.iteration_count() && !progress.is_cancelled() {
             optimisation.run_to(optimisation.done() + 1, &Silent).map_err(RenderError::from)?;
             progress.step();
-            let done = optimisation.done();
-            if !done.is_multiple_of(SCORED) && done != iteration_count {
+            if let Some(clock) = &mut clock
+                && clock.has_measured(optimisation, progress)
+            {
+                every = scored_every(optimisation.iteration_count());
+            }
+            let (done, iteration_count) = (optimisation.done(), optimisation.iteration_count());
+            if !done.is_multiple_of(every) && done != iteration_count {
                 continue;
             }
-            let gaussians = optimisation.optimised().gaussians;
+            let gaussians = optimisation.optimised().scene();
             if done < iteration_count {
-                keep(&scene_of(&gaussians))?;
+                keep(&gaussians)?;
             }
             if !self.held_out.is_empty() {
                 let psnr = self.score(&gaussians, any, album, &self.held_out)?;
@@ -229,12 +275,12 @@ impl<'a> SceneOptimisation<'a> {
     /// Mean PSNR of these views.
     fn score(
         &self,
-        gaussians: &[GaussianBlock],
+        gaussians: &GaussianScene,
         any: &AnyDevice,
         album: &Album<'_>,
         views: &[usize],
     ) -> Result<f64, RenderError> {
-        let given = AnyField::new(GivenGaussians { scene: scene_of(gaussians), notes: Vec::new() });
+        let given = AnyField::new(GivenGaussians { scene: gaussians.clone(), notes: Vec::new() });
         let renderer = given.on(any);
         let mut stage = Stage::prepare(self.scene, album, &self.sources, renderer.as_ref(), &self.options, &Silent)?;
         let mut sum = 0.0;
@@ -244,4 +290,9 @@ impl<'a> SceneOptimisation<'a> {
         }
         Ok(sum / views.len() as f64)
     }
+}
+
+/// Iterations between two scores of so many.
+fn scored_every(iterations: u32) -> u32 {
+    (iterations / MAX_SCORES).next_multiple_of(SCORED).max(SCORED)
 }

@@ -75,6 +75,16 @@ pub fn check_name(path: &Path) -> Result<(), &'static str> {
     }
 }
 
+/// Whether a file of this name is a page.
+pub fn is_page(path: &Path) -> bool {
+    is_of(path, "html")
+}
+
+/// Whether a file of this name holds colours that depend on the direction: pages and `.splat` have one for all.
+pub fn holds_harmonics(path: &Path) -> bool {
+    !is_page(path) && !is_of(path, "splat")
+}
+
 /// Writes what an optimisation of a scene from these sources ended with: as a page if the file is called so, otherwise
 /// as [`GaussianScene::write`] does.
 ///
@@ -87,7 +97,7 @@ pub fn write_optimised(
     ended: &EndedOptimisation,
 ) -> Result<(), WriteError> {
     let EndedOptimisation { gaussians, background, .. } = ended;
-    if !is_of(path, "html") {
+    if !is_page(path) {
         return gaussians.write(path, &scene.frame);
     }
     let views = sources.iter().map(|view| &scene.views[*view]);

@@ -5,11 +5,11 @@ use crate::request::{device, render_options};
 use pyo3::prelude::*;
 use std::fs::canonicalize;
 use std::path::PathBuf;
-use viewfuse::field::gaussians::{MAX_COUNT, MAX_ITERATIONS, Recipe};
+use viewfuse::field::gaussians::{MAX_COUNT, MAX_ITERATIONS, Quality, RecipeOptions};
 use viewfuse::field::optimise::SceneOptimisation;
 use viewfuse::job::files::check_writable;
 use viewfuse::job::progress::Progress;
-use viewfuse::output::gaussian_page::{check_name, write_optimised};
+use viewfuse::output::gaussian_page::{check_name, holds_harmonics, write_optimised};
 use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::Selection;
 use viewfuse::scene::gaussians::{GaussianFile, GaussianScene};
@@ -44,6 +44,7 @@ pub(crate) struct Optimisation {
     pub(crate) weights: Option<String>,
     pub(crate) left_out: Option<String>,
     pub(crate) towards: Option<String>,
+    pub(crate) quality: String,
     pub(crate) count: Option<u32>,
     pub(crate) iterations: Option<u32>,
     pub(crate) resume: Option<PathBuf>,
@@ -70,6 +71,9 @@ impl Optimisation {
         };
         let count = given("count", self.count, MAX_COUNT)?;
         let iterations = given("iterations", self.iterations, MAX_ITERATIONS)?;
+        let quality = self.quality.parse::<Quality>().map_err(Failure::Input)?;
+        let is_of_one_colour = !holds_harmonics(output);
+        let recipe = RecipeOptions { quality, iterations, count, is_of_one_colour, seed: self.seed };
         let of_scene =
             SceneOptimisation::new(scene, &self.selection, self.left_out.as_deref(), self.towards.as_deref())?;
         check_writable(output)?;
@@ -78,7 +82,7 @@ impl Optimisation {
         let optimisation = SceneOptimisation {
             weighting,
             options: render_options(self.size, &self.background)?,
-            recipe: Recipe { seed: self.seed, ..Recipe::default() }.with(iterations, count),
+            recipe,
             before: self.resume.as_ref().map(|path| GaussianFile::open(path, scene)).transpose()?,
             ..of_scene
         };

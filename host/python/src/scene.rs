@@ -174,7 +174,7 @@ impl PyScene {
 
     /// Optimises Gaussians for the photographs, and writes them: as .ply, smaller as .spz or .splat, or as an .html
     /// page. Ctrl-C ends it, and what there is so far is written.
-    #[pyo3(signature = (output, *, weights=None, left_out=None, towards=None, sources=None, views=None, count=None, iterations=None, resume=None, size=None, device="auto", background="auto", seed=0, progress=None))]
+    #[pyo3(signature = (output, *, weights=None, left_out=None, towards=None, quality="fast", sources=None, views=None, count=None, iterations=None, resume=None, size=None, device="auto", background="auto", seed=0, progress=None))]
     #[allow(clippy::too_many_arguments)]
     fn optimise(
         &self,
@@ -183,6 +183,7 @@ impl PyScene {
         weights: Option<String>,
         left_out: Option<String>,
         towards: Option<String>,
+        quality: &str,
         sources: Option<String>,
         views: Option<&Bound<'_, PyAny>>,
         count: Option<u32>,
@@ -195,13 +196,14 @@ impl PyScene {
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyGaussians> {
         let selection = held_out(None, sources, views)?;
-        let (device, background) = (device.to_owned(), background.to_owned());
+        let (device, background, quality) = (device.to_owned(), background.to_owned(), quality.to_owned());
         let optimisation = Optimisation {
             output,
             selection,
             weights,
             left_out,
             towards,
+            quality,
             count,
             iterations,
             resume,

@@ -6,28 +6,35 @@ use super::outputs::keep_file_apart;
 use super::printing::{say, warn_of};
 use super::terminal::Terminal;
 use super::threads::on_threads;
+use crate::shared::wrong;
 use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 use viewfuse_device::Memory;
 use viewfuse_device::choice::{AnyDevice, Chosen};
 use viewfuse_field::AnyField;
-use viewfuse_field::gaussians::{MAX_COUNT, MAX_ITERATIONS, Recipe};
+use viewfuse_field::gaussians::{MAX_COUNT, MAX_ITERATIONS, Quality, Recipe, RecipeOptions};
 use viewfuse_field::optimise::{EndedOptimisation, SceneOptimisation, TOWARDS};
 use viewfuse_job::files::check_writable;
-use viewfuse_output::gaussian_page::{check_name, write_optimised};
+use viewfuse_output::gaussian_page::{check_name, holds_harmonics, is_page, write_optimised};
 use viewfuse_scene::gaussians::{GaussianFile, GaussianScene};
 use viewfuse_weighting::{WeightingSpec, grammar};
+
+/// Photographs from which on a page is of the standard quality.
+const SHARP_SOURCES: usize = 20;
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  viewfuse optimise photos/ -o photos.ply\n  \
     viewfuse optimise dino/ --left-out 3 -o dino.ply\n      view 3 is kept back, and scored as the Gaussians become better\n  \
     viewfuse optimise dino/ --towards 3 --left-out 3 -o dino.ply\n      at last for view 3: its nearest photographs count most\n  \
+    viewfuse optimise photos/ --quality standard -o photos.ply\n      sharper, in minutes; --max-time 10m says how many\n  \
     viewfuse optimise photos/ -o photos.html\n      one page for any browser, without a server: to share\n  \
     viewfuse render photos/ --gaussians photos.ply --orbit 24 -o out\n\n\
-    Begins with the surfaces that the training-free field finds, and takes a few seconds. Ctrl-C writes what there is so far, \
-    and a .ply is written every 40 iterations: --resume goes on from it with the iterations of the finest size. The file has the layout of \"3D Gaussian Splatting\", which other viewers read, in the \
+    Begins with the surfaces that the training-free field finds, and takes some ten seconds; --quality standard takes \
+    minutes, and is sharper from some twenty photographs on. Ctrl-C writes what there is so far, and a .ply is written on \
+    the way: --resume goes on from it with the iterations of the finest size. The file has the layout of \"3D Gaussian Splatting\", which other viewers read, in the \
     coordinates of the scene's files; a .spz has less than a tenth of its bytes, a .splat an eighth.")]
 pub(crate) struct Arguments {
     /// The scene
@@ -41,6 +48,14 @@ pub(crate) struct Arguments {
     left_out: Option<String>,
     #[arg(long, value_name = "VIEWS", help = towards_help())]
     towards: Option<String>,
+    /// How sharp the Gaussians are to be: fast takes some ten seconds, standard minutes and high five times as long;
+    /// these hold some photographs out of a trial first, and take fast where that is better [default: fast, for a page
+    /// of 20 photographs and more standard]
+    #[arg(long, value_name = "fast|standard|high")]
+    quality: Option<Quality>,
+    /// As many iterations as fit into this time with standard or high: seconds, or minutes as 10m
+    #[arg(long, value_name = "TIME", value_parser = parse_time)]
+    max_time: Option<Duration>,
     #[arg(long, value_name = "N", help = count_help(), value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_COUNT)))]
     count: Option<u32>,
     /// Iterations at each size of the sources, the finest last
@@ -70,8 +85,25 @@ fn towards_help() -> String {
 }
 
 fn count_help() -> String {
-    let Recipe { max_count, max_per_pixel, .. } = Recipe::default();
-    format!("Most Gaussians [default: {max_per_pixel} a pixel of a source, at most {max_count}]")
+    let limits = Quality::ALL.map(|quality| {
+        let Recipe { max_count, max_per_pixel, .. } = quality.recipe(false);
+        format!("{max_per_pixel} a pixel of a source, at most {max_count} with {quality}")
+    });
+    format!("Most Gaussians [default: {}]", limits.join(", "))
+}
+
+/// Seconds, or minutes with an `m`.
+fn parse_time(text: &str) -> Result<Duration, String> {
+    let (number, unit) =
+        text.strip_suffix('m').map_or((text.strip_suffix('s').unwrap_or(text), 1.0), |own| (own, 60.0));
+    let seconds = number.trim().parse::<f64>().ok().map(|own| own * unit).filter(|own| (1.0..=1.0e6).contains(own));
+    let seconds = seconds.ok_or_else(|| format!("{text} is no time of at least a second: 90, 90s or 10m"))?;
+    Ok(Duration::from_secs_f64(seconds))
+}
+
+/// The quality for a file, if none is given.
+fn quality_for(output: &Path, source_count: usize) -> Quality {
+    if is_page(output) && source_count >= SHARP_SOURCES { Quality::Standard } else { Quality::Fast }
 }
 
 /// A file of a format that is written.
@@ -91,8 +123,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     keep_file_apart([&scene], output)?;
     GaussianScene::check_place(output, &scene.frame)?;
     let before = arguments.resume.as_ref().map(|path| GaussianFile::open(path, &scene)).transpose()?;
-    let recipe = Recipe { seed: arguments.seed, ..Recipe::default() }.with(arguments.iterations, arguments.count);
-    let optimisation = SceneOptimisation { options, weighting, recipe, before, ..of_scene };
+    let quality = arguments.quality.unwrap_or_else(|| quality_for(output, of_scene.sources.len()));
+    let Arguments { iterations, count, seed, max_time, .. } = *arguments;
+    if max_time.is_some() && quality == Quality::Fast {
+        return Err(wrong("--max-time is for --quality standard and high: fast has a few hundred iterations"));
+    }
+    let recipe = RecipeOptions { quality, iterations, count, is_of_one_colour: !holds_harmonics(output), seed };
+    let optimisation = SceneOptimisation { options, weighting, recipe, max_time, before, ..of_scene };
     let Chosen { device, reason } = arguments.device.open()?;
     let progress = Terminal::new("optimising");
     // For --resume, if the program is killed.

@@ -1,6 +1,8 @@
 //! The loop: a source at a time is drawn, compared with its photograph, and what made it is stepped.
 
-use super::given::behind;
+use super::given::{behind, scene_of};
+use super::growth::{grow, growth_at};
+use super::harmonics::Harmonics;
 use super::level::{LevelView, level};
 use super::loss::{Pair, gradient};
 use super::particles::{Particle, Step, refined, step_all};
@@ -9,26 +11,36 @@ use super::recipe::Recipe;
 use super::start::{Extent, start};
 use crate::FieldError;
 use crate::point_cloud::CloudPoint;
+use viewfuse_core::Vec3;
 use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::gaussian::REST_COUNTS;
 use viewfuse_core::random::uniform;
 use viewfuse_device::Device;
 use viewfuse_device::cpu::Cpu;
-use viewfuse_device::parallel::map;
+use viewfuse_device::parallel::{for_each, map};
 use viewfuse_job::progress::Progress;
 use viewfuse_kernels::gaussians::adam::adam_step;
 use viewfuse_kernels::rows::GaussianBlock;
+use viewfuse_scene::gaussians::GaussianScene;
 use viewfuse_scene::photographs::{SourceImages, longest_side};
 
 /// Levels of the pyramid.
 const LEVELS: usize = 4;
+/// Share of the finest level's iterations from which on the harmonics of degree 1 are optimised; those of degree 2 and 3
+/// from twice and thrice as much.
+const DEGREE_SHARE: f32 = 0.15;
 /// Share of a gain's difference from 1 in its derivative.
 const GAIN_PULL: f32 = 0.02;
 
 /// Gaussians of a scene, optimised so far.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Optimised {
-    /// The Gaussians.
+    /// The Gaussians; their colours are those of degree 0.
     pub gaussians: Vec<GaussianBlock>,
+    /// Degree of the spherical harmonics.
+    pub degree: u32,
+    /// Coefficients of the degrees above 0: `[gaussian][channel][coefficient]`.
+    pub f_rest: Vec<f32>,
     /// Depth along the principal axis from which on they are seen, world units.
     pub near: f32,
     /// What is seen where nothing is: red, green, blue.
@@ -37,16 +49,29 @@ pub struct Optimised {
     pub gains: Vec<[f32; 3]>,
 }
 
+impl Optimised {
+    /// The Gaussians as a scene that can be written.
+    pub fn scene(&self) -> GaussianScene {
+        GaussianScene { degree: self.degree, f_rest: self.f_rest.clone(), ..scene_of(&self.gaussians) }
+    }
+}
+
 /// An optimisation, on whatever device makes its steps.
 pub trait Optimisation {
     /// Counts each source's differences by its weight from now on; the weights are scaled to 1 in the mean.
     fn weigh(&mut self, weights: &[f32]);
 
     /// Goes on from Gaussians that were optimised before, with the finest level's iterations.
-    fn resume(&mut self, gaussians: &[GaussianBlock]);
+    fn resume(&mut self, scene: &GaussianScene);
 
     /// Adds iterations at the finest level.
     fn extend(&mut self, iterations: u32);
+
+    /// So many iterations at the finest level in place of the recipe's, at least those that are done.
+    fn set_finest(&mut self, iterations: u32);
+
+    /// How many iterations are done at the finest level.
+    fn done_at_finest(&self) -> u32;
 
     /// How many iterations are done.
     fn done(&self) -> u32;
@@ -109,8 +134,15 @@ impl<D: Device> Optimisation for Optimiser<'_, D> {
         }
     }
 
-    fn resume(&mut self, gaussians: &[GaussianBlock]) {
-        self.particles = gaussians.iter().copied().map(Particle::new).collect();
+    fn resume(&mut self, scene: &GaussianScene) {
+        let count = 3 * REST_COUNTS[scene.degree.min(3) as usize] as usize;
+        let flat = GaussianScene { gaussians: scene.gaussians.clone(), ..GaussianScene::default() };
+        let particle = |(index, gaussian): (usize, GaussianBlock)| {
+            let rest = scene.f_rest.get(index * count..(index + 1) * count).filter(|_| self.recipe.degree > 0);
+            Particle::begun(gaussian, rest.map_or_else(Harmonics::default, Harmonics::new))
+        };
+        self.particles = flat.blocks(Vec3::ZERO).into_iter().enumerate().map(particle).collect();
+        self.first_count = self.particles.len();
         let [.., finest] = self.recipe.iterations;
         self.iteration = self.iteration_count() - finest;
         self.level = Some(self.level_of(self.iteration).0);
@@ -119,6 +151,17 @@ impl<D: Device> Optimisation for Optimiser<'_, D> {
     fn extend(&mut self, iterations: u32) {
         let [.., finest] = &mut self.recipe.iterations;
         *finest += iterations;
+    }
+
+    fn set_finest(&mut self, iterations: u32) {
+        let least = self.done_at_finest();
+        let [.., finest] = &mut self.recipe.iterations;
+        *finest = iterations.max(least);
+    }
+
+    fn done_at_finest(&self) -> u32 {
+        let [.., finest] = self.recipe.iterations;
+        self.iteration.saturating_sub(self.iteration_count() - finest)
     }
 
     fn done(&self) -> u32 {
@@ -141,8 +184,12 @@ impl<D: Device> Optimisation for Optimiser<'_, D> {
     }
 
     fn optimised(&self) -> Optimised {
+        let count = self.particles.iter().map(|own| own.harmonics.count()).max().unwrap_or(0);
+        let degree = REST_COUNTS.iter().position(|own| *own as usize == count).unwrap_or(0);
         Optimised {
             gaussians: self.particles.iter().map(|particle| particle.gaussian).collect(),
+            degree: degree as u32,
+            f_rest: self.particles.iter().flat_map(|own| own.harmonics.coefficients(count)).collect(),
             near: self.splatter.near,
             background: self.splatter.background,
             gains: self.gains.iter().map(|gain| gain.value).collect(),
@@ -166,6 +213,8 @@ struct Optimiser<'d, D> {
     /// `[level][source]`, the finest level first.
     levels: Vec<Vec<LevelView>>,
     particles: Vec<Particle>,
+    /// How many Gaussians the finest level began with.
+    first_count: usize,
     gains: Vec<Gain>,
     /// How much each source counts, 1 in the mean.
     weights: Vec<f32>,
@@ -206,6 +255,7 @@ impl<'d, D: Device> Optimiser<'d, D> {
             recipe,
             extent,
             levels,
+            first_count: 0,
             particles,
             gains: vec![gain; source_count],
             weights: vec![1.0; source_count],
@@ -257,17 +307,26 @@ impl<'d, D: Device> Optimiser<'d, D> {
                 self.particles = refined(&self.particles, &cameras, &self.extent, footprint, &self.recipe);
             }
             self.level = Some(level);
+            self.first_count = self.particles.len();
         }
+        let finest = if level == 0 { self.recipe.iterations[LEVELS - 1] } else { 0 };
+        if self.recipe.grows
+            && let Some(growth) = growth_at((share * finest as f32).round() as u32, finest.max(1))
+        {
+            grow(&mut self.particles, growth, self.first_count, self.recipe.max_count);
+        }
+        let degree = if level == 0 { self.recipe.degree.min((share / DEGREE_SHARE) as u32) } else { 0 };
         let source = self.next_source();
         let view = &self.levels[level][source];
         let device = self.splatter.device;
-        let gaussians: Vec<GaussianBlock> = self.particles.iter().map(|particle| particle.gaussian).collect();
+        let mut gaussians = vec![GaussianBlock::default(); self.particles.len()];
+        for_each(&mut gaussians, 256, |index, gaussian| *gaussian = self.particles[index].block(&view.camera));
         let uploaded = device.upload(&gaussians)?;
         let picture = self.splatter.picture(&uploaded, gaussians.len(), &view.camera)?;
         let colours = device.download(&picture.colours)?;
         let (by_pixels, by_gain) =
             by_pixels(&colours, view, self.gains[source].value, self.weights[source], &self.recipe);
-        let (gradients, tile_counts) = self.splatter.gradients(&uploaded, &picture, &by_pixels)?;
+        let gradients = self.splatter.gradients(&uploaded, &picture, &by_pixels)?;
         let done = self.iteration as f32 / self.iteration_count() as f32;
         let [place, scale, turn, opaque, colour, gain_rate] = self.recipe.rates;
         let rates = [
@@ -280,8 +339,8 @@ impl<'d, D: Device> Optimiser<'d, D> {
         let opacity_penalty = self.recipe.opacity_penalty / (view.camera.width * view.camera.height) as f32;
         let camera = view.camera;
         let depth = self.extent.depth;
-        let step =
-            Step { gradients: &gradients, tile_counts: &tile_counts, camera, rates, opacity_penalty, footprint, depth };
+        let in_sight = &picture.lists.in_sight[..];
+        let step = Step { gradients: &gradients, in_sight, camera, rates, opacity_penalty, footprint, depth, degree };
         step_all(&mut self.particles, &step);
         self.gains[source].step(by_gain, gain_rate);
         self.level_gains();

@@ -1,5 +1,6 @@
 //! Gaussians with the state of their optimisation: steps of Adam, pruning, splitting.
 
+use super::harmonics::Harmonics;
 use super::recipe::Recipe;
 use super::start::Extent;
 use viewfuse_core::Vec3;
@@ -21,17 +22,21 @@ const MAX_SCALE: f32 = 8.0;
 /// A Gaussian and the moments of its derivatives.
 #[derive(Clone, Debug)]
 pub(super) struct Particle {
+    /// Its colour is that of degree 0.
     pub(super) gaussian: GaussianBlock,
+    pub(super) harmonics: Harmonics,
     moments: [[f32; 2]; 14],
     step_count: i32,
+    /// Sum of the lengths of the derivative by its place in a picture, and of how many pictures.
+    moved: (f32, u32),
 }
 
 /// What an iteration does to the particles.
 pub(super) struct Step<'a> {
     /// Derivatives by the Gaussians' parameters.
     pub(super) gradients: &'a [GaussianBlock],
-    /// In how many tiles each Gaussian is seen: others stay as they are.
-    pub(super) tile_counts: &'a [u32],
+    /// Whether each Gaussian is in the picture: others stay as they are.
+    pub(super) in_sight: &'a [bool],
     pub(super) camera: CameraBlock,
     /// Of position, log scale, rotation, opacity, colour.
     pub(super) rates: [f32; 5],
@@ -41,16 +46,59 @@ pub(super) struct Step<'a> {
     pub(super) footprint: f32,
     /// Median depth, world units.
     pub(super) depth: f32,
+    /// Degree of the spherical harmonics so far.
+    pub(super) degree: u32,
 }
 
 impl Particle {
     pub(super) fn new(gaussian: GaussianBlock) -> Particle {
-        Particle { gaussian, moments: [[0.0; 2]; 14], step_count: 0 }
+        Particle::begun(gaussian, Harmonics::default())
+    }
+
+    pub(super) fn begun(gaussian: GaussianBlock, harmonics: Harmonics) -> Particle {
+        Particle { gaussian, harmonics, moments: [[0.0; 2]; 14], step_count: 0, moved: (0.0, 0) }
+    }
+
+    /// As a camera sees it.
+    pub(super) fn block(&self, camera: &CameraBlock) -> GaussianBlock {
+        GaussianBlock { colour: self.harmonics.along(self.gaussian.colour, self.direction(camera)), ..self.gaussian }
+    }
+
+    /// From a camera to its mean, of length 1; 0 at the camera itself.
+    fn direction(&self, camera: &CameraBlock) -> Vec3 {
+        (Vec3::from_array(self.gaussian.position) - camera.centre_world()).normalize_or_zero()
+    }
+
+    /// How much the loss moves it: 0 if it was in no picture.
+    pub(super) fn score(&self) -> f32 {
+        self.moved.0 / self.moved.1.max(1) as f32
+    }
+
+    /// Counts a picture with a derivative of this length.
+    pub(super) fn scored(&mut self, length: f32) {
+        if length.is_finite() {
+            self.moved = (self.moved.0 + length, self.moved.1 + 1);
+        }
+    }
+
+    pub(super) fn reset_score(&mut self) {
+        self.moved = (0.0, 0);
     }
 
     fn step(&mut self, gradient: &GaussianBlock, step: &Step<'_>) {
         self.step_count += 1;
         let corrections = [1.0 - FIRST_DECAY.powi(self.step_count), 1.0 - SECOND_DECAY.powi(self.step_count)];
+        let unit = self.direction(&step.camera);
+        let mut by_colour = gradient.colour;
+        if step.degree > 0 {
+            self.harmonics.raise(step.degree);
+            let seen = self.harmonics.along(self.gaussian.colour, unit);
+            // Colours end at 0.
+            by_colour.iter_mut().zip(seen).filter(|(_, seen)| *seen <= 0.0).for_each(|(by, _)| *by = 0.0);
+            if by_colour.iter().all(|by| by.is_finite()) {
+                self.harmonics.step(by_colour, unit, step.rates[4], corrections);
+            }
+        }
         let own = &mut self.gaussian;
         let solid = opacity(own.opacity);
         let penalty = step.opacity_penalty * solid * (1.0 - solid);
@@ -67,7 +115,7 @@ impl Particle {
         all(&mut own.log_scales, &gradient.log_scales, scale);
         all(&mut own.rotation, &gradient.rotation, turn);
         all(std::slice::from_mut(&mut own.opacity), &[gradient.opacity + penalty], opaque);
-        all(&mut own.colour, &gradient.colour, colour);
+        all(&mut own.colour, &by_colour, colour);
         let [x, y, z] = own.position;
         let depth = step.camera.pose.rotate_to_camera(Vec3::new(x, y, z) - step.camera.centre_world()).z;
         let most = (MAX_SCALE * step.footprint * (depth / step.depth).max(1.0)).ln();
@@ -76,13 +124,15 @@ impl Particle {
         let least = scales.iter().copied().fold(f32::NEG_INFINITY, f32::max) - MAX_ELONGATION;
         scales.iter_mut().for_each(|scale| *scale = scale.max(least));
         own.opacity = own.opacity.clamp(-MAX_LOGIT, MAX_LOGIT);
+        // A place in the picture moves by the focal length over the depth.
+        self.scored(Vec3::from_array(gradient.position).length() * depth / step.camera.intrinsics[0]);
     }
 }
 
 /// Steps all Gaussians that are seen.
 pub(super) fn step_all(particles: &mut [Particle], step: &Step<'_>) {
     for_each(particles, 128, |index, particle| {
-        if step.tile_counts[index] > 0 {
+        if step.in_sight[index] {
             particle.step(&step.gradients[index], step);
         }
     });
@@ -104,7 +154,7 @@ pub(super) fn refined(
     let mut refined = Vec::with_capacity(2 * kept.len());
     kept.reverse();
     while let Some((own, splits)) = kept.pop() {
-        let axis = (0..3).fold(0, |most, axis| if own.log_scales[axis] > own.log_scales[most] { axis } else { most });
+        let axis = longest_axis(&own);
         let has_room = refined.len() + kept.len() + 1 < recipe.max_count;
         let limit = recipe.split_scale * footprint * nearest(&own, cameras, extent).max(0.3);
         if splits < MAX_SPLITS && has_room && own.log_scales[axis].exp() > limit {
@@ -124,8 +174,13 @@ fn nearest(own: &GaussianBlock, cameras: &[CameraBlock], extent: &Extent) -> f32
     least.min(1.0e6 * extent.depth) / extent.depth
 }
 
-/// Two Gaussians in the place of one, apart along its longest axis.
-fn halves(own: &GaussianBlock, axis: usize) -> [GaussianBlock; 2] {
+/// The axis of the greatest standard deviation.
+pub(super) fn longest_axis(own: &GaussianBlock) -> usize {
+    (0..3).fold(0, |most, axis| if own.log_scales[axis] > own.log_scales[most] { axis } else { most })
+}
+
+/// Two Gaussians in the place of one, apart along an axis.
+pub(super) fn halves(own: &GaussianBlock, axis: usize) -> [GaussianBlock; 2] {
     let apart = axes(own.rotation)[axis] * (0.5 * own.log_scales[axis].exp());
     let solid = 1.0 - (1.0 - opacity(own.opacity)).powf(0.8);
     let half = |side: f32| {

@@ -23,7 +23,8 @@ pub struct Splatter<'d, D> {
 pub struct Splatted<D: Device> {
     block: SplatBlock,
     tiles: TileBlock,
-    lists: Tiles,
+    /// Which splats each tile shows.
+    pub lists: Tiles,
     starts: D::Buffer<u32>,
     entries: D::Buffer<u32>,
     splats: D::Buffer<ProjectedGaussian>,
@@ -97,7 +98,7 @@ impl<'d, D: Device> Splatter<'d, D> {
         gaussians: &D::Buffer<GaussianBlock>,
         picture: &Splatted<D>,
         by_pixels: &[[f32; 4]],
-    ) -> Result<(Vec<GaussianBlock>, Vec<u32>), DeviceError> {
+    ) -> Result<Vec<GaussianBlock>, DeviceError> {
         let device = self.device;
         let Splatted { block, tiles, lists, starts, entries, splats, colours, .. } = picture;
         let by_pixels = device.upload(by_pixels)?;
@@ -108,7 +109,6 @@ impl<'d, D: Device> Splatter<'d, D> {
         let uploaded = device.upload(&use_starts)?;
         let mut gradients = device.zeros(block.gaussian_count as usize)?;
         device.project_gradients(block, gaussians, splats, &uploaded, &uses, &sums, &mut gradients)?;
-        let counts = use_starts.windows(2).map(|part| part[1] - part[0]).collect();
-        Ok((device.download(&gradients)?, counts))
+        device.download(&gradients)
     }
 }

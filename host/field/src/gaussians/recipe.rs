@@ -52,6 +52,11 @@ pub struct Recipe {
     pub silhouette_share: f32,
     /// Share of what the Gaussians leave of the photographs that is added to their pictures.
     pub residual_share: f32,
+    /// Greatest degree of the spherical harmonics, which are switched on one after the other at the finest level; 0 for
+    /// colours that are the same from everywhere.
+    pub degree: u32,
+    /// Whether the number of Gaussians rises to the most at the finest level.
+    pub grows: bool,
     /// Seed of what is drawn at random.
     pub seed: u64,
 }
@@ -77,6 +82,8 @@ impl Default for Recipe {
             near: 0.5,
             silhouette_share: 0.5,
             residual_share: 1.0,
+            degree: 0,
+            grows: false,
             seed: 0,
         }
     }

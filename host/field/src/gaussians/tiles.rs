@@ -1,7 +1,11 @@
 //! A picture's tiles, and which splats each shows, the nearest first.
 
+use viewfuse_device::parallel::map;
 use viewfuse_kernels::gaussians::{SPLAT_TILE, TileBlock};
 use viewfuse_kernels::rows::ProjectedGaussian;
+
+/// Splats that are listed at once.
+const PIECE: usize = 4096;
 
 /// The lists of a picture's tiles.
 #[derive(Clone, Debug, Default)]
@@ -10,34 +14,47 @@ pub struct Tiles {
     pub starts: Vec<u32>,
     /// Indices of splats: tile by tile, front to back; of the same depth, by index.
     pub entries: Vec<u32>,
+    /// Whether each splat's box has pixels of the picture.
+    pub in_sight: Vec<bool>,
 }
 
 impl Tiles {
-    /// The lists for these splats. Those that are not drawn are in none.
+    /// The lists for these splats: each is in those of the tiles where it may be seen. Those that are not drawn are in
+    /// none.
     pub fn of(block: &TileBlock, splats: &[ProjectedGaussian]) -> Tiles {
-        let side = SPLAT_TILE as u32;
+        let mut in_sight = vec![false; splats.len()];
         // Depths are positive, so their bits are in their order.
-        let mut order: Vec<(u64, [u32; 4])> = Vec::with_capacity(splats.len());
-        for (index, splat) in splats.iter().enumerate().filter(|(_, splat)| splat.opacity > 0.0) {
+        let mut order: Vec<u64> = Vec::with_capacity(splats.len());
+        for ((index, splat), in_sight) in splats.iter().enumerate().zip(&mut in_sight) {
             let [left, right, top, bottom] = splat.pixels(block.width, block.height);
-            if left < right && top < bottom {
-                let tiles = [left / side, (right - 1) / side, top / side, (bottom - 1) / side];
-                order.push((u64::from(splat.depth.to_bits()) << 32 | index as u64, tiles));
+            *in_sight = left < right && top < bottom;
+            if *in_sight {
+                order.push(u64::from(splat.depth.to_bits()) << 32 | index as u64);
             }
         }
-        order.sort_unstable_by_key(|(key, _)| *key);
+        order.sort_unstable();
+        let pieces: Vec<&[u64]> = order.chunks(PIECE).collect();
+        let pieces: Vec<Vec<[u32; 2]>> = map(pieces.len(), 1, |piece| {
+            let mut listed = Vec::with_capacity(4 * PIECE);
+            for key in pieces[piece] {
+                let index = *key as u32;
+                for_each_tile(block, &splats[index as usize], |tile| listed.push([tile, index]));
+            }
+            listed
+        });
         let mut starts = vec![0_u32; block.tile_count() as usize + 1];
-        for_each_tile(block, &order, |_, tile| starts[tile + 1] += 1);
+        pieces.iter().flatten().for_each(|[tile, _]| starts[*tile as usize + 1] += 1);
         for tile in 1..starts.len() {
             starts[tile] += starts[tile - 1];
         }
         let mut entries = vec![0; starts.last().copied().unwrap_or_default() as usize];
         let mut next = starts.clone();
-        for_each_tile(block, &order, |splat, tile| {
-            entries[next[tile] as usize] = splat;
-            next[tile] += 1;
-        });
-        Tiles { starts, entries }
+        for [tile, splat] in pieces.iter().flatten() {
+            let next = &mut next[*tile as usize];
+            entries[*next as usize] = *splat;
+            *next += 1;
+        }
+        Tiles { starts, entries, in_sight }
     }
 
     /// The entries of each of `count` splats, ascending: where each one's part begins, and the numbers of its entries.
@@ -57,12 +74,16 @@ impl Tiles {
     }
 }
 
-/// `work(splat, tile)` for each tile of each splat, in this order.
-fn for_each_tile(block: &TileBlock, order: &[(u64, [u32; 4])], mut work: impl FnMut(u32, usize)) {
-    for (key, [left, right, top, bottom]) in order {
-        for row in *top..=*bottom {
-            for column in *left..=*right {
-                work(*key as u32, (row * block.tile_columns + column) as usize);
+/// `work(tile)` for each tile, row by row, of which a splat may be seen at a pixel.
+fn for_each_tile(block: &TileBlock, splat: &ProjectedGaussian, mut work: impl FnMut(u32)) {
+    let side = SPLAT_TILE as u32;
+    let [left, right, top, bottom] = splat.pixels(block.width, block.height);
+    for row in top / side..=(bottom - 1) / side {
+        let rows = [top.max(row * side), (bottom - 1).min(row * side + side - 1)];
+        for column in left / side..=(right - 1) / side {
+            let columns = [left.max(column * side), (right - 1).min(column * side + side - 1)];
+            if splat.reaches(columns, rows) {
+                work(row * block.tile_columns + column);
             }
         }
     }

@@ -106,7 +106,7 @@ pub(super) struct Splats<D: Device> {
 impl<D: Device> Splats<D> {
     /// Those of a recipe.
     pub(super) fn upload(device: &D, optimised: Optimised, recipe: &Recipe) -> Result<Splats<D>, FieldError> {
-        let Optimised { gaussians, near, background, gains } = optimised;
+        let Optimised { gaussians, near, background, gains, .. } = optimised;
         let (count, residuals) = (gaussians.len(), Residuals::new(gains.len(), recipe.residual_share));
         Ok(Splats { gaussians: device.upload(&gaussians)?, count, near, background, gains, residuals })
     }

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3};
 use viewfuse_core::Vec3;
-use viewfuse_core::gaussian::{REST_COUNTS, SH_0, colour_along};
+use viewfuse_core::gaussian::{REST_COUNTS, harmonics};
 
 /// Coefficients of a channel beyond degree 0.
 const COUNT: usize = 15;
@@ -59,15 +59,7 @@ fn matrix(old_from_new: DMat3) -> [[f64; COUNT]; COUNT] {
 
 /// The harmonics of core along a direction.
 fn basis(direction: DVec3) -> [f64; COUNT] {
-    // Colours end at 0: above this level no harmonic reaches it.
-    const LEVEL: f32 = 2.0;
-    let colour = |f_rest: &[f32]| colour_along([(LEVEL - 0.5) / SH_0; 3], f_rest, 3, direction.as_vec3());
-    std::array::from_fn(|index| {
-        let mut f_rest = [0.0; 3 * COUNT];
-        f_rest[index] = 1.0;
-        let [with, without, _] = colour(&f_rest);
-        f64::from(with) - f64::from(without)
-    })
+    harmonics(direction.as_vec3()).map(f64::from)
 }
 
 /// The coefficients of a Gaussian of this degree as those of the greatest: zeros behind each channel's.

@@ -1,0 +1,102 @@
+//! How sharp the Gaussians of a scene are to be, and the recipe for it.
+
+use super::recipe::Recipe;
+use std::fmt;
+use std::str::FromStr;
+
+/// How sharp the Gaussians are to be.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Quality {
+    /// Some ten seconds: for few photographs, and for a look.
+    #[default]
+    Fast,
+    /// Minutes: for some twenty photographs and more.
+    Standard,
+    /// Five times as long as [`Quality::Standard`], at up to twice the size.
+    High,
+}
+
+impl Quality {
+    /// All of them, the fastest first.
+    pub const ALL: [Quality; 3] = [Quality::Fast, Quality::Standard, Quality::High];
+
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Quality::Fast => "fast",
+            Quality::Standard => "standard",
+            Quality::High => "high",
+        }
+    }
+
+    /// The recipe, for sources with silhouettes or for whole photographs. Beyond [`Quality::Fast`] it begins with few
+    /// Gaussians, their number rises to its limit, and colours depend on the direction: with exposures that differ from
+    /// photograph to photograph, too, so that these have no gains. What was measured is in
+    /// `host/results/gaussian_quality.md`.
+    pub fn recipe(self, has_silhouettes: bool) -> Recipe {
+        let fast = Recipe::default();
+        let (side, finest, max_count) = match self {
+            Quality::Fast => return fast,
+            Quality::Standard => (800, 3000, 100_000),
+            Quality::High => (1600, 10_000, 500_000),
+        };
+        let [place, scale, turn, opaque, colour, _] = fast.rates;
+        let whole = Recipe {
+            side,
+            iterations: [0, 60, 60, finest],
+            max_count,
+            max_per_pixel: 0.75,
+            split_scale: f32::INFINITY,
+            rates: [place, scale, turn, opaque, colour, 0.0],
+            degree: 3,
+            grows: true,
+            ..fast
+        };
+        match has_silhouettes {
+            true => Recipe { random_count: 0, opacity_penalty: 0.1, silhouette_share: 1.0, ..whole },
+            false => whole,
+        }
+    }
+}
+
+/// What the recipe of a scene is made of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RecipeOptions {
+    /// How sharp the Gaussians are to be.
+    pub quality: Quality,
+    /// Iterations at each size that the quality has, in place of its own.
+    pub iterations: Option<u32>,
+    /// Most Gaussians, whatever the sources' size.
+    pub count: Option<u32>,
+    /// Whether colours are the same from everywhere, as some files have them: sources have gains then.
+    pub is_of_one_colour: bool,
+    /// Seed of what is drawn at random.
+    pub seed: u64,
+}
+
+impl RecipeOptions {
+    /// The recipe, for sources with silhouettes or for whole photographs.
+    pub fn recipe(&self, has_silhouettes: bool) -> Recipe {
+        let recipe = self.quality.recipe(has_silhouettes).with(self.iterations, self.count);
+        let recipe = Recipe { seed: self.seed, ..recipe };
+        if !self.is_of_one_colour {
+            return recipe;
+        }
+        Recipe { degree: 0, rates: Recipe::default().rates, ..recipe }
+    }
+}
+
+impl fmt::Display for Quality {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(self.name())
+    }
+}
+
+impl FromStr for Quality {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Quality, String> {
+        let found = Quality::ALL.into_iter().find(|own| own.name() == name);
+        found.ok_or_else(|| format!("{name} is no quality: fast, standard or high"))
+    }
+}

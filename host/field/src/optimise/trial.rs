@@ -1,0 +1,130 @@
+//! Which recipe, and how many iterations: those that held-out sources prefer, tried at a small size.
+
+use super::{OptimiseError, SceneOptimisation};
+use crate::AnyField;
+use crate::gaussians::{Quality, Recipe, RecipeOptions};
+use crate::point_cloud::point_cloud;
+use crate::render::Stage;
+use viewfuse_device::choice::AnyDevice;
+use viewfuse_job::progress::{Progress, Silent};
+use viewfuse_scene::photographs::Album;
+
+/// Longest side of the sources in a trial, in pixels: that of the fast recipe.
+const SIDE: u32 = 280;
+/// Most iterations of the finest level in a trial; otherwise half of the recipe's.
+const MAX_ITERATIONS: u32 = 1500;
+/// One source in so many is held out, at least two and at most six.
+const HELD_OUT_EVERY: usize = 8;
+/// Fewest sources of a trial: of fewer, what is held out is far from the others.
+const MIN_SOURCES: usize = 12;
+/// Share of its iterations before which a trial's best score ends the recipe early: later ones hardly differ.
+const EARLY: f32 = 0.8;
+
+/// Places of the sources that are held out, evenly apart.
+fn held_out(source_count: usize) -> Vec<usize> {
+    let count = (source_count / HELD_OUT_EVERY).clamp(2, 6);
+    (0..count).map(|index| (2 * index + 1) * source_count / (2 * count)).collect()
+}
+
+/// A recipe at the size of trials.
+fn small(recipe: Recipe) -> Recipe {
+    let [eighth, quarter, half, whole] = recipe.iterations;
+    let whole = if recipe.grows { (whole / 2).min(MAX_ITERATIONS) } else { whole };
+    Recipe { side: recipe.side.min(SIDE), iterations: [eighth, quarter, half, whole], ..recipe }
+}
+
+impl SceneOptimisation<'_> {
+    /// The recipe, or the fast one where held-out sources prefer it; with fewer iterations where they are better after
+    /// fewer.
+    pub(super) fn tried(
+        &self,
+        device: &AnyDevice,
+        album: &Album<'_>,
+        recipe: Recipe,
+        progress: &dyn Progress,
+    ) -> Result<Recipe, OptimiseError> {
+        let (quality, count) = (self.recipe.quality, self.sources.len());
+        let fast = |has_silhouettes| RecipeOptions { quality: Quality::Fast, ..self.recipe }.recipe(has_silhouettes);
+        if count < MIN_SOURCES {
+            progress.note(&format!("{count} photographs are too few for {quality}, from {MIN_SOURCES} on: fast"));
+            return Ok(fast(false));
+        }
+        let places = held_out(count);
+        let (own, sources): (Vec<_>, Vec<_>) = (0..count).partition(|place| places.contains(place));
+        let of = |places: Vec<usize>| -> Vec<usize> { places.into_iter().map(|place| self.sources[place]).collect() };
+        let (own, sources) = (of(own), of(sources));
+        let field = AnyField::default();
+        let renderer = field.on(device);
+        let mut stage = Stage::prepare(self.scene, album, &sources, renderer.as_ref(), &self.options, &Silent)?;
+        let points = point_cloud(&mut stage, &self.weighting, Recipe::cloud(sources.len()), &Silent)?;
+        let fast = fast(stage.images.has_silhouettes);
+        let recipes = [small(fast), small(recipe)];
+        progress.expect(recipes.iter().map(|own| own.iterations.iter().sum::<u32>() as usize).sum());
+        let trial = SceneOptimisation { sources, held_out: own, before: None, towards: Vec::new(), ..self.clone() };
+        let mut curves = Vec::new();
+        for recipe in recipes {
+            let mut optimisation = trial.begin(device, &stage.images, &points, recipe)?;
+            let mut scores = Vec::new();
+            let counted = Counted(progress);
+            trial.advance(optimisation.as_mut(), device, album, &counted, None, &mut |_| Ok(()), &mut scores)?;
+            progress.check().map_err(|error| OptimiseError::Render(crate::FieldError::from(error).into()))?;
+            curves.push(scores);
+        }
+        let best = |scores: &[(u32, f64)]| {
+            scores.iter().copied().fold((0, f64::NEG_INFINITY), |best, own| if own.1 > best.1 { own } else { best })
+        };
+        // The fast recipe ends where it ends.
+        let fast_score = curves[0].last().map_or(f64::NEG_INFINITY, |own| own.1);
+        let (end, score) = best(&curves[1]);
+        let (chosen, words) = if score <= fast_score {
+            (fast, "fast is used".to_owned())
+        } else {
+            let [.., finest] = small(recipe).iterations;
+            let before = recipes[1].iterations.iter().sum::<u32>() - finest;
+            let share = end.saturating_sub(before) as f32 / finest.max(1) as f32;
+            let chosen = if share < EARLY { ended_early(recipe, share) } else { recipe };
+            let [.., iterations] = chosen.iterations;
+            (chosen, format!("{quality} is used, with {iterations} iterations at the whole size"))
+        };
+        let of = trial.held_out.len();
+        progress.note(&format!(
+            "{of} of {count} photographs left out of a trial have {fast_score:.2} dB with fast and {score:.2} dB with {quality}: {words}"
+        ));
+        Ok(chosen)
+    }
+}
+
+/// With this share of the finest level's iterations.
+fn ended_early(recipe: Recipe, share: f32) -> Recipe {
+    let [eighth, quarter, half, whole] = recipe.iterations;
+    Recipe { iterations: [eighth, quarter, half, ((whole as f32 * share) as u32).max(1)], ..recipe }
+}
+
+/// Steps and cancellation alone.
+struct Counted<'a>(&'a dyn Progress);
+
+impl Progress for Counted<'_> {
+    fn step(&self) {
+        self.0.step();
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.0.is_cancelled()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn held_out_sources_are_apart_and_leave_most() {
+        assert_eq!(held_out(12), [3, 9]);
+        assert_eq!(held_out(43), [4, 12, 21, 30, 38]);
+        for count in MIN_SOURCES..200 {
+            let places = held_out(count);
+            assert!(places.windows(2).all(|pair| pair[1] >= pair[0] + 4), "{count}: {places:?}");
+            assert!(places.iter().all(|place| *place < count) && places.len() * 6 <= count.max(12));
+        }
+    }
+}
