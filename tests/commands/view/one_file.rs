@@ -246,7 +246,10 @@ fn a_page_follows_a_hand_and_a_finger(browser: &Browser) {
 fn the_page_of_a_command_opens(browser: &Browser) {
     let folder = toy();
     for output in ["toy.ply", "toy.html"] {
-        done(folder.path(), &format!("optimise toy --size 96x96 --sources 0..19 --device cpu -o {output}"));
+        done(
+            folder.path(),
+            &format!("optimise toy --size 96x96 --sources 0..19 --device cpu --quality fast -o {output}"),
+        );
     }
     let chromium = Chromium::start(browser);
     let tab = chromium.open(&address(&folder.path().join("toy.html")), WINDOW, false);
