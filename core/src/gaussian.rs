@@ -203,9 +203,7 @@ impl ProjectedGaussian {
         let edge = |coordinate: f32, end: u32| clamp(coordinate + 0.5, 0.0, end as f32) as u32;
         [edge(x - right, width), edge(x + right, width), edge(y - down, height), edge(y + down, height)]
     }
-}
 
-impl ProjectedGaussian {
     /// Whether the opacity may reach [`MIN_ALPHA`] at a pixel's centre of these columns and rows (each first and last):
     /// the least value that the exponent's quadratic form takes in their rectangle, against the one that the opacity at
     /// the mean allows. Never false where [`ProjectedGaussian::alpha`] is above 0: the comparison has a margin of 1 % of

@@ -174,6 +174,9 @@ impl<'a> SceneOptimisation<'a> {
         let mut optimisation = self.begin(device, &stage.images, &points, recipe)?;
         if let Some(before) = &self.before {
             before.notes.iter().for_each(|note| progress.warn(note));
+            if before.scene.degree > recipe.degree {
+                progress.warn("the colours to go on from depend on the direction; this quality or file has one for all directions");
+            }
             optimisation.resume(&before.scene);
         }
         progress.stage("optimising", iterations, 30);

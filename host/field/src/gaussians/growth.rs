@@ -32,9 +32,9 @@ pub(super) fn grow(particles: &mut Vec<Particle>, growth: u32, first: usize, max
     let mut order: Vec<usize> = (0..particles.len()).collect();
     order.sort_by(|a, b| particles[*b].score().total_cmp(&particles[*a].score()));
     for index in order.into_iter().take(count) {
-        let own = &particles[index];
-        let parts = halves(&own.gaussian, longest_axis(&own.gaussian));
-        let [first, second] = parts.map(|half| Particle::begun(half, own.harmonics.begun_anew()));
+        let split = &particles[index];
+        let parts = halves(&split.gaussian, longest_axis(&split.gaussian));
+        let [first, second] = parts.map(|half| Particle::begun(half, split.harmonics.begun_anew()));
         particles[index] = first;
         particles.push(second);
     }

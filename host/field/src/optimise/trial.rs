@@ -19,6 +19,8 @@ const HELD_OUT_EVERY: usize = 8;
 const MIN_SOURCES: usize = 12;
 /// Share of its iterations before which a trial's best score ends the recipe early: later ones hardly differ.
 const EARLY: f32 = 0.8;
+/// Least share of the iterations that is left: before it the number has hardly grown.
+const LEAST: f32 = 0.1;
 
 /// Places of the sources that are held out, evenly apart.
 fn held_out(source_count: usize) -> Vec<usize> {
@@ -50,17 +52,18 @@ impl SceneOptimisation<'_> {
             return Ok(fast(false));
         }
         let places = held_out(count);
-        let (own, sources): (Vec<_>, Vec<_>) = (0..count).partition(|place| places.contains(place));
-        let of = |places: Vec<usize>| -> Vec<usize> { places.into_iter().map(|place| self.sources[place]).collect() };
-        let (own, sources) = (of(own), of(sources));
+        let (held_out, sources): (Vec<_>, Vec<_>) = (0..count).partition(|place| places.contains(place));
+        let views =
+            |places: Vec<usize>| -> Vec<usize> { places.into_iter().map(|place| self.sources[place]).collect() };
+        let (held_out, sources) = (views(held_out), views(sources));
         let field = AnyField::default();
         let renderer = field.on(device);
         let mut stage = Stage::prepare(self.scene, album, &sources, renderer.as_ref(), &self.options, &Silent)?;
         let points = point_cloud(&mut stage, &self.weighting, Recipe::cloud(sources.len()), &Silent)?;
         let fast = fast(stage.images.has_silhouettes);
         let recipes = [small(fast), small(recipe)];
-        progress.expect(recipes.iter().map(|own| own.iterations.iter().sum::<u32>() as usize).sum());
-        let trial = SceneOptimisation { sources, held_out: own, before: None, towards: Vec::new(), ..self.clone() };
+        progress.expect(recipes.iter().map(|recipe| recipe.iterations.iter().sum::<u32>() as usize).sum());
+        let trial = SceneOptimisation { sources, held_out, before: None, towards: Vec::new(), ..self.clone() };
         let mut curves = Vec::new();
         for recipe in recipes {
             let mut optimisation = trial.begin(device, &stage.images, &points, recipe)?;
@@ -86,18 +89,18 @@ impl SceneOptimisation<'_> {
             let [.., iterations] = chosen.iterations;
             (chosen, format!("{quality} is used, with {iterations} iterations at the whole size"))
         };
-        let of = trial.held_out.len();
+        let held_out_count = trial.held_out.len();
         progress.note(&format!(
-            "{of} of {count} photographs left out of a trial have {fast_score:.2} dB with fast and {score:.2} dB with {quality}: {words}"
+            "{held_out_count} of {count} photographs left out of a trial have {fast_score:.2} dB with fast and {score:.2} dB with {quality}: {words}"
         ));
         Ok(chosen)
     }
 }
 
-/// With this share of the finest level's iterations.
+/// With this share of the finest level's iterations, at least [`LEAST`].
 fn ended_early(recipe: Recipe, share: f32) -> Recipe {
     let [eighth, quarter, half, whole] = recipe.iterations;
-    Recipe { iterations: [eighth, quarter, half, ((whole as f32 * share) as u32).max(1)], ..recipe }
+    Recipe { iterations: [eighth, quarter, half, ((whole as f32 * share.max(LEAST)) as u32).max(1)], ..recipe }
 }
 
 /// Steps and cancellation alone.
