@@ -181,6 +181,9 @@ fn more_quality_is_tried_on_sources_and_has_colours_by_direction() {
     let resumed = scores(&done(folder.path(), &format!("{OPTIMISE} {more}")));
     assert!(resumed.last().expect("a score").1 > sharp - 0.5, "{resumed:?} after {sharp}");
     assert_eq!(gaussians(&folder.path().join("c.ply")).degree, 3);
+    let fast = format!("{OPTIMISE} --resume a.ply --iterations 1 -o d.ply");
+    let Outcome { code, stderr, .. } = Outcome::of(command(BINARY, folder.path(), &fast));
+    assert!(code == Some(0) && stderr.contains("the colours to go on from depend on the direction"), "{stderr}");
 }
 
 fn few_photographs_and_a_short_time_have_fewer_iterations() {
