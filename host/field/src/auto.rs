@@ -391,7 +391,7 @@ impl Search<'_, '_> {
         single: &[Outcome],
         has_silhouettes: bool,
     ) -> Result<Option<Mixed>, RenderError> {
-        let mut mixed = regions::mixed(self.held_out, weighting, mixtures, self.progress)?;
+        let mut mixed = regions::mixed(self.held_out, weighting, mixtures, single, self.progress)?;
         for Mixed { label, mixture, outcomes, .. } in &mixed {
             let options = chosen.also_stating(Setting { name: MIXED, value: mixture.parts.len() as f32 });
             let scores = outcomes.iter().map(|outcome| outcome.psnr).collect();
