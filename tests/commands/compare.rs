@@ -179,6 +179,7 @@ fn what_cannot_be_compared() {
     refused("toy/rgb made", &["made/000000.png: is missing", "toy/rgb/000000.png"]);
     refused("broken.png toy/rgb/000000.png", &["broken.png: not a readable image"]);
     refused("toy/rgb/000000.png toy/rgb", &["toy/rgb: is a folder"]);
+    refused("toy/rgb toy/rgb/000000.png", &["toy/rgb: is a folder, toy/rgb/000000.png is not"]);
     refused("large.png toy/rgb/000000.png", &["large.png", "256x256 cannot be compared with one of 128x128"]);
     refused("small.png toy/rgb/000000.png", &["small.png", "4x3 cannot be compared with one of 128x128"]);
     let one = "toy/rgb/000000.png toy/rgb/000001.png";

@@ -58,6 +58,9 @@ fn a_path_as_animated_webp_and_as_y4m() {
     let scene = toy();
     let printed = done(scene.path(), &format!("{PATH} --video webp,gif,y4m --fps 12 -o out"));
     assert!(printed.contains("out/video.webp\n") && printed.contains("out/video.y4m\n"), "{printed}");
+    // At a photograph's own place no other one needs to show what it shows.
+    let ends = printed.lines().filter(|line| line.contains("between-000.png") || line.contains("between-004.png"));
+    assert_eq!(ends.map(|line| line.contains("photograph from between")).collect::<Vec<_>>(), [false; 2], "{printed}");
     let out = scene.path().join("out");
     let pictures: Vec<RgbImage> = (0..5).map(|frame| png(&out, &format!("between-{frame:03}.png"))).collect();
     assert!(pictures[0] != pictures[4], "the camera does not move");

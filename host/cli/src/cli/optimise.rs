@@ -49,8 +49,9 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "VIEWS", help = towards_help())]
     towards: Option<String>,
     /// How sharp the Gaussians are to be: fast takes some ten seconds, standard minutes and high five times as long;
-    /// these hold some photographs out of a trial first, and take fast where that is better [default: fast, for a page
-    /// of 20 photographs and more standard]
+    /// these hold some photographs out of a trial first, and take fast where that is better. Photographs are seen at
+    /// --size, by standard at 800 pixels at most and by high at 1600 [default: fast, for a page of 20 photographs and
+    /// more standard]
     #[arg(long, value_name = "fast|standard|high")]
     quality: Option<Quality>,
     /// As many iterations as fit into this time with standard or high: seconds, or minutes as 10m

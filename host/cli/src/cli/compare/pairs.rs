@@ -21,6 +21,7 @@ pub(super) fn pairs(prediction: &Path, truth: &Path) -> anyhow::Result<Vec<Pair>
         let name = prediction.display().to_string();
         return Ok(vec![Pair { name, prediction: prediction.to_owned(), truth: truth.to_owned() }]);
     }
+    ensure!(!truth.is_file(), "{}: is a folder, {} is not", prediction.display(), truth.display());
     let all = pictures(prediction)?;
     let is_beside = |path: &Path| {
         let stem = stem(path);
