@@ -4,6 +4,11 @@
 The formulas are those of viewfuse-core's `gaussian` and of viewfuse-field's `gaussians::loss`. The tiles of a picture are blended
 together, those with lists of like length in one batch: a loop over single tiles takes longer. Prints one line of JSON; with
 --render the picture of a view is written first.
+
+With --whole, the iterations are those of `viewfuse optimise --quality standard --resume GAUSSIANS --iterations N` and the result is a
+file: spherical harmonics up to degree 3, switched on in steps, and growth by the published rule ("3D Gaussian Splatting", section 5.2:
+the mean derivative by the place in the picture) to a stated number, written from the papers and autograd; colours' derivatives by the
+direction, which viewfuse leaves out, move Gaussians here, as in the published code.
 """
 
 import argparse
@@ -26,6 +31,10 @@ MAX_PAIRS = 1_000_000
 # Learning rates of position (median depth's pixels), log scale, rotation, opacity, colour, gain.
 RATES = [0.1, 1.0e-2, 2.0e-3, 5.0e-2, 5.0e-3, 5.0e-3]
 STRUCTURE_SHARE, SMALL, OPACITY_PENALTY = 0.2, 0.01, 0.02
+# Of --whole: harmonics' rate as a share of the colour's, the share of the iterations from one degree to the next, how often the number
+# grows and in which share of the iterations, and the opacity below which a Gaussian is pruned.
+REST_SHARE, DEGREE_SHARE, GROWTHS, GROWING, PRUNED = 0.2, 0.15, 14, 0.6, 0.01
+MOST, MOST_PER_PIXEL = 100_000, 0.75
 
 
 def read_ply(path):
@@ -75,7 +84,7 @@ def turned(quaternions):
 
 
 def project(gaussians, view, near):
-    """Mean, conic, opacity, colour, depth and extent of the Gaussians that are drawn, nearest first."""
+    """Mean, conic, opacity, colour, extent and index of the Gaussians that are drawn, nearest first."""
     position, log_scales, rotation, logit, colour = gaussians
     world, (fx, fy, cx, cy), photograph = view
     height, width = photograph.shape[1:]
@@ -98,11 +107,11 @@ def project(gaussians, view, near):
     with torch.no_grad():
         reach = 2 * torch.log(255 * opacity).clamp(min=0)
         extent = torch.sqrt(reach[:, None] * torch.stack([uu, vv], 1))
-    return mean, conic, opacity, colour, extent
+    return mean, conic, opacity, colour, extent, torch.nonzero(kept)[:, 0][order]
 
 
 def lists(mean, extent, width, height):
-    """The splats of each tile, nearest first: lists of indices."""
+    """The splats of each tile, nearest first: lists of indices; and in how many tiles each splat is."""
     low = ((mean - extent) / TILE).floor().clamp(min=0).long()
     high = ((mean + extent) / TILE).floor().long()
     columns, rows = -(-width // TILE), -(-height // TILE)
@@ -116,14 +125,14 @@ def lists(mean, extent, width, height):
     tiles = row * columns + column
     order = torch.argsort(tiles, stable=True)
     lengths = torch.bincount(tiles, minlength=columns * rows)
-    return splats[order], lengths, torch.cumsum(lengths, 0) - lengths, columns, rows
+    return splats[order], lengths, torch.cumsum(lengths, 0) - lengths, columns, rows, number
 
 
 def picture(gaussians, view, near, behind):
-    """Red, green and blue over the background, [3][row][column]."""
+    """Red, green and blue over the background, [3][row][column], and which Gaussians are in the picture."""
     height, width = view[2].shape[1:]
-    mean, conic, opacity, colour, extent = project(gaussians, view, near)
-    entries, lengths, starts, columns, rows = lists(mean.detach(), extent, width, height)
+    mean, conic, opacity, colour, extent, index = project(gaussians, view, near)
+    entries, lengths, starts, columns, rows, number = lists(mean.detach(), extent, width, height)
     inside = torch.arange(TILE * TILE)
     done, parts = [], []
     order = torch.argsort(lengths, descending=True)
@@ -152,7 +161,7 @@ def picture(gaussians, view, near, behind):
         parts.append(weights @ colour[splats] + left[:, :, -1:] * behind)
     whole = torch.cat(parts)[torch.argsort(torch.cat(done))]
     whole = whole.reshape(rows, columns, TILE, TILE, 3).permute(4, 0, 2, 1, 3)
-    return whole.reshape(3, rows * TILE, columns * TILE)[:, :height, :width]
+    return whole.reshape(3, rows * TILE, columns * TILE)[:, :height, :width], index[number > 0]
 
 
 WINDOW = torch.exp(-torch.arange(-4, 5.0) ** 2 / (2 * 1.5**2))
@@ -175,6 +184,130 @@ def loss_of(own, photograph):
     return (1 - STRUCTURE_SHARE) * difference + STRUCTURE_SHARE * (1 - (light * contrast).mean())
 
 
+def harmonics(unit):
+    """The 15 spherical harmonics of degrees 1 to 3 along directions, in the order and with the signs of the published code."""
+    x, y, z = unit.unbind(1)
+    xx, yy, zz = x * x, y * y, z * z
+    degree_1 = [-0.4886025 * y, 0.4886025 * z, -0.4886025 * x]
+    degree_2 = [
+        1.0925484 * x * y, -1.0925484 * y * z, 0.3153916 * (2 * zz - xx - yy), -1.0925484 * x * z, 0.5462742 * (xx - yy),
+    ]
+    degree_3 = [
+        -0.5900436 * y * (3 * xx - yy), 2.8906114 * x * y * z, -0.4570458 * y * (4 * zz - xx - yy),
+        0.3731763 * z * (2 * zz - 3 * xx - 3 * yy), -0.4570458 * x * (4 * zz - xx - yy), 1.4453057 * z * (xx - yy),
+        -0.5900436 * x * (xx - 3 * yy),
+    ]
+    return torch.stack(degree_1 + degree_2 + degree_3, 1)
+
+
+class Growing:
+    """Gaussians whose number rises, with the moments of Adam and the scores by which they are split."""
+
+    def __init__(self, gaussians):
+        self.tensors = [*gaussians, torch.zeros(len(gaussians[0]), 15, 3)]
+        self.moments = [(torch.zeros_like(own), torch.zeros_like(own)) for own in self.tensors]
+        count = len(self.tensors[0])
+        self.steps, self.moved, self.pictures = torch.zeros(count), torch.zeros(count), torch.zeros(count)
+
+    def seen_from(self, world, degree):
+        """The Gaussians with the colours that a camera sees."""
+        position, *others, colour, rest = self.tensors
+        if degree > 0:
+            centre = -world[:3, :3].T @ world[:3, 3]
+            count = (degree + 1) ** 2 - 1
+            basis = harmonics(functional.normalize(position - centre, dim=1))[:, :count]
+            colour = (colour + (basis[:, :, None] * rest[:, :count]).sum(1)).clamp(min=0)
+        return [position, *others, colour]
+
+    @torch.no_grad()
+    def step(self, index, rates, camera, depth, footprint):
+        """Adam (Kingma and Ba 2015) for those in a picture, and the bounds of the parameters."""
+        self.steps[index] += 1
+        corrections = [1 - decay ** self.steps[index] for decay in (0.9, 0.99)]
+        for own, (first, second), rate in zip(self.tensors, self.moments, rates):
+            if own.grad is None:
+                continue
+            by, shape = own.grad[index], (-1,) + (1,) * (own.dim() - 1)
+            first[index] = 0.9 * first[index] + 0.1 * by
+            second[index] = 0.99 * second[index] + 0.01 * by * by
+            mean, square = (moment[index] / own.view(shape) for moment, own in zip((first, second), corrections))
+            own[index] -= rate * mean / (square.sqrt() + 1e-15)
+        position, log_scales, _, logit, _, _ = self.tensors
+        world, (fx, _, _, _), _ = camera
+        depths = (position[index] @ world[:3, :3].T + world[:3, 3])[:, 2]
+        most = torch.log(8 * footprint * (depths / depth).clamp(min=1))
+        scales = torch.minimum(log_scales[index], most[:, None])
+        log_scales[index] = torch.maximum(scales, scales.max(1, keepdim=True).values - 2.3)
+        logit.clamp_(-6, 6)
+        self.moved[index] += position.grad[index].norm(dim=1) * depths / fx
+        self.pictures[index] += 1
+
+    @torch.no_grad()
+    def grow(self, growth, first, most):
+        target = int(first * max(most / first, 1) ** (growth / GROWTHS))
+        self.keep(torch.nonzero(torch.sigmoid(self.tensors[3]) >= PRUNED)[:, 0])
+        count = max(0, min(min(target, most) - len(self.steps), len(self.steps)))
+        chosen = torch.argsort(self.moved / self.pictures.clamp(min=1), descending=True, stable=True)[:count]
+        position, log_scales, rotation, logit, _, _ = self.tensors
+        longest = log_scales[chosen].argmax(1)
+        rows = torch.arange(count)
+        apart = turned(rotation[chosen])[rows, :, longest] * (0.5 * log_scales[chosen, longest].exp())[:, None]
+        solid = 1 - (1 - torch.sigmoid(logit[chosen])) ** 0.8
+        log_scales[chosen, longest] -= 0.47
+        logit[chosen] = torch.logit(solid)
+        for moments in self.moments:
+            for own in moments:
+                own[chosen] = 0
+        self.steps[chosen] = 0
+        self.keep(torch.cat([torch.arange(len(self.steps)), chosen]))
+        position = self.tensors[0]
+        position[chosen] -= apart
+        position[len(position) - count :] += apart
+        self.moved.zero_(), self.pictures.zero_()
+
+    def keep(self, index):
+        self.tensors = [own.detach()[index].clone() for own in self.tensors]
+        self.moments = [tuple(own[index].clone() for own in moments) for moments in self.moments]
+        self.steps, self.moved, self.pictures = (own[index].clone() for own in (self.steps, self.moved, self.pictures))
+
+
+def whole(gaussians, views, depth, behind, count, seed):
+    """The iterations of the finest size."""
+    growing = Growing(gaussians)
+    random = numpy.random.default_rng(seed)
+    footprint = depth / views[0][1][0]
+    first, order = len(gaussians[0]), []
+    most = min(MOST, math.ceil(MOST_PER_PIXEL * max(own[2][0].numel() for own in views)))
+    growths = lambda done: min(GROWTHS, int(done * GROWTHS / (GROWING * count)))
+    for iteration in range(count):
+        share, done = iteration / count, (2 * count + iteration) / (3 * count)
+        if iteration > 0 and growths(iteration) > growths(iteration - 1):
+            growing.grow(growths(iteration), first, most)
+        degree = min(3, int(share / DEGREE_SHARE))
+        order = order or list(random.permutation(len(views)))
+        view = views[order.pop()]
+        for own in growing.tensors:
+            own.requires_grad_()
+            own.grad = None
+        shown, index = picture(growing.seen_from(view[0], degree), view, 0.5 * depth, behind)
+        penalty = OPACITY_PENALTY * torch.sigmoid(growing.tensors[3][index]).sum() / view[2][0].numel()
+        (loss_of(shown, view[2]) + penalty).backward()
+        colour = RATES[4] * 0.1**done
+        rates = [RATES[0] * footprint * 0.3**share, RATES[1] * 0.2**done, RATES[2], RATES[3] * 0.2**done, colour, REST_SHARE * colour]
+        growing.step(index, rates, view, depth, footprint)
+    return growing
+
+
+def write_ply(path, tensors):
+    position, log_scales, rotation, logit, colour, rest = (own.detach() for own in tensors)
+    names = ["x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", *(f"f_rest_{own}" for own in range(45)), "opacity"]
+    names += ["scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"]
+    rest = rest.transpose(1, 2).reshape(len(rest), 45)
+    table = torch.cat([position, (colour - 0.5) / SH_0, rest, logit[:, None], log_scales, rotation], 1)
+    head = ["ply", "format binary_little_endian 1.0", f"element vertex {len(table)}", *(f"property float {own}" for own in names)]
+    path.write_bytes("\n".join([*head, "end_header\n"]).encode() + table.numpy().astype("<f4").tobytes())
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scene", type=Path, help="a folder with a transforms.json")
@@ -183,18 +316,29 @@ def main():
     parser.add_argument("--iterations", type=int, default=10, help="that are timed")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--render", nargs=2, metavar=("VIEW", "PNG"), help="write the picture of a view")
+    parser.add_argument("--whole", type=Path, metavar="PLY", help="optimise as --quality standard does, and write the Gaussians")
+    parser.add_argument("--left-out", default="", metavar="INDICES", help="views that are no sources, separated by commas")
+    parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     torch.set_num_threads(options.threads)
-    views = read_views(options.scene, options.side)
+    left_out = {int(own) for own in options.left_out.split(",") if own}
+    views = [own for index, own in enumerate(read_views(options.scene, options.side)) if index not in left_out]
     gaussians = read_ply(options.gaussians)
     depths = torch.cat([(gaussians[0] @ world[:3, :3].T + world[:3, 3])[:, 2] for world, _, _ in views])
     depth = float(depths[depths > 0].median())
     behind = torch.stack([photograph.mean((1, 2)) for _, _, photograph in views]).mean(0)
     if options.render:
         with torch.no_grad():
-            shown = picture(gaussians, views[int(options.render[0])], 0.1 * depth, behind)
+            shown, _ = picture(gaussians, views[int(options.render[0])], 0.1 * depth, behind)
         levels = (shown.clamp(0, 1) * 255).round().byte().permute(1, 2, 0).numpy()
         Image.fromarray(levels).save(options.render[1])
+    if options.whole:
+        begun, computed = time.perf_counter(), time.process_time()
+        grown = whole(gaussians, views, depth, behind, options.iterations, options.seed)
+        seconds = {"seconds": time.perf_counter() - begun, "processor_seconds": time.process_time() - computed}
+        write_ply(options.whole, grown.tensors)
+        print(json.dumps({"torch": torch.__version__, "python": platform.python_version(), "gaussians": len(grown.steps), **seconds}))
+        return
     gains = torch.ones(len(views), 3, 1, 1, requires_grad=True)
     learned = [own.requires_grad_() for own in gaussians] + [gains]
     rates = [RATES[0] * depth / views[0][1][0]] + RATES[1:]
@@ -204,7 +348,7 @@ def main():
         if iteration == warm:
             start, computed = time.perf_counter(), time.process_time()
         own = iteration % len(views)
-        shown = picture(gaussians, views[own], 0.5 * depth, behind) * gains[own]
+        shown = picture(gaussians, views[own], 0.5 * depth, behind)[0] * gains[own]
         photograph = views[own][2]
         penalty = OPACITY_PENALTY * torch.sigmoid(gaussians[3]).sum() / photograph[0].numel()
         loss = loss_of(shown, photograph)

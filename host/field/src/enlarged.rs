@@ -30,11 +30,11 @@ pub(crate) fn enlarged(rendered: Rendered, [width, height]: [u32; 2]) -> Rendere
     picture
 }
 
-/// For each of `enlarged` pixels along an axis the two nearest of `own`, with their shares, which sum to 1.
-fn places(own: u32, enlarged: u32) -> Vec<[(u32, f32); 2]> {
-    let last = own.saturating_sub(1);
+/// For each of `enlarged` pixels along an axis the two nearest of `count`, with their shares, which sum to 1.
+fn places(count: u32, enlarged: u32) -> Vec<[(u32, f32); 2]> {
+    let last = count.saturating_sub(1);
     let place = |pixel: u32| {
-        let centre = (pixel as f32 + 0.5) * own as f32 / enlarged as f32 - 0.5;
+        let centre = (pixel as f32 + 0.5) * count as f32 / enlarged as f32 - 0.5;
         let centre = centre.clamp(0.0, last as f32);
         let (before, share) = (centre.floor(), centre.fract());
         [(before as u32, 1.0 - share), ((before as u32 + 1).min(last), share)]

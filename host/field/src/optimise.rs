@@ -125,7 +125,7 @@ impl<'a> SceneOptimisation<'a> {
             }
         };
         let (held_out, towards) = (views(held_out)?, views(towards)?);
-        let photographs = |targets: &[Target]| targets.iter().filter_map(|own| own.truth).collect::<Vec<usize>>();
+        let photographs = |targets: &[Target]| targets.iter().filter_map(|target| target.truth).collect::<Vec<usize>>();
         let held_out = photographs(&held_out);
         let excluded = [held_out.clone(), photographs(&towards)].concat();
         Ok(SceneOptimisation {
@@ -214,8 +214,8 @@ impl<'a> SceneOptimisation<'a> {
         recipe: Recipe,
     ) -> Result<Box<dyn Optimisation + 'd>, OptimiseError> {
         let begun = match device {
-            AnyDevice::Cpu(own) => optimisation(own, images, points, recipe),
-            AnyDevice::Vulkan(own) => optimisation(own.as_ref(), images, points, recipe),
+            AnyDevice::Cpu(device) => optimisation(device, images, points, recipe),
+            AnyDevice::Vulkan(device) => optimisation(device.as_ref(), images, points, recipe),
         };
         let too_few = || OptimiseError::Few { scene: self.scene.path.display().to_string() };
         begun.map_err(RenderError::from)?.ok_or_else(too_few)

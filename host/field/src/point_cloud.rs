@@ -128,8 +128,8 @@ impl Fusion<'_> {
     /// The point of a pixel with the points of the views that agree, its own first; `None` if too few agree.
     fn parts(&self, view: usize, pixel: usize) -> Option<Vec<Part>> {
         let position = self.point(view, pixel)?;
-        let own = self.maps[view].camera;
-        let width = own.width as usize;
+        let camera = self.maps[view].camera;
+        let width = camera.width as usize;
         let (x, y) = ((pixel % width) as f32 + 0.5, (pixel / width) as f32 + 0.5);
         let mut parts = vec![Part { view, pixel, position, weight: self.confidence(view, pixel) }];
         let mut against = 0;
@@ -150,7 +150,7 @@ impl Fusion<'_> {
                 against += 1;
             }
             let Some(point) = self.point(other, there) else { continue };
-            let back = own.project(point);
+            let back = camera.project(point);
             let is_back = (back.x - x).abs() <= PIXEL_TOLERANCE && (back.y - y).abs() <= PIXEL_TOLERANCE;
             if behind.abs() <= DEPTH_TOLERANCE * seen.depth && back.in_front && is_back {
                 let weight = self.relevance[view].get(other as u32) * self.confidence(other, there);
@@ -171,8 +171,8 @@ impl Fusion<'_> {
             // Relative to one of them, where rounding is least.
             position += (part.position - first.position) * share;
             normal += self.normal(part.view, part.pixel) * share;
-            let own = self.colour(part.view, part.pixel);
-            (0..3).for_each(|channel| colour[channel] += share * own[channel]);
+            let texel = self.colour(part.view, part.pixel);
+            (0..3).for_each(|channel| colour[channel] += share * texel[channel]);
         }
         let towards = self.maps[first.view].camera.centre_world() - first.position;
         Some(CloudPoint {
@@ -213,17 +213,17 @@ impl Fusion<'_> {
             let is_surface = inside && there > 0.0 && (there - depth).abs() <= SURFACE_TOLERANCE * depth;
             is_surface.then(|| camera.towards(x as f32 + 0.5, y as f32 + 0.5) * there)
         };
-        let own = camera.towards(column as f32 + 0.5, row as f32 + 0.5) * depth;
+        let ray = camera.towards(column as f32 + 0.5, row as f32 + 0.5) * depth;
         let slope = |ahead: Option<Vec3>, behind: Option<Vec3>| match (ahead, behind) {
             (None, None) => None,
-            (ahead, behind) => Some(ahead.unwrap_or(own) - behind.unwrap_or(own)),
+            (ahead, behind) => Some(ahead.unwrap_or(ray) - behind.unwrap_or(ray)),
         };
         let across = slope(at(1, 0), at(-1, 0)).zip(slope(at(0, 1), at(0, -1)));
         let normal = across.and_then(|(right, down)| down.cross(right).try_normalize());
         match normal {
-            Some(normal) if normal.dot(own) > 0.0 => -normal,
+            Some(normal) if normal.dot(ray) > 0.0 => -normal,
             Some(normal) => normal,
-            None => (-own).normalize(),
+            None => (-ray).normalize(),
         }
     }
 

@@ -118,7 +118,7 @@ impl Row {
     /// Refuses what the field does not have, and values that it does not take.
     pub(crate) fn check(&self, given: &Given) -> Result<(), OpenError> {
         let is = || format!("is a {}", self.title);
-        let knows = |name: &str| name == VIEWS.name || self.omissions.iter().any(|own| own.name == name);
+        let knows = |name: &str| name == VIEWS.name || self.omissions.iter().any(|omission| omission.name == name);
         if let Some(unknown) = given.compute.iter().find(|name| !knows(name)) {
             return Err(OpenError::cannot(format!("compute {unknown}"), is()));
         }

@@ -104,7 +104,7 @@ mod tests {
         for row in ROWS {
             let computing = Given { compute: vec!["everything".to_owned()], ..Given::default() };
             let foreign = ROWS.iter().flat_map(|row| row.flags);
-            let foreign = foreign.filter(|flag| row.flags.iter().all(|own| own.name != flag.name));
+            let foreign = foreign.filter(|flag| row.flags.iter().all(|known| known.name != flag.name));
             let foreign = foreign.map(|flag| Given::default().with(flag.name, ""));
             for options in foreign.chain([computing]) {
                 let refused = matches!(opened(row, &options), Err(OpenError::Refused { .. }));

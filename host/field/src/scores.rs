@@ -63,9 +63,9 @@ pub fn ssim_of_seen(prediction: &RgbImage, truth: &RgbImage, seen: Option<&GrayI
             let length = column - first;
             if length >= window {
                 let strip = |picture: &RgbImage| crop_imm(picture, first, top, length, window).to_image();
-                let (own, true_strip) = (strip(prediction), strip(truth));
+                let (strip_shown, true_strip) = (strip(prediction), strip(truth));
                 let count = length - window + 1;
-                sum += f64::from(count) * ssim(&own, &true_strip, length as usize, SSIM_WINDOW, 3)?;
+                sum += f64::from(count) * ssim(&strip_shown, &true_strip, length as usize, SSIM_WINDOW, 3)?;
                 window_count += count;
             }
             first = column + 1;

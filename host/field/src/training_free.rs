@@ -87,8 +87,8 @@ impl Options for TrainingFree {
     }
 
     fn settings(&self) -> Vec<Setting> {
-        let own = self.sweep.settings().into_iter().chain(self.shown.setting());
-        own.chain(if self.shown == Shown::Depths { Vec::new() } else { self.recipe.settings() }).collect()
+        let settings = self.sweep.settings().into_iter().chain(self.shown.setting());
+        settings.chain(if self.shown == Shown::Depths { Vec::new() } else { self.recipe.settings() }).collect()
     }
 
     fn folder(&self) -> Option<&Path> {
@@ -112,7 +112,7 @@ flags! {
     "cache", "FOLDER", parse_folder, Picture, &[],
         "Keep what is found of the sources and what is chosen for them in this folder, and start from what is there: \
          it may be deleted at any time",
-        |own, folder| *own = Some(folder);
+        |cache, folder| *cache = Some(folder);
 }
 
 fn parse_folder(text: &str) -> Result<PathBuf, String> {

@@ -106,18 +106,18 @@ pub fn check_folder(folder: &Path, planned: &Planned<'_>) -> Result<Vec<FrameRec
     if path.exists() && recorded_targets(folder).is_none() {
         return Err(OutputError::OtherRecord { path });
     }
-    let own: BTreeSet<String> = targets.iter().flat_map(|target| files_of(&target.name)).collect();
+    let written: BTreeSet<String> = targets.iter().flat_map(|target| files_of(&target.name)).collect();
     let earlier = earlier_files(folder);
     // What a run was writing when it was killed is in no list yet.
     if !was_interrupted(folder) {
         let videos = videos.iter().map(|format| format!("video.{format}"));
         let is_in_the_way = |file: &String| !earlier.contains(file) && folder.join(file).symlink_metadata().is_ok();
-        if let Some(file) = own.iter().cloned().chain(videos).find(is_in_the_way) {
+        if let Some(file) = written.iter().cloned().chain(videos).find(is_in_the_way) {
             return Err(OutputError::NotWritten { path: folder.join(file) });
         }
     }
     // A video is of the whole run, and goes with its record.
-    let mut others: Vec<String> = earlier.difference(&own).cloned().collect();
+    let mut others: Vec<String> = earlier.difference(&written).cloned().collect();
     others.retain(|name| !name.starts_with("video."));
     match others.first() {
         Some(example) if !replaces => frames_that_stay(folder, planned, &others).map_err(|reason| {
@@ -150,16 +150,18 @@ fn frames_that_stay(folder: &Path, planned: &Planned<'_>, others: &[String]) -> 
         // As text a number may differ in its last bit.
         a.iter().flatten().zip(b.iter().flatten()).all(|(a, b)| (a - b).abs() <= SAME_POSE * (1.0 + a.abs()))
     };
-    let replaced = |own: &FrameRecord| targets.iter().find(|target| target.name == own.target);
-    let moved = |own: &FrameRecord| {
-        replaced(own)
-            .is_some_and(|target| !is_same(&frame.file_from_camera(&target.camera.pose), &own.world_from_camera))
+    let replaced = |frame_before: &FrameRecord| targets.iter().find(|target| target.name == frame_before.target);
+    let moved = |frame_before: &FrameRecord| {
+        replaced(frame_before).is_some_and(|target| {
+            !is_same(&frame.file_from_camera(&target.camera.pose), &frame_before.world_from_camera)
+        })
     };
     if earlier.frames.iter().any(moved) {
         return Err("cameras of the same names were elsewhere");
     }
-    let stay: Vec<FrameRecord> = earlier.frames.into_iter().filter(|own| replaced(own).is_none()).collect();
-    let files: BTreeSet<String> = stay.iter().flat_map(|own| files_of(&own.target)).collect();
+    let stay: Vec<FrameRecord> =
+        earlier.frames.into_iter().filter(|frame_before| replaced(frame_before).is_none()).collect();
+    let files: BTreeSet<String> = stay.iter().flat_map(|frame_before| files_of(&frame_before.target)).collect();
     match others.iter().all(|file| files.contains(file)) {
         true => Ok(stay),
         false => Err("another run was interrupted there"),

@@ -61,7 +61,7 @@ pub struct GaussianPage<'a> {
 const FORMATS: [&str; 4] = ["ply", "splat", "spz", "html"];
 
 fn is_of(path: &Path, format: &str) -> bool {
-    path.extension().is_some_and(|own| own.eq_ignore_ascii_case(format))
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(format))
 }
 
 /// Whether a file of this name can be written.
@@ -69,7 +69,7 @@ fn is_of(path: &Path, format: &str) -> bool {
 /// # Errors
 /// For a format that is none.
 pub fn check_name(path: &Path) -> Result<(), &'static str> {
-    match FORMATS.iter().any(|own| is_of(path, own)) {
+    match FORMATS.iter().any(|format| is_of(path, format)) {
         true => Ok(()),
         false => Err("scenes of Gaussians are written as .ply or .html, and smaller as .splat or .spz"),
     }
@@ -101,7 +101,7 @@ pub fn write_optimised(
         return gaussians.write(path, &scene.frame);
     }
     let views = sources.iter().map(|view| &scene.views[*view]);
-    let cameras: Vec<(String, Camera)> = views.map(|own| (own.name.clone(), own.camera)).collect();
+    let cameras: Vec<(String, Camera)> = views.map(|view| (view.name.clone(), view.camera)).collect();
     let page = GaussianPage { title: &scene.name(), scene: gaussians, cameras: &cameras, background: *background };
     write_html(path, &page)
 }
@@ -199,7 +199,8 @@ impl<'a> Told<'a> {
     fn of(page: &GaussianPage<'a>) -> Told<'a> {
         let cameras: Vec<Camera> = page.cameras.iter().map(|(_, camera)| *camera).collect();
         let rig = Rig::of(&cameras);
-        let mut deviations: Vec<f32> = log_scales(page.scene).map(f32::exp).filter(|own| *own > 0.0).collect();
+        let mut deviations: Vec<f32> =
+            log_scales(page.scene).map(f32::exp).filter(|deviation| *deviation > 0.0).collect();
         deviations.sort_unstable_by(f32::total_cmp);
         let row = |(name, camera): &'a (String, Camera)| Row {
             name,
@@ -222,23 +223,24 @@ impl<'a> Told<'a> {
 impl Stored {
     fn of(scene: &GaussianScene) -> Stored {
         let all = &scene.gaussians;
-        let limits = log_scales(scene).fold([f32::MAX, f32::MIN], |[low, high], own| [low.min(own), high.max(own)]);
+        let limits =
+            log_scales(scene).fold([f32::MAX, f32::MIN], |[low, high], value| [low.min(value), high.max(value)]);
         let limits = if all.is_empty() { [0.0; 2] } else { limits };
         let span = (limits[1] - limits[0]).max(f32::MIN_POSITIVE);
-        let scale = |own: f32| ((own - limits[0]) / span * 65_535.0).round() as u16;
+        let scale = |value: f32| ((value - limits[0]) / span * 65_535.0).round() as u16;
         Stored {
             count: all.len(),
             limits,
-            means: text(all.iter().flat_map(|own| own.position).flat_map(f32::to_le_bytes)),
-            scales: text(log_scales(scene).flat_map(|own| scale(own).to_le_bytes())),
-            rotations: text(all.iter().flat_map(|own| turn(own.rotation)).flat_map(i16::to_le_bytes)),
+            means: text(all.iter().flat_map(|gaussian| gaussian.position).flat_map(f32::to_le_bytes)),
+            scales: text(log_scales(scene).flat_map(|value| scale(value).to_le_bytes())),
+            rotations: text(all.iter().flat_map(|gaussian| turn(gaussian.rotation)).flat_map(i16::to_le_bytes)),
             colours: text(all.iter().flat_map(colour)),
         }
     }
 }
 
 fn log_scales(scene: &GaussianScene) -> impl Iterator<Item = f32> + '_ {
-    scene.gaussians.iter().flat_map(|own| own.log_scales)
+    scene.gaussians.iter().flat_map(|gaussian| gaussian.log_scales)
 }
 
 /// The index of the camera nearest to the middle of all.
@@ -255,15 +257,15 @@ fn sides(camera: &Camera) -> [u32; 2] {
 
 /// A quaternion of length 1, in units of 1 / 32767; no rotation for one that is none.
 fn turn(rotation: [f32; 4]) -> [i16; 4] {
-    let length = rotation.iter().map(|own| f64::from(*own).powi(2)).sum::<f64>().sqrt();
+    let length = rotation.iter().map(|part| f64::from(*part).powi(2)).sum::<f64>().sqrt();
     if !(length > 0.0 && length.is_finite()) {
         return [i16::MAX, 0, 0, 0];
     }
-    rotation.map(|own| (f64::from(own) / length * 32_767.0).round() as i16)
+    rotation.map(|part| (f64::from(part) / length * 32_767.0).round() as i16)
 }
 
 fn colour(gaussian: &Gaussian) -> [u8; 4] {
-    let [red, green, blue] = gaussian.f_dc.map(|own| level(0.5 + SH_0 * own));
+    let [red, green, blue] = gaussian.f_dc.map(|value| level(0.5 + SH_0 * value));
     [red, green, blue, level(opacity(gaussian.opacity))]
 }
 

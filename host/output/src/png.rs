@@ -27,7 +27,7 @@ pub fn without_background(colours: &[[f32; 4]], [width, height]: [u32; 2], backg
         if level(alpha) == 0 {
             return Rgba([0; 4]);
         }
-        let own = |channel: usize| level((colour[channel] - (1.0 - alpha) * background[channel]) / alpha);
-        Rgba([own(0), own(1), own(2), level(alpha)])
+        let without = |channel: usize| level((colour[channel] - (1.0 - alpha) * background[channel]) / alpha);
+        Rgba([without(0), without(1), without(2), level(alpha)])
     })
 }

@@ -250,13 +250,14 @@ impl RunWriter {
         self.lock()?;
         // A journal of this run lists files that stay.
         let stay = self.earlier.iter().map(|earlier| &earlier.target);
-        let own: BTreeSet<String> = self.target_names.iter().chain(stay).flat_map(|target| files_of(target)).collect();
+        let written: BTreeSet<String> =
+            self.target_names.iter().chain(stay).flat_map(|target| files_of(target)).collect();
         let earlier = earlier_files(&self.folder);
         match &mut self.journal {
             Some(journal) => journal.begin()?,
             None => FrameJournal::remove_any(&self.folder)?,
         }
-        earlier.difference(&own).try_for_each(|file| remove_if_there(&self.folder.join(file)))?;
+        earlier.difference(&written).try_for_each(|file| remove_if_there(&self.folder.join(file)))?;
         // What stays is in it: a run that is killed loses nothing of that.
         if self.earlier.is_empty() { remove_if_there(&self.folder.join(RECORD)) } else { Ok(()) }
     }

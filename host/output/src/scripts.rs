@@ -35,6 +35,6 @@ pub const BASE_STYLE: &str = include_str!("../page/base.css");
 /// differ.
 pub(crate) fn joined(scripts: &[Script]) -> String {
     let lines = scripts.iter().flat_map(|script| script.text.lines());
-    let own = lines.filter(|line| !line.starts_with("import "));
-    own.map(|line| format!("{}\n", line.strip_prefix("export ").unwrap_or(line))).collect()
+    let kept = lines.filter(|line| !line.starts_with("import "));
+    kept.map(|line| format!("{}\n", line.strip_prefix("export ").unwrap_or(line))).collect()
 }

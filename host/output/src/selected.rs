@@ -71,11 +71,12 @@ impl SelectedSources {
         let all = SourcePoses::new(&poses)?;
         let weights: Vec<SourceWeights> =
             job.targets.iter().map(|target| weighting.weigh(&all, &unit.pose(&target.camera.pose))).collect();
-        let share = |own: &SourceWeights, chosen: &[usize]| chosen.iter().map(|&one| own.get(one as u32)).sum::<f32>();
+        let share =
+            |weights: &SourceWeights, chosen: &[usize]| chosen.iter().map(|&one| weights.get(one as u32)).sum::<f32>();
         let name = |&view: &usize| scene.views[view].name.clone();
         let mut targets = Vec::with_capacity(job.targets.len());
-        for (target, own) in job.targets.iter().zip(&weights) {
-            let chosen = select_sources(std::slice::from_ref(own), count);
+        for (target, relevance) in job.targets.iter().zip(&weights) {
+            let chosen = select_sources(std::slice::from_ref(relevance), count);
             let few = SourcePoses::new(&chosen.iter().map(|&one| poses[one]).collect::<Vec<_>>())?;
             let few_weights = weighting.weigh(&few, &unit.pose(&target.camera.pose));
             let mut order: Vec<(usize, f32)> =
@@ -88,11 +89,11 @@ impl SelectedSources {
                 sources: indices.iter().map(name).collect(),
                 indices,
                 weights: order.iter().map(|(_, weight)| *weight).collect(),
-                share: share(own, &chosen),
+                share: share(relevance, &chosen),
             });
         }
         let chosen = select_sources(&weights, count);
-        let shares: Vec<f32> = weights.iter().map(|own| share(own, &chosen)).collect();
+        let shares: Vec<f32> = weights.iter().map(|relevance| share(relevance, &chosen)).collect();
         let mean = shares.iter().sum::<f32>() / shares.len().max(1) as f32;
         let indices: Vec<usize> = chosen.iter().map(|&one| job.sources[one]).collect();
         let together = SourceSet {

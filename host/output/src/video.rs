@@ -197,7 +197,7 @@ fn over(picture: DynamicImage, background: [u8; 3]) -> RgbImage {
     let picture = picture.into_rgba8();
     RgbImage::from_fn(picture.width(), picture.height(), |x, y| {
         let [r, g, b, a] = picture.get_pixel(x, y).0.map(u32::from);
-        let mix = |own: u32, behind: u8| ((own * a + u32::from(behind) * (255 - a) + 127) / 255) as u8;
+        let mix = |colour: u32, behind: u8| ((colour * a + u32::from(behind) * (255 - a) + 127) / 255) as u8;
         Rgb([mix(r, background[0]), mix(g, background[1]), mix(b, background[2])])
     })
 }

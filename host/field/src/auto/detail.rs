@@ -13,10 +13,10 @@ pub(super) fn lost_detail(images: &[SourceImage], side: u32) -> f64 {
         let (to_column, to_row) = (small_width as f32 / width as f32, small_height as f32 / height as f32);
         for row in 0..height {
             for column in 0..width {
-                let own = image.texels[(row * width + column) as usize];
+                let whole = image.texels[(row * width + column) as usize];
                 let (x, y) = ((column as f32 + 0.5) * to_column, (row as f32 + 0.5) * to_row);
                 let coarse = bilinear_from(&small.texels[..], 0, small_width, small_height, x, y);
-                let squares = (0..3).map(|channel| f64::from(own[channel] - coarse[channel]).powi(2));
+                let squares = (0..3).map(|channel| f64::from(whole[channel] - coarse[channel]).powi(2));
                 sum += squares.sum::<f64>();
             }
         }

@@ -41,8 +41,8 @@ pub(super) fn draw(picture: &Rendered, count: usize, seed: u64) -> Vec<Draw> {
     let even_share = 1.0 - seen_share - contrast_share;
     let at = |draw: usize| (draw as f64 + f64::from(uniform(seed, draw as u32, 0))) / count.max(1) as f64;
     let (mut draws, mut reached) = (Vec::with_capacity(count), 0.0);
-    for (pixel, (own, colour)) in contrasts.iter().zip(&picture.colours).enumerate() {
-        let of_contrast = if contrast > 0.0 { own / contrast } else { 0.0 };
+    for (pixel, (pixel_contrast, colour)) in contrasts.iter().zip(&picture.colours).enumerate() {
+        let of_contrast = if contrast > 0.0 { pixel_contrast / contrast } else { 0.0 };
         let of_seen = if is_seen(colour) { 1.0 / seen } else { 0.0 };
         let probability = even_share * even + seen_share * of_seen + contrast_share * of_contrast;
         reached += probability;

@@ -58,7 +58,7 @@ impl Expected {
     pub(super) fn after(&self, effort: usize, most: f64) -> usize {
         let next = self.cheapest_within(most).max(effort + 1);
         let mut near = (effort + 1..=effort + MAX_SKIPPED).rev();
-        let cheap = near.find(|near| self.efforts.get(*near).is_some_and(|own| own.typical_share <= CHEAP));
+        let cheap = near.find(|near| self.efforts.get(*near).is_some_and(|effort| effort.typical_share <= CHEAP));
         cheap.map_or(next, |cheap| next.min(cheap))
     }
 

@@ -58,7 +58,7 @@ fn correlation(sources: &SourceImages, image: &SourceImage, shown: &Rendered) ->
             })
             .collect();
         let length = pairs.len().max(1) as f64;
-        let mean = [pairs.iter().map(|own| own.0).sum::<f64>(), pairs.iter().map(|own| own.1).sum()];
+        let mean = [pairs.iter().map(|pair| pair.0).sum::<f64>(), pairs.iter().map(|pair| pair.1).sum()];
         for (first, second) in &pairs {
             let (first, second) = (first - mean[0] / length, second - mean[1] / length);
             product += first * second;

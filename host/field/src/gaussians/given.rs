@@ -85,7 +85,7 @@ impl GivenGaussians {
         let count = self.scene.gaussians.len();
         let looked_at = (0..MAX_LOOKED_AT.min(count)).filter_map(|draw| {
             let drawn = if count > MAX_LOOKED_AT { (uniform(0, draw as u32, 0) * count as f32) as usize } else { draw };
-            self.scene.gaussians.get(drawn).map(|own| Vec3::from_array(own.position))
+            self.scene.gaussians.get(drawn).map(|gaussian| Vec3::from_array(gaussian.position))
         });
         let positions: Vec<Vec3> = looked_at.collect();
         let seen = sources.images.iter().flat_map(|image| {
@@ -102,9 +102,9 @@ impl<D: Device> Prepare<'_, D> {
     /// The Gaussians on the device as this camera sees them. Those that all cameras see alike are taken there once.
     fn uploaded(&mut self, camera: &CameraBlock) -> Result<&Uploaded<D>, DeviceError> {
         let scene = self.scene;
-        let is_there = |own: &Uploaded<D>| match scene.is_antialiased {
-            true => own.camera == *camera,
-            false => scene.degree == 0 || own.camera.centre_world() == camera.centre_world(),
+        let is_there = |uploaded: &Uploaded<D>| match scene.is_antialiased {
+            true => uploaded.camera == *camera,
+            false => scene.degree == 0 || uploaded.camera.centre_world() == camera.centre_world(),
         };
         let kept = self.uploaded.take().filter(is_there);
         let uploaded = match kept {
@@ -138,9 +138,9 @@ fn fade(block: &mut GaussianBlock, camera: &CameraBlock) {
         return;
     }
     let [u, v] = image_axes(block, camera, place);
-    let own = u.cross(v).length_squared();
-    let dilated = own + DILATION * (u.length_squared() + v.length_squared()) + DILATION * DILATION;
-    let fainter = opacity(block.opacity) * (own / dilated).max(0.0).sqrt();
+    let area = u.cross(v).length_squared();
+    let dilated = area + DILATION * (u.length_squared() + v.length_squared()) + DILATION * DILATION;
+    let fainter = opacity(block.opacity) * (area / dilated).max(0.0).sqrt();
     if fainter.is_finite() {
         block.opacity = (fainter / (1.0 - fainter)).ln().clamp(-80.0, 80.0);
     }
@@ -163,14 +163,14 @@ impl<D: Device> Prepared for Prepare<'_, D> {
 
 /// Gaussians of one colour in all directions, as a scene that can be written.
 pub fn scene_of(gaussians: &[GaussianBlock]) -> GaussianScene {
-    let own = |block: &GaussianBlock| Gaussian {
+    let gaussian = |block: &GaussianBlock| Gaussian {
         position: block.position,
         log_scales: block.log_scales,
         rotation: block.rotation,
         opacity: block.opacity,
         f_dc: block.colour.map(|value| (value - 0.5) / SH_0),
     };
-    GaussianScene { gaussians: gaussians.iter().map(own).collect(), ..GaussianScene::default() }
+    GaussianScene { gaussians: gaussians.iter().map(gaussian).collect(), ..GaussianScene::default() }
 }
 
 /// What lies behind Gaussians: the background of sources with silhouettes, otherwise the mean of all photographs.

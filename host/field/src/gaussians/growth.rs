@@ -27,7 +27,7 @@ pub(super) fn growth_at(done: u32, count: u32) -> Option<u32> {
 pub(super) fn grow(particles: &mut Vec<Particle>, growth: u32, first: usize, max_count: usize) {
     let factor = max_count as f64 / first.max(1) as f64;
     let target = (first as f64 * factor.max(1.0).powf(f64::from(growth) / f64::from(GROWTHS))) as usize;
-    particles.retain(|own| opacity(own.gaussian.opacity) >= PRUNE_OPACITY);
+    particles.retain(|particle| opacity(particle.gaussian.opacity) >= PRUNE_OPACITY);
     let count = target.min(max_count).saturating_sub(particles.len()).min(particles.len());
     let mut order: Vec<usize> = (0..particles.len()).collect();
     order.sort_by(|a, b| particles[*b].score().total_cmp(&particles[*a].score()));
@@ -76,10 +76,11 @@ mod tests {
         particles[8].scored(9.0);
         grow(&mut particles, 1, 100, 103);
         assert_eq!(particles.len(), 100, "one went, and one came for it");
-        let near =
-            |index: f32| particles.iter().filter(|own| (own.gaussian.position[0] - 4.0 * index).abs() < 1.0).count();
+        let near = |index: f32| {
+            particles.iter().filter(|particle| (particle.gaussian.position[0] - 4.0 * index).abs() < 1.0).count()
+        };
         assert_eq!((near(8.0), near(7.0), near(3.0)), (2, 1, 0), "the greatest score is split");
-        assert!(particles.iter().all(|own| own.score() == 0.0));
+        assert!(particles.iter().all(|particle| particle.score() == 0.0));
         grow(&mut particles, GROWTHS, 100, 150);
         assert_eq!(particles.len(), 150);
         grow(&mut particles, GROWTHS, 100, 90);

@@ -184,12 +184,12 @@ impl<D: Device> Optimisation for Optimiser<'_, D> {
     }
 
     fn optimised(&self) -> Optimised {
-        let count = self.particles.iter().map(|own| own.harmonics.count()).max().unwrap_or(0);
-        let degree = REST_COUNTS.iter().position(|own| *own as usize == count).unwrap_or(0);
+        let count = self.particles.iter().map(|particle| particle.harmonics.count()).max().unwrap_or(0);
+        let degree = REST_COUNTS.iter().position(|rest| *rest as usize == count).unwrap_or(0);
         Optimised {
             gaussians: self.particles.iter().map(|particle| particle.gaussian).collect(),
             degree: degree as u32,
-            f_rest: self.particles.iter().flat_map(|own| own.harmonics.coefficients(count)).collect(),
+            f_rest: self.particles.iter().flat_map(|particle| particle.harmonics.coefficients(count)).collect(),
             near: self.splatter.near,
             background: self.splatter.background,
             gains: self.gains.iter().map(|gain| gain.value).collect(),
@@ -240,7 +240,7 @@ impl<'d, D: Device> Optimiser<'d, D> {
     ) -> Result<Option<Optimiser<'d, D>>, FieldError> {
         let own_side = images.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
         let side = own_side.min(recipe.side);
-        let levels = map(LEVELS, 1, |own| level(images, side, own as u32));
+        let levels = map(LEVELS, 1, |number| level(images, side, number as u32));
         let levels: Vec<Vec<LevelView>> =
             levels.into_iter().collect::<Result<_, _>>().map_err(FieldError::unsuitable)?;
         let finest = levels.first().and_then(|views| views.first()).map_or(1.0, |view| view.camera.intrinsics[0]);

@@ -99,8 +99,8 @@ impl Particle {
                 self.harmonics.step(by_colour, unit, step.rates[4], corrections);
             }
         }
-        let own = &mut self.gaussian;
-        let solid = opacity(own.opacity);
+        let gaussian = &mut self.gaussian;
+        let solid = opacity(gaussian.opacity);
         let penalty = step.opacity_penalty * solid * (1.0 - solid);
         let [place, scale, turn, opaque, colour] = step.rates;
         let mut moments = self.moments.iter_mut();
@@ -111,19 +111,19 @@ impl Particle {
                 }
             }
         };
-        all(&mut own.position, &gradient.position, place);
-        all(&mut own.log_scales, &gradient.log_scales, scale);
-        all(&mut own.rotation, &gradient.rotation, turn);
-        all(std::slice::from_mut(&mut own.opacity), &[gradient.opacity + penalty], opaque);
-        all(&mut own.colour, &by_colour, colour);
-        let [x, y, z] = own.position;
+        all(&mut gaussian.position, &gradient.position, place);
+        all(&mut gaussian.log_scales, &gradient.log_scales, scale);
+        all(&mut gaussian.rotation, &gradient.rotation, turn);
+        all(std::slice::from_mut(&mut gaussian.opacity), &[gradient.opacity + penalty], opaque);
+        all(&mut gaussian.colour, &by_colour, colour);
+        let [x, y, z] = gaussian.position;
         let depth = step.camera.pose.rotate_to_camera(Vec3::new(x, y, z) - step.camera.centre_world()).z;
         let most = (MAX_SCALE * step.footprint * (depth / step.depth).max(1.0)).ln();
-        let scales = &mut own.log_scales;
+        let scales = &mut gaussian.log_scales;
         scales.iter_mut().for_each(|scale| *scale = scale.min(most));
         let least = scales.iter().copied().fold(f32::NEG_INFINITY, f32::max) - MAX_ELONGATION;
         scales.iter_mut().for_each(|scale| *scale = scale.max(least));
-        own.opacity = own.opacity.clamp(-MAX_LOGIT, MAX_LOGIT);
+        gaussian.opacity = gaussian.opacity.clamp(-MAX_LOGIT, MAX_LOGIT);
         // A place in the picture moves by the focal length over the depth.
         self.scored(Vec3::from_array(gradient.position).length() * depth / step.camera.intrinsics[0]);
     }
@@ -153,39 +153,39 @@ pub(super) fn refined(
         .collect();
     let mut refined = Vec::with_capacity(2 * kept.len());
     kept.reverse();
-    while let Some((own, splits)) = kept.pop() {
-        let axis = longest_axis(&own);
+    while let Some((gaussian, splits)) = kept.pop() {
+        let axis = longest_axis(&gaussian);
         let has_room = refined.len() + kept.len() + 1 < recipe.max_count;
-        let limit = recipe.split_scale * footprint * nearest(&own, cameras, extent).max(0.3);
-        if splits < MAX_SPLITS && has_room && own.log_scales[axis].exp() > limit {
-            kept.extend(halves(&own, axis).map(|half| (half, splits + 1)));
+        let limit = recipe.split_scale * footprint * nearest(&gaussian, cameras, extent).max(0.3);
+        if splits < MAX_SPLITS && has_room && gaussian.log_scales[axis].exp() > limit {
+            kept.extend(halves(&gaussian, axis).map(|half| (half, splits + 1)));
         } else {
-            refined.push(Particle::new(own));
+            refined.push(Particle::new(gaussian));
         }
     }
     refined
 }
 
 /// The least depth at which a source sees a Gaussian, relative to the median depth.
-fn nearest(own: &GaussianBlock, cameras: &[CameraBlock], extent: &Extent) -> f32 {
-    let position = Vec3::from_array(own.position);
+fn nearest(gaussian: &GaussianBlock, cameras: &[CameraBlock], extent: &Extent) -> f32 {
+    let position = Vec3::from_array(gaussian.position);
     let depths = cameras.iter().map(|camera| camera.pose.rotate_to_camera(position - camera.centre_world()).z);
     let least = depths.filter(|depth| *depth > 0.25 * extent.depth).fold(f32::INFINITY, f32::min);
     least.min(1.0e6 * extent.depth) / extent.depth
 }
 
 /// The axis of the greatest standard deviation.
-pub(super) fn longest_axis(own: &GaussianBlock) -> usize {
-    (0..3).fold(0, |most, axis| if own.log_scales[axis] > own.log_scales[most] { axis } else { most })
+pub(super) fn longest_axis(gaussian: &GaussianBlock) -> usize {
+    (0..3).fold(0, |most, axis| if gaussian.log_scales[axis] > gaussian.log_scales[most] { axis } else { most })
 }
 
 /// Two Gaussians in the place of one, apart along an axis.
-pub(super) fn halves(own: &GaussianBlock, axis: usize) -> [GaussianBlock; 2] {
-    let apart = axes(own.rotation)[axis] * (0.5 * own.log_scales[axis].exp());
-    let solid = 1.0 - (1.0 - opacity(own.opacity)).powf(0.8);
+pub(super) fn halves(gaussian: &GaussianBlock, axis: usize) -> [GaussianBlock; 2] {
+    let apart = axes(gaussian.rotation)[axis] * (0.5 * gaussian.log_scales[axis].exp());
+    let solid = 1.0 - (1.0 - opacity(gaussian.opacity)).powf(0.8);
     let half = |side: f32| {
-        let mut half = *own;
-        half.position = (Vec3::from_array(own.position) + apart * side).to_array();
+        let mut half = *gaussian;
+        half.position = (Vec3::from_array(gaussian.position) + apart * side).to_array();
         // A standard deviation of 0.62: with the distance, that of both together stays.
         half.log_scales[axis] -= 0.47;
         half.opacity = (solid / (1.0 - solid)).ln();

@@ -96,7 +96,7 @@ impl FromStr for Quality {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Quality, String> {
-        let found = Quality::ALL.into_iter().find(|own| own.name() == name);
+        let found = Quality::ALL.into_iter().find(|quality| quality.name() == name);
         found.ok_or_else(|| format!("{name} is no quality: fast, standard or high"))
     }
 }

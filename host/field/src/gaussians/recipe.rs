@@ -92,8 +92,8 @@ impl Default for Recipe {
 impl Recipe {
     /// The cloud of so many sources that the optimisation begins with.
     pub fn cloud(source_count: usize) -> CloudOptions {
-        let own = CloudOptions::default();
-        if source_count <= MAX_UNCONFIRMED { CloudOptions { least_views: 1 } } else { own }
+        let options = CloudOptions::default();
+        if source_count <= MAX_UNCONFIRMED { CloudOptions { least_views: 1 } } else { options }
     }
 
     /// The recipes for pictures that are mixed with the field's own; which of them is better is the scene's
@@ -150,7 +150,7 @@ impl Recipe {
     /// sources' size.
     pub fn with(mut self, iterations: Option<u32>, count: Option<u32>) -> Recipe {
         if let Some(iterations) = iterations {
-            self.iterations.iter_mut().filter(|own| **own > 0).for_each(|own| *own = iterations);
+            self.iterations.iter_mut().filter(|count| **count > 0).for_each(|count| *count = iterations);
         }
         if let Some(count) = count {
             (self.max_count, self.max_per_pixel) = (count as usize, f32::INFINITY);

@@ -66,11 +66,11 @@ impl Residuals {
         (images, gain): (&SourceImages, [f32; 3]),
         least_opacity: f32,
     ) -> Result<(), FieldError> {
-        let (Some(own), Some(image)) = (self.views.get_mut(view), images.images.get(view)) else { return Ok(()) };
-        if own.is_none() {
+        let (Some(place), Some(image)) = (self.views.get_mut(view), images.images.get(view)) else { return Ok(()) };
+        if place.is_none() {
             let camera = image.camera.block(0);
             let Rendered { colours, depths, .. } = splatter.rendered(gaussians, count, &camera, least_opacity)?;
-            *own = Some(View { camera, residual: residual(&colours, image, images, gain), depths });
+            *place = Some(View { camera, residual: residual(&colours, image, images, gain), depths });
         }
         Ok(())
     }
@@ -99,11 +99,11 @@ impl Residuals {
 /// The residual of a source over the background; 0 where its lens saw nothing.
 fn residual(colours: &[[f32; 4]], image: &SourceImage, images: &SourceImages, gain: [f32; 3]) -> Vec<[f32; 3]> {
     let behind = images.background;
-    let of = |(own, texel): (&[f32; 4], &[f32; 4])| {
+    let of = |(colour, texel): (&[f32; 4], &[f32; 4])| {
         [0, 1, 2].map(|channel| match images.has_silhouettes {
-            true => texel[channel] + (1.0 - texel[3]) * behind[channel] - gain[channel] * own[channel],
+            true => texel[channel] + (1.0 - texel[3]) * behind[channel] - gain[channel] * colour[channel],
             false if texel[3] < 0.999 => 0.0,
-            false => texel[channel] - gain[channel] * own[channel],
+            false => texel[channel] - gain[channel] * colour[channel],
         })
     };
     colours.iter().zip(&image.texels).map(of).collect()
@@ -124,7 +124,7 @@ fn at(views: &[(&View, f32)], least: f32, point: Vec3) -> [f32; 3] {
         }
     }
     // Without any weight at all both are 0.
-    sums.map(|own| own / (sum + least).max(f32::MIN_POSITIVE))
+    sums.map(|value| value / (sum + least).max(f32::MIN_POSITIVE))
 }
 
 #[cfg(test)]
@@ -146,12 +146,12 @@ mod tests {
     }
 
     fn added(depth: f32, sources: &[(f32, f32)]) -> [f32; 4] {
-        let view = |(own, _): &(f32, f32)| View {
+        let view = |(depth, _): &(f32, f32)| View {
             camera: camera(),
             residual: vec![[0.2, -0.9, 0.0]; 48],
-            depths: vec![*own; 48],
+            depths: vec![*depth; 48],
         };
-        let residuals = Residuals { views: sources.iter().map(|own| Some(view(own))).collect(), share: 1.0 };
+        let residuals = Residuals { views: sources.iter().map(|source| Some(view(source))).collect(), share: 1.0 };
         let weights: Vec<(usize, f32)> = sources.iter().map(|(_, weight)| *weight).enumerate().collect();
         let mut picture = grey(depth);
         residuals.add(&camera(), &weights, &mut picture);

@@ -86,12 +86,12 @@ fn of_points(points: &[CloudPoint], extent: &Extent, recipe: &Recipe) -> Vec<Gau
     let cells = cells.values().filter(|cell| cell.count >= recipe.least_points);
     let gaussian = |cell: &Cell| {
         let share = 1.0 / cell.count as f32;
-        let mut own = ball(cell.position * share, 0.5 * side, recipe.opacities[0], cell.colour * share);
+        let mut gaussian = ball(cell.position * share, 0.5 * side, recipe.opacities[0], cell.colour * share);
         if let Some(normal) = cell.normal.try_normalize().filter(|_| recipe.flatness < 1.0) {
-            own.log_scales[2] += recipe.flatness.ln();
-            own.rotation = towards(normal);
+            gaussian.log_scales[2] += recipe.flatness.ln();
+            gaussian.rotation = towards(normal);
         }
-        own
+        gaussian
     };
     cells.map(gaussian).collect()
 }

@@ -74,10 +74,13 @@ impl SceneOptimisation<'_> {
             curves.push(scores);
         }
         let best = |scores: &[(u32, f64)]| {
-            scores.iter().copied().fold((0, f64::NEG_INFINITY), |best, own| if own.1 > best.1 { own } else { best })
+            scores
+                .iter()
+                .copied()
+                .fold((0, f64::NEG_INFINITY), |best, score| if score.1 > best.1 { score } else { best })
         };
         // The fast recipe ends where it ends.
-        let fast_score = curves[0].last().map_or(f64::NEG_INFINITY, |own| own.1);
+        let fast_score = curves[0].last().map_or(f64::NEG_INFINITY, |score| score.1);
         let (end, score) = best(&curves[1]);
         let (chosen, words) = if score <= fast_score {
             (fast, "fast is used".to_owned())

@@ -85,9 +85,9 @@ mod tests {
 
     #[test]
     fn without_surfaces_or_maps_there_is_nothing_to_say() {
-        let own = [map(0.0, 2.0, 1.0)];
-        assert_eq!(seen(&camera(0.0), [16, 16], &[0.0; 256], &own), None);
-        assert_eq!(seen(&camera(0.0), [16, 16], &[], &own), None);
+        let maps = [map(0.0, 2.0, 1.0)];
+        assert_eq!(seen(&camera(0.0), [16, 16], &[0.0; 256], &maps), None);
+        assert_eq!(seen(&camera(0.0), [16, 16], &[], &maps), None);
         assert_eq!(seen(&camera(0.0), [16, 16], &[2.0; 256], &[]), None);
     }
 }

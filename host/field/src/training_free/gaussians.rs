@@ -91,8 +91,8 @@ flags! {
     Recipe;
     "gaussian-iterations", "N", parse_iterations, Picture, &[],
         "Iterations at each size of the sources",
-        |own, iterations| *own = own.with(Some(iterations), None);
-    "gaussian-count", "N", parse_count, Picture, &[], "Most Gaussians", |own, count| *own = own.with(None, Some(count));
+        |recipe, iterations| *recipe = recipe.with(Some(iterations), None);
+    "gaussian-count", "N", parse_count, Picture, &[], "Most Gaussians", |recipe, count| *recipe = recipe.with(None, Some(count));
 }
 
 fn parse_iterations(text: &str) -> Result<u32, String> {

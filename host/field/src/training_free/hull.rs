@@ -305,8 +305,8 @@ impl<D: Device> Geometry for Views<'_, D> {
         let depths = self.depths.as_ref().ok_or_else(|| FieldError::unsuitable(NotWeighed))?;
         let maps = self.device.download(&depths.maps)?;
         let map = |camera: &CameraBlock| {
-            let own = maps[camera.first_texel as usize..].iter().take((camera.width * camera.height) as usize);
-            let depths = own.map(|depth| if *depth < NO_SURFACE { *depth } else { 0.0 }).collect();
+            let depths = maps[camera.first_texel as usize..].iter().take((camera.width * camera.height) as usize);
+            let depths = depths.map(|depth| if *depth < NO_SURFACE { *depth } else { 0.0 }).collect();
             DepthMap { camera: CameraBlock { first_texel: 0, ..*camera }, depths, confidences: Vec::new() }
         };
         Ok(self.silhouettes().scene.cameras.iter().map(map).collect())

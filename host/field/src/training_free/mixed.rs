@@ -191,8 +191,15 @@ impl<D: Device> Prepared for Mixed<'_, D> {
         let side = images.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
         let reduced = TrainingFree { shown: Shown::Depths, ..options.clone() };
         let mut efforts: Vec<Variant<TrainingFree>> = match images.has_silhouettes {
-            true => options.hull.efforts(side).into_iter().map(|own| own.map(|hull| reduced.with_hull(hull))).collect(),
-            false => options.sweep.efforts(side).into_iter().map(|own| own.map(|sweep| reduced.with(sweep))).collect(),
+            true => options
+                .hull
+                .efforts(side)
+                .into_iter()
+                .map(|effort| effort.map(|hull| reduced.with_hull(hull)))
+                .collect(),
+            false => {
+                options.sweep.efforts(side).into_iter().map(|effort| effort.map(|sweep| reduced.with(sweep))).collect()
+            }
         };
         if let Some(exact) = efforts.last_mut() {
             exact.options = options.clone();
