@@ -10,6 +10,7 @@ pub(crate) const TESTS: &[Test] = &[
     Test::new("arrays_of_any_length_come_back", arrays_of_any_length_come_back),
     Test::new("arrays_larger_than_a_transfer_come_back", arrays_larger_than_a_transfer_come_back),
     Test::new("arrays_in_pieces_come_back", arrays_in_pieces_come_back),
+    Test::new("uploads_do_not_wait_for_one_another", uploads_do_not_wait_for_one_another),
 ];
 
 /// Numbers without a pattern that a shifted or repeated stretch would share.
@@ -61,6 +62,20 @@ fn arrays_in_pieces_come_back(candidate: &Candidate) -> Result<(), Failed> {
         let gpu = candidate.gpu(&GpuOptions { limits, ..GpuOptions::default() })?;
         of_every_width(&gpu, 1)?;
         of_every_width(&gpu, 10_001)?;
+    }
+    Ok(())
+}
+
+/// More than staging memory holds, so that its parts are written again while the device works.
+fn uploads_do_not_wait_for_one_another(candidate: &Candidate) -> Result<(), Failed> {
+    let gpu = candidate.gpu(&GpuOptions::default())?;
+    let values = |array: usize| -> Vec<u64> { (0..50_000 + array).map(|index| number(index + 7 * array)).collect() };
+    let arrays = (0..100).map(|array| gpu.upload(&values(array))).collect::<Result<Vec<_>, _>>()?;
+    let submissions = gpu.submission_count();
+    // 40 MB pass through 16 MiB in parts of four: each time that a part is written again.
+    assert!(submissions <= 12, "{submissions} submissions for 100 uploads");
+    for (index, array) in arrays.iter().enumerate() {
+        assert!(gpu.download(array)? == values(index), "array {index}");
     }
     Ok(())
 }

@@ -60,6 +60,8 @@ def read_views(folder, side):
     views = []
     for frame in about["frames"]:
         own = {**about, **frame}
+        if any(own.get(name) for name in ("k1", "k2", "k3", "k4", "p1", "p2")):
+            raise SystemExit(f"{frame['file_path']}: the lens distorts, which this program does not undo")
         picture = Image.open(folder / frame["file_path"]).convert("RGB")
         scale = min(1.0, side / max(picture.size))
         size = [max(1, round(scale * length)) for length in picture.size]

@@ -8,6 +8,7 @@ use crate::handle::{Handle, Memory};
 use crate::instance::Instance;
 use crate::kernel::{Access, Form, Kernel};
 use crate::pipelines::Pipelines;
+use crate::staging::Ring;
 use crate::submissions::{Done, Submission, Submissions};
 use ash::vk;
 use std::ops::Range;
@@ -126,7 +127,7 @@ pub(crate) struct State {
     pub(crate) refused: Vec<(Kernel, Form)>,
     /// How long elements took.
     pub(crate) rates: [Rate; Kernel::ALL.len()],
-    pub(crate) upload: Option<Memory>,
+    pub(crate) upload: Option<Ring>,
     pub(crate) download: Option<Memory>,
     /// The number of the interval of commands since the last barrier.
     stretch: u64,
@@ -290,6 +291,12 @@ impl State {
     pub(crate) fn wait(&mut self) -> Result<(), VulkanError> {
         let State { submissions, tallies, rates, .. } = self;
         submissions.wait(&mut |done| count(tallies, rates, done))
+    }
+
+    /// Waits until the submission of this number is done.
+    pub(crate) fn wait_for(&mut self, submission: u64) -> Result<(), VulkanError> {
+        let State { submissions, tallies, rates, .. } = self;
+        submissions.wait_for(submission, &mut |done| count(tallies, rates, done))
     }
 }
 

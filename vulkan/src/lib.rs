@@ -12,6 +12,7 @@
 //! forms                          forms of tiles: what is measured, what is chosen
 //! excerpt, pipelines             the part of a module that a kernel needs, pipelines of kernels
 //! submissions                    submitted commands
+//! staging                        the memory that uploads pass through
 //! gpu                            an opened device: its state, recorded commands
 //! remembered                     pipelines and forms from one process to the next
 //! dispatch, pieces               dispatches, split to fit the device and its watchdog
@@ -36,6 +37,7 @@ mod messages;
 mod pieces;
 mod pipelines;
 mod remembered;
+mod staging;
 mod subgroups;
 mod submissions;
 mod transfers;

@@ -130,6 +130,11 @@ impl Submissions {
         self.count
     }
 
+    /// The number, from 1, of the submission that commands are recorded into now.
+    pub(crate) fn next(&self) -> u64 {
+        self.count + 1
+    }
+
     /// The open submission, or a new one. If all are in flight, it waits for the oldest first. It comes back through
     /// [`Submissions::go_on`].
     pub(crate) fn take_open(&mut self, done: &mut dyn FnMut(Done)) -> Result<Submission, VulkanError> {
@@ -220,6 +225,17 @@ impl Submissions {
     pub(crate) fn wait(&mut self, done: &mut dyn FnMut(Done)) -> Result<(), VulkanError> {
         self.flush()?;
         while !self.running.is_empty() {
+            self.wait_for_oldest(done)?;
+        }
+        Ok(())
+    }
+
+    /// Waits until the submission of this number is done: at once for 0.
+    pub(crate) fn wait_for(&mut self, number: u64, done: &mut dyn FnMut(Done)) -> Result<(), VulkanError> {
+        if number > self.count {
+            self.flush()?;
+        }
+        while !self.running.is_empty() && self.count - (self.running.len() as u64) < number {
             self.wait_for_oldest(done)?;
         }
         Ok(())

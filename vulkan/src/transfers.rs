@@ -5,13 +5,14 @@ use crate::error::VulkanError;
 use crate::gpu::{Gpu, State};
 use crate::handle::Memory;
 use crate::kernel::Access;
+use crate::staging::{Places, Ring};
 use ash::vk;
 use bytemuck::Pod;
 use gpu_allocator::MemoryLocation;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Bytes of the staging buffer.
+/// Bytes of staging memory each way, where one allocation can have so many.
 const STAGING: u64 = 16 << 20;
 /// Most bytes that are recorded with the commands: the most of an update.
 const INLINE: usize = 64 << 10;
@@ -40,7 +41,7 @@ impl Gpu {
         })
     }
 
-    /// Writes bytes of one of an array's buffers, at most those of a staging buffer.
+    /// Writes bytes of one of an array's buffers.
     pub(crate) fn write_piece(
         &self,
         state: &mut State,
@@ -49,17 +50,26 @@ impl Gpu {
         offset: u64,
         bytes: &[u8],
     ) -> Result<(), VulkanError> {
-        self.staging(&mut state.upload, MemoryLocation::CpuToGpu)?;
-        let (from, mapped) = self.mapped(&mut state.upload)?;
-        mapped[..bytes.len()].copy_from_slice(bytes);
-        let copy = [vk::BufferCopy::default().dst_offset(offset).size(bytes.len() as u64)];
-        let to = memory.buffer;
-        self.record(state, &[(array, Access::Write)], |device, submission, _| {
-            // SAFETY: both ranges exist; the submission is waited for before staging is written again.
-            unsafe { device.cmd_copy_buffer(submission.commands, from, to, &copy) };
-            Ok(())
-        })?;
-        state.wait()
+        let (to, mut written) = (memory.buffer, 0);
+        while written < bytes.len() {
+            let (from, place) = self.stage(state, &bytes[written..])?;
+            let submission = state.submissions.next();
+            let copy = vk::BufferCopy {
+                src_offset: place.start as u64,
+                dst_offset: offset + written as u64,
+                size: place.len() as u64,
+            };
+            self.record(state, &[(array, Access::Write)], |device, submission, _| {
+                // SAFETY: both ranges exist; the submission is waited for before staging is written again there.
+                unsafe { device.cmd_copy_buffer(submission.commands, from, to, &[copy]) };
+                Ok(())
+            })?;
+            if let Some(ring) = &mut state.upload {
+                ring.places.copied(submission);
+            }
+            written += place.len();
+        }
+        Ok(())
     }
 
     /// Records the bytes of a short array with the commands: nobody waits.
@@ -126,8 +136,10 @@ impl Gpu {
         offset: u64,
         bytes: &mut [u8],
     ) -> Result<(), VulkanError> {
-        self.staging(&mut state.download, MemoryLocation::GpuToCpu)?;
-        let (to, _) = self.mapped(&mut state.download)?;
+        if state.download.is_none() {
+            state.download = Some(self.handle.memory(self.staging_bytes() as u64, MemoryLocation::GpuToCpu)?);
+        }
+        let (to, _) = self.mapped(state.download.as_mut())?;
         let copy = [vk::BufferCopy::default().src_offset(offset).size(bytes.len() as u64)];
         let from = memory.buffer;
         self.record(state, &[(array, Access::Read)], |device, submission, _| {
@@ -144,7 +156,7 @@ impl Gpu {
             Ok(())
         })?;
         state.wait()?;
-        let (_, mapped) = self.mapped(&mut state.download)?;
+        let (_, mapped) = self.mapped(state.download.as_mut())?;
         bytes.copy_from_slice(&mapped[..bytes.len()]);
         Ok(())
     }
@@ -218,22 +230,31 @@ impl Gpu {
         })
     }
 
+    /// Most bytes of a download at a time, and of the uploads in flight.
     pub(crate) fn staging_bytes(&self) -> usize {
         STAGING.min(self.handle.limits.allocation) as usize
     }
 
-    /// The staging buffer and its mapping on the host.
-    fn mapped<'a>(&self, staging: &'a mut Option<Memory>) -> Result<(vk::Buffer, &'a mut [u8]), VulkanError> {
-        let mapped = staging.as_mut().and_then(|memory| Some((memory.buffer, memory.mapped()?)));
-        let hidden = || "staging memory is not visible to the host".to_owned();
-        mapped.ok_or_else(|| VulkanError::Memory(self.handle.name.clone(), hidden()))
+    /// Copies bytes, as many as fit, to a place that the next submission is to read: the buffer and the place. It waits
+    /// only where the device still copies from there.
+    fn stage(&self, state: &mut State, bytes: &[u8]) -> Result<(vk::Buffer, Range<usize>), VulkanError> {
+        if state.upload.is_none() {
+            let bytes = self.staging_bytes();
+            let memory = self.handle.memory(bytes as u64, MemoryLocation::CpuToGpu)?;
+            state.upload = Some(Ring { memory, places: Places::new(bytes) });
+        }
+        let (place, copied_in) = state.upload.as_mut().map_or((0..0, 0), |ring| ring.places.take(bytes.len()));
+        state.wait_for(copied_in)?;
+        let (buffer, mapped) = self.mapped(state.upload.as_mut().map(|ring| &mut ring.memory))?;
+        mapped[place.clone()].copy_from_slice(&bytes[..place.len()]);
+        Ok((buffer, place))
     }
 
-    fn staging(&self, staging: &mut Option<Memory>, location: MemoryLocation) -> Result<(), VulkanError> {
-        if staging.is_none() {
-            *staging = Some(self.handle.memory(self.staging_bytes() as u64, location)?);
-        }
-        Ok(())
+    /// Staging memory and its mapping on the host.
+    fn mapped<'a>(&self, staging: Option<&'a mut Memory>) -> Result<(vk::Buffer, &'a mut [u8]), VulkanError> {
+        let mapped = staging.and_then(|memory| Some((memory.buffer, memory.mapped()?)));
+        let hidden = || "staging memory is not visible to the host".to_owned();
+        mapped.ok_or_else(|| VulkanError::Memory(self.handle.name.clone(), hidden()))
     }
 }
 
