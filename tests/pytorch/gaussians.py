@@ -37,20 +37,28 @@ REST_SHARE, DEGREE_SHARE, GROWTHS, GROWING, PRUNED = 0.2, 0.15, 14, 0.6, 0.01
 MOST, MOST_PER_PIXEL = 100_000, 0.75
 
 
-def read_ply(path):
-    """The Gaussians of a file in the layout of "3D Gaussian Splatting"."""
+def read_table(path):
+    """The vertices of a binary .ply, by the names of their properties."""
     data = path.read_bytes()
     end = data.index(b"end_header\n") + len(b"end_header\n")
-    lines = data[:end].decode().splitlines()
-    names = [line.split()[2] for line in lines if line.startswith("property float")]
-    table = numpy.frombuffer(data[end:], "<f4").reshape(-1, len(names))
-    columns = lambda *wanted: torch.tensor(table[:, [names.index(name) for name in wanted]].copy())
+    properties = [line.split()[1:] for line in data[:end].decode().splitlines() if line.startswith("property")]
+    kinds = {"float": "<f4", "double": "<f8", "uchar": "u1"}
+    return numpy.frombuffer(data[end:], [(name, kinds[kind]) for kind, name in properties])
+
+
+def columns(table, *names):
+    return torch.tensor(numpy.stack([table[name] for name in names], 1).astype(numpy.float32))
+
+
+def read_ply(path):
+    """The Gaussians of a file in the layout of "3D Gaussian Splatting"."""
+    table = read_table(path)
     return [
-        columns("x", "y", "z"),
-        columns("scale_0", "scale_1", "scale_2"),
-        columns("rot_0", "rot_1", "rot_2", "rot_3"),
-        columns("opacity")[:, 0],
-        0.5 + SH_0 * columns("f_dc_0", "f_dc_1", "f_dc_2"),
+        columns(table, "x", "y", "z"),
+        columns(table, "scale_0", "scale_1", "scale_2"),
+        columns(table, "rot_0", "rot_1", "rot_2", "rot_3"),
+        columns(table, "opacity")[:, 0],
+        0.5 + SH_0 * columns(table, "f_dc_0", "f_dc_1", "f_dc_2"),
     ]
 
 
@@ -186,6 +194,17 @@ def loss_of(own, photograph):
     return (1 - STRUCTURE_SHARE) * difference + STRUCTURE_SHARE * (1 - (light * contrast).mean())
 
 
+def median_depth(positions, views):
+    """Of what is in the pictures."""
+    depths = []
+    for world, (fx, fy, cx, cy), photograph in views:
+        x, y, z = (positions @ world[:3, :3].T + world[:3, 3]).unbind(1)
+        across, down = fx * x / z + cx, fy * y / z + cy
+        inside = (z > 0) & (across >= 0) & (down >= 0) & (across < photograph.shape[2]) & (down < photograph.shape[1])
+        depths.append(z[inside])
+    return float(torch.cat(depths).median())
+
+
 def harmonics(unit):
     """The 15 spherical harmonics of degrees 1 to 3 along directions, in the order and with the signs of the published code."""
     x, y, z = unit.unbind(1)
@@ -319,6 +338,7 @@ def main():
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--render", nargs=2, metavar=("VIEW", "PNG"), help="write the picture of a view")
     parser.add_argument("--whole", type=Path, metavar="PLY", help="optimise as --quality standard does, and write the Gaussians")
+    parser.add_argument("--surfaces", type=Path, metavar="PLY", help="points whose median depth is the scene's [default: the Gaussians]")
     parser.add_argument("--left-out", default="", metavar="INDICES", help="views that are no sources, separated by commas")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
@@ -326,8 +346,8 @@ def main():
     left_out = {int(own) for own in options.left_out.split(",") if own}
     views = [own for index, own in enumerate(read_views(options.scene, options.side)) if index not in left_out]
     gaussians = read_ply(options.gaussians)
-    depths = torch.cat([(gaussians[0] @ world[:3, :3].T + world[:3, 3])[:, 2] for world, _, _ in views])
-    depth = float(depths[depths > 0].median())
+    surfaces = columns(read_table(options.surfaces), "x", "y", "z") if options.surfaces else gaussians[0]
+    depth = median_depth(surfaces, views)
     behind = torch.stack([photograph.mean((1, 2)) for _, _, photograph in views]).mean(0)
     if options.render:
         with torch.no_grad():

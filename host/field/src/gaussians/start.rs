@@ -54,8 +54,7 @@ pub(super) fn start(
     extent: &Extent,
     recipe: &Recipe,
 ) -> Vec<GaussianBlock> {
-    let mut gaussians = of_points(points, extent, recipe);
-    gaussians.truncate(recipe.max_count);
+    let mut gaussians = evenly(of_points(points, extent, recipe), recipe.max_count);
     let count = (recipe.random_count as usize).min(recipe.max_count - gaussians.len());
     let mut drawn = (0..MAX_DRAWS * recipe.random_count).filter_map(|draw| at_random(draw, images, extent, recipe));
     gaussians.extend(drawn.by_ref().take(count));
@@ -69,6 +68,14 @@ struct Cell {
     normal: Vec3,
     colour: Vec3,
     count: u32,
+}
+
+/// At most so many of them, evenly by their order: they are sorted by place, and a part without any would stay empty.
+fn evenly(gaussians: Vec<GaussianBlock>, most: usize) -> Vec<GaussianBlock> {
+    if gaussians.len() <= most {
+        return gaussians;
+    }
+    (0..most).map(|index| gaussians[index * gaussians.len() / most]).collect()
 }
 
 /// One Gaussian for each cube of points, in the order of the cubes.
@@ -138,4 +145,21 @@ fn colour_at(image: &SourceImage, camera: &CameraBlock, position: Vec3) -> Optio
     let [red, green, blue, alpha] =
         if seen.in_image { image.texels[camera.texel_at(seen.x, seen.y)] } else { [0.0; 4] };
     (alpha > 0.5).then(|| Vec3::new(red, green, blue) / alpha)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fewer_than_there_are_still_fill_the_whole() {
+        let at = |place: f32| ball(Vec3::new(place, 0.0, 0.0), 1.0, 0.5, Vec3::ZERO);
+        let places = |most: usize| -> Vec<f32> {
+            let row = (0..10).map(|place| at(place as f32)).collect();
+            evenly(row, most).iter().map(|gaussian| gaussian.position[0]).collect()
+        };
+        assert_eq!(places(4), [0.0, 2.0, 5.0, 7.0]);
+        assert_eq!(places(10), places(20));
+        assert!(places(0).is_empty());
+    }
 }
