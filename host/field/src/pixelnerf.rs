@@ -379,10 +379,10 @@ impl Counts {
         if maps {
             self.mapped_rows += rows;
         }
-        for (total, own) in self.passes.iter_mut().zip(evaluated) {
-            total.samples += own.samples;
-            total.evaluated += own.evaluated;
-            total.unseen += own.unseen;
+        for (total, pass) in self.passes.iter_mut().zip(evaluated) {
+            total.samples += pass.samples;
+            total.evaluated += pass.evaluated;
+            total.unseen += pass.unseen;
         }
     }
 }

@@ -235,13 +235,13 @@ fn run_up<D: Device>(
     image: Image<D>,
     skip: &Image<D>,
 ) -> Result<Image<D>, DeviceError> {
-    let (own, above) = (skip.size.channels, upconv.channels);
-    let mut wide = scratch.image(skip.size.with_channels(own + above))?;
+    let (across, above) = (skip.size.channels, upconv.channels);
+    let mut wide = scratch.image(skip.size.with_channels(across + above))?;
     upsample(scratch.device(), skip, 0, &mut wide)?;
-    let mut wide = wide.channel_slice(own, above);
+    let mut wide = wide.channel_slice(across, above);
     upconv.run_into(scratch.device(), &image, &mut wide)?;
     scratch.recycle(image);
-    run_stage(scratch, stage, wide.channel_slice(0, own + above))
+    run_stage(scratch, stage, wide.channel_slice(0, across + above))
 }
 
 fn run_stage<D: Device>(

@@ -43,37 +43,37 @@ flags! {
     GenvsOptions;
     "samples", "N,N,N|N", parse_samples, Picture, &[],
         "Samples on a ray of a GeNVS [default: 64]",
-        |own, count| own.rays.sample_count = count;
-    "near-far", "NEAR,FAR", parse_near_far, Picture, &[], NEAR_FAR, |own, bounds| own.rays.near_far = Some(bounds);
+        |options, count| options.rays.sample_count = count;
+    "near-far", "NEAR,FAR", parse_near_far, Picture, &[], NEAR_FAR, |options, bounds| options.rays.near_far = Some(bounds);
     "noise", "MAX,MIN", parse_noise, Picture, &[],
         "Largest and smallest noise level [default: 80,0.002]",
-        |own, schedule| own.plan.schedule = schedule;
+        |options, schedule| options.plan.schedule = schedule;
     "sampler", "NAME", parse_sampler, Effort, BOUNDS,
         "Sampler: heun, unipc, ipndm [default: ipndm; heun where nothing is left out]",
-        |own, given| if let Steps::Fixed { sampler, .. } = &mut own.plan.steps {
+        |options, given| if let Steps::Fixed { sampler, .. } = &mut options.plan.steps {
             *sampler = given;
         };
     "steps", "N", parse_steps, Effort, BOUNDS,
         "Noise levels. Each takes one call of the denoiser; with heun two, except the last [default: as many as the \
          bound on the error needs; 10 beside other options of what is omitted; 25 where nothing is]",
-        |own, given| if let Steps::Fixed { level_count, .. } = &mut own.plan.steps {
+        |options, given| if let Steps::Fixed { level_count, .. } = &mut options.plan.steps {
             *level_count = given;
         };
     "tolerance", "ERROR", parse_tolerance, Effort, &["max_error", "max_time", "sampler", "steps"],
         "Choose the levels adaptively, with each step's error below this (root mean square, of values between -1 \
          and 1); 0.01 is just visible",
-        |own, tolerance| own.plan.steps = Steps::within(tolerance);
+        |options, tolerance| options.plan.steps = Steps::within(tolerance);
     "churn", "AMOUNT", parse_churn, Effort, &["tolerance"],
         "Add this amount of noise between steps over the whole run; multistep samplers start again each time, so \
          use heun",
-        |own, amount| own.plan.churn.amount = amount;
+        |options, amount| options.plan.churn.amount = amount;
     "half-volumes", "", switch, Effort, BOUNDS_OR_EXACT,
         "Keep views' features in half precision (f16): half the memory, but every row of them is computed",
-        |own, ()| own.omissions.half_volumes = true;
+        |options, ()| options.omissions.half_volumes = true;
     "reuse", "LEVEL", parse_level, Sequence, BOUNDS_OR_EXACT,
         "Start each frame from the one before with noise of this level, about the size of the differences between \
          frames: for orbits",
-        |own, level| own.omissions.reuse = Some(level);
+        |options, level| options.omissions.reuse = Some(level);
 }
 
 /// The flags that say nothing of the denoiser or of sequences of pictures.

@@ -121,8 +121,8 @@ pub(super) fn drawn(field: &AnyField, options: &RenderOptions, target_count: usi
     let GenvsOptions { rays, plan: Plan { schedule, seed, .. }, .. } = field.options();
     let exact = Plan { schedule, ..Plan::published(seed) };
     let over = |plan: Plan, sampler, level_count| Plan { steps: Steps::Fixed { sampler, level_count }, ..plan };
-    let variant = |label: &str, own: GenvsOptions, leave_out| {
-        let field = AnyField::new(field.with_options(own));
+    let variant = |label: &str, changed: GenvsOptions, leave_out| {
+        let field = AnyField::new(field.with_options(changed));
         Variant::to_measure(label, (field, RenderOptions { leave_out, early_termination: 0.0, ..options.clone() }))
     };
     let alone = GenvsOptions { rays, plan: exact, omissions: Omissions::NONE, divisor: 1 };
@@ -142,7 +142,7 @@ pub(super) fn drawn(field: &AnyField, options: &RenderOptions, target_count: usi
 
     let fast = Plan { schedule, ..Plan::fast(seed) };
     let together = GenvsOptions { plan: fast, omissions: Omissions::default(), ..alone };
-    let all = |label: String, own| variant(&format!("{ALL}{label}"), own, options.leave_out);
+    let all = |label: String, changed| variant(&format!("{ALL}{label}"), changed, options.leave_out);
     drawn.push(all(String::new(), together));
     drawn.extend(MIN_SHARES.map(|least| variant(&format!("{ALL}, leave out {least}"), together, least)));
     let steps = |plan| GenvsOptions { plan, ..together };

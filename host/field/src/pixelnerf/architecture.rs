@@ -167,9 +167,9 @@ impl Architecture {
                     level - 1
                 )));
             }
-            let own = sizes.size(&format!("encoder.model.layer{level}.0.conv1.weight"), 4, 0)?;
-            channels += own;
-            levels.push(Level { channels: own, block_count });
+            let width = sizes.size(&format!("encoder.model.layer{level}.0.conv1.weight"), 4, 0)?;
+            channels += width;
+            levels.push(Level { channels: width, block_count });
         }
         if channels != latent_channels {
             return Err(sizes.refuse(format!(

@@ -213,9 +213,9 @@ impl<D: Device> Renderer<'_, D> {
         evaluated: &mut Evaluated,
     ) -> Result<Vec<f32>, FieldError> {
         self.progress.check()?;
-        let own = replace(&mut workspace.points, self.device.upload(points)?);
+        let points_before = replace(&mut workspace.points, self.device.upload(points)?);
         let left_out = self.fine.evaluate_visible(workspace, self.views, points.len() as u32);
-        workspace.points = own;
+        workspace.points = points_before;
         evaluated.unseen += left_out?;
         Ok(self.device.download(&workspace.raw)?)
     }
@@ -278,8 +278,8 @@ impl Unfinished {
         (0..self.node_count).map(move |node| {
             let mut mean = EMPTY;
             for [red, green, blue, density] in rows.iter().filter_map(|row| row.get(node)) {
-                let own = [*red, *green, *blue, density.max(0.0)];
-                mean = [0, 1, 2, 3].map(|channel| mean[channel] + 0.25 * own[channel]);
+                let value = [*red, *green, *blue, density.max(0.0)];
+                mean = [0, 1, 2, 3].map(|channel| mean[channel] + 0.25 * value[channel]);
             }
             mean
         })

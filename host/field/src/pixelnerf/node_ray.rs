@@ -131,8 +131,13 @@ impl NodeRay<'_> {
 
 /// Weights of four nodes at equal distances for a place between the middle two, by the cubic polynomial through them.
 fn cubic_weights(share: f32) -> [f32; 4] {
-    let (before, own, left, behind) = (share + 1.0, share, 1.0 - share, 2.0 - share);
-    [-own * left * behind / 6.0, before * left * behind / 2.0, before * own * behind / 2.0, -before * own * left / 6.0]
+    let (before, along, left, behind) = (share + 1.0, share, 1.0 - share, 2.0 - share);
+    [
+        -along * left * behind / 6.0,
+        before * left * behind / 2.0,
+        before * along * behind / 2.0,
+        -before * along * left / 6.0,
+    ]
 }
 
 #[cfg(test)]

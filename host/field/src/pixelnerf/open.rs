@@ -58,25 +58,25 @@ flags! {
     "samples", "N,N,N|N", parse_samples, Picture, &[],
         "Samples on a ray of a PixelNeRF: in the first pass, in the second pass by weight, and in the second pass \
          around the depth [default: 64,16,16]",
-        |own, counts: [u32; 3]| {
-            let sampling = &mut own.sampling;
+        |options, counts: [u32; 3]| {
+            let sampling = &mut options.sampling;
             [sampling.coarse_count, sampling.importance_count, sampling.depth_count] = counts;
         };
-    "near-far", "NEAR,FAR", parse_near_far, Picture, &[], NEAR_FAR, |own, bounds| own.sampling.near_far = Some(bounds);
+    "near-far", "NEAR,FAR", parse_near_far, Picture, &[], NEAR_FAR, |options, bounds| options.sampling.near_far = Some(bounds);
     "published-depth", "", switch, Picture, &[],
         "Place second-pass samples around the depth of the published code (the sum of weights times depths, too \
          near on rays that are not opaque) instead of the mean depth",
-        |own, ()| own.sampling.published_depth = true;
+        |options, ()| options.sampling.published_depth = true;
     "probe-step", "PIXELS", parse_step, Effort, BOUNDS_OR_EXACT,
         "Probe one ray in every square of this many pixels on a side for empty space [default: 4]",
-        |own, step| own.omissions.empty_space = step;
+        |options, step| options.omissions.empty_space = step;
     "probe-error", "ERROR", parse_error, Effort, BOUNDS_OR_EXACT,
         "Raise the threshold of empty space while the probes' colours change by at most this, root mean square; 1 \
          is from black to white [default: 1/128]",
-        |own, error| own.omissions.probe_error = error;
+        |options, error| options.omissions.probe_error = error;
     "half-latents", "", switch, Effort, BOUNDS_OR_EXACT,
         "Keep the latents that points look up in half precision (f16): half of their memory",
-        |own, ()| own.omissions.half_latents = true;
+        |options, ()| options.omissions.half_latents = true;
 }
 
 /// In the first pass, in the second by weight, and in the second around the depth.
@@ -98,18 +98,18 @@ fn parse_error(text: &str) -> Result<f32, String> {
 fn open(checkpoint: Checkpoint, given: &Given) -> Result<AnyField, OpenError> {
     let mut options = taken(given, PixelNerfOptions::default());
     options.sampling.seed = given.seed;
-    let own = &mut options.omissions;
-    own.unused_views = !given.computes(&VIEWS);
-    own.latent_layers = !given.computes(&LAYERS);
-    own.unseen_points = !given.computes(&BEHIND);
-    own.empty_rays = !given.computes(&RAYS);
-    own.empty_parts = !given.computes(&PARTS);
-    own.hidden_samples = !given.computes(&HIDDEN);
+    let omissions = &mut options.omissions;
+    omissions.unused_views = !given.computes(&VIEWS);
+    omissions.latent_layers = !given.computes(&LAYERS);
+    omissions.unseen_points = !given.computes(&BEHIND);
+    omissions.empty_rays = !given.computes(&RAYS);
+    omissions.empty_parts = !given.computes(&PARTS);
+    omissions.hidden_samples = !given.computes(&HIDDEN);
     if given.computes(&SPACE) {
-        own.empty_space = 0;
+        omissions.empty_space = 0;
     }
     if given.exact {
-        own.probe_error = 0.0;
+        omissions.probe_error = 0.0;
     }
     Ok(AnyField::new(PixelNerf::new(&checkpoint, options)?))
 }

@@ -148,7 +148,7 @@ pub struct PixelNerfOptions {
 impl Options for PixelNerfOptions {
     /// Where both keep the same grids.
     fn encodes_alike(&self, other: &PixelNerfOptions) -> bool {
-        let grids = |own: &PixelNerfOptions| (own.omissions.latent_layers, own.omissions.half_latents);
+        let grids = |options: &PixelNerfOptions| (options.omissions.latent_layers, options.omissions.half_latents);
         grids(self) == grids(other)
     }
 }

@@ -181,7 +181,7 @@ pub(super) fn between(
     }
     let depths = pixels.map(|pixel| picture.depths[pixel]);
     let depth = 0.25 * depths.iter().sum::<f32>();
-    let is_one_surface = depths.iter().all(|own| (own - depth).abs() <= far_difference);
+    let is_one_surface = depths.iter().all(|other| (other - depth).abs() <= far_difference);
     // The mean of two surfaces' depths is on neither.
     Some((mean, if is_one_surface { depth } else { depths[0] }))
 }

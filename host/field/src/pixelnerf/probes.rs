@@ -37,8 +37,8 @@ impl<D: Device> Renderer<'_, D> {
                 // The one choice that is made from whole samples on the host, in f64: once a picture, of few rays.
                 let samples = self.device.download(&samples.values)?;
                 for ray in samples.chunks(count as usize) {
-                    let own = SHARES.map(|share| change(ray, share, &self.background));
-                    changes.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+                    let changed = SHARES.map(|share| change(ray, share, &self.background));
+                    changes.iter_mut().zip(changed).for_each(|(sum, change)| *sum += change);
                 }
             }
         }

@@ -120,7 +120,7 @@ impl<D: Device> Network<'_, D> {
         let mut left_out = 0;
         for Group { views: seeing, weights, points: indices } in groups {
             let cameras: Vec<CameraBlock> = seeing.iter().map(|view| visibility.cameras[*view]).collect();
-            let own = Views {
+            let seeing_views = Views {
                 cameras: self.device.upload(&cameras)?,
                 weights: self.device.upload(&weights)?,
                 latents: seeing.iter().map(|view| views.latents[*view]).collect(),
@@ -128,7 +128,7 @@ impl<D: Device> Network<'_, D> {
             };
             let some: Vec<RayPoint> = indices.iter().map(|index| points[*index]).collect();
             let all = replace(&mut workspace.points, self.device.upload(&some)?);
-            let evaluated = self.evaluate(workspace, &own, some.len() as u32);
+            let evaluated = self.evaluate(workspace, &seeing_views, some.len() as u32);
             workspace.points = all;
             evaluated?;
             left_out += ((views.latents.len() - seeing.len()) * some.len()) as u64;
