@@ -3,41 +3,27 @@
 use super::{BINARY, done, read_json};
 use image::codecs::webp::WebPDecoder;
 use image::{AnimationDecoder, Rgb, RgbImage};
-use libtest_mimic::Trial;
 use serde_json::{Value, json};
 use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::Path;
 use std::process::Command;
 use viewfuse_tests::command::{Outcome, command, files_below, killed_when, names_in, toy, without_progress};
-use viewfuse_tests::trials::{is_required, needing, trial};
+use viewfuse_tests::trials::lacking;
 
-pub(crate) fn trials() -> Vec<Trial> {
-    let is_there = Command::new("ffmpeg").arg("-version").output().is_ok_and(|output| output.status.success());
-    let missing = (!is_there).then(|| "no ffmpeg".to_owned());
-    let real = trial("commands::moving::mp4_by_ffmpeg_shows_the_pictures", mp4_by_ffmpeg_shows_the_pictures);
-    let mut trials = always();
-    trials.push(needing(missing, is_required("VIEWFUSE_REQUIRE_FFMPEG"), real));
-    trials
-}
+viewfuse_tests::trials![
+    a_path_as_animated_webp_and_as_y4m,
+    a_run_that_was_killed_twice_ends_with_the_same_bytes,
+    more_frames_than_a_gif_can_show_keep_their_pace,
+    another_run_begins_anew,
+    an_ffmpeg_gets_the_video_or_there_is_y4m,
+    depths_and_opacity_for_other_programs,
+    camera_paths_from_files;
+    lacking(has_ffmpeg(), "no ffmpeg"), "VIEWFUSE_REQUIRE_FFMPEG" => mp4_by_ffmpeg_shows_the_pictures,
+];
 
-/// Those that need nothing else.
-fn always() -> Vec<Trial> {
-    vec![
-        trial("commands::moving::a_path_as_animated_webp_and_as_y4m", a_path_as_animated_webp_and_as_y4m),
-        trial(
-            "commands::moving::a_run_that_was_killed_twice_ends_with_the_same_bytes",
-            a_run_that_was_killed_twice_ends_with_the_same_bytes,
-        ),
-        trial(
-            "commands::moving::more_frames_than_a_gif_can_show_keep_their_pace",
-            more_frames_than_a_gif_can_show_keep_their_pace,
-        ),
-        trial("commands::moving::another_run_begins_anew", another_run_begins_anew),
-        trial("commands::moving::an_ffmpeg_gets_the_video_or_there_is_y4m", an_ffmpeg_gets_the_video_or_there_is_y4m),
-        trial("commands::moving::depths_and_opacity_for_other_programs", depths_and_opacity_for_other_programs),
-        trial("commands::moving::camera_paths_from_files", camera_paths_from_files),
-    ]
+fn has_ffmpeg() -> bool {
+    Command::new("ffmpeg").arg("-version").output().is_ok_and(|output| output.status.success())
 }
 
 const PATH: &str = "render toy --between 2 6 --frames 5 --size 24x24 --weights error:alpha=1 --device cpu --no-sheets";

@@ -2,24 +2,18 @@
 //! with `VIEWFUSE_REQUIRE_PYTHON=1`. That it is built from the same crates as the command is tested always.
 
 use super::BINARY;
-use libtest_mimic::Trial;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::process::Command;
 use viewfuse_tests::places::repository;
-use viewfuse_tests::trials::{is_required, needing, trial};
 
 /// What has the wheel built and tested.
 const REQUIRE: &str = "VIEWFUSE_REQUIRE_PYTHON";
 
-pub(crate) fn trials() -> Vec<Trial> {
-    let wheel = trial("commands::python::the_wheel_in_an_empty_environment", the_wheel_in_an_empty_environment);
-    let missing = (!is_required(REQUIRE)).then(|| format!("minutes, and the network; {REQUIRE}=1 runs it"));
-    vec![
-        needing(missing, is_required(REQUIRE), wheel),
-        trial("commands::python::it_is_built_from_the_same_crates", it_is_built_from_the_same_crates),
-    ]
-}
+viewfuse_tests::trials![
+    it_is_built_from_the_same_crates;
+    Some(format!("minutes, and the network; {REQUIRE}=1 runs it")), REQUIRE => the_wheel_in_an_empty_environment,
+];
 
 fn the_wheel_in_an_empty_environment() {
     let output = Command::new(repository().join("host/python/test"))

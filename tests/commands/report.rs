@@ -4,35 +4,28 @@
 //! and say why; with `VIEWFUSE_REQUIRE_BROWSER=1` they fail instead. Pictures of the page, to be looked at, are left in
 //! `tmp/report` of the target folder.
 
-use super::browser::{self, Browser, InBrowser};
+use super::browser::{Browser, REQUIRE};
 use super::{done, lab};
-use libtest_mimic::Trial;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, files_below, toy};
 use viewfuse_tests::scenes::Folder;
-use viewfuse_tests::trials::trial;
 
 const SMALL: &str =
     "--size 24x24 --device cpu --weights mean --weights distance:power=2 --weights error:alpha=1,angle=full";
 
-pub(crate) fn trials() -> Vec<Trial> {
-    let mut trials = vec![
-        trial("commands::report::the_page_holds_everything", the_page_holds_everything),
-        trial("commands::report::evaluations_under_way_are_shown", evaluations_under_way_are_shown),
-        trial("commands::report::what_is_no_record_is_refused", what_is_no_record_is_refused),
-        trial("commands::report::a_received_folder_shows_only_its_own", a_received_folder_shows_only_its_own),
-        trial("commands::report::damaged_numbers_are_refused", damaged_numbers_are_refused),
-    ];
-    let tests: [(&str, InBrowser); 3] = [
-        ("report::browser::a_person_sees_what_was_measured", a_person_sees_what_was_measured),
-        ("report::browser::light_and_dark", light_and_dark),
-        ("report::browser::the_looks_at_the_page_can_fail", the_looks_at_the_page_can_fail),
-    ];
-    trials.extend(browser::trials(tests));
-    trials
-}
+viewfuse_tests::trials![
+    the_page_holds_everything,
+    evaluations_under_way_are_shown,
+    what_is_no_record_is_refused,
+    a_received_folder_shows_only_its_own,
+    damaged_numbers_are_refused;
+    Browser::missing(), REQUIRE =>
+        a_person_sees_what_was_measured,
+        light_and_dark,
+        the_looks_at_the_page_can_fail,
+];
 
 /// The sample scene twice, three evaluations of it, a sweep and a training.
 fn runs() -> Folder {
@@ -170,7 +163,8 @@ fn assert_marks(table: &Value) {
     }
 }
 
-fn a_person_sees_what_was_measured(browser: &Browser) {
+fn a_person_sees_what_was_measured() {
+    let browser = &Browser::needed();
     let folder = runs();
     done(folder.path(), REPORT);
     let page = page(folder.path());
@@ -225,7 +219,8 @@ fn a_person_sees_what_was_measured(browser: &Browser) {
 }
 
 /// The negative control: pages on which something is wrong are not taken for good ones.
-fn the_looks_at_the_page_can_fail(browser: &Browser) {
+fn the_looks_at_the_page_can_fail() {
+    let browser = &Browser::needed();
     let folder = toy();
     done(folder.path(), &format!("evaluate toy --protocol random {SMALL} --pictures 0 -o out"));
     done(folder.path(), "report out -o page.html");
@@ -248,7 +243,8 @@ fn the_looks_at_the_page_can_fail(browser: &Browser) {
     assert!(std::panic::catch_unwind(|| assert_marks(table)).is_err());
 }
 
-fn light_and_dark(browser: &Browser) {
+fn light_and_dark() {
+    let browser = &Browser::needed();
     let folder = small_run();
     done(folder.path(), "report run -o page.html");
     let pictures = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report");

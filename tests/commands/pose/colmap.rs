@@ -1,8 +1,7 @@
 //! `--from`: a person's own COLMAP, played by a script that says what the room's poses are, or something else.
 
-use super::{COUNT_ALONE, bare, needs, posed, worst_rotation};
+use super::{COUNT_ALONE, REQUIRE, bare, no_program, no_scripts, posed, worst_rotation};
 use crate::{BINARY, read_json};
-use libtest_mimic::Trial;
 use std::f64::consts::PI;
 use std::fmt::Write;
 use std::fs;
@@ -13,7 +12,6 @@ use viewfuse::scene::rig::Rig;
 use viewfuse_tests::command::{Outcome, assert_command_refused, assert_wrong_arguments, command, files_below};
 use viewfuse_tests::places::data;
 use viewfuse_tests::scenes::Folder;
-use viewfuse_tests::trials::trial;
 
 /// Plays `colmap`: it keeps a list of its calls, and its mapper writes a model that lies beside it, by the features
 /// asked for.
@@ -42,20 +40,12 @@ if [ "$step" = mapper ]; then
 fi
 "#;
 
-pub(super) fn trials() -> Vec<Trial> {
-    let mut all = vec![
-        trial("commands::pose::colmap::python_without_pycolmap", python_without_pycolmap),
-        trial("commands::pose::colmap::not_installed", not_installed),
-    ];
-    if cfg!(unix) {
-        all.extend([
-            trial("commands::pose::colmap::in_place_of_openmvg", in_place_of_openmvg),
-            trial("commands::pose::colmap::what_it_cannot_do_is_said", what_it_cannot_do_is_said),
-            needs("colmap::as_a_second_opinion", as_a_second_opinion),
-        ]);
-    }
-    all
-}
+viewfuse_tests::trials![
+    python_without_pycolmap,
+    not_installed;
+    no_scripts() => in_place_of_openmvg, what_it_cannot_do_is_said;
+    no_scripts().or_else(no_program), REQUIRE => as_a_second_opinion,
+];
 
 /// Writes the room's first photographs and their true poses as COLMAP's text model, each turned about its down axis by
 /// as many degrees as `turn` says.

@@ -1,13 +1,12 @@
 //! A scene of Gaussians as one page, in a browser: its picture beside core's, the weights of the view on the screen, a
 //! hand, a phone.
 
-use super::super::browser::{self, Browser, InBrowser};
+use super::super::browser::{Browser, REQUIRE};
 use super::super::done;
 use super::devtools::{Chromium, Tab};
 use super::keep;
 use glam::{Quat, Vec3};
 use image::{Rgb, RgbImage};
-use libtest_mimic::Trial;
 use serde_json::json;
 use std::path::Path;
 use tempfile::TempDir;
@@ -21,14 +20,12 @@ use viewfuse_core::sources::Sources;
 use viewfuse_core::weighting::{Scheme, weigh};
 use viewfuse_tests::command::toy;
 
-pub(super) fn trials() -> [Trial; 3] {
-    let tests: [(&str, InBrowser); 3] = [
-        ("view::browser::the_page_of_a_command_opens", the_page_of_a_command_opens),
-        ("view::browser::a_page_shows_the_gaussians_of_core", a_page_shows_the_gaussians_of_core),
-        ("view::browser::a_page_follows_a_hand_and_a_finger", a_page_follows_a_hand_and_a_finger),
-    ];
-    browser::trials(tests)
-}
+viewfuse_tests::trials![;
+    Browser::missing(), REQUIRE =>
+        the_page_of_a_command_opens,
+        a_page_shows_the_gaussians_of_core,
+        a_page_follows_a_hand_and_a_finger,
+];
 
 const VIEWS: usize = 5;
 const WIDTH: usize = 240;
@@ -149,7 +146,8 @@ fn weights(tab: &Tab<'_>) -> Vec<f64> {
     list.as_array().expect("weights").iter().map(|own| own.as_f64().expect("a weight")).collect()
 }
 
-fn a_page_shows_the_gaussians_of_core(browser: &Browser) {
+fn a_page_shows_the_gaussians_of_core() {
+    let browser = &Browser::needed();
     let (_folder, address) = written();
     let (scene, cameras) = (scene(), cameras());
     let chromium = Chromium::start(browser);
@@ -178,7 +176,8 @@ fn a_page_shows_the_gaussians_of_core(browser: &Browser) {
     assert_eq!(complaints(&tab), [""; 0]);
 }
 
-fn a_page_follows_a_hand_and_a_finger(browser: &Browser) {
+fn a_page_follows_a_hand_and_a_finger() {
+    let browser = &Browser::needed();
     let (_folder, address) = written();
     let chromium = Chromium::start(browser);
     let tab = chromium.open(&address, [1000, 900], false);
@@ -243,7 +242,8 @@ fn a_page_follows_a_hand_and_a_finger(browser: &Browser) {
 }
 
 /// The page that `optimise` writes, beside `render` with the file that it writes.
-fn the_page_of_a_command_opens(browser: &Browser) {
+fn the_page_of_a_command_opens() {
+    let browser = &Browser::needed();
     let folder = toy();
     for output in ["toy.ply", "toy.html"] {
         done(

@@ -4,7 +4,6 @@ use super::super::{BINARY, assert_near, numbers};
 use super::{done_with_warnings, room, start};
 use image::codecs::webp::WebPDecoder;
 use image::{AnimationDecoder, DynamicImage};
-use libtest_mimic::Trial;
 use serde_json::{Value, json};
 use std::io::Cursor;
 use std::path::Path;
@@ -14,29 +13,28 @@ use viewfuse_tests::devices::vulkan_devices;
 use viewfuse_tests::patience::wait_until;
 use viewfuse_tests::places::{data, repository};
 use viewfuse_tests::scenes::Folder;
-use viewfuse_tests::trials::{is_required, needing, trial};
+use viewfuse_tests::trials::lacking;
 use viewfuse_tests::viewer::{Answer, Connection, Program, request};
 
-pub(super) fn trials() -> Vec<Trial> {
-    let has_vulkan = vulkan_devices().is_ok_and(|(_, adapters)| adapters.iter().any(|own| own.missing.is_empty()));
-    let missing = (!has_vulkan).then(|| "no Vulkan device".to_owned());
-    let on_vulkan = trial("commands::view::a_vulkan_device_shows_the_same", a_vulkan_device_shows_the_same);
-    vec![
-        needing(missing, is_required("VIEWFUSE_REQUIRE_VULKAN"), on_vulkan),
-        trial("commands::view::other_hosts_and_addresses_get_nothing", other_hosts_and_addresses_get_nothing),
-        trial("commands::view::how_much_was_photographed_is_told", how_much_was_photographed_is_told),
-        trial("commands::view::full_pictures_are_those_of_render", full_pictures_are_those_of_render),
-        trial("commands::view::no_view_is_an_error_of_the_server", no_view_is_an_error_of_the_server),
-        trial("commands::view::the_scheme_can_be_chosen_for_the_scene", the_scheme_can_be_chosen_for_the_scene),
-        trial("commands::view::the_newest_request_wins", the_newest_request_wins),
-        trial("commands::view::a_video_has_the_pictures_of_its_path", a_video_has_the_pictures_of_its_path),
-        trial("commands::view::one_video_at_a_time_for_who_waits", one_video_at_a_time_for_who_waits),
-        trial("commands::view::a_video_is_mp4_where_ffmpeg_is", a_video_is_mp4_where_ffmpeg_is),
-        trial("commands::view::ctrl_c_ends_it_and_nothing_is_written", ctrl_c_ends_it_and_nothing_is_written),
-        trial("commands::view::a_taken_port_is_an_error", a_taken_port_is_an_error),
-        trial("commands::view::learned_fields_are_shown", learned_fields_are_shown),
-        trial("commands::view::gaussians_are_shown", gaussians_are_shown),
-    ]
+viewfuse_tests::trials![
+    other_hosts_and_addresses_get_nothing,
+    how_much_was_photographed_is_told,
+    full_pictures_are_those_of_render,
+    no_view_is_an_error_of_the_server,
+    the_scheme_can_be_chosen_for_the_scene,
+    the_newest_request_wins,
+    a_video_has_the_pictures_of_its_path,
+    one_video_at_a_time_for_who_waits,
+    a_video_is_mp4_where_ffmpeg_is,
+    ctrl_c_ends_it_and_nothing_is_written,
+    a_taken_port_is_an_error,
+    learned_fields_are_shown,
+    gaussians_are_shown;
+    lacking(has_vulkan(), "no Vulkan device"), "VIEWFUSE_REQUIRE_VULKAN" => a_vulkan_device_shows_the_same,
+];
+
+fn has_vulkan() -> bool {
+    vulkan_devices().is_ok_and(|(_, adapters)| adapters.iter().any(|adapter| adapter.missing.is_empty()))
 }
 
 fn other_hosts_and_addresses_get_nothing() {
