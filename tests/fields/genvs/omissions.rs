@@ -4,18 +4,16 @@ use super::{
     assert_sound, exact, largest_difference, leaving_out, made, picture_with, recorded, sources, target, weights,
     without_denoiser,
 };
-use std::sync::Arc;
 use viewfuse::device::cpu::Cpu;
+use viewfuse::field::LeftOut;
 use viewfuse::field::genvs::reference::Reference;
 use viewfuse::field::genvs::sampling::{Plan, Steps};
 use viewfuse::field::genvs::{GenvsOptions, Omissions};
-use viewfuse::field::render::{RenderOptions, Stage};
-use viewfuse::field::{LeftOut, On};
 use viewfuse::job::progress::Silent;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::weights::Weights;
-use viewfuse_tests::fields::line;
+use viewfuse_tests::fields::{line, on_sources};
 
 fn in_18_calls() -> Plan {
     let steps = Steps::Fixed { sampler: Sampler::Ipndm, level_count: 18 };
@@ -55,18 +53,15 @@ fn rows_that_no_ray_reaches_are_not_computed() {
         Camera { pinhole, ..camera }
     };
     let targets = [part(16.0, 8), part(-12.0, 4), part(16.0, 32)];
-    let quiet = Silent;
     let with = |omissions| {
         let field = without_denoiser(leaving_out(omissions));
-        let renderer = On { device: &Cpu, field: &field };
-        let options = RenderOptions::default();
-        let mut stage =
-            Stage::of_sources(Arc::new(sources.clone()), &renderer, &options, &quiet).expect("sources on the device");
-        let render = |target: &Camera| {
-            let picture = stage.picture(target, &Weights::mean(3), 0.0, &quiet);
-            (picture.expect("a picture"), line(&stage.record(), "volume rows").left_out)
-        };
-        targets.iter().map(render).collect::<Vec<_>>()
+        on_sources(&sources, &field, &Silent, |stage| {
+            let render = |target: &Camera| {
+                let picture = stage.picture(target, &Weights::mean(3), 0.0, &Silent);
+                (picture.expect("a picture"), line(&stage.record(), "volume rows").left_out)
+            };
+            targets.iter().map(render).collect::<Vec<_>>()
+        })
     };
     let exact = with(Omissions::NONE);
     let few = with(Omissions { unseen_rows: true, ..Omissions::NONE });
@@ -88,20 +83,16 @@ fn an_earlier_frame_saves_calls() {
             ..viewfuse_tests::lorry::orbit(16).camera(2.02, 0.35).expect("a camera")
         },
     ];
-    let quiet = Silent;
     let frames = |reuse| {
         let options = GenvsOptions { omissions: Omissions { reuse, ..Omissions::NONE }, ..exact() };
         let field = made(GenvsOptions { plan: Plan { early_termination: None, ..in_18_calls() }, ..options });
-        let renderer = On { device: &Cpu, field: &field };
-        let options = RenderOptions::default();
-        let mut stage =
-            Stage::of_sources(Arc::new(sources.clone()), &renderer, &options, &quiet).expect("sources on the device");
-        let mut render = |camera| stage.picture(camera, &Weights::mean(2), 0.0, &quiet);
-        let frames = cameras.each_ref().map(|camera| render(camera).expect("a picture"));
-        // A frame of another size begins anew.
-        let smaller = render(&target(8)).expect("a picture");
-        assert_sound(&smaller);
-        (frames, line(&stage.record(), "denoiser calls"))
+        on_sources(&sources, &field, &Silent, |stage| {
+            let mut render = |camera| stage.picture(camera, &Weights::mean(2), 0.0, &Silent).expect("a picture");
+            let frames = cameras.each_ref().map(&mut render);
+            // A frame of another size begins anew.
+            assert_sound(&render(&target(8)));
+            (frames, line(&stage.record(), "denoiser calls"))
+        })
     };
     let (whole, all) = frames(None);
     assert_eq!((all.left_out, all.of, all.switch), (0, 3 * 18, false));
