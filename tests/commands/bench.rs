@@ -13,7 +13,7 @@ fn the_cpu_beside_its_limits() {
     let bench: Value = serde_json::from_str(&printed).expect("JSON");
     let device = &bench["devices"][0];
     assert!(device["device"].as_str().is_some_and(|name| name.starts_with("cpu")), "{device}");
-    let number = |of: &Value, key: &str| of[key].as_f64().unwrap_or(f64::NAN);
+    let number = |record: &Value, key: &str| record[key].as_f64().unwrap_or(f64::NAN);
     for key in ["copy_giga_bytes", "multiply_add_giga_operations", "giga_look_ups"] {
         assert!(number(device, key) > 0.0, "{key}: {device}");
     }

@@ -9,7 +9,7 @@ use viewfuse_tests::command::{assert_wrong_arguments, run, toy};
 
 viewfuse_tests::trials![
     a_bound_on_the_error_is_kept_and_recorded,
-    a_network_keeps_45_decibels_unless_options_say_what_is_left_out,
+    a_network_keeps_45_decibels_unless_options_say_what_is_omitted,
     a_time_that_is_too_short_is_said,
     an_evaluation_says_how_its_bound_is_kept,
     wrong_bounds_are_refused,
@@ -40,15 +40,15 @@ fn a_bound_on_the_error_is_kept_and_recorded() {
     fs::remove_dir_all(folder.path().join("out")).expect("removed");
     done(folder.path(), &format!("render toy {NETWORK} --max-error 0.0316228 -o out"));
     assert!(before == picture());
-    // Nothing may be left out for a bound that only the exact picture keeps.
+    // Nothing may be omitted for a bound that only the exact picture keeps.
     fs::remove_dir_all(folder.path().join("out")).expect("removed");
     done(folder.path(), &format!("render toy {NETWORK} --max-error 119dB -o out"));
     assert!(frames(folder.path()).iter().all(|frame| frame["kept"]["effort"] == "exact"));
 }
 
-/// With what was left out of these test networks before there was a default bound they are 24, 52 and 35 dB from their
+/// With what was omitted by these test networks before there was a default bound they are 24, 52 and 35 dB from their
 /// exact pictures.
-fn a_network_keeps_45_decibels_unless_options_say_what_is_left_out() {
+fn a_network_keeps_45_decibels_unless_options_say_what_is_omitted() {
     let folder = toy();
     let render = |options: &str| {
         if folder.path().join("out").exists() {
@@ -97,7 +97,7 @@ fn an_evaluation_says_how_its_bound_is_kept() {
     let outcome = run(BINARY, folder.path(), &format!("evaluate toy {NETWORK} --weights mean --max-error 30dB"));
     assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
     let all = format!("{}{}", outcome.stdout, outcome.stderr);
-    // Each of the two targets is left out by itself.
+    // Each of the two targets is held out by itself.
     assert_eq!(all.matches("mean: the bound is kept by 1 of 1 pictures: ").count(), 2, "{all}");
 }
 

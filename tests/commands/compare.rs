@@ -27,8 +27,8 @@ fn one_picture_and_folders() {
     assert!(printed.starts_with("1 picture\n"), "{printed}");
     assert_eq!(row(&printed, "psnr")[1..], ["inf", "inf", "toy/rgb/000000.png"]);
     assert_eq!(row(&printed, "ssim")[1..3], ["1.0000", "1.0000"]);
-    for (name, of) in [("000001", "000001"), ("000002", "000007")] {
-        let bytes = std::fs::read(folder.file(&format!("toy/rgb/{of}.png"))).expect("a picture");
+    for (name, shown) in [("000001", "000001"), ("000002", "000007")] {
+        let bytes = std::fs::read(folder.file(&format!("toy/rgb/{shown}.png"))).expect("a picture");
         folder.write(&format!("made/{name}.png"), bytes);
     }
     folder.write("made/notes.txt", "no picture");
@@ -70,11 +70,11 @@ fn scores_are_those_of_render() {
         assert!(printed.starts_with("4 pictures\n") && printed.contains(&format!("({out}/run.json)")), "{printed}");
         assert!(printed.contains("4 of 4 photographs are larger: resampled by area averages"), "{printed}");
         for metric in ["psnr", "ssim"] {
-            let own = scores(metric);
+            let again = scores(metric);
             // A picture with an alpha channel was rounded once more.
             let rounding = if more == "--alpha" { 0.05 } else { 0.0001 };
-            assert_near(number(&printed, metric, 1), own.iter().sum::<f64>() / 4.0, rounding);
-            assert_near(number(&printed, metric, 2), own.iter().copied().fold(f64::INFINITY, f64::min), rounding);
+            assert_near(number(&printed, metric, 1), again.iter().sum::<f64>() / 4.0, rounding);
+            assert_near(number(&printed, metric, 2), again.iter().copied().fold(f64::INFINITY, f64::min), rounding);
         }
         let printed = done(folder.path(), &format!("compare {out}/000020.png toy/rgb/000020.png"));
         assert_near(number(&printed, "psnr", 1), scores("psnr")[0], 0.05);

@@ -72,11 +72,12 @@ fn devices_that_are_not_there_are_refused() {
     );
     let (adapters, problem) = adapters();
     // A number is an index, also where it stands in a device's name.
-    let in_names = adapters.iter().flat_map(|adapter| adapter.name.split(|own: char| !own.is_ascii_digit()));
+    let in_names = adapters.iter().flat_map(|adapter| adapter.name.split(|letter: char| !letter.is_ascii_digit()));
     let is_none = |number: &&str| number.parse().is_ok_and(|number: usize| number >= adapters.len());
     for wanted in in_names.filter(is_none).chain(["99", "'nonsense'", "'v'"]) {
         // Without any, that is what is said.
-        let counted: Vec<String> = adapters.iter().map(|own| format!("{} {}", own.index, own.name)).collect();
+        let counted: Vec<String> =
+            adapters.iter().map(|adapter| format!("{} {}", adapter.index, adapter.name)).collect();
         let are = if counted.len() == 1 { "is" } else { "are" };
         let said = format!("no Vulkan device {wanted}; there {are}: {}", counted.join(", "));
         let device = format!("vulkan:{}", wanted.trim_matches('\''));

@@ -130,10 +130,10 @@ fn two_runs_do_not_mix_in_one_folder() {
     let alone = Folder::new();
     done(folder.path(), &format!("export toy --layout colmap -o {}", alone.path().join("exported").display()));
     let files = |folder: &Path| -> Vec<(String, u64)> {
-        let of = |(path, length): (std::path::PathBuf, u64)| {
+        let named = |(path, length): (std::path::PathBuf, u64)| {
             (path.file_name().expect("a name").to_string_lossy().into_owned(), length)
         };
-        files_below(&folder.join("exported")).into_iter().map(of).collect()
+        files_below(&folder.join("exported")).into_iter().map(named).collect()
     };
     assert_eq!(files(folder.path()), files(alone.path()));
 }
@@ -189,11 +189,11 @@ fn a_target_is_added_to_a_run_of_the_same_settings() {
     let (added, whole) = (record("out"), record("whole"));
     assert_eq!((&added["earlier"], &whole["earlier"]), (&1.into(), &0.into()));
     assert_eq!((targets(&added), &added["settings"]), (targets(&whole), &whole["settings"]));
-    for (own, other) in
+    for (here, other) in
         added["frames"].as_array().expect("frames").iter().zip(whole["frames"].as_array().expect("frames"))
     {
         for key in ["world_from_camera", "weights", "psnr"] {
-            assert_eq!(own[key].to_string().get(..8), other[key].to_string().get(..8), "{key}");
+            assert_eq!(here[key].to_string().get(..8), other[key].to_string().get(..8), "{key}");
         }
     }
     // One of them again: the others stay.
@@ -228,7 +228,7 @@ fn a_target_is_added_to_a_run_of_the_same_settings() {
 
 /// Whether all of these are among others.
 fn whole_of(all: &[(String, Vec<u8>)], others: &[(String, Vec<u8>)]) -> bool {
-    all.iter().all(|own| others.contains(own))
+    all.iter().all(|file| others.contains(file))
 }
 
 /// `--cache` without `--model`: the default field has options, too.

@@ -15,10 +15,10 @@ viewfuse_tests::trials![
     a_picture_of_any_size_a_sheet_and_a_record_without_depth,
     unless_told_otherwise_the_size_is_the_networks,
     options_reach_the_run,
-    exact_leaves_nothing_out,
+    exact_omits_nothing,
     frames_start_from_the_ones_before,
     files_of_either_network,
-    sweeps_samplers_and_what_is_left_out,
+    sweeps_samplers_and_omissions,
 ];
 
 const RENDER: &str = "render toy --targets 20 --views 2 --size 16x16 --device cpu -o out";
@@ -34,8 +34,8 @@ fn picture(folder: &Path, options: &str) -> Vec<u8> {
     fs::read(folder.join("out/000020.png")).expect("a picture")
 }
 
-/// How much was left out, whether it was allowed to, and of how much, by what it is.
-fn left_out(record: &Value, what: &str) -> (u64, bool, u64) {
+/// How much was omitted, whether it was allowed to, and of how much, by what it is.
+fn omitted(record: &Value, what: &str) -> (u64, bool, u64) {
     let lines = record["left_out"].as_array().expect("a list");
     let line = lines.iter().find(|line| line["what"] == what).expect(what);
     let count = |key: &str| line[key].as_u64().expect("a count");
@@ -64,7 +64,7 @@ fn a_picture_of_any_size_a_sheet_and_a_record_without_depth() {
     assert_eq!((&denoising["sampler"], &denoising["levels"]), (&"ipndm".into(), &3.into()));
     assert_eq!((&denoising["calls"], &denoising["saved_calls"]), (&3.into(), &0.into()));
     assert_eq!((&denoising["tolerance"], &denoising["reuse"]), (&Value::Null, &Value::Null));
-    assert!(left_out(&record, "encoded views").1 && left_out(&record, "volume rows").1);
+    assert!(omitted(&record, "encoded views").1 && omitted(&record, "volume rows").1);
 }
 
 fn unless_told_otherwise_the_size_is_the_networks() {
@@ -91,24 +91,24 @@ fn options_reach_the_run() {
     assert_eq!(denoising("--steps 3 --compute calls")["early_termination"], Value::Null);
 }
 
-fn exact_leaves_nothing_out() {
+fn exact_omits_nothing() {
     let scene = toy();
     let exact = record(scene.path(), "--model genvs:small --exact --weights distance:power=3");
     let denoising = &exact["denoising"];
     assert_eq!((&denoising["sampler"], &denoising["levels"]), (&"heun".into(), &25.into()));
     assert_eq!((&denoising["calls"], &denoising["saved_calls"]), (&49.into(), &0.into()));
-    assert_eq!(left_out(&exact, "encoded views"), (0, false, 2));
-    assert_eq!(left_out(&exact, "volume rows"), (0, false, 128));
-    assert_eq!(left_out(&exact, "denoiser calls"), (0, false, 49));
+    assert_eq!(omitted(&exact, "encoded views"), (0, false, 2));
+    assert_eq!(omitted(&exact, "volume rows"), (0, false, 128));
+    assert_eq!(omitted(&exact, "denoiser calls"), (0, false, 49));
     let shorter = record(scene.path(), "--model genvs:small --exact --steps 2");
     assert_eq!((&shorter["denoising"]["sampler"], &shorter["denoising"]["calls"]), (&"heun".into(), &3.into()));
     let rows = record(scene.path(), "--model genvs:small --compute rows --steps 1");
-    assert_eq!(left_out(&rows, "volume rows"), (0, false, 128));
+    assert_eq!(omitted(&rows, "volume rows"), (0, false, 128));
     let halves = record(scene.path(), "--model genvs:small --half-volumes --steps 1");
-    let (bytes, is_on, of) = left_out(&halves, "volume bytes");
-    assert!(is_on && bytes > 0 && 2 * bytes == of, "{bytes} of {of}");
-    assert_eq!((left_out(&halves, "volume rows").1, left_out(&rows, "volume bytes").0), (false, 0));
-    assert!(left_out(&rows, "encoded views").1 && left_out(&rows, "denoiser calls").1);
+    let (bytes, is_on, total) = omitted(&halves, "volume bytes");
+    assert!(is_on && bytes > 0 && 2 * bytes == total, "{bytes} of {total}");
+    assert_eq!((omitted(&halves, "volume rows").1, omitted(&rows, "volume bytes").0), (false, 0));
+    assert!(omitted(&rows, "encoded views").1 && omitted(&rows, "denoiser calls").1);
 }
 
 fn frames_start_from_the_ones_before() {
@@ -160,7 +160,7 @@ fn files_of_either_network() {
     assert_refused(BINARY, folder, "render toy --targets 20 --model other.safetensors -o new", &parts);
 }
 
-fn sweeps_samplers_and_what_is_left_out() {
+fn sweeps_samplers_and_omissions() {
     let scene = toy();
     let folder = scene.path();
     let arguments = "pareto toy --targets 20,21 --views 2 --model genvs:small --size 16x16 --samples 8 --repeat 1 --device cpu -o out";
@@ -179,7 +179,7 @@ fn sweeps_samplers_and_what_is_left_out() {
     let all = all.into_iter().chain(["all, half the size", "all, reuse 20", "all, reuse 2"]);
     assert_eq!(words, all.collect::<Vec<_>>());
     assert!(words.iter().all(|setting| printed.contains(setting)), "{printed}");
-    let point = |setting: &str| &points[words.iter().position(|own| *own == setting).expect(setting)];
+    let point = |setting: &str| &points[words.iter().position(|word| *word == setting).expect(setting)];
     let psnr = |setting: &str| point(setting)["versus_exact"]["psnr"].as_f64().expect("not equal");
     let calls = |setting: &str| point(setting)["denoising"]["calls"].as_u64().expect("a count");
     // For both targets.

@@ -96,13 +96,13 @@ fn the_few_sources_of_a_path() {
     let share = numbers(&together["share"]);
     assert!(share[0] >= share[1] && share[1] > 0.0 && share[0] < 1.0, "{share:?}");
     // Each target alone has more of the weight than of what serves all.
-    let own: Vec<f64> = selected["targets"]
+    let numbers: Vec<f64> = selected["targets"]
         .as_array()
         .expect("targets")
         .iter()
         .map(|one| one["share"].as_f64().expect("a share"))
         .collect();
-    assert!(own.iter().sum::<f64>() / 12.0 >= share[0] - 1.0e-6);
+    assert!(numbers.iter().sum::<f64>() / 12.0 >= share[0] - 1.0e-6);
 }
 
 fn labels_name_schemes() {

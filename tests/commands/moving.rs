@@ -68,7 +68,7 @@ fn a_path_as_animated_webp_and_as_y4m() {
             let shown = rgb_of(&frame, 24, x as usize, y as usize);
             own.iter()
                 .zip(shown)
-                .for_each(|(own, shown)| assert!((f64::from(*own) - shown).abs() < 3.0, "{own} {shown}"));
+                .for_each(|(level, shown)| assert!((f64::from(*level) - shown).abs() < 3.0, "{level} {shown}"));
         }
     }
     assert!(video.read_frame().is_err(), "a sixth frame");
@@ -113,7 +113,7 @@ fn more_frames_than_a_gif_can_show_keep_their_pace() {
     while let Some(frame) = decoder.read_next_frame().expect("a frame") {
         delays.push(frame.delay);
     }
-    // Five frames of 1/120 s: those that would be shown for less than 2 hundredths are left out.
+    // Five frames of 1/120 s: those that would be shown for less than 2 hundredths are dropped.
     assert_eq!(delays, [2, 2]);
 }
 
@@ -210,11 +210,11 @@ fn mp4_by_ffmpeg_shows_the_pictures() {
         levels.sum::<f64>() / f64::from(3 * 63 * 63)
     };
     for (at, frame) in frames.iter().enumerate() {
-        let own = difference(frame, &pictures[at]);
-        assert!(own < 6.0, "frame {at} differs by {own}");
+        let apart = difference(frame, &pictures[at]);
+        assert!(apart < 6.0, "frame {at} differs by {apart}");
         // It is that picture and no other.
         let other = difference(frame, &pictures[(at + 2) % 5]);
-        assert!(other > 1.5 * own, "frame {at}: {own}, another picture {other}");
+        assert!(other > 1.5 * apart, "frame {at}: {apart}, another picture {other}");
     }
 }
 
@@ -295,12 +295,12 @@ fn depths_and_opacity_for_other_programs() {
     let opaque = with_alpha.pixels().filter(|pixel| pixel[3] == 255).count();
     let empty = with_alpha.pixels().filter(|pixel| pixel[3] == 0).count();
     assert!(opaque > 100 && empty > 300, "{opaque} {empty}");
-    for (own, plain) in with_alpha.pixels().zip(plain.pixels()) {
-        let alpha = f64::from(own[3]) / 255.0;
+    for (pixel, plain) in with_alpha.pixels().zip(plain.pixels()) {
+        let alpha = f64::from(pixel[3]) / 255.0;
         for channel in 0..3 {
-            let mixed = alpha * f64::from(own[channel]) + (1.0 - alpha) * background[channel];
+            let mixed = alpha * f64::from(pixel[channel]) + (1.0 - alpha) * background[channel];
             // Faint pixels round their alpha.
-            assert!((mixed - f64::from(plain[channel])).abs() <= 2.0, "{own:?} over the background is not {plain:?}");
+            assert!((mixed - f64::from(plain[channel])).abs() <= 2.0, "{pixel:?} over the background is not {plain:?}");
         }
     }
 }

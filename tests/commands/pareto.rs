@@ -9,7 +9,7 @@ use viewfuse::evaluate::pareto::front::best_for_their_time;
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, command, names_in, toy};
 
 viewfuse_tests::trials![
-    sweeps_what_a_network_leaves_out,
+    sweeps_what_a_network_omits,
     sweeps_the_field_without_a_network,
     targets_without_photographs_have_no_loss,
     bad_input_is_refused,
@@ -71,7 +71,7 @@ fn check_plot(folder: &Path) -> String {
     plot
 }
 
-fn sweeps_what_a_network_leaves_out() {
+fn sweeps_what_a_network_omits() {
     let scene = toy();
     let folder = scene.path();
     let printed = done(folder, &format!("{NETWORK} -o out"));
@@ -95,7 +95,7 @@ fn sweeps_what_a_network_leaves_out() {
         "all, 8+4+4",
         "all, 16+0+0",
     ] {
-        assert_eq!(settings.iter().filter(|own| **own == setting).count(), 1, "{setting} in {settings:?}");
+        assert_eq!(settings.iter().filter(|other| **other == setting).count(), 1, "{setting} in {settings:?}");
         assert!(printed.contains(setting), "{setting} in\n{printed}");
     }
     for row in &rows {
@@ -106,14 +106,14 @@ fn sweeps_what_a_network_leaves_out() {
         assert_eq!(row["repeatable"], "1", "{row:?}");
         assert!(number(row, "psnr_truth_db") > 5.0, "{row:?}");
     }
-    let row = |setting: &str| &rows[settings.iter().position(|own| *own == setting).expect("a setting")];
+    let row = |setting: &str| &rows[settings.iter().position(|other| *other == setting).expect("a setting")];
     assert_eq!((row("exact")["psnr_exact_db"].as_str(), number(row("exact"), "gain")), ("inf", 1.0));
     assert_eq!(number(row("exact"), "first_pass_samples_left_out"), 0.0);
     assert_eq!(number(row("exact"), "second_pass_samples_left_out"), 0.0);
     // Rounding shows: the difference is taken before 8 bits.
     let layers = row("latent layers");
     assert!(number(layers, "largest_difference") > 0.0 && number(layers, "psnr_exact_db") > 90.0, "{layers:?}");
-    // What is left out is counted, and fewer samples cost more.
+    // What is omitted is counted, and fewer samples cost more.
     assert!(number(row("all"), "first_pass_samples_left_out") > 0.3 * number(row("all"), "first_pass_samples_of"));
     let few = number(row("all, 2+1+1"), "psnr_exact_db");
     assert!(few < number(row("all"), "psnr_exact_db") && few < 40.0, "{few}");
@@ -150,7 +150,7 @@ fn sweeps_the_field_without_a_network() {
     let rows = table(folder);
     let settings: Vec<&str> = rows.iter().map(|row| row["setting"].as_str()).collect();
     assert_eq!(settings.iter().filter(|setting| **setting == "exact").count(), 2, "{settings:?}");
-    let row = |setting: &str| &rows[settings.iter().position(|own| *own == setting).expect("a setting")];
+    let row = |setting: &str| &rows[settings.iter().position(|other| *other == setting).expect("a setting")];
     assert!(number(row("sources 1/4"), "psnr_exact_db") < number(row("early termination 1/256"), "psnr_exact_db"));
     let record = record(folder);
     assert_eq!(record["devices"][1]["exact_versus_first"]["root_mean_square"], 0.0);

@@ -53,7 +53,7 @@ viewfuse_tests::trials![
     bare_photographs_say_how;
     no_program(), REQUIRE =>
         eight_photographs_to_a_picture,
-        what_does_not_belong_is_left_out_by_name,
+        what_does_not_belong_is_excluded_by_name,
         sizes_and_orientations_may_differ,
         a_step_leaves_few_enough,
         photographs_of_nothing_in_common,
@@ -113,9 +113,9 @@ fn worst_rotation(scene: &Scene) -> f32 {
     let mut worst = 0.0_f32;
     for a in &scene.views {
         for b in &scene.views {
-            let (own, true_one) = (relative(scene, &a.name, &b.name), relative(&known, &a.name, &b.name));
+            let (found, true_one) = (relative(scene, &a.name, &b.name), relative(&known, &a.name, &b.name));
             // trace(A B^T) = 1 + 2 cos
-            let trace: f32 = own.iter().zip(&true_one).map(|(own, true_one)| own.dot(*true_one)).sum();
+            let trace: f32 = found.iter().zip(&true_one).map(|(row, true_one)| row.dot(*true_one)).sum();
             worst = worst.max((0.5 * (trace - 1.0)).clamp(-1.0, 1.0).acos().to_degrees());
         }
     }
@@ -151,7 +151,7 @@ fn eight_photographs_to_a_picture() {
     assert!(psnr > 21.0, "{psnr} dB");
 }
 
-fn what_does_not_belong_is_left_out_by_name() {
+fn what_does_not_belong_is_excluded_by_name() {
     let folder = bare(0..5);
     let cut = room(5);
     folder.write("bare/cut.jpg", &cut[..cut.len() / 2]);
@@ -238,7 +238,7 @@ fn ctrl_c_leaves_nothing() {
     };
     let threads_have = || {
         let tasks = fs::read_dir(format!("/proc/{process}/task")).into_iter().flatten().flatten();
-        tasks.into_iter().any(|task| fs::read_to_string(task.path().join("children")).is_ok_and(|own| !own.is_empty()))
+        tasks.into_iter().any(|task| fs::read_to_string(task.path().join("children")).is_ok_and(|all| !all.is_empty()))
     };
     wait_while_running(&mut child, || has_child() || threads_have());
     interrupt(child, "-INT");

@@ -58,7 +58,8 @@ fn it_is_built_from_the_same_crates() {
     }
     assert!(needed.len() > 60, "{needed:?}");
     for (name, version, needs) in of_python.iter().filter(|(name, ..)| needed.contains(name.as_str())) {
-        let versions: Vec<&String> = ours.iter().filter(|own| own.0 == *name).map(|own| &own.1).collect();
+        let versions: Vec<&String> =
+            ours.iter().filter(|package| package.0 == *name).map(|package| &package.1).collect();
         assert!(versions.contains(&version), "{name}: {version}, and {versions:?} in Cargo.lock");
         let packages = metadata["packages"].as_array().expect("packages");
         let Some(package) = packages.iter().find(|package| package["name"] == name.as_str()) else { continue };

@@ -9,7 +9,7 @@ use viewfuse_tests::command::{Outcome, change_poses, names_in, run, toy};
 
 viewfuse_tests::trials![
     writes_a_picture_a_depth_map_a_sheet_and_a_record,
-    leaves_out_what_counts_little,
+    drops_what_counts_little,
     orbits,
     an_orbit_stays_where_photographs_are,
     cameras_of_a_map_stay_in_its_coordinates,
@@ -59,7 +59,7 @@ fn writes_a_picture_a_depth_map_a_sheet_and_a_record() {
     let record = record(folder, "out/deeper");
     assert_eq!((&record["seed"], &record["scene"], &record["size"]), (&7.into(), &"toy".into(), &[64, 64][..].into()));
     assert!(record["device"].as_str().is_some_and(|device| device.starts_with("cpu")), "{record}");
-    // The default is the choice for the scene: six sources were left out, and the best scheme is used.
+    // The default is the choice for the scene: six sources were held out, and the best scheme is used.
     assert_eq!(record["chosen"]["left_out"].as_array().map(Vec::len), Some(6), "{}", record["chosen"]);
     let candidates = record["chosen"]["candidates"].as_array().expect("what was tried");
     assert!(candidates.iter().any(|candidate| candidate["weighting"] == record["weighting"]), "{record}");
@@ -87,23 +87,23 @@ fn writes_a_picture_a_depth_map_a_sheet_and_a_record() {
     assert!(depths.iter().all(|z| *z == 0.0 || (0.7..1.9).contains(z)));
 }
 
-fn leaves_out_what_counts_little() {
+fn drops_what_counts_little() {
     let scene = toy();
     done(scene.path(), "render toy --targets 20 --size 32x32 --leave-out 0.2 --weights error:alpha=1 -o out");
     let record = record(scene.path(), "out");
     assert_eq!((&record["weighting"], &record["chosen"]), (&"error:alpha=1".into(), &Value::Null));
     let frame = &record["frames"][0];
     let (used, before) = (numbers(&frame["weights"]), numbers(&frame["weights_before"]));
-    let (sources, left_out) = (texts(&record["sources"]), texts(&frame["left_out"]));
-    assert!(!left_out.is_empty() && left_out.len() < 23);
-    let omitted: f64 = (0..23).filter(|&view| left_out.contains(&sources[view])).map(|view| before[view]).sum();
+    let (sources, dropped) = (texts(&record["sources"]), texts(&frame["left_out"]));
+    assert!(!dropped.is_empty() && dropped.len() < 23);
+    let omitted: f64 = (0..23).filter(|&view| dropped.contains(&sources[view])).map(|view| before[view]).sum();
     assert!(omitted <= 0.2 + 1.0e-6);
     assert_near(frame["left_out_weight"].as_f64().expect("a number"), omitted, 1.0e-6);
     assert_near(used.iter().sum(), 1.0, 1.0e-5);
-    let most_left_out = (0..23).filter(|&v| left_out.contains(&sources[v])).map(|v| before[v]).fold(0.0, f64::max);
+    let most_dropped = (0..23).filter(|&v| dropped.contains(&sources[v])).map(|v| before[v]).fold(0.0, f64::max);
     for view in 0..23 {
-        assert_eq!(used[view] == 0.0, left_out.contains(&sources[view]), "view {view}");
-        assert!(used[view] == 0.0 || before[view] >= most_left_out, "view {view} counts less and was kept");
+        assert_eq!(used[view] == 0.0, dropped.contains(&sources[view]), "view {view}");
+        assert!(used[view] == 0.0 || before[view] >= most_dropped, "view {view} counts less and was kept");
     }
 }
 
@@ -158,7 +158,7 @@ fn an_orbit_stays_where_photographs_are() {
     let full = shares("full");
     assert!(full.iter().filter(|share| **share < 0.1).count() >= 2, "{full:?}");
     let warnings = record(scene.path(), "full")["warnings"].clone();
-    assert!(texts(&warnings).iter().any(|own| own.contains(warning)), "{warnings}");
+    assert!(texts(&warnings).iter().any(|text| text.contains(warning)), "{warnings}");
 }
 
 fn cameras_of_a_map_stay_in_its_coordinates() {

@@ -193,8 +193,9 @@ fn a_person_sees_what_was_measured() {
     let row = printed.lines().find(|line| line.starts_with(" distance:power=2")).expect("a row");
     let words = |text: &str| text.replace(['*', '~'], "").split_whitespace().map(str::to_owned).collect::<Vec<_>>();
     let rows = views[0]["tables"][3]["rows"].as_array().expect("rows");
-    let own = rows.iter().filter_map(Value::as_array).find(|row| row[0]["text"] == "distance:power=2").expect("a row");
-    let shown: Vec<String> = own.iter().flat_map(|cell| words(cell["text"].as_str().expect("a text"))).collect();
+    let cells =
+        rows.iter().filter_map(Value::as_array).find(|row| row[0]["text"] == "distance:power=2").expect("a row");
+    let shown: Vec<String> = cells.iter().flat_map(|cell| words(cell["text"].as_str().expect("a text"))).collect();
     assert_eq!(shown, words(row));
     // What is bold has its mark on the terminal, and nothing else.
     let counted = done(folder.path(), &format!("evaluate toy lorry --protocol count:sources=2+4+8 {SMALL} -o count"));
@@ -203,7 +204,7 @@ fn a_person_sees_what_was_measured() {
     for (printed, tables) in [(&counted, &tables[..3]), (&printed, &tables[3..4])] {
         let rows = tables.iter().flat_map(|table| table["rows"].as_array().expect("rows").iter());
         let schemes: Vec<&str> = rows.clone().filter_map(|row| row[0]["text"].as_str()).collect();
-        let is_row = |line: &&str| schemes.iter().any(|own| line.trim_start().starts_with(&format!("{own} ")));
+        let is_row = |line: &&str| schemes.iter().any(|scheme| line.trim_start().starts_with(&format!("{scheme} ")));
         let lines: Vec<&str> = printed.lines().filter(is_row).collect();
         assert_eq!(lines.len(), schemes.len(), "{printed}");
         for (row, line) in rows.zip(lines) {
@@ -260,7 +261,7 @@ fn light_and_dark() {
         let brightness = (background[0] + background[1] + background[2]) / 3;
         assert!(if is_dark { brightness < 60 } else { brightness > 240 }, "{name}: {background:?}");
         let far = |pixel: &image::Rgb<u8>| {
-            pixel.0.iter().zip(background).any(|(own, other)| u32::from(*own).abs_diff(other) > 120)
+            pixel.0.iter().zip(background).any(|(level, other)| u32::from(*level).abs_diff(other) > 120)
         };
         assert!(picture.pixels().filter(|pixel| far(pixel)).count() > 1000, "{name} shows nothing");
     }

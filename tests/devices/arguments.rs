@@ -82,8 +82,8 @@ fn arrays_of_other_elements_are_refused(candidate: &Candidate) -> Result<(), Fai
 
 fn arrays_of_another_device_are_refused(candidate: &Candidate) -> Result<(), Failed> {
     let (gpu, other) = (candidate.gpu(&GpuOptions::default())?, candidate.gpu(&GpuOptions::default())?);
-    let [own, foreign] = [gpu.zeros::<f32>(6)?, other.zeros::<f32>(6)?];
-    let (downloaded, arrays) = (gpu.download(&foreign), [own.bind(), foreign.bind(), own.bind()]);
+    let [ours, foreign] = [gpu.zeros::<f32>(6)?, other.zeros::<f32>(6)?];
+    let (downloaded, arrays) = (gpu.download(&foreign), [ours.bind(), foreign.bind(), ours.bind()]);
     let dispatched = gpu.dispatch(Kernel::FuseViews, bytes_of(&BLOCK), 0..3, &arrays);
     for outcome in [downloaded.map(|_| ()), dispatched] {
         let is_refused = matches!(&outcome, Err(VulkanError::OtherDevice(_, owner)) if *owner == other.name());

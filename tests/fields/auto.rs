@@ -111,11 +111,11 @@ fn the_choice_is_the_best_that_was_tried_or_the_default() -> Result<(), Box<dyn 
     let given_up = |candidate: &&auto::Candidate| candidate.scores.len() < held_out.len();
     assert!(candidates.iter().filter(given_up).all(|candidate| candidate.psnr.is_none()), "{candidates:?}");
     let score = |candidate: &auto::Candidate| candidate.psnr;
-    let own = candidates
+    let tried = candidates
         .iter()
         .find(|one| one.weighting == weighting.to_string() && one.options.settings() == options.settings());
-    let own = own.map(score).ok_or("the choice was tried")?;
-    assert!(own >= score(&candidates[0]), "{own:?} is below the default");
+    let psnr = tried.map(score).ok_or("the choice was tried")?;
+    assert!(psnr >= score(&candidates[0]), "{psnr:?} is below the default");
     let expected = chosen.expected(&frames[0]).ok_or("a score to expect")?;
     let truth = frames[0].truth.as_ref().ok_or("a truth")?.psnr;
     println!("expected {expected:?}, true {truth:.2} dB");

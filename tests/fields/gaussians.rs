@@ -108,10 +108,10 @@ fn a_bound_on_the_error_is_kept_with_fewer_iterations() {
     }
 }
 
-/// Few photographs of an object: its sources that are left out are better with Gaussians; of many, the hull alone is, and
+/// Few photographs of an object: its held-out sources are better with Gaussians; of many, the hull alone is, and
 /// schemes are tried only then.
 #[test]
-fn the_hull_is_mixed_with_gaussians_where_sources_that_are_left_out_gain() {
+fn the_hull_is_mixed_with_gaussians_where_held_out_sources_gain() {
     let options =
         RenderOptions { background: viewfuse::scene::photographs::BackgroundChoice::Auto, ..RenderOptions::default() };
     let mixture = |sources: &str| {

@@ -30,8 +30,8 @@ const SCHEMES: [(&str, bool); 10] = [
 ];
 /// Shares of the way to the next photograph, from the middle to the photograph itself.
 const AWAY: [f32; 7] = [0.5, 0.3, 0.15, 0.08, 0.03, 0.01, 0.0];
-/// How much of the weight is omitted, and with how many of the schemes it is tried.
-const LEFT_OUT: [(f32, usize); 3] = [(0.01, 10), (0.0, 3), (0.2, 3)];
+/// How much of the weight is dropped, and with how many of the schemes it is tried.
+const DROPPED: [(f32, usize); 3] = [(0.01, 10), (0.0, 3), (0.2, 3)];
 /// Most decibels that a picture loses as its camera comes nearer.
 const MAX_LOSS: f64 = 0.5;
 /// Decibels of a picture at a photograph that has all the weight, and share of it that two photographs show.
@@ -55,7 +55,7 @@ fn frame(stage: &mut Stage<'_>, weighting: &Weighting, camera: Camera) -> Frame 
 
 #[test]
 fn pictures_become_the_photograph_as_the_camera_comes_nearer() {
-    for (leave_out, count) in LEFT_OUT {
+    for (leave_out, count) in DROPPED {
         nearer_is_better(leave_out, &SCHEMES[..count]);
     }
 }
@@ -85,7 +85,7 @@ fn nearer(stage: &mut Stage<'_>, scene: &Scene, leave_out: f32, (scheme, is_all)
     ] {
         let frames = AWAY.map(|share| frame(stage, &weighting, away(&camera, to, ahead, share)));
         let scores = frames.each_ref().map(|frame| psnr_of_seen(&frame.picture, &photograph, None));
-        let way = format!("{scheme}, {leave_out} left out, {way}");
+        let way = format!("{scheme}, {leave_out} dropped, {way}");
         println!("{way}: {scores:.1?}");
         let worst = scores.windows(2).map(|pair| pair[0] - pair[1]).fold(f64::MIN, f64::max);
         assert!(worst <= MAX_LOSS, "{way}: {worst:.1} dB lost on the way, {scores:.1?}");

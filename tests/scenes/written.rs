@@ -390,7 +390,7 @@ fn hostile_names_are_given_back_or_refused() {
                     let read = Scene::open(&path).unwrap_or_else(|error| panic!("{layout}: {error}"));
                     assert_eq!(read.views.len(), 2, "{layout}: {name:?}");
                     for (index, view) in scene.views.iter().enumerate() {
-                        let back = read.views.iter().position(|own| own.name == view.name);
+                        let back = read.views.iter().position(|known| known.name == view.name);
                         let back = back.unwrap_or_else(|| panic!("{layout}: {name:?}: {:?}", self::names(&read)));
                         assert_eq!(scene.photograph(index).ok(), read.photograph(back).ok(), "{layout}: {name:?}");
                         let centre = |scene: &Scene, view: usize| scene.views[view].camera.pose.centre_world();

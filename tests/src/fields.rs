@@ -71,7 +71,7 @@ pub fn picture<D: Device + Sync, F: Field + Sync>(
     Ok((picture, stage.record()))
 }
 
-/// What a record says of something that may be left out.
+/// What a record says of something that may be omitted.
 ///
 /// # Panics
 /// If it says nothing.

@@ -115,8 +115,8 @@ pub fn png_checksum(bytes: &[u8]) -> u32 {
 
 /// A piece of a PNG.
 pub fn png_chunk(kind: &[u8], content: &[u8]) -> Vec<u8> {
-    let own = [kind, content].concat();
-    [&(content.len() as u32).to_be_bytes()[..], &own, &png_checksum(&own).to_be_bytes()].concat()
+    let chunk = [kind, content].concat();
+    [&(content.len() as u32).to_be_bytes()[..], &chunk, &png_checksum(&chunk).to_be_bytes()].concat()
 }
 
 /// Numbers with blanks between them.

@@ -105,7 +105,8 @@ fn in_place_of_openmvg() {
     assert!(worst_rotation(&scene) < 0.1 && scene.points.len() == 40, "{}", worst_rotation(&scene));
     let record = read_json(folder.path().join("posed/pose.json"));
     let attempts = record["attempts"].as_array().expect("a list");
-    let told: Vec<_> = attempts.iter().map(|own| (own["solver"].as_str(), own["features"].as_str())).collect();
+    let told: Vec<_> =
+        attempts.iter().map(|attempt| (attempt["solver"].as_str(), attempt["features"].as_str())).collect();
     assert_eq!(told, [(Some("COLMAP 9.8.7"), Some("sift")), (Some("COLMAP 9.8.7"), Some("dsp-sift"))]);
     // What it was asked: the known camera and the seed, and of the options only those that it has.
     let calls = fs::read_to_string(folder.path().join("bin/calls")).expect("calls");

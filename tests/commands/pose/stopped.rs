@@ -38,7 +38,7 @@ fn asked(folder: &Folder, run: &str) -> usize {
 /// The answers that are kept for `posed`.
 fn kept(folder: &Folder) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder.path().join(".posed.attempts")).into_iter().flatten().flatten();
-    entries.map(|entry| entry.path()).filter(|path| path.extension().is_some_and(|own| own == "json")).collect()
+    entries.map(|entry| entry.path()).filter(|path| path.extension().is_some_and(|end| end == "json")).collect()
 }
 
 /// The first run has left nothing but finished attempts; the second one makes the others, and what it writes is what a

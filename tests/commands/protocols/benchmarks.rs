@@ -130,8 +130,8 @@ fn dtu_takes_the_published_views() {
 }
 
 fn blender_takes_views_of_its_splits() {
-    let of = |split, count: usize| (0..count).map(move |view| (format!("{split}_r_{view}"), Some(split)));
-    let whole = scene(of(Split::Train, 100).chain(of(Split::Validation, 5)).chain(of(Split::Test, 200)));
+    let views = |split, count: usize| (0..count).map(move |view| (format!("{split}_r_{view}"), Some(split)));
+    let whole = scene(views(Split::Train, 100).chain(views(Split::Validation, 5)).chain(views(Split::Test, 200)));
     let job = &jobs("blender:8", &whole)[0];
     assert_eq!(job.sources, [2, 16, 26, 55, 73, 75, 86, 93]);
     assert_eq!((job.targets.len(), job.targets[0], job.targets[1], job.targets[24]), (25, 105, 113, 297));
@@ -150,7 +150,7 @@ fn blender_takes_views_of_its_splits() {
         ),
         "{error}"
     );
-    let half = scene(of(Split::Train, 100));
+    let half = scene(views(Split::Train, 100));
     assert!(refusal("blender:8", &half).contains("has no views of a test split"), "{}", refusal("blender:8", &half));
 }
 
@@ -174,8 +174,8 @@ fn blender_on_a_scene_in_its_layout() {
         folder.write(&format!("lorry/transforms_{split}.json"), transforms.to_string());
     }
     let scene = Scene::open(folder.path().join("lorry")).expect("a scene");
-    let of = |split| scene.views.iter().filter(|view| view.split == Some(split)).count();
-    assert_eq!([Split::Train, Split::Validation, Split::Test].map(of), [8, 1, 4]);
+    let count = |split| scene.views.iter().filter(|view| view.split == Some(split)).count();
+    assert_eq!([Split::Train, Split::Validation, Split::Test].map(count), [8, 1, 4]);
     assert!(scene.photograph(0).is_ok_and(|photograph| photograph.has_alpha));
     let expected = sphere.pinhole;
     assert!(scene.views.iter().all(|view| (view.camera.pinhole.focal()[0] - expected.focal()[0]).abs() < 1e-4));

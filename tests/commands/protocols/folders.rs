@@ -236,11 +236,12 @@ fn pictures_show_sources_predictions_and_truth() {
             image::open(pictures.join(file)).unwrap_or_else(|error| panic!("{file}: {error}")).to_rgb8()
         };
         assert_eq!(open(&shown["truth"]).dimensions(), (24, 24));
-        let names: Vec<&Value> = shown["sources"].as_array().expect("sources").iter().map(|own| &own["name"]).collect();
+        let names: Vec<&Value> =
+            shown["sources"].as_array().expect("sources").iter().map(|source| &source["name"]).collect();
         assert_eq!(names, job["sources"].as_array().expect("sources").iter().collect::<Vec<_>>());
         let schemes = shown["schemes"].as_array().expect("schemes");
         assert_eq!(
-            schemes.iter().map(|own| own["scheme"].as_str()).collect::<Vec<_>>(),
+            schemes.iter().map(|scheme| scheme["scheme"].as_str()).collect::<Vec<_>>(),
             [Some("mean"), Some("error:alpha=1"), Some("l1")]
         );
         for scheme in schemes {

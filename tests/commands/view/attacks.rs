@@ -65,8 +65,8 @@ impl Attacked {
 
     /// An open tab and a new one get what they ask for.
     fn tabs_are_served(&self, open: &mut Connection<'_>) {
-        let own = [("Host", self.program.host.as_str())];
-        assert_eq!(open.ask("GET", &format!("{}status", self.program.path), &own, b"").status, 200);
+        let headers = [("Host", self.program.host.as_str())];
+        assert_eq!(open.ask("GET", &format!("{}status", self.program.path), &headers, b"").status, 200);
         let start = &self.program.scene()["start"];
         self.program.connect().picture(&request("new", start, true)).unpacked();
     }
@@ -132,9 +132,9 @@ fn a_slow_body_holds_up_nobody() {
     let mut attacked = Attacked::start();
     let path = format!("{}picture", attacked.program.path);
     let mut open = attacked.program.connect();
-    let own = &attacked.program.host;
+    let host = &attacked.program.host;
     let slow: Vec<TcpStream> =
-        [("/", "evil.example", 1000), (&path, own, 1000), ("/", "evil.example", 5000), (&path, own, 5000)]
+        [("/", "evil.example", 1000), (&path, host, 1000), ("/", "evil.example", 5000), (&path, host, 5000)]
             .into_iter()
             .map(|(path, host, length)| {
                 let mut stream = attacked.raw();
@@ -177,8 +177,8 @@ fn pipelined_requests_do_not_queue() {
     let stream = attacked.raw();
     let answered = scope(|scope| {
         let sending = scope.spawn(|| (&stream).write_all(&all.as_bytes()[..1000 * text.len()]));
-        let mut own = attacked.program.connection_of(stream.try_clone().expect("the same connection"));
-        let answered = (0..1000).filter(|_| own.receive().status == 403).count();
+        let mut connection = attacked.program.connection_of(stream.try_clone().expect("the same connection"));
+        let answered = (0..1000).filter(|_| connection.receive().status == 403).count();
         sending.join().expect("no panic").expect("all are taken");
         answered
     });
@@ -241,8 +241,8 @@ fn port_80_needs_no_number() {
     for host in ["127.0.0.1", "localhost", "127.0.0.1:80", "localhost:80"] {
         assert_eq!(program.connect().ask("GET", &path, &[("Host", host)], b"").status, 200, "{host}");
         let origin = format!("http://{host}");
-        let own = [("Host", host), ("Origin", origin.as_str())];
-        assert_eq!(program.connect().ask("GET", &path, &own, b"").status, 200, "{origin}");
+        let headers = [("Host", host), ("Origin", origin.as_str())];
+        assert_eq!(program.connect().ask("GET", &path, &headers, b"").status, 200, "{origin}");
     }
     assert_eq!(program.connect().ask("GET", &path, &[("Host", "127.0.0.1:81")], b"").status, 403);
 }

@@ -224,13 +224,13 @@ impl Tab<'_> {
         // Whatever was sent before the answer to this call has arrived.
         self.evaluate("0");
         let events = self.chromium.events.borrow();
-        let own = events.iter().filter(|event| event["sessionId"] == self.session.as_str());
+        let received = events.iter().filter(|event| event["sessionId"] == self.session.as_str());
         let is_message = |event: &&Value| {
             ["Runtime.consoleAPICalled", "Runtime.exceptionThrown", "Log.entryAdded"]
                 .iter()
                 .any(|method| event["method"] == *method)
         };
-        own.filter(is_message).map(|event| event["params"].to_string()).collect()
+        received.filter(is_message).map(|event| event["params"].to_string()).collect()
     }
 
     /// The window, as PNG.

@@ -70,9 +70,10 @@ fn pictures_follow_the_hand(browser: &Browser, scene: &str, finest: [f64; 2], ke
     assert!(told >= drawn.len() as f64, "weights were drawn {told} times for {} pictures", drawn.len());
     assert!(drawn.is_sorted(), "an older picture replaced a newer one: {drawn:?}");
     for size in seen["sizes"].as_array().expect("sizes") {
-        let own = numbers(size);
-        let is_coarse = SIXTEENTHS.iter().any(|share| (0..2).all(|i| (own[i] - finest[i] * share / 16.0).abs() < 1.0));
-        assert!(is_coarse, "{own:?} while dragging");
+        let sides = numbers(size);
+        let is_coarse =
+            SIXTEENTHS.iter().any(|share| (0..2).all(|i| (sides[i] - finest[i] * share / 16.0).abs() < 1.0));
+        assert!(is_coarse, "{sides:?} while dragging");
     }
     tab.wait_for("shows.shown.full && shows.shown.pose === shows.pose");
     assert_eq!(tab.console(), [""; 0]);

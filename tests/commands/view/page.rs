@@ -267,8 +267,8 @@ fn a_view_is_taken_elsewhere() {
     let scene = viewfuse::scene::Scene::open(folder.path()).expect("a scene");
     let pose = scene.views[0].camera.pose.to_opencv();
     let shown: Vec<f64> = numbers(&tab.evaluate("matrixOf(shows.pose).flat()"));
-    for (own, shown) in pose.iter().flatten().zip(shown) {
-        assert_near(f64::from(*own), shown, 1.0e-6);
+    for (number, shown) in pose.iter().flatten().zip(shown) {
+        assert_near(f64::from(*number), shown, 1.0e-6);
     }
     tab.call("Page.bringToFront", json!({}));
     tab.evaluate("document.getElementById('copy').click()");
@@ -291,12 +291,12 @@ fn a_view_is_taken_elsewhere() {
     wait_until("no picture is saved", || names_in(&files).len() == 3 && files.join("run.json").exists());
     let of_page = image::open(files.join("view.png")).expect("a picture").to_rgb8();
     assert!(of_page == rendered, "another picture is saved");
-    let (own, run) = (read_json(files.join("run.json")), read_json(folder.path().join("out/run.json")));
+    let (saved, run) = (read_json(files.join("run.json")), read_json(folder.path().join("out/run.json")));
     for key in ["viewfuse", "device", "field", "weighting", "chosen", "size", "background", "sources", "depth_units"] {
-        assert_eq!(own[key], run[key], "{key}");
+        assert_eq!(saved[key], run[key], "{key}");
     }
     for key in ["world_from_camera", "weights", "left_out", "depth_step"] {
-        assert_near_all(&own["frames"][0][key], &run["frames"][0][key], key);
+        assert_near_all(&saved["frames"][0][key], &run["frames"][0][key], key);
     }
     // A view of the scene that is no source has a name.
     tab.evaluate("goTo(shows.scene.others[0].pose)");
@@ -307,15 +307,15 @@ fn a_view_is_taken_elsewhere() {
 
 /// Values of two records are the same but for the rounding of a pose that went through a file.
 #[track_caller]
-fn assert_near_all(own: &Value, other: &Value, what: &str) {
-    match (own.as_array(), other.as_array()) {
+fn assert_near_all(one: &Value, other: &Value, what: &str) {
+    match (one.as_array(), other.as_array()) {
         (Some(all), Some(others)) => {
             assert_eq!(all.len(), others.len(), "{what}");
-            all.iter().zip(others).for_each(|(own, other)| assert_near_all(own, other, what));
+            all.iter().zip(others).for_each(|(one, other)| assert_near_all(one, other, what));
         }
-        _ => match (own.as_f64(), other.as_f64()) {
-            (Some(own), Some(other)) => assert_near(own, other, 1.0e-5),
-            _ => assert_eq!(own, other, "{what}"),
+        _ => match (one.as_f64(), other.as_f64()) {
+            (Some(one), Some(other)) => assert_near(one, other, 1.0e-5),
+            _ => assert_eq!(one, other, "{what}"),
         },
     }
 }
@@ -371,7 +371,7 @@ fn a_path_goes_through_keyframes() {
     tab.wait_for("document.getElementById('save-video').textContent === 'Save video'");
     if format == "webp" {
         let bytes = fs::read(&film).expect("a video");
-        assert!(bytes.starts_with(b"RIFF") && bytes.windows(4).filter(|own| own == b"ANMF").count() == 3);
+        assert!(bytes.starts_with(b"RIFF") && bytes.windows(4).filter(|word| word == b"ANMF").count() == 3);
     }
     fs::remove_file(film).expect("a file");
     click("save-path");
@@ -384,7 +384,7 @@ fn a_path_goes_through_keyframes() {
     done_with_warnings(folder.path(), line.strip_prefix("viewfuse ").expect("the command"));
     let written = names_in(&folder.path().join("out"));
     for name in ["view_0.png", "view_1.png", "view_2.png", "video.webp"] {
-        assert!(written.iter().any(|own| own == name), "{name} is not in {written:?}");
+        assert!(written.iter().any(|file| file == name), "{name} is not in {written:?}");
     }
     // Around the subject: in the middle as far from it as at both ends, within the scene's own units.
     let scene = read_json(saved);

@@ -39,7 +39,7 @@ fn has_vulkan() -> bool {
 
 fn other_hosts_and_addresses_get_nothing() {
     let program = start(&repository(), &format!("{} --size 24x24", data("toy").display()));
-    let own = ("Host", program.host.as_str());
+    let header = ("Host", program.host.as_str());
     let status = |method: &str, path: &str, headers: &[(&str, &str)], body: &[u8]| {
         program.connect().ask(method, path, headers, body).status
     };
@@ -56,16 +56,16 @@ fn other_hosts_and_addresses_get_nothing() {
         assert_eq!(status("GET", &program.path, &[("Host", host)], b""), 403, "{host}");
     }
     assert_eq!(status("GET", &program.path, &[], b""), 403, "no host");
-    assert_eq!(status("GET", &program.path, &[own, own], b""), 403, "two hosts");
-    assert_eq!(status("GET", &program.path, &[own, ("Origin", "http://evil.example")], b""), 403);
+    assert_eq!(status("GET", &program.path, &[header, header], b""), 403, "two hosts");
+    assert_eq!(status("GET", &program.path, &[header, ("Origin", "http://evil.example")], b""), 403);
     for path in ["/", "/scene", "/0123456789abcdef0123456789abcdef/", &program.path[..20]] {
-        assert_eq!(status("GET", path, &[own], b""), 403, "{path}");
+        assert_eq!(status("GET", path, &[header], b""), 403, "{path}");
     }
     for (rest, expected) in [("scene", 405), ("picture", 400), ("nothing", 404), ("../Cargo.toml", 404)] {
-        assert_eq!(status("POST", &format!("{}{rest}", program.path), &[own], b"{}"), expected, "{rest}");
+        assert_eq!(status("POST", &format!("{}{rest}", program.path), &[header], b"{}"), expected, "{rest}");
     }
     let long = vec![b' '; 5000];
-    assert_eq!(status("POST", &format!("{}picture", program.path), &[own], &long), 413);
+    assert_eq!(status("POST", &format!("{}picture", program.path), &[header], &long), 413);
     let start = &program.scene()["start"];
     for (key, value) in [("scheme", "attention:Cargo.toml"), ("scheme", "median"), ("layer", "everything")] {
         let mut wrong = request("a", start, true);
@@ -126,8 +126,8 @@ fn a_video_has_the_pictures_of_its_path() {
         let (_, picture) = program.connect().picture(&request).unpacked();
         assert!(DynamicImage::from(frame.buffer().clone()).into_rgb8() == picture, "without loss");
         // Rounded to whole milliseconds.
-        let (milliseconds, of) = frame.delay().numer_denom_ms();
-        assert!((41..=42).contains(&(milliseconds / of)), "{milliseconds} / {of}");
+        let (milliseconds, divisor) = frame.delay().numer_denom_ms();
+        assert!((41..=42).contains(&(milliseconds / divisor)), "{milliseconds} / {divisor}");
     }
     for (wrong, part) in [
         (path(&scene["start"], 1), "from 2 to 240 frames, not 1"),
@@ -295,11 +295,11 @@ fn the_scheme_can_be_chosen_for_the_scene() {
         program.connect().picture(&request).unpacked().1
     };
     let shown = [&chosen, &json!("mean"), &chosen].map(picture);
-    for (scheme, own) in ["auto", "mean"].into_iter().zip(&shown) {
+    for (scheme, row) in ["auto", "mean"].into_iter().zip(&shown) {
         let arguments = format!("render toy --targets 000020 --weights {scheme} {options} --device cpu -o {scheme}");
         done_with_warnings(folder.path(), &arguments);
         let path = folder.path().join(scheme).join("000020.png");
-        assert!(image::open(path).expect("a picture").to_rgb8() == *own, "{scheme}: another picture");
+        assert!(image::open(path).expect("a picture").to_rgb8() == *row, "{scheme}: another picture");
     }
     assert!(shown[0] != shown[1] && shown[0] == shown[2]);
 }

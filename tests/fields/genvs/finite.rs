@@ -17,9 +17,9 @@ fn multiplied(module: &str, factor: f32) -> Genvs {
     let belongs =
         |name: &str| name.strip_prefix(module).is_some_and(|rest| rest.starts_with('.') && rest.ends_with(".weight"));
     let checkpoint = changed(&made, |tensors| {
-        let own: Vec<_> = tensors.iter_mut().filter(|(tensor, _)| belongs(&tensor.name)).collect();
-        assert!(!own.is_empty(), "{module}");
-        own.into_iter().flat_map(|(_, values)| values).for_each(|value| *value *= factor);
+        let chosen: Vec<_> = tensors.iter_mut().filter(|(tensor, _)| belongs(&tensor.name)).collect();
+        assert!(!chosen.is_empty(), "{module}");
+        chosen.into_iter().flat_map(|(_, values)| values).for_each(|value| *value *= factor);
     });
     Genvs::new(checkpoint, exact()).expect("a made network")
 }

@@ -1,7 +1,7 @@
-//! Each thing that can be left out, alone: what it saves and what it costs, against the exact picture.
+//! Each thing that can be omitted, alone: what it saves and what it costs, against the exact picture.
 
 use super::{
-    assert_sound, exact, largest_difference, leaving_out, made, picture_with, recorded, sources, target, weights,
+    assert_sound, exact, largest_difference, made, omitting, picture_with, recorded, sources, target, weights,
     without_denoiser,
 };
 use viewfuse::device::cpu::Cpu;
@@ -21,7 +21,7 @@ fn in_18_calls() -> Plan {
 }
 
 #[test]
-fn nothing_is_left_out_where_nothing_may() {
+fn nothing_is_omitted_where_nothing_may() {
     let (_, record) = recorded(&made(exact()), &sources(3), &Weights::mean(3), &target(16));
     assert_eq!(record.left_out.len(), 4);
     for line in &record.left_out {
@@ -36,7 +36,7 @@ fn nothing_is_left_out_where_nothing_may() {
 fn views_that_no_target_uses_are_not_encoded() {
     let (sources, target, weights) = (sources(4), target(16), weights([0.0, 0.25, 0.0, 0.75], 4));
     let reference = picture_with(&made(exact()), &sources, &weights, &target);
-    let field = made(leaving_out(Omissions { unused_views: true, ..Omissions::NONE }));
+    let field = made(omitting(Omissions { unused_views: true, ..Omissions::NONE }));
     let (picture, record) = recorded(&field, &sources, &weights, &target);
     assert_eq!(picture, reference, "zeros are added exactly");
     let LeftOut { left_out, of, switch, .. } = line(&record, "encoded views");
@@ -54,7 +54,7 @@ fn rows_that_no_ray_reaches_are_not_computed() {
     };
     let targets = [part(16.0, 8), part(-12.0, 4), part(16.0, 32)];
     let with = |omissions| {
-        let field = without_denoiser(leaving_out(omissions));
+        let field = without_denoiser(omitting(omissions));
         on_sources(&sources, &field, &Silent, |stage| {
             let render = |target: &Camera| {
                 let picture = stage.picture(target, &Weights::mean(3), 0.0, &Silent);
@@ -65,9 +65,9 @@ fn rows_that_no_ray_reaches_are_not_computed() {
     };
     let exact = with(Omissions::NONE);
     let few = with(Omissions { unseen_rows: true, ..Omissions::NONE });
-    for ((exact, none), (few, left_out)) in exact.iter().zip(&few) {
+    for ((exact, none), (few, omitted)) in exact.iter().zip(&few) {
         assert_eq!(few, exact, "rows that nobody sees");
-        println!("{left_out} of {} rows left out", 3 * 32);
+        println!("{omitted} of {} rows omitted", 3 * 32);
         assert_eq!(*none, 0);
     }
     assert!(few[0].1 > 20 && few[1].1 < few[0].1 && few[2].1 <= few[1].1, "what was there is not computed again");
@@ -101,7 +101,7 @@ fn an_earlier_frame_saves_calls() {
     assert_eq!(with[0], whole[0], "the first frame has none before it");
     assert!(with[1] != whole[1], "the second one started elsewhere");
     assert_sound(&with[1]);
-    // Above the largest level nothing is left out.
+    // Above the largest level nothing is omitted.
     let (_, none) = frames(Some(1.0e6));
     assert_eq!(none.left_out, 0);
 }
@@ -116,7 +116,7 @@ fn a_picture_that_no_longer_changes_ends_early() {
     };
     let ((whole, _), (early, calls)) = (with(None), with(Plan::fast(0).early_termination));
     let difference = largest_difference(&whole.colours, &early.colours);
-    println!("{} of {} calls left out, largest difference {difference:.1e}", calls.left_out, calls.of);
+    println!("{} of {} calls omitted, largest difference {difference:.1e}", calls.left_out, calls.of);
     assert!(calls.left_out > 0 && calls.of == 18);
     assert!(difference <= 0.5 / 255.0 + 1.0e-6, "half a level: {difference}");
 }

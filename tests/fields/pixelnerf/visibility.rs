@@ -1,7 +1,7 @@
 //! Views at points behind their cameras: of weight 0, and neither looked up nor computed.
 
 use super::{
-    Omissions, assert_sound, exact, is_not_finite, leaving_out, mist, orbit, picture_with, recorded, sources, target,
+    Omissions, assert_sound, exact, is_not_finite, mist, omitting, orbit, picture_with, recorded, sources, target,
 };
 use viewfuse::field::pixelnerf::{PixelNerfOptions, Sampling};
 use viewfuse::scene::photographs::SourceImages;
@@ -97,7 +97,7 @@ fn rays_through_the_plane_of_a_camera_keep_their_bits() {
 }
 
 #[test]
-fn as_many_are_left_out_as_lie_behind_cameras() {
+fn as_many_are_omitted_as_lie_behind_cameras() {
     let sources = sources(3);
     let target = looking_out(&sources, 0.6);
     let (near, far, count) = (0.1, 1.8, 10);
@@ -138,7 +138,7 @@ fn as_many_are_left_out_as_lie_behind_cameras() {
 fn a_view_of_weight_0_is_not_read_where_all_views_are_encoded() {
     let (sound, spoiled) = (sources(3), spoiled(1));
     let weights = weights([0.75, 0.0, 0.25]);
-    let field = |unseen_points| mist(leaving_out(Omissions { unseen_points, ..Omissions::NONE }));
+    let field = |unseen_points| mist(omitting(Omissions { unseen_points, ..Omissions::NONE }));
     let picture = picture_with(&field(true), &spoiled, &weights, &target(SIDE), 0.0);
     assert_eq!(picture, picture_with(&mist(exact()), &sound, &weights, &target(SIDE), 0.0));
     assert!(is_not_finite(&field(false), &spoiled, &weights, &target(SIDE), 0.0));

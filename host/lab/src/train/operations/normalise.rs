@@ -104,7 +104,9 @@ impl Operation<3> for Normalise {
                     own[channel] = slope;
                 }
             }
-            let sums = |of: &[T]| -> Vec<T> { of.iter().zip(weights).map(|(of, weight)| *of * *weight).collect() };
+            let sums = |values: &[T]| -> Vec<T> {
+                values.iter().zip(weights).map(|(value, weight)| *value * *weight).collect()
+            };
             let mean_slope = self.shared(&sums(&of_biases));
             let mean_product = self.shared(&sums(&of_weights));
             for (pixel, own) in image.chunks_exact(channels).zip(of_image.chunks_exact_mut(channels)) {

@@ -16,8 +16,8 @@ use viewfuse_kernels::pixelnerf::{EmbedBlock, GatherBlock, GridPlace, in_view_ax
 
 /// Points of a chunk.
 const CHUNK: usize = 64;
-/// A point is left out of the backward pass if its gradient is less than this share of the points' mean (sums of
-/// magnitudes). All that is left out together is then at most this share of the whole.
+/// A point is omitted from the backward pass if its gradient is less than this share of the points' mean (sums of
+/// magnitudes). All that is omitted together is then at most this share of the whole.
 const NEGLIGIBLE: f64 = 1.0e-4;
 
 /// Sizes of the network.
@@ -323,8 +323,8 @@ impl PointNetwork {
         let least = NEGLIGIBLE * all / (points.object_count * points.point_count) as f64;
         // NaN is no less than anything: it stays and shows itself.
         let is_kept = |point: &usize, rows: &[T]| !(own(&rows[4 * point..][..4]) <= least);
-        let of = |rows: &[T]| (0..points.point_count).filter(|point| is_kept(point, rows)).collect();
-        gradient.chunks_exact(4 * points.point_count).map(of).collect()
+        let kept = |rows: &[T]| (0..points.point_count).filter(|point| is_kept(point, rows)).collect();
+        gradient.chunks_exact(4 * points.point_count).map(kept).collect()
     }
 }
 
