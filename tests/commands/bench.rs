@@ -1,6 +1,6 @@
 //! `viewfuse bench`: what it prints and what it returns.
 
-use super::{BINARY, done};
+use super::{BINARY, done, list_of};
 use serde_json::Value;
 use viewfuse_tests::command::{assert_wrong_arguments, files_below};
 use viewfuse_tests::scenes::Folder;
@@ -17,7 +17,7 @@ fn the_cpu_beside_its_limits() {
     for key in ["copy_giga_bytes", "multiply_add_giga_operations", "giga_look_ups"] {
         assert!(number(device, key) > 0.0, "{key}: {device}");
     }
-    let kernels = device["kernels"].as_array().expect("a list");
+    let kernels = list_of(&device["kernels"]);
     for name in ["census_cost", "compare_views", "composite", "convolve", "gather_latents", "linear", "matrix_product"]
     {
         assert!(kernels.iter().any(|kernel| kernel["kernel"] == name), "{name}: {printed}");

@@ -1,6 +1,6 @@
 //! `viewfuse compare`.
 
-use super::{BINARY, assert_near, done, read_json};
+use super::{BINARY, assert_near, done, list_of, number_of, read_json};
 use image::DynamicImage;
 use image::metadata::Orientation;
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, f32_bytes, safetensors, toy};
@@ -59,12 +59,7 @@ fn scores_are_those_of_render() {
         done(folder.path(), &render);
         let record = read_json(folder.path().join(out).join("run.json"));
         let scores = |name: &str| -> Vec<f64> {
-            record["frames"]
-                .as_array()
-                .expect("frames")
-                .iter()
-                .map(|frame| frame[name].as_f64().expect("a score"))
-                .collect()
+            list_of(&record["frames"]).iter().map(|frame| number_of(&frame[name])).collect()
         };
         let printed = done(folder.path(), &format!("compare {out}/ toy/rgb/"));
         assert!(printed.starts_with("4 pictures\n") && printed.contains(&format!("({out}/run.json)")), "{printed}");

@@ -1,7 +1,7 @@
 //! `viewfuse devices`, the option `--device`, and `check` of all devices. What is there is asked of the library: on a
 //! machine without Vulkan it is the CPU alone.
 
-use super::{BINARY, done, read_json};
+use super::{BINARY, done, list_of, read_json};
 use serde_json::{Value, json};
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, files_below, toy};
 use viewfuse_tests::devices::vulkan_devices;
@@ -47,7 +47,7 @@ fn devices_as_json() {
     let report: Value = serde_json::from_str(&done(Folder::new().path(), "devices --json")).expect("JSON");
     assert!(report["cpu"].as_str().is_some_and(|cpu| cpu.starts_with("cpu (")), "{report}");
     assert_eq!(report["vulkan_problem"], json!(problem));
-    let listed = report["vulkan"].as_array().expect("a list");
+    let listed = list_of(&report["vulkan"]);
     assert_eq!(listed.len(), adapters.len());
     for (device, adapter) in listed.iter().zip(&adapters) {
         assert_eq!(device["device"], format!("vulkan:{}", adapter.index));

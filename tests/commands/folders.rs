@@ -1,6 +1,6 @@
 //! Output folders that hold something already: a person's own files, an earlier run, a run that is not finished yet.
 
-use super::{BINARY, done, read_json};
+use super::{BINARY, done, list_of, read_json, text_of};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -173,8 +173,8 @@ fn a_target_is_added_to_a_run_of_the_same_settings() {
     };
     let record = |output: &str| -> Value { read_json(path.join(output).join("run.json")) };
     let targets = |record: &Value| -> Vec<String> {
-        let frames = record["frames"].as_array().expect("frames");
-        frames.iter().map(|frame| frame["target"].as_str().expect("a name").to_owned()).collect()
+        let frames = list_of(&record["frames"]);
+        frames.iter().map(|frame| text_of(&frame["target"]).to_owned()).collect()
     };
     let pictures = |output: &str| {
         let is_picture = |name: &String| name.ends_with(".png");
@@ -189,9 +189,7 @@ fn a_target_is_added_to_a_run_of_the_same_settings() {
     let (added, whole) = (record("out"), record("whole"));
     assert_eq!((&added["earlier"], &whole["earlier"]), (&1.into(), &0.into()));
     assert_eq!((targets(&added), &added["settings"]), (targets(&whole), &whole["settings"]));
-    for (here, other) in
-        added["frames"].as_array().expect("frames").iter().zip(whole["frames"].as_array().expect("frames"))
-    {
+    for (here, other) in list_of(&added["frames"]).iter().zip(list_of(&whole["frames"])) {
         for key in ["world_from_camera", "weights", "psnr"] {
             assert_eq!(here[key].to_string().get(..8), other[key].to_string().get(..8), "{key}");
         }

@@ -1,6 +1,6 @@
 //! `viewfuse` with a GeNVS.
 
-use super::{BINARY, done, read_json, texts};
+use super::{BINARY, done, list_of, read_json, text_of, texts};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -36,7 +36,7 @@ fn picture(folder: &Path, options: &str) -> Vec<u8> {
 
 /// How much was omitted, whether it was allowed to, and of how much, by what it is.
 fn omitted(record: &Value, what: &str) -> (u64, bool, u64) {
-    let lines = record["left_out"].as_array().expect("a list");
+    let lines = list_of(&record["left_out"]);
     let line = lines.iter().find(|line| line["what"] == what).expect(what);
     let count = |key: &str| line[key].as_u64().expect("a count");
     (count("left_out"), line["switch"] == true, count("of"))
@@ -173,8 +173,8 @@ fn sweeps_samplers_and_omissions() {
     assert_eq!(names_in(&folder.join("out")), ["pareto.csv", "pareto.json", "pareto.svg"]);
     let record = read_json(folder.join("out/pareto.json"));
     assert_eq!((&record["field"], &record["size"]), (&"genvs".into(), &[16, 16][..].into()));
-    let points = record["devices"][0]["points"].as_array().expect("points");
-    let words: Vec<&str> = points.iter().map(|point| point["setting"].as_str().expect("words")).collect();
+    let points = list_of(&record["devices"][0]["points"]);
+    let words: Vec<&str> = points.iter().map(|point| text_of(&point["setting"])).collect();
     let all = ["exact", "heun, 8", "ipndm, 6", "ipndm, 12", "tolerance 0.03"];
     let all = all.into_iter().chain(["all, half the size", "all, reuse 20", "all, reuse 2"]);
     assert_eq!(words, all.collect::<Vec<_>>());

@@ -1,6 +1,6 @@
 //! `viewfuse inspect`: a good scene raises no warning, a bad one its own.
 
-use super::{done, numbers, read_json, texts};
+use super::{done, list_of, number_of, numbers, read_json, texts};
 use serde_json::Value;
 use viewfuse_tests::command::{change_poses, names_in, run, toy};
 use viewfuse_tests::scenes::Folder;
@@ -42,9 +42,9 @@ fn a_good_scene() {
     assert_eq!((numbers(&inspection["size"]), numbers(&inspection["focal"])), (vec![128.0; 2], vec![131.25; 2]));
     assert!(numbers(&inspection["focus"]).iter().all(|x| x.abs() < 1.0e-4));
     assert!(numbers(&inspection["distances"]).iter().all(|distance| (distance - 1.3).abs() < 1.0e-4));
-    let (near, far) = (inspection["near"].as_f64().expect("near"), inspection["far"].as_f64().expect("far"));
+    let (near, far) = (number_of(&inspection["near"]), number_of(&inspection["far"]));
     assert!(0.5 < near && near < 1.3 && 1.3 < far && far < 2.0);
-    let corners = inspection["object"].as_array().expect("an object");
+    let corners = list_of(&inspection["object"]);
     assert!(numbers(&corners[0]).iter().all(|x| *x < 0.0) && numbers(&corners[1]).iter().all(|x| *x > 0.0));
     assert!(done(scene.path(), "inspect toy").contains("warnings   none"));
 }
@@ -56,11 +56,11 @@ fn views_are_listed_with_their_neighbours() {
     let row = lines.iter().find(|words| words.first() == Some(&"#3")).unwrap_or_else(|| panic!("{printed}"));
     assert_eq!(row[..3], ["#3", "000003", "128x128"], "{printed}");
     let listed: Value = serde_json::from_str(&done(scene.path(), "inspect toy --views --json")).expect("JSON");
-    let listed = listed.as_array().expect("a list");
+    let listed = list_of(&listed);
     assert_eq!(listed.len(), 24);
     for (index, view) in listed.iter().enumerate() {
         assert_eq!((view["index"].as_u64(), view["has_photograph"].as_bool()), (Some(index as u64), Some(true)));
-        let neighbours = view["neighbours"].as_array().expect("a list").iter();
+        let neighbours = list_of(&view["neighbours"]).iter();
         let angles = numbers(&neighbours.clone().map(|neighbour| neighbour["degrees"].clone()).collect());
         assert!(angles.len() == 3 && angles.is_sorted() && angles[0] > 0.0 && angles[2] < 90.0, "{view}");
         let others: Vec<u64> = neighbours.filter_map(|neighbour| neighbour["index"].as_u64()).collect();
@@ -205,11 +205,11 @@ fn the_quality_is_that_of_held_out_photographs() {
         serde_json::from_str::<Value>(&printed).expect("JSON")["quality"].clone()
     };
     let judged = quality("");
-    let held_out = judged["left_out"].as_array().expect("views");
-    let scores: Vec<f64> = held_out.iter().map(|view| view["psnr"].as_f64().expect("a score")).collect();
+    let held_out = list_of(&judged["left_out"]);
+    let scores: Vec<f64> = held_out.iter().map(|view| number_of(&view["psnr"])).collect();
     assert_eq!(scores.len(), 6);
     let mean = scores.iter().sum::<f64>() / 6.0;
-    let expected = judged["expected"]["psnr"].as_f64().expect("a score");
+    let expected = number_of(&judged["expected"]["psnr"]);
     // A view between neighbours has nearer sources than a held-out view.
     assert!(20.0 < mean && mean < expected && expected < 45.0, "{judged}");
     let printed = done(scene.path(), "inspect toy --quality");

@@ -1,6 +1,6 @@
 //! What other programs take from the weights: arrays, tables, and lists of the few views that targets need.
 
-use super::{BINARY, assert_near, done, numbers, texts};
+use super::{BINARY, assert_near, done, list_of, number_of, numbers, texts};
 use serde_json::Value;
 use std::fs;
 use viewfuse_tests::command::{assert_wrong_arguments, toy};
@@ -23,7 +23,7 @@ fn weights_of_many_targets() {
     let folder = scene.path();
     let what = "weights toy --orbit 3 --sources 0..5 --weights mean --weights half=error:alpha=0.5";
     let listed = json(&done(folder, &format!("{what} --json")));
-    let targets = listed.as_array().expect("a list");
+    let targets = list_of(&listed);
     assert_eq!(targets.len(), 3);
     let csv = done(folder, &format!("{what} --csv"));
     let lines: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
@@ -66,7 +66,7 @@ fn the_few_sources_of_a_target() {
     order.sort_by(|a, b| weights[*b].total_cmp(&weights[*a]));
     let greatest: Vec<&str> = order[..3].iter().map(|&source| texts(&all["sources"])[source]).collect();
     assert_eq!(texts(&target["sources"]), greatest);
-    assert_near(target["share"].as_f64().expect("a share"), order[..3].iter().map(|&one| weights[one]).sum(), 1.0e-5);
+    assert_near(number_of(&target["share"]), order[..3].iter().map(|&one| weights[one]).sum(), 1.0e-5);
     assert_near(numbers(&target["weights"]).iter().sum(), 1.0, 1.0e-5);
     let views = texts(&selected["views"]);
     let indices: Vec<usize> = numbers(&target["indices"]).into_iter().map(|index| index as usize).collect();
@@ -96,12 +96,7 @@ fn the_few_sources_of_a_path() {
     let share = numbers(&together["share"]);
     assert!(share[0] >= share[1] && share[1] > 0.0 && share[0] < 1.0, "{share:?}");
     // Each target alone has more of the weight than of what serves all.
-    let numbers: Vec<f64> = selected["targets"]
-        .as_array()
-        .expect("targets")
-        .iter()
-        .map(|one| one["share"].as_f64().expect("a share"))
-        .collect();
+    let numbers: Vec<f64> = list_of(&selected["targets"]).iter().map(|one| number_of(&one["share"])).collect();
     assert!(numbers.iter().sum::<f64>() / 12.0 >= share[0] - 1.0e-6);
 }
 

@@ -104,16 +104,32 @@ fn read_json(path: impl AsRef<Path>) -> Value {
     serde_json::from_slice(&bytes).unwrap_or_else(|error| panic!("{}: {error}", path.as_ref().display()))
 }
 
+/// What a JSON list holds.
+#[track_caller]
+fn list_of(value: &Value) -> &Vec<Value> {
+    value.as_array().unwrap_or_else(|| panic!("{value} is no list"))
+}
+
+#[track_caller]
+fn number_of(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+#[track_caller]
+fn text_of(value: &Value) -> &str {
+    value.as_str().unwrap_or_else(|| panic!("{value} is no text"))
+}
+
 /// The numbers of a JSON list.
 #[track_caller]
 fn numbers(list: &Value) -> Vec<f64> {
-    list.as_array().expect("a list").iter().map(|number| number.as_f64().expect("a number")).collect()
+    list_of(list).iter().map(number_of).collect()
 }
 
 /// The texts of a JSON list.
 #[track_caller]
 fn texts(list: &Value) -> Vec<&str> {
-    list.as_array().expect("a list").iter().map(|text| text.as_str().expect("a text")).collect()
+    list_of(list).iter().map(text_of).collect()
 }
 
 #[track_caller]

@@ -1,6 +1,6 @@
 //! Videos and animated pictures of paths: their content by other readers, and runs that are killed and continued.
 
-use super::{BINARY, done, read_json};
+use super::{BINARY, done, list_of, number_of, numbers, read_json};
 use image::codecs::webp::WebPDecoder;
 use image::{AnimationDecoder, Rgb, RgbImage};
 use serde_json::{Value, json};
@@ -156,7 +156,7 @@ fn a_run_that_was_killed_twice_ends_with_the_same_bytes() {
     // The record is complete, and in the order of the path.
     let record = |run: &str| -> Value { read_json(folder.join(run).join("run.json")) };
     let targets = |record: &Value| -> Vec<Value> {
-        record["frames"].as_array().expect("frames").iter().map(|frame| frame["target"].clone()).collect()
+        list_of(&record["frames"]).iter().map(|frame| frame["target"].clone()).collect()
     };
     assert_eq!(targets(&record("cut")), targets(&record("whole")));
     assert_eq!((record("cut")["continued"].as_u64(), &record("whole")["continued"]), (Some(there as u64), &json!(0)));
@@ -276,7 +276,7 @@ fn depths_and_opacity_for_other_programs() {
     assert_eq!(read, depths);
     // The steps of the PNG, by the record.
     let record = read_json(out.join("run.json"));
-    let step = record["frames"][0]["depth_step"].as_f64().expect("a step");
+    let step = number_of(&record["frames"][0]["depth_step"]);
     assert!(record["depth_units"]["depth"].as_str().is_some_and(|words| words.contains("units of the scene's files")));
     let levels = image::open(out.join("wide_depth.png")).expect("a map").to_luma16();
     for (level, depth) in levels.pixels().zip(&depths) {
@@ -286,12 +286,7 @@ fn depths_and_opacity_for_other_programs() {
     let with_alpha = image::open(out.join("wide.png")).expect("a picture").into_rgba8();
     done(folder, &format!("{arguments} -o plain"));
     let plain = png(&folder.join("plain"), "wide.png");
-    let background: Vec<f64> = record["background"]["used"]
-        .as_array()
-        .expect("a colour")
-        .iter()
-        .map(|level| level.as_f64().expect("a level"))
-        .collect();
+    let background: Vec<f64> = numbers(&record["background"]["used"]);
     let opaque = with_alpha.pixels().filter(|pixel| pixel[3] == 255).count();
     let empty = with_alpha.pixels().filter(|pixel| pixel[3] == 0).count();
     assert!(opaque > 100 && empty > 300, "{opaque} {empty}");
@@ -312,7 +307,7 @@ fn camera_paths_from_files() {
     done(folder, "render toy --targets 20 --sources 0..11 --size 24x24 --device cpu --no-sheets -o view");
     let pose = record("view")["frames"][0]["world_from_camera"].clone();
     // The same camera by a table, and by nerfstudio's viewer with axes turned around.
-    let number = |row: usize, column: usize| pose[row][column].as_f64().expect("a number");
+    let number = |row: usize, column: usize| number_of(&pose[row][column]);
     let entries: Vec<String> = (0..12).map(|k| number(k / 4, k % 4).to_string()).collect();
     let names: Vec<String> = (0..12).map(|k| format!("m{}{}", k / 4, k % 4)).collect();
     scene.write("poses.csv", format!("name,{}\nview,{}\n", names.join(","), entries.join(",")));

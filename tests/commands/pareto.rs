@@ -1,6 +1,6 @@
 //! `viewfuse pareto`.
 
-use super::{BINARY, done, read_json};
+use super::{BINARY, done, list_of, number_of, read_json, text_of};
 use serde_json::Value;
 use std::collections::HashMap;
 use std::fs;
@@ -125,14 +125,14 @@ fn sweeps_what_a_network_omits() {
     assert_eq!(device["points"].as_array().map(Vec::len), Some(rows.len()));
     assert_eq!(device["exact_versus_first"], Value::Null);
     // The mark is what the front of the record's own numbers says.
-    let recorded = device["points"].as_array().expect("points");
-    let value = |number: &Value| number.as_f64().expect("a number");
+    let recorded = list_of(&device["points"]);
+    let value = |number: &Value| number_of(number);
     let pair = |point: &Value| [value(&point["seconds"]), value(&point["versus_exact"]["root_mean_square"])];
     let points: Vec<[f64; 2]> = recorded.iter().map(pair).collect();
     let best: Vec<bool> = rows.iter().map(|row| row["best"] == "1").collect();
     assert_eq!(best, best_for_their_time(&points));
     assert!(best.contains(&true) && best.contains(&false));
-    let chosen = device["fastest_of_same_look"].as_str().expect("a setting");
+    let chosen = text_of(&device["fastest_of_same_look"]);
     assert!(number(row(chosen), "psnr_exact_db") >= 40.0);
     assert!(printed.contains(&format!("fastest at 40 dB or more from exact: {chosen}\n")), "{printed}");
     assert!(printed.contains("every round gave the same pictures"), "{printed}");

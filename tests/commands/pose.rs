@@ -9,7 +9,7 @@ mod helper;
 mod on_the_way;
 mod stopped;
 
-use super::{BINARY, read_json};
+use super::{BINARY, list_of, read_json};
 use image::{DynamicImage, ImageFormat, RgbImage, imageops};
 use std::fs;
 use std::io::Cursor;
@@ -132,7 +132,7 @@ fn eight_photographs_to_a_picture() {
     let worst = worst_rotation(&scene);
     assert!(worst < 1.5, "{worst} degrees");
     let record = read_json(folder.path().join("posed/pose.json"));
-    let accepted = record["accepted"].as_array().expect("a list");
+    let accepted = list_of(&record["accepted"]);
     assert_eq!(accepted.iter().filter(|photo| photo["verdict"] == "sure").count(), 8, "{record}");
     // Features are found in enlarged photographs; cameras are those of the photographs.
     let camera = &scene.views[0].camera.pinhole;

@@ -1,7 +1,7 @@
 //! The Python package. Its wheel is built and tested by `host/python/test`, which takes minutes and the network: only
 //! with `VIEWFUSE_REQUIRE_PYTHON=1`. That it is built from the same crates as the command is tested always.
 
-use super::BINARY;
+use super::{BINARY, list_of};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::process::Command;
@@ -61,9 +61,9 @@ fn it_is_built_from_the_same_crates() {
         let versions: Vec<&String> =
             ours.iter().filter(|package| package.0 == *name).map(|package| &package.1).collect();
         assert!(versions.contains(&version), "{name}: {version}, and {versions:?} in Cargo.lock");
-        let packages = metadata["packages"].as_array().expect("packages");
+        let packages = list_of(&metadata["packages"]);
         let Some(package) = packages.iter().find(|package| package["name"] == name.as_str()) else { continue };
-        let dependencies = package["dependencies"].as_array().expect("a list").iter();
+        let dependencies = list_of(&package["dependencies"]).iter();
         let always = dependencies.filter(|need| need["kind"].is_null() && need["optional"] == false);
         for need in always.filter(|need| need["target"].is_null()).filter_map(|need| need["name"].as_str()) {
             assert!(needs.contains(need), "{name} needs {need}: run cargo in host/python, without --locked");

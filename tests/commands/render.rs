@@ -1,6 +1,6 @@
 //! `viewfuse render`.
 
-use super::{BINARY, assert_near, done, numbers, read_json, texts};
+use super::{BINARY, assert_near, done, list_of, number_of, numbers, read_json, texts};
 use image::{ColorType, DynamicImage};
 use serde_json::Value;
 use std::fs;
@@ -61,12 +61,12 @@ fn writes_a_picture_a_depth_map_a_sheet_and_a_record() {
     assert!(record["device"].as_str().is_some_and(|device| device.starts_with("cpu")), "{record}");
     // The default is the choice for the scene: six sources were held out, and the best scheme is used.
     assert_eq!(record["chosen"]["left_out"].as_array().map(Vec::len), Some(6), "{}", record["chosen"]);
-    let candidates = record["chosen"]["candidates"].as_array().expect("what was tried");
+    let candidates = list_of(&record["chosen"]["candidates"]);
     assert!(candidates.iter().any(|candidate| candidate["weighting"] == record["weighting"]), "{record}");
     assert!(record["frames"][0]["expected"]["psnr"].is_number(), "{record}");
     let expected: Vec<String> = (0..24).filter(|view| *view != 20).map(|view| format!("{view:06}")).collect();
     assert_eq!(texts(&record["sources"]), expected);
-    let time = |name: &str| record["times"][name].as_f64().expect("a time in seconds");
+    let time = |name: &str| number_of(&record["times"][name]);
     let stages: f64 = ["open", "photographs", "prepare", "encode", "frames"].map(time).iter().sum();
     assert!(stages > 0.0 && stages <= time("total"), "{}", record["times"]);
 
@@ -81,7 +81,7 @@ fn writes_a_picture_a_depth_map_a_sheet_and_a_record() {
     assert!(frame["ssim"].as_f64().is_some_and(|ssim| ssim > 0.8 && ssim <= 1.0));
 
     // The depth map in world units: the lorry is within 0.55 of the origin, the camera 1.3 from it.
-    let step = frame["depth_step"].as_f64().expect("the unit of the depth map");
+    let step = number_of(&frame["depth_step"]);
     let depths: Vec<f64> = depth.to_luma16().pixels().map(|pixel| step * f64::from(pixel[0])).collect();
     assert!(depths.iter().filter(|z| **z > 0.0).count() > 300);
     assert!(depths.iter().all(|z| *z == 0.0 || (0.7..1.9).contains(z)));
@@ -98,7 +98,7 @@ fn drops_what_counts_little() {
     assert!(!dropped.is_empty() && dropped.len() < 23);
     let omitted: f64 = (0..23).filter(|&view| dropped.contains(&sources[view])).map(|view| before[view]).sum();
     assert!(omitted <= 0.2 + 1.0e-6);
-    assert_near(frame["left_out_weight"].as_f64().expect("a number"), omitted, 1.0e-6);
+    assert_near(number_of(&frame["left_out_weight"]), omitted, 1.0e-6);
     assert_near(used.iter().sum(), 1.0, 1.0e-5);
     let most_dropped = (0..23).filter(|&v| dropped.contains(&sources[v])).map(|v| before[v]).fold(0.0, f64::max);
     for view in 0..23 {
@@ -132,7 +132,7 @@ fn an_orbit_stays_where_photographs_are() {
     let scene = toy();
     let shares = |output: &str| -> Vec<f64> {
         let frames = record(scene.path(), output)["frames"].as_array().expect("frames").clone();
-        frames.iter().map(|frame| frame["seen"].as_f64().expect("a share")).collect()
+        frames.iter().map(|frame| number_of(&frame["seen"])).collect()
     };
     // Two views that are neighbours.
     let orbit = |count: &str, output: &str| {

@@ -5,7 +5,7 @@
 //! `tmp/report` of the target folder.
 
 use super::browser::{Browser, REQUIRE};
-use super::{done, lab};
+use super::{done, lab, list_of, text_of};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
@@ -139,8 +139,8 @@ fn number(text: &str) -> f64 {
 /// marked.
 #[track_caller]
 fn assert_marks(table: &Value) {
-    let header: Vec<&str> = table["header"].as_array().expect("a header").iter().filter_map(Value::as_str).collect();
-    let rows: Vec<&Vec<Value>> = table["rows"].as_array().expect("rows").iter().filter_map(Value::as_array).collect();
+    let header: Vec<&str> = list_of(&table["header"]).iter().filter_map(Value::as_str).collect();
+    let rows: Vec<&Vec<Value>> = list_of(&table["rows"]).iter().filter_map(Value::as_array).collect();
     assert!(rows.len() > 3 || !header[0].contains("weighting"), "{table}");
     for (column, title) in header.iter().enumerate() {
         let larger_is_better = title.ends_with('↑');
@@ -151,7 +151,7 @@ fn assert_marks(table: &Value) {
         let bold = rows.iter().filter(|row| !row[column]["bold"].is_null()).count();
         assert!(bold < rows.len(), "{title}: {table}");
         let key = |row: &&Vec<Value>| {
-            let value = number(row[column]["text"].as_str().expect("a text"));
+            let value = number(text_of(&row[column]["text"]));
             if larger_is_better { -value } else { value }
         };
         let best = rows.iter().map(key).fold(f64::INFINITY, f64::min);
@@ -184,7 +184,7 @@ fn a_person_sees_what_was_measured() {
         // Three metrics with a figure and one of differences each, and the sweep.
         assert_eq!((&view["scripts"], &view["figures"]), (&json!(0), &json!(7)), "at {width}");
         assert!(view["smallestText"].as_f64().is_some_and(|size| size >= 11.0), "{}", view["smallestText"]);
-        let tables = view["tables"].as_array().expect("tables");
+        let tables = list_of(&view["tables"]);
         assert_eq!(tables.len(), 3 + 1 + 1);
         tables.iter().for_each(|table| assert_marks(table));
     }
@@ -192,24 +192,24 @@ fn a_person_sees_what_was_measured() {
     let printed = done(folder.path(), &format!("evaluate toy lorry --protocol random {SMALL} --pictures 1 -o random"));
     let row = printed.lines().find(|line| line.starts_with(" distance:power=2")).expect("a row");
     let words = |text: &str| text.replace(['*', '~'], "").split_whitespace().map(str::to_owned).collect::<Vec<_>>();
-    let rows = views[0]["tables"][3]["rows"].as_array().expect("rows");
+    let rows = list_of(&views[0]["tables"][3]["rows"]);
     let cells =
         rows.iter().filter_map(Value::as_array).find(|row| row[0]["text"] == "distance:power=2").expect("a row");
-    let shown: Vec<String> = cells.iter().flat_map(|cell| words(cell["text"].as_str().expect("a text"))).collect();
+    let shown: Vec<String> = cells.iter().flat_map(|cell| words(text_of(&cell["text"]))).collect();
     assert_eq!(shown, words(row));
     // What is bold has its mark on the terminal, and nothing else.
     let counted = done(folder.path(), &format!("evaluate toy lorry --protocol count:sources=2+4+8 {SMALL} -o count"));
-    let tables = views[0]["tables"].as_array().expect("tables");
+    let tables = list_of(&views[0]["tables"]);
     let mut marks = [0, 0];
     for (printed, tables) in [(&counted, &tables[..3]), (&printed, &tables[3..4])] {
-        let rows = tables.iter().flat_map(|table| table["rows"].as_array().expect("rows").iter());
+        let rows = tables.iter().flat_map(|table| list_of(&table["rows"]).iter());
         let schemes: Vec<&str> = rows.clone().filter_map(|row| row[0]["text"].as_str()).collect();
         let is_row = |line: &&str| schemes.iter().any(|scheme| line.trim_start().starts_with(&format!("{scheme} ")));
         let lines: Vec<&str> = printed.lines().filter(is_row).collect();
         assert_eq!(lines.len(), schemes.len(), "{printed}");
         for (row, line) in rows.zip(lines) {
-            for cell in row.as_array().expect("cells").iter().skip(1) {
-                let text = cell["text"].as_str().expect("a text");
+            for cell in list_of(row).iter().skip(1) {
+                let text = text_of(&cell["text"]);
                 let is_marked = !text.is_empty() && line.contains(&format!("* {text} "));
                 assert_eq!(!cell["bold"].is_null(), is_marked, "{text} of {line}");
                 marks[usize::from(is_marked)] += 1;

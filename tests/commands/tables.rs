@@ -1,6 +1,6 @@
 //! `viewfuse weights` and `viewfuse evaluate`: tables for people, JSON and CSV for programs.
 
-use super::{BINARY, assert_near, done, numbers, read_json, texts};
+use super::{BINARY, assert_near, done, number_of, numbers, read_json, texts};
 use serde_json::Value;
 use std::fs;
 use viewfuse::weighting::scheme_names;
@@ -128,7 +128,7 @@ fn auto_is_a_row_and_leaves_the_others_alone() {
     let outcome = run(BINARY, scene.path(), &format!("render {job} -o out"));
     assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
     let record = read_json(scene.path().join("out/run.json"));
-    assert_near(score(&both, "auto"), record["frames"][0]["psnr"].as_f64().expect("a score"), 1.0e-4);
+    assert_near(score(&both, "auto"), number_of(&record["frames"][0]["psnr"]), 1.0e-4);
 }
 
 /// `viewfuse ... | head` closes the pipe early: no panic, and the files are written all the same.

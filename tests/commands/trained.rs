@@ -1,6 +1,6 @@
 //! The networks and weightings that are in the repository, on an object that none of them was trained on.
 
-use super::{done, read_json};
+use super::{done, list_of, number_of, read_json};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use viewfuse::evaluate::baseline::Baseline;
@@ -70,13 +70,11 @@ fn most_samples_are_omitted_and_the_picture_stays() {
     };
     render("exact", "--exact");
     let record = render("default", "");
-    let samples = record["left_out"]
-        .as_array()
-        .expect("a list")
+    let samples = list_of(&record["left_out"])
         .iter()
         .filter(|line| line["what"].as_str().is_some_and(|what| what.ends_with("-pass samples")));
     let [omitted, all] = samples.fold([0.0, 0.0], |[omitted, all], line| {
-        let number = |key: &str| line[key].as_f64().expect("a number");
+        let number = |key: &str| number_of(&line[key]);
         [omitted + number("left_out"), all + number("of")]
     });
     assert!(omitted > 0.85 * all, "{omitted} of {all}");

@@ -1,7 +1,7 @@
 //! `--from`: a person's own COLMAP, played by a script that says what the room's poses are, or something else.
 
 use super::{COUNT_ALONE, REQUIRE, bare, no_program, no_scripts, posed, worst_rotation};
-use crate::{BINARY, read_json};
+use crate::{BINARY, list_of, read_json, text_of};
 use std::f64::consts::PI;
 use std::fmt::Write;
 use std::fs;
@@ -104,7 +104,7 @@ fn in_place_of_openmvg() {
     let scene = Scene::open(folder.path().join("posed")).expect("a scene");
     assert!(worst_rotation(&scene) < 0.1 && scene.points.len() == 40, "{}", worst_rotation(&scene));
     let record = read_json(folder.path().join("posed/pose.json"));
-    let attempts = record["attempts"].as_array().expect("a list");
+    let attempts = list_of(&record["attempts"]);
     let told: Vec<_> =
         attempts.iter().map(|attempt| (attempt["solver"].as_str(), attempt["features"].as_str())).collect();
     assert_eq!(told, [(Some("COLMAP 9.8.7"), Some("sift")), (Some("COLMAP 9.8.7"), Some("dsp-sift"))]);
@@ -126,13 +126,13 @@ fn as_a_second_opinion() {
     assert!(said.starts_with("registered 5 of 5 photographs\n"), "{said}");
     assert!(worst_rotation(&Scene::open(folder.path().join("posed")).expect("a scene")) < 1.5);
     let record = read_json(folder.path().join("posed/pose.json"));
-    let attempts = record["attempts"].as_array().expect("a list");
+    let attempts = list_of(&record["attempts"]);
     let solver =
         |own: &serde_json::Value| own["solver"].as_str().unwrap_or_default().split(' ').next().map(str::to_owned);
     let solvers: Vec<_> = attempts.iter().filter_map(solver).collect();
     assert_eq!(solvers, ["openmvg-sfm", "openmvg-sfm", "COLMAP", "COLMAP"]);
     // The wrong attempt is known as one.
-    let refused = attempts[3]["refused"].as_str().expect("a reason");
+    let refused = text_of(&attempts[3]["refused"]);
     assert!(refused.contains("no other attempt has the same rotations"), "{refused}");
     assert!(attempts[2]["refused"].is_null(), "{}", attempts[2]);
 }

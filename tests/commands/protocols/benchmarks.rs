@@ -1,6 +1,6 @@
 //! Protocols of few-shot papers: the views they take, what they refuse, what is printed beside them.
 
-use crate::{BINARY, read_json};
+use crate::{BINARY, list_of, number_of, read_json, text_of};
 use image::{GrayImage, Luma};
 use serde_json::{Value, json};
 use std::fs;
@@ -182,8 +182,8 @@ fn blender_on_a_scene_in_its_layout() {
     let whole = json(folder.path(), "lorry --protocol blender:8");
     assert_eq!(whole["jobs"][0]["targets"], json!(["test_r_0", "test_r_40", "test_r_104"]));
     assert_eq!(whole["settings"]["protocol"], "blender:8");
-    let rows = whole["tables"][0]["rows"].as_array().expect("rows");
-    let psnr = |row: usize| rows[row]["cells"][0]["value"]["mean"].as_f64().expect("a number");
+    let rows = list_of(&whole["tables"][0]["rows"]);
+    let psnr = |row: usize| number_of(&rows[row]["cells"][0]["value"]["mean"]);
     // Of the object over white; a copy of a source is far worse.
     assert!(psnr(3) > psnr(0) + 3.0 && psnr(3) > 18.0, "{rows:?}");
     assert!(
@@ -254,7 +254,7 @@ fn json_is_the_table() {
     assert_eq!(whole["jobs"][0]["targets"], json!(["000000", "000008", "000016"]));
     let table = &whole["tables"][0];
     assert_eq!((&table["unit"], &table["target_count"]), (&"views".into(), &3.into()));
-    let rows = table["rows"].as_array().expect("rows");
+    let rows = list_of(&table["rows"]);
     let schemes: Vec<&str> = rows.iter().filter_map(|row| row["scheme"].as_str()).collect();
     assert_eq!(schemes, ["nearest copy", "warped copy", "warped blend", "mean", "l1"]);
     assert_eq!(rows[0]["is_baseline"], true);
@@ -264,8 +264,7 @@ fn json_is_the_table() {
     assert!(whole["published"]["withheld"].as_str().is_some_and(|why| why.contains("504x378")));
     // Without a protocol as well, a table a scene and one of all.
     let plain = json(folder, "toy again --targets 20,21 --size 32x32");
-    let titles: Vec<&str> =
-        plain["tables"].as_array().expect("tables").iter().filter_map(|table| table["title"].as_str()).collect();
+    let titles: Vec<&str> = list_of(&plain["tables"]).iter().filter_map(|table| table["title"].as_str()).collect();
     assert_eq!(titles, ["toy: 2 targets", "again: 2 targets", "all 2 scenes: 4 targets"]);
     assert_eq!(plain["tables"][2]["unit"], "scenes");
 }
@@ -336,8 +335,8 @@ fn masks_serve_the_metric() {
     }
     let run = |scene: &str, protocol: &str| json(folder.path(), &format!("{scene} --protocol {protocol} --size 32x32"));
     let names = |whole: &Value| -> Vec<String> {
-        let metrics = whole["tables"][0]["metrics"].as_array().expect("metrics").clone();
-        metrics.iter().map(|metric| metric["label"].as_str().expect("a label").to_owned()).collect()
+        let metrics = list_of(&whole["tables"][0]["metrics"]).clone();
+        metrics.iter().map(|metric| text_of(&metric["label"]).to_owned()).collect()
     };
     let bare = run("bare", "dtu:3");
     assert_eq!(names(&bare), ["PSNR", "SSIM", "PSNR corrected"]);

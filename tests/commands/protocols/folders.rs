@@ -1,6 +1,6 @@
 //! The folder of an evaluation: killed, split, gone on with, refused.
 
-use crate::{BINARY, read_json};
+use crate::{BINARY, list_of, number_of, read_json, text_of};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -232,32 +232,28 @@ fn pictures_show_sources_predictions_and_truth() {
     for (name, job) in described.iter().zip(&jobs) {
         let shown = read_json(pictures.join(name));
         let open = |file: &Value| {
-            let file = file.as_str().expect("a name");
+            let file = text_of(file);
             image::open(pictures.join(file)).unwrap_or_else(|error| panic!("{file}: {error}")).to_rgb8()
         };
         assert_eq!(open(&shown["truth"]).dimensions(), (24, 24));
-        let names: Vec<&Value> =
-            shown["sources"].as_array().expect("sources").iter().map(|source| &source["name"]).collect();
-        assert_eq!(names, job["sources"].as_array().expect("sources").iter().collect::<Vec<_>>());
-        let schemes = shown["schemes"].as_array().expect("schemes");
+        let names: Vec<&Value> = list_of(&shown["sources"]).iter().map(|source| &source["name"]).collect();
+        assert_eq!(names, list_of(&job["sources"]).iter().collect::<Vec<_>>());
+        let schemes = list_of(&shown["schemes"]);
         assert_eq!(
             schemes.iter().map(|scheme| scheme["scheme"].as_str()).collect::<Vec<_>>(),
             [Some("mean"), Some("error:alpha=1"), Some("l1")]
         );
         for scheme in schemes {
-            let weights: Vec<f64> =
-                scheme["weights"].as_array().expect("weights").iter().filter_map(Value::as_f64).collect();
+            let weights: Vec<f64> = list_of(&scheme["weights"]).iter().filter_map(Value::as_f64).collect();
             assert!(weights.len() == 3 && (weights.iter().sum::<f64>() - 1.0).abs() < 1.0e-5, "{weights:?}");
             // The picture is the one that was scored.
-            let score = job["scores"]
-                .as_array()
-                .expect("scores")
+            let score = list_of(&job["scores"])
                 .iter()
                 .find(|score| (&score["scheme"], &score["target"]) == (&scheme["scheme"], &shown["target"]));
             assert_eq!(score.expect("a score")["values"][0], scheme["values"][0]);
             let (picture, truth) = (open(&scheme["file"]), open(&shown["truth"]));
             let psnr = viewfuse_core::metrics::psnr(&picture, &truth);
-            assert!((psnr - scheme["values"][0][1].as_f64().expect("a ratio")).abs() < 1.0e-9, "{psnr}");
+            assert!((psnr - number_of(&scheme["values"][0][1])).abs() < 1.0e-9, "{psnr}");
         }
     }
 }

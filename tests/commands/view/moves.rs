@@ -1,7 +1,7 @@
 //! Pictures that follow a hand that drags, and that memory does not grow.
 
 use super::super::browser::{Browser, REQUIRE};
-use super::super::{done, numbers};
+use super::super::{done, list_of, number_of, numbers};
 use super::devtools::{Chromium, Tab};
 use super::{COUNT, keep, room, start, weights};
 use serde_json::json;
@@ -66,10 +66,10 @@ fn pictures_follow_the_hand(browser: &Browser, scene: &str, finest: [f64; 2], ke
     let seen = tab.evaluate("({sizes: drawnSizes, numbers: drawnNumbers, weights: weightsTold})");
     weights(&tab);
     keep(&tab, kept);
-    let (told, drawn) = (seen["weights"].as_f64().expect("a number"), numbers(&seen["numbers"]));
+    let (told, drawn) = (number_of(&seen["weights"]), numbers(&seen["numbers"]));
     assert!(told >= drawn.len() as f64, "weights were drawn {told} times for {} pictures", drawn.len());
     assert!(drawn.is_sorted(), "an older picture replaced a newer one: {drawn:?}");
-    for size in seen["sizes"].as_array().expect("sizes") {
+    for size in list_of(&seen["sizes"]) {
         let sides = numbers(size);
         let is_coarse =
             SIXTEENTHS.iter().any(|share| (0..2).all(|i| (sides[i] - finest[i] * share / 16.0).abs() < 1.0));

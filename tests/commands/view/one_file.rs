@@ -2,7 +2,7 @@
 //! hand, a phone.
 
 use super::super::browser::{Browser, REQUIRE};
-use super::super::done;
+use super::super::{done, numbers};
 use super::devtools::{Chromium, Tab};
 use super::keep;
 use glam::{Quat, Vec3};
@@ -143,7 +143,7 @@ fn complaints(tab: &Tab<'_>) -> Vec<String> {
 fn weights(tab: &Tab<'_>) -> Vec<f64> {
     let list =
         tab.evaluate("[...document.querySelectorAll('#sources output')].map((own) => Number(own.dataset.weight))");
-    list.as_array().expect("weights").iter().map(|weight| weight.as_f64().expect("a weight")).collect()
+    numbers(&list)
 }
 
 fn a_page_shows_the_gaussians_of_core() {

@@ -1,7 +1,7 @@
 //! The page in a browser: a hand, two hands on a phone, keys, menus, tabs, and what is taken elsewhere.
 
 use super::super::browser::{Browser, REQUIRE};
-use super::super::{BINARY, assert_near, numbers, read_json};
+use super::super::{BINARY, assert_near, number_of, numbers, read_json};
 use super::devtools::{Chromium, Tab};
 use super::{FOLLOWED, NOTE_PICTURES, WEIGHTS, done_with_warnings, keep, room, weights};
 use image::{RgbImage, RgbaImage};
@@ -390,10 +390,10 @@ fn a_path_goes_through_keyframes() {
     let scene = read_json(saved);
     let about = tab.evaluate("({focus: shows.focus, origin: shows.scene.origin, scale: shows.scene.scale})");
     let (focus, origin) = (numbers(&about["focus"]), numbers(&about["origin"]));
-    let scale = about["scale"].as_f64().expect("a number");
+    let scale = number_of(&about["scale"]);
     let place = |frame: usize, axis: usize| {
         let matrix = &scene["frames"][frame]["transform_matrix"];
-        (matrix[axis][3].as_f64().expect("a number") - origin[axis]) / scale
+        (number_of(&matrix[axis][3]) - origin[axis]) / scale
     };
     let distance = |frame: usize| (0..3).map(|axis| (place(frame, axis) - focus[axis]).powi(2)).sum::<f64>().sqrt();
     assert_near(distance(1), distance(0), 1.0e-6);

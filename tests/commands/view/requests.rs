@@ -1,6 +1,6 @@
 //! The server by requests alone: who may ask, what is answered, and that it ends.
 
-use super::super::{BINARY, assert_near, numbers};
+use super::super::{BINARY, assert_near, list_of, number_of, numbers};
 use super::{done_with_warnings, room, start};
 use image::codecs::webp::WebPDecoder;
 use image::{AnimationDecoder, DynamicImage};
@@ -92,7 +92,7 @@ fn filming(programs: &Path) -> Program {
 fn path(start: &Value, frames: usize) -> Value {
     let pose = |frame: usize| {
         let mut pose = start.clone();
-        pose[0][3] = (pose[0][3].as_f64().expect("a number") + 0.01 * frame as f64).into();
+        pose[0][3] = (number_of(&pose[0][3]) + 0.01 * frame as f64).into();
         pose
     };
     json!({"poses": (0..frames).map(pose).collect::<Vec<_>>(), "scheme": "mean"})
@@ -120,7 +120,7 @@ fn a_video_has_the_pictures_of_its_path() {
     let decoder = WebPDecoder::new(Cursor::new(answer.body)).expect("a WebP");
     let frames = decoder.into_frames().collect_frames().expect("frames");
     assert_eq!(frames.len(), 3);
-    for (frame, pose) in frames.iter().zip(film["poses"].as_array().expect("poses")) {
+    for (frame, pose) in frames.iter().zip(list_of(&film["poses"])) {
         let mut request = request("a", pose, false);
         request["scheme"] = "mean".into();
         let (_, picture) = program.connect().picture(&request).unpacked();
@@ -198,20 +198,20 @@ fn a_video_is_mp4_where_ffmpeg_is() {
 fn how_much_was_photographed_is_told() {
     let program = start(&repository(), &format!("{} --size 24x18", data("room").display()));
     let scene = program.scene();
-    let ring = scene["ring"].as_array().expect("places");
-    let seen: Vec<f64> = ring.iter().map(|place| place["seen"].as_f64().expect("a share")).collect();
+    let ring = list_of(&scene["ring"]);
+    let seen: Vec<f64> = ring.iter().map(|place| number_of(&place["seen"])).collect();
     assert_eq!(seen.len(), 36);
     let count = |is: &dyn Fn(f64) -> bool| seen.iter().filter(|share| is(**share)).count();
     assert!(count(&|share| share > 0.9) >= 3 && count(&|share| share < 0.1) >= 15, "{seen:?}");
     let share = |pose: &Value, is_moving: bool| {
         let (answer, _) = program.connect().picture(&request("a", pose, is_moving)).unpacked();
-        answer["seen"].as_f64().expect("a share")
+        number_of(&answer["seen"])
     };
     // Looking back, over its own shoulder: the first two columns are turned around.
     let (there, mut away) = (scene["start"].clone(), scene["start"].clone());
     for row in 0..3 {
         for column in [0, 2] {
-            away[row][column] = (-away[row][column].as_f64().expect("a number")).into();
+            away[row][column] = (-number_of(&away[row][column])).into();
         }
     }
     for is_moving in [true, false] {
@@ -230,7 +230,7 @@ fn full_pictures_are_those_of_render() {
     }
     let program = start(folder.path(), &format!("{} {options} --weights error:alpha=1", scene.display()));
     let found = program.scene();
-    let others = found["others"].as_array().expect("other views");
+    let others = list_of(&found["others"]);
     let pose = &others.iter().find(|view| view["name"] == "005").expect("view 005")["pose"];
     let mut connection = program.connect();
     let mut pictures = Vec::new();
@@ -397,7 +397,7 @@ fn gaussians_are_shown() {
     let expected = image::open(folder.path().join("out/000020.png")).expect("a picture").to_rgb8();
     let program = start(folder.path(), "toy --gaussians toy.ply --sources 0..19 --size 64x64");
     let found = program.scene();
-    let others = found["others"].as_array().expect("other views");
+    let others = list_of(&found["others"]);
     let pose = &others.iter().find(|view| view["name"] == "000020").expect("view 20")["pose"];
     let mut connection = program.connect();
     let (full, picture) = connection.picture(&request("a", pose, false)).unpacked();
