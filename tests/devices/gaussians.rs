@@ -1,6 +1,6 @@
 //! Gaussians of the sample scene on each device: derivatives, and pictures of a scene that is optimised.
 
-use crate::candidate::{Candidate, Test};
+use crate::candidate::{Candidate, tests};
 use libtest_mimic::Failed;
 use std::sync::OnceLock;
 use viewfuse::device::choice::AnyDevice;
@@ -22,10 +22,7 @@ use viewfuse_kernels::rows::GaussianBlock;
 use viewfuse_tests::places::data;
 use viewfuse_vulkan::GpuOptions;
 
-pub(crate) const TESTS: &[Test] = &[
-    Test::new("derivatives_of_a_scene_are_the_cpus", derivatives_are_the_cpus),
-    Test::new("a_scene_is_as_good_as_the_cpus", a_scene_is_as_good),
-];
+tests!(derivatives_of_a_scene_are_the_cpus, a_scene_is_as_good_as_the_cpus);
 
 /// Most splats of a tile: fewer than those whose loops Mesa's llvmpipe ends (`viewfuse_field::gaussians::optimised`).
 const MAX_LISTED: u32 = 100;
@@ -108,7 +105,7 @@ fn derivatives<D: Device>(device: &D, made: &Optimised) -> Vec<GaussianBlock> {
 /// Some of a Gaussian's parameters.
 type Part = fn(&GaussianBlock) -> Vec<f32>;
 
-fn derivatives_are_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
+fn derivatives_of_a_scene_are_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
     let device = candidate.vulkan(&GpuOptions::default())?;
     let made = thinned();
     let (cpu, ours) = (derivatives(&Cpu, &made), derivatives(&device, &made));
@@ -146,7 +143,7 @@ fn score(made: &Optimised) -> f64 {
     (0..images.images.len()).map(score).sum::<f64>() / images.images.len() as f64
 }
 
-fn a_scene_is_as_good(candidate: &Candidate) -> Result<(), Failed> {
+fn a_scene_is_as_good_as_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
     let device = candidate.vulkan(&GpuOptions::default())?;
     let ours = scene(&device);
     if device.is_software() {

@@ -1,7 +1,7 @@
 //! A small PixelNeRF on each device: the reference values, and whole pictures with everything and with nothing left
 //! out.
 
-use crate::candidate::{Candidate, Test};
+use crate::candidate::{Candidate, tests};
 use libtest_mimic::Failed;
 use viewfuse::check::verify::verify;
 use viewfuse::device::cpu::Cpu;
@@ -18,11 +18,11 @@ use viewfuse_tests::fields::largest_difference;
 use viewfuse_tests::places::data;
 use viewfuse_vulkan::{GpuOptions, Limits};
 
-pub(crate) const TESTS: &[Test] = &[
-    Test::new("pixelnerf_has_the_reference_values", pixelnerf_has_the_reference_values),
-    Test::new("pixelnerfs_pictures_are_the_cpus", pixelnerfs_pictures_are_the_cpus),
-    Test::new("pixelnerfs_sample_lists_stay_on_the_device", pixelnerfs_sample_lists_stay_on_the_device),
-];
+tests!(
+    pixelnerf_has_the_reference_values,
+    pixelnerfs_pictures_are_the_cpus,
+    pixelnerfs_sample_lists_stay_on_the_device
+);
 
 const SIDE: u32 = 20;
 const COARSE_COUNT: u32 = 32;

@@ -14,7 +14,7 @@ use viewfuse::field::genvs::{Architecture, Estimate, Genvs, GenvsOptions, Omissi
 use viewfuse::field::{FieldError, Record, Rendered};
 use viewfuse::job::progress::{Progress, Silent};
 use viewfuse::scene::photographs::SourceImages;
-use viewfuse::weighting::sources::{MAX_SOURCES, SourceWeights};
+use viewfuse::weighting::sources::SourceWeights;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::weights::Weights;
@@ -44,13 +44,6 @@ pub(super) fn without_denoiser(options: GenvsOptions) -> Genvs {
 /// The lorry from some sides, on white.
 fn sources(count: u32) -> SourceImages {
     photographs(count, 32)
-}
-
-/// Weights of the first views; the others have none.
-fn weights<const N: usize>(scores: [f32; N], count: u32) -> SourceWeights {
-    let mut all = [0.0; MAX_SOURCES];
-    all[..N].copy_from_slice(&scores);
-    Weights::from_scores(&all, count)
 }
 
 fn try_picture(

@@ -26,6 +26,13 @@ pub fn job(scene: &Scene, sources: &str, targets: &str) -> FewShot {
     Selection { targets, sources, ..Selection::default() }.resolve(scene, 1).expect("views")
 }
 
+/// Weights of the first of so many views, by their scores; the others have none.
+pub fn weights<const N: usize>(scores: [f32; N], count: u32) -> SourceWeights {
+    let mut all = [0.0; MAX_SOURCES];
+    all[..N].copy_from_slice(&scores);
+    Weights::from_scores(&all, count)
+}
+
 /// Calls `act` with the sources of a job, prepared; the photographs of its targets are there.
 pub fn on_scene<T>(
     scene: &Scene,

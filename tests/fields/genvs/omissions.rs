@@ -1,8 +1,7 @@
 //! Each thing that can be omitted, alone: what it saves and what it costs, against the exact picture.
 
 use super::{
-    assert_sound, exact, largest_difference, made, omitting, picture_with, recorded, sources, target, weights,
-    without_denoiser,
+    assert_sound, exact, largest_difference, made, omitting, picture_with, recorded, sources, target, without_denoiser,
 };
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::LeftOut;
@@ -13,7 +12,7 @@ use viewfuse::job::progress::Silent;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::weights::Weights;
-use viewfuse_tests::fields::{line, on_sources};
+use viewfuse_tests::fields::{line, on_sources, weights};
 
 fn in_18_calls() -> Plan {
     let steps = Steps::Fixed { sampler: Sampler::Ipndm, level_count: 18 };

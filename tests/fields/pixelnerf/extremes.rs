@@ -7,7 +7,7 @@ use viewfuse::field::pixelnerf::{Architecture, Omissions, PixelNerf, PixelNerfOp
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::photographs::SourceImages;
 use viewfuse_core::weights::Weights;
-use viewfuse_tests::checkpoints::changed;
+use viewfuse_tests::checkpoints::{LARGE, multiplied};
 use viewfuse_tests::fields;
 
 #[test]
@@ -57,27 +57,16 @@ fn a_background_of_another_colour_shows_where_nothing_is() {
     assert!((0.8..1.3).contains(&middle), "the body is before the middle of the scene: {middle}");
 }
 
-/// Times this, every weight is finite still; what becomes of numbers that meet several of them is not.
-const LARGE: f32 = 1.9e38;
-
-/// The body's network with all weights of layers of this name multiplied.
-fn multiplied(layer: &str, options: PixelNerfOptions) -> PixelNerf {
-    let checkpoint = changed(&test_networks::body(&Architecture::small(16)), |tensors| {
-        let chosen: Vec<_> = tensors.iter_mut().filter(|(tensor, _)| tensor.name.ends_with(layer)).collect();
-        assert!(!chosen.is_empty(), "{layer}");
-        chosen.into_iter().flat_map(|(_, values)| values).for_each(|value| *value *= LARGE);
-    });
-    PixelNerf::new(&checkpoint, options).expect("a made network")
-}
-
 #[test]
 fn networks_that_overflow_are_errors_and_no_white_pictures() {
     let sources = sources(2);
     let weights = Weights::mean(2);
     let between_nodes = Omissions { nodes: 16, ..Omissions::default() };
     for layer in ["lin_in.weight", "fc_1.weight"] {
+        let made = test_networks::body(&Architecture::small(16));
+        let checkpoint = multiplied(&made, |name| name.ends_with(layer), LARGE);
         for omissions in [Omissions::NONE, Omissions::default(), between_nodes] {
-            let field = multiplied(layer, omitting(omissions));
+            let field = PixelNerf::new(&checkpoint, omitting(omissions)).expect("a made network");
             let made = fields::picture(&Cpu, &field, &sources, &weights, &target(8), 0.0, &Silent);
             let error = made.err().unwrap_or_else(|| panic!("{layer}: a picture"));
             let said = error.to_string();
