@@ -167,24 +167,25 @@ fn an_earlier_run_is_replaced_as_a_whole_or_not_at_all() {
 /// The same settings are the same options and sources; what is there stays, whatever happens to the new run.
 fn a_target_is_added_to_a_run_of_the_same_settings() {
     let folder = toy();
-    let path = folder.path();
     let render = |more: &str, output: &str| {
         format!("render toy --sources 0..3 --size 24x24 --device cpu --weights mean --no-sheets {more} -o {output}")
     };
-    let record = |output: &str| -> Value { read_json(path.join(output).join("run.json")) };
+    let record = |output: &str| -> Value { read_json(folder.join(output).join("run.json")) };
     let targets = |record: &Value| -> Vec<String> {
         let frames = list_of(&record["frames"]);
         frames.iter().map(|frame| text_of(&frame["target"]).to_owned()).collect()
     };
     let pictures = |output: &str| {
         let is_picture = |name: &String| name.ends_with(".png");
-        let names = names_in(&path.join(output)).into_iter().filter(is_picture);
-        names.map(|name| (name.clone(), fs::read(path.join(output).join(name)).expect("a picture"))).collect::<Vec<_>>()
+        let names = names_in(&folder.join(output)).into_iter().filter(is_picture);
+        names
+            .map(|name| (name.clone(), fs::read(folder.join(output).join(name)).expect("a picture")))
+            .collect::<Vec<_>>()
     };
-    done(path, &render("--targets 20", "out"));
-    let said = done(path, &render("--targets 21,22", "out"));
+    done(&folder, &render("--targets 20", "out"));
+    let said = done(&folder, &render("--targets 21,22", "out"));
     assert!(said.contains("\nadded to 1 of an earlier run with the same settings and sources\n"), "{said}");
-    done(path, &render("--targets 20,21,22", "whole"));
+    done(&folder, &render("--targets 20,21,22", "whole"));
     assert!(pictures("out") == pictures("whole"), "other pictures than those of one run");
     let (added, whole) = (record("out"), record("whole"));
     assert_eq!((&added["earlier"], &whole["earlier"]), (&1.into(), &0.into()));
@@ -195,7 +196,7 @@ fn a_target_is_added_to_a_run_of_the_same_settings() {
         }
     }
     // One of them again: the others stay.
-    done(path, &render("--targets 20", "out"));
+    done(&folder, &render("--targets 20", "out"));
     assert_eq!(targets(&record("out")), ["000021", "000022", "000020"]);
     assert!(pictures("out") == pictures("whole"));
 
@@ -206,19 +207,19 @@ fn a_target_is_added_to_a_run_of_the_same_settings() {
         (render("--targets 2", "out"), "a source"),
         (render("--targets 23 --video webp", "out"), "a video is of all pictures of one run"),
     ] {
-        assert_refused(BINARY, path, &arguments, &[reason]);
+        assert_refused(BINARY, &folder, &arguments, &[reason]);
     }
     // A run that is killed while it adds loses nothing; only it may go on.
-    killed_when(BINARY, path, &render("--orbit 800", "out"), || path.join("out/orbit-002.png").exists());
+    killed_when(BINARY, &folder, &render("--orbit 800", "out"), || folder.join("out/orbit-002.png").exists());
     assert_eq!(targets(&record("out")), ["000021", "000022", "000020"]);
-    assert_refused(BINARY, path, &render("--targets 23", "out"), &["another run was interrupted there"]);
+    assert_refused(BINARY, &folder, &render("--targets 23", "out"), &["another run was interrupted there"]);
     assert!(whole_of(&pictures("whole"), &pictures("out")), "a picture is lost");
     // It may warn of what the sources do not show.
-    let rendered = |arguments: &str| assert_eq!(run(BINARY, path, arguments).code, Some(0), "{arguments}");
+    let rendered = |arguments: &str| assert_eq!(run(BINARY, &folder, arguments).code, Some(0), "{arguments}");
     rendered(&render("--orbit 3", "other"));
-    done(path, &render("--targets 20", "other"));
+    done(&folder, &render("--targets 20", "other"));
     // Fewer cameras of the same names are elsewhere.
-    assert_refused(BINARY, path, &render("--orbit 2", "other"), &["cameras of the same names were elsewhere"]);
+    assert_refused(BINARY, &folder, &render("--orbit 2", "other"), &["cameras of the same names were elsewhere"]);
     // A path that is whole is replaced, beside what stays.
     rendered(&render("--orbit 3", "other"));
     assert_eq!(targets(&record("other")), ["000020", "orbit-000", "orbit-001", "orbit-002"]);

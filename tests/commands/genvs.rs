@@ -43,12 +43,11 @@ fn omitted(record: &Value, what: &str) -> (u64, bool, u64) {
 }
 
 fn a_picture_of_any_size_a_sheet_and_a_record_without_depth() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     // The depth map of an earlier run would belong to another picture.
-    done(folder, "render toy --targets 20 --size 16x16 --device cpu -o out");
+    done(&folder, "render toy --targets 20 --size 16x16 --device cpu -o out");
     let printed = done(
-        folder,
+        &folder,
         "render toy --targets 20 --views 3 --size 21x20 --model genvs:small --seed 5 --device cpu --steps 3 -o out",
     );
     assert!(printed.contains("1 view from 3 sources, error:alpha=1, genvs on cpu"), "{printed}");
@@ -132,39 +131,37 @@ fn frames_start_from_the_ones_before() {
 
 /// Which network a file holds is said by its tensors, not by its name.
 fn files_of_either_network() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     let computed = genvs::test_networks::deterministic(&genvs::Architecture::small());
     computed.write_safetensors(&folder.join("one.safetensors"), Precision::Kept, &Silent).expect("a file");
     let computed = pixelnerf::test_networks::deterministic(&pixelnerf::Architecture::small(8));
     computed.write_safetensors(&folder.join("two.safetensors"), Precision::Kept, &Silent).expect("a file");
-    let genvs = picture(folder, "--steps 2 --model one.safetensors");
-    assert!(genvs == picture(folder, "--steps 2 --model genvs:small"), "a file is not what was written");
-    let pixelnerf = record(folder, "--samples 8,4,4 --model two.safetensors");
+    let genvs = picture(&folder, "--steps 2 --model one.safetensors");
+    assert!(genvs == picture(&folder, "--steps 2 --model genvs:small"), "a file is not what was written");
+    let pixelnerf = record(&folder, "--samples 8,4,4 --model two.safetensors");
     assert_eq!((&pixelnerf["field"], &pixelnerf["denoising"]), (&"pixelnerf".into(), &Value::Null));
     let without = genvs::Architecture { denoiser: None, ..genvs::Architecture::small() };
     genvs::test_networks::deterministic(&without)
         .write_safetensors(&folder.join("three.safetensors"), Precision::Kept, &Silent)
         .expect("a file");
-    let plain = record(folder, "--model three.safetensors");
+    let plain = record(&folder, "--model three.safetensors");
     assert_eq!((&plain["field"], &plain["denoising"]), (&"genvs".into(), &Value::Null));
     let arguments = "render toy --targets 20 --model three.safetensors --sampler heun -o new";
-    assert_wrong_arguments(BINARY, folder, arguments, &["--sampler cannot be used", "has no denoiser"]);
+    assert_wrong_arguments(BINARY, &folder, arguments, &["--sampler cannot be used", "has no denoiser"]);
     let other = safetensors(&[("mlp.weight", "F32", &[1], f32_bytes([1.0]))]);
-    scene.write("other.safetensors", other);
+    folder.write("other.safetensors", other);
     let parts = [
         "--model: other.safetensors: holds no supported network",
         "'encoder.model.' (PixelNeRF)",
         "'pixel_nerf_net.' (GeNVS)",
     ];
-    assert_refused(BINARY, folder, "render toy --targets 20 --model other.safetensors -o new", &parts);
+    assert_refused(BINARY, &folder, "render toy --targets 20 --model other.safetensors -o new", &parts);
 }
 
 fn sweeps_samplers_and_omissions() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     let arguments = "pareto toy --targets 20,21 --views 2 --model genvs:small --size 16x16 --samples 8 --repeat 1 --device cpu -o out";
-    let mut sweep = command(BINARY, folder, arguments);
+    let mut sweep = command(BINARY, &folder, arguments);
     for words in ["heun, 8", "ipndm, 6", "ipndm, 12", "tolerance 0.03", "all, half", "all, reuse"] {
         sweep.args(["--only", words]);
     }

@@ -126,19 +126,18 @@ fn killed(folder: &Path, arguments: &str, frames: usize) {
 }
 
 fn a_run_that_was_killed_twice_ends_with_the_same_bytes() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     let arguments = "render toy --orbit 120 --size 24x24 --device cpu --no-sheets --depth npy --video webp,y4m -o";
-    done(folder, &format!("{arguments} whole"));
+    done(&folder, &format!("{arguments} whole"));
     let arguments = format!("{arguments} cut");
-    killed(folder, &arguments, 3);
+    killed(&folder, &arguments, 3);
     // What a kill leaves in the middle of a line and of a frame.
     let journal = folder.join("cut/frames.jsonl");
     let text = fs::read_to_string(&journal).expect("a journal");
     fs::write(&journal, format!("{text}{{\"frame\":")).expect("a journal");
     fs::remove_file(folder.join("cut/orbit-001_depth.npy")).expect("a file");
-    killed(folder, &arguments, 60);
-    let printed = done(folder, &arguments);
+    killed(&folder, &arguments, 60);
+    let printed = done(&folder, &arguments);
     let there: usize = printed
         .lines()
         .find_map(|line| line.strip_prefix("continued: ")?.split_once(" of them were there")?.0.parse().ok())
@@ -163,16 +162,15 @@ fn a_run_that_was_killed_twice_ends_with_the_same_bytes() {
 }
 
 fn another_run_begins_anew() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     let arguments = "render toy --orbit 60 --size 24x24 --device cpu --no-sheets --replace -o cut";
-    killed(folder, arguments, 2);
-    let printed = done(folder, &format!("{PATH} --replace -o cut"));
+    killed(&folder, arguments, 2);
+    let printed = done(&folder, &format!("{PATH} --replace -o cut"));
     assert!(!printed.contains("continued"), "{printed}");
     // Other weights make other pictures.
-    killed(folder, arguments, 2);
+    killed(&folder, arguments, 2);
     let printed =
-        done(folder, "render toy --orbit 4 --size 24x24 --device cpu --no-sheets --weights mean --replace -o cut");
+        done(&folder, "render toy --orbit 4 --size 24x24 --device cpu --no-sheets --weights mean --replace -o cut");
     assert!(!printed.contains("continued"), "{printed}");
     assert!(!folder.join("cut/frames.jsonl").exists() && folder.join("cut/run.json").is_file());
 }
@@ -186,11 +184,10 @@ fn with_programs(folder: &Path, programs: &Path, arguments: &str) -> Outcome {
 
 /// The ffmpeg of this machine: what it wrote, it decodes to the pictures again, up to its compression.
 fn mp4_by_ffmpeg_shows_the_pictures() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     // Odd sides, which the format does not have: a row and a column are added.
     done(
-        folder,
+        &folder,
         "render toy --between 2 6 --frames 5 --size 63x63 --device cpu --no-sheets --video mp4 --fps 10 -o out",
     );
     let video = folder.join("out/video.mp4");
@@ -219,11 +216,10 @@ fn mp4_by_ffmpeg_shows_the_pictures() {
 }
 
 fn an_ffmpeg_gets_the_video_or_there_is_y4m() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     let programs = folder.join("programs");
     fs::create_dir(&programs).expect("a folder");
-    let run = with_programs(folder, &programs, &format!("{PATH} --video mp4 -o out"));
+    let run = with_programs(&folder, &programs, &format!("{PATH} --video mp4 -o out"));
     assert_eq!(run.code, Some(0), "{}", run.stderr);
     assert_eq!(run.stderr, "viewfuse: out/video.y4m, not mp4, is written: there is no ffmpeg on the path\n");
     assert!(run.stdout.contains("\nout/video.y4m\n"), "{}", run.stdout);
@@ -232,14 +228,14 @@ fn an_ffmpeg_gets_the_video_or_there_is_y4m() {
         return;
     }
     // A program of that name that keeps what it reads, and says how it was called.
-    scene.script("programs/ffmpeg", "for last; do :; done\nexec /bin/cat > \"$last\"\n");
-    let run = with_programs(folder, &programs, &format!("{PATH} --video mp4 -o out"));
+    folder.script("programs/ffmpeg", "for last; do :; done\nexec /bin/cat > \"$last\"\n");
+    let run = with_programs(&folder, &programs, &format!("{PATH} --video mp4 -o out"));
     assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
     assert!(fs::read(folder.join("out/video.mp4")).expect("a video") == video, "the program got another video");
     assert!(!folder.join("out/video.y4m").exists(), "the video of the run before is left");
     // One that fails.
-    scene.script("programs/ffmpeg", "echo no such encoder >&2\nexit 3\n");
-    let run = with_programs(folder, &programs, &format!("{PATH} --video mp4 -o out"));
+    folder.script("programs/ffmpeg", "echo no such encoder >&2\nexit 3\n");
+    let run = with_programs(&folder, &programs, &format!("{PATH} --video mp4 -o out"));
     assert_eq!(run.code, Some(1));
     assert!(run.stderr.contains("video.mp4: ffmpeg could not write it: no such encoder"), "{}", run.stderr);
     assert!(names_in(&folder.join("out")).iter().all(|name| !name.ends_with("mp4")));
@@ -255,15 +251,14 @@ fn npy(path: &Path) -> (String, Vec<f32>) {
 }
 
 fn depths_and_opacity_for_other_programs() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     // Wider than high, so that rows and columns differ.
-    scene.write(
+    folder.write(
         "wide.csv",
         "name,x,y,z,look_x,look_y,look_z,fx,fy,cx,cy,width,height\nwide,1,0.7,0.5,0,0,0,60,60,24,16,48,32\n",
     );
     let arguments = "render toy --camera-path wide.csv --device cpu --no-sheets";
-    done(folder, &format!("{arguments} --alpha --depth png,exr,npy -o out"));
+    done(&folder, &format!("{arguments} --alpha --depth png,exr,npy -o out"));
     let out = folder.join("out");
     assert_eq!(names_in(&out), ["run.json", "wide.png", "wide_depth.exr", "wide_depth.npy", "wide_depth.png"]);
     let (header, depths) = npy(&out.join("wide_depth.npy"));
@@ -284,7 +279,7 @@ fn depths_and_opacity_for_other_programs() {
     }
     // Opacity is that of the object; colour and background make the picture without alpha.
     let with_alpha = image::open(out.join("wide.png")).expect("a picture").into_rgba8();
-    done(folder, &format!("{arguments} -o plain"));
+    done(&folder, &format!("{arguments} -o plain"));
     let plain = png(&folder.join("plain"), "wide.png");
     let background: Vec<f64> = numbers(&record["background"]["used"]);
     let opaque = with_alpha.pixels().filter(|pixel| pixel[3] == 255).count();
@@ -301,23 +296,22 @@ fn depths_and_opacity_for_other_programs() {
 }
 
 fn camera_paths_from_files() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     let record = |run: &str| -> Value { read_json(folder.join(run).join("run.json")) };
-    done(folder, "render toy --targets 20 --sources 0..11 --size 24x24 --device cpu --no-sheets -o view");
+    done(&folder, "render toy --targets 20 --sources 0..11 --size 24x24 --device cpu --no-sheets -o view");
     let pose = record("view")["frames"][0]["world_from_camera"].clone();
     // The same camera by a table, and by nerfstudio's viewer with axes turned around.
     let number = |row: usize, column: usize| number_of(&pose[row][column]);
     let entries: Vec<String> = (0..12).map(|k| number(k / 4, k % 4).to_string()).collect();
     let names: Vec<String> = (0..12).map(|k| format!("m{}{}", k / 4, k % 4)).collect();
-    scene.write("poses.csv", format!("name,{}\nview,{}\n", names.join(","), entries.join(",")));
+    folder.write("poses.csv", format!("name,{}\nview,{}\n", names.join(","), entries.join(",")));
     let opengl: Vec<f64> =
         (0..16).map(|k| number(k / 4, k % 4) * if k % 4 == 1 || k % 4 == 2 { -1.0 } else { 1.0 }).collect();
     let frame = json!({ "file_path": "view", "transform_matrix": opengl.chunks(4).collect::<Vec<_>>() });
-    scene.write("poses.json", json!({ "frames": [frame], "fps": 10 }).to_string());
+    folder.write("poses.json", json!({ "frames": [frame], "fps": 10 }).to_string());
     for file in ["poses.csv", "poses.json"] {
         let arguments = format!("--camera-path {file} --sources 0..11 --size 24x24 --device cpu --no-sheets");
-        done(folder, &format!("render toy {arguments} --video y4m -o path"));
+        done(&folder, &format!("render toy {arguments} --video y4m -o path"));
         assert!(png(&folder.join("path"), "view.png") == png(&folder.join("view"), "000020.png"), "{file}");
         let video = y4m::decode(File::open(folder.join("path/video.y4m")).expect("a file")).expect("y4m");
         assert_eq!(video.get_framerate().num, if file == "poses.json" { 10 } else { 30 });

@@ -38,10 +38,9 @@ fn pictures(folder: &Path) -> Vec<(String, Vec<u8>)> {
 }
 
 fn writes_a_picture_a_depth_map_a_sheet_and_a_record() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     let printed =
-        done(folder, "render toy --targets 20 --size 64x64 --seed 7 --leave-out 0 --device cpu -o out/deeper");
+        done(&folder, "render toy --targets 20 --size 64x64 --seed 7 --leave-out 0 --device cpu -o out/deeper");
     assert!(
         printed.contains("out/deeper/000020.png  PSNR ") && printed.contains("1 view from 23 sources"),
         "{printed}"
@@ -56,7 +55,7 @@ fn writes_a_picture_a_depth_map_a_sheet_and_a_record() {
     let sheet = picture(&output, "000020_sheet.png");
     assert!(sheet.width() > 64 && sheet.height() > 64);
 
-    let record = record(folder, "out/deeper");
+    let record = record(&folder, "out/deeper");
     assert_eq!((&record["seed"], &record["scene"], &record["size"]), (&7.into(), &"toy".into(), &[64, 64][..].into()));
     assert!(record["device"].as_str().is_some_and(|device| device.starts_with("cpu")), "{record}");
     // The default is the choice for the scene: six sources were held out, and the best scheme is used.
@@ -184,12 +183,11 @@ fn cameras_of_a_map_stay_in_its_coordinates() {
 }
 
 fn the_same_run_makes_the_same_pictures() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     let arguments = "render toy --targets 20,22 --size 48x48";
-    done(folder, &format!("{arguments} -o first"));
-    done(folder, &format!("{arguments} -o second"));
-    done(folder, &format!("{arguments} --threads 1 -o third"));
+    done(&folder, &format!("{arguments} -o first"));
+    done(&folder, &format!("{arguments} -o second"));
+    done(&folder, &format!("{arguments} --threads 1 -o third"));
     let first = pictures(&folder.join("first"));
     assert_eq!(first.len(), 6);
     assert!(first == pictures(&folder.join("second")), "two runs differ");
@@ -215,15 +213,14 @@ fn chooses_sources() {
 }
 
 fn weights_change_the_picture() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     for (output, scheme) in [("a", "mean"), ("b", "error:alpha=1"), ("c", "cross-attention")] {
-        done(folder, &format!("render toy --targets 20 --size 32x32 --leave-out 0 --weights {scheme} -o {output}"));
-        assert_eq!(record(folder, output)["weighting"], scheme);
+        done(&folder, &format!("render toy --targets 20 --size 32x32 --leave-out 0 --weights {scheme} -o {output}"));
+        assert_eq!(record(&folder, output)["weighting"], scheme);
     }
-    let mean = numbers(&record(folder, "a")["frames"][0]["weights"]);
+    let mean = numbers(&record(&folder, "a")["frames"][0]["weights"]);
     mean.iter().for_each(|weight| assert_near(*weight, 1.0 / 23.0, 1.0e-7));
-    let prediction = |output: &str| picture(folder, &format!("{output}/000020.png")).to_rgb8();
+    let prediction = |output: &str| picture(&folder, &format!("{output}/000020.png")).to_rgb8();
     assert!(prediction("a") != prediction("b") && prediction("b") != prediction("c"));
 }
 

@@ -30,14 +30,13 @@ viewfuse_tests::trials![
 /// The sample scene twice, three evaluations of it, a sweep and a training.
 fn runs() -> Folder {
     let folder = toy();
-    let path = folder.path();
-    for (file, _) in files_below(&path.join("toy")).into_iter().filter(|(file, _)| file.is_file()) {
-        let inside = file.strip_prefix(path.join("toy")).expect("inside").display().to_string();
+    for (file, _) in files_below(&folder.join("toy")).into_iter().filter(|(file, _)| file.is_file()) {
+        let inside = file.strip_prefix(folder.join("toy")).expect("inside").display().to_string();
         fs::copy(&file, folder.file(&format!("lorry/{inside}"))).expect("a copy");
     }
-    done(path, &format!("evaluate toy lorry --protocol count:sources=2+4+8 {SMALL} -o count"));
-    done(path, &format!("evaluate toy lorry --protocol random {SMALL} --pictures 1 -o random"));
-    done(path, "pareto toy --targets 20 --views 3 --size 16x16 --repeat 1 --device cpu -o sweep");
+    done(&folder, &format!("evaluate toy lorry --protocol count:sources=2+4+8 {SMALL} -o count"));
+    done(&folder, &format!("evaluate toy lorry --protocol random {SMALL} --pictures 1 -o random"));
+    done(&folder, "pareto toy --targets 20 --views 3 --size 16x16 --repeat 1 --device cpu -o sweep");
     folder.write(
         "trained/record.json",
         json!({"steps": 12, "settings": {"rate": 0.001}, "scores": (0..20).collect::<Vec<_>>()}).to_string(),
@@ -99,21 +98,19 @@ fn the_page_holds_everything() {
 
 fn evaluations_under_way_are_shown() {
     let folder = toy();
-    let path = folder.path();
-    done(path, &format!("evaluate toy --protocol random --trials 5 {SMALL} --shard 1/2 -o half"));
-    done(path, "report half -o page.html");
-    assert!(page(path).contains("<strong>Not finished: </strong>2 of 5 jobs"), "{}", page(path));
-    assert!(page(path).contains("Missing: 0, 2, 4."));
+    done(&folder, &format!("evaluate toy --protocol random --trials 5 {SMALL} --shard 1/2 -o half"));
+    done(&folder, "report half -o page.html");
+    assert!(page(&folder).contains("<strong>Not finished: </strong>2 of 5 jobs"), "{}", page(&folder));
+    assert!(page(&folder).contains("Missing: 0, 2, 4."));
     // Nothing at all is done yet.
-    fs::remove_file(path.join("half/scores-1-of-2.jsonl")).expect("a journal");
-    done(path, "report half -o page.html");
-    assert!(page(path).contains("0 of 5 jobs") && !page(path).contains("warped copy"));
+    fs::remove_file(folder.join("half/scores-1-of-2.jsonl")).expect("a journal");
+    done(&folder, "report half -o page.html");
+    assert!(page(&folder).contains("0 of 5 jobs") && !page(&folder).contains("warped copy"));
 }
 
 fn what_is_no_record_is_refused() {
     let folder = toy();
-    let path = folder.path();
-    let refused = |arguments: &str, parts: &[&str]| assert_refused(lab(), path, arguments, parts);
+    let refused = |arguments: &str, parts: &[&str]| assert_refused(lab(), &folder, arguments, parts);
     refused("report toy -o page.html", &["toy/run.json: cannot be read"]);
     refused(
         "report --pareto toy/intrinsics.txt -o page.html",
@@ -121,11 +118,11 @@ fn what_is_no_record_is_refused() {
     );
     refused("report --training toy -o page.html", &["toy/record.json: cannot be read"]);
     refused("report --training toy -o toy", &["toy: cannot be written: it is a folder"]);
-    assert_wrong_arguments(lab(), path, "report -o page.html", &["required"]);
-    done(path, &format!("evaluate toy --protocol random {SMALL} -o out"));
-    fs::remove_file(path.join("out/pictures/job-00000-truth.png")).expect("a picture");
+    assert_wrong_arguments(lab(), &folder, "report -o page.html", &["required"]);
+    done(&folder, &format!("evaluate toy --protocol random {SMALL} -o out"));
+    fs::remove_file(folder.join("out/pictures/job-00000-truth.png")).expect("a picture");
     refused("report out -o page.html", &["out/pictures/job-00000-truth.png: cannot be read"]);
-    fs::write(path.join("out/pictures/job-00000.json"), "{}").expect("a file");
+    fs::write(folder.join("out/pictures/job-00000.json"), "{}").expect("a file");
     refused("report out -o page.html", &["out/pictures/job-00000.json: does not describe pictures"]);
 }
 
@@ -278,14 +275,13 @@ fn small_run() -> Folder {
 /// A folder that somebody sent must not bring files of whoever makes the page onto the page.
 fn a_received_folder_shows_only_its_own() {
     let folder = small_run();
-    let path = folder.path();
     folder.write("secret.png", "a key").write("run/secret.png", "a key").write("run/pictures/key.txt", "a key");
     folder.write("run/pictures/false.png", "a key");
-    let file = path.join("run/pictures/job-00000.json");
+    let file = folder.join("run/pictures/job-00000.json");
     let text = fs::read_to_string(&file).expect("a description");
     let truth = "job-00000-truth.png";
     assert!(text.contains(truth));
-    let absolute = path.join("secret.png");
+    let absolute = folder.join("secret.png");
     for name in [
         absolute.to_str().expect("text"),
         "../secret.png",
@@ -300,65 +296,64 @@ fn a_received_folder_shows_only_its_own() {
         for old in [truth, "job-00000-source-000.png", "job-00000-scheme-000.png"] {
             fs::write(&file, text.replace(old, name)).expect("a file");
             let parts = ["run/pictures/job-00000.json: names", "no picture in the folder"];
-            assert_refused(lab(), path, "report run -o page.html", &parts);
+            assert_refused(lab(), &folder, "report run -o page.html", &parts);
         }
     }
     fs::write(&file, text.replace(truth, "false.png")).expect("a file");
-    assert_refused(lab(), path, "report run -o page.html", &["run/pictures/false.png: is not a PNG"]);
+    assert_refused(lab(), &folder, "report run -o page.html", &["run/pictures/false.png: is not a PNG"]);
     #[cfg(unix)]
     {
         use std::os::unix::fs::symlink;
-        fs::copy(path.join("toy/rgb/000000.png"), path.join("mine.png")).expect("a picture");
-        symlink(path.join("mine.png"), path.join("run/pictures/link.png")).expect("a link");
+        fs::copy(folder.join("toy/rgb/000000.png"), folder.join("mine.png")).expect("a picture");
+        symlink(folder.join("mine.png"), folder.join("run/pictures/link.png")).expect("a link");
         fs::write(&file, text.replace(truth, "link.png")).expect("a file");
-        assert_refused(lab(), path, "report run -o page.html", &["link.png", "no picture in the folder"]);
+        assert_refused(lab(), &folder, "report run -o page.html", &["link.png", "no picture in the folder"]);
         folder.write("trained/record.json", "{}");
-        symlink("/etc/passwd", path.join("trained/curve.svg")).expect("a link");
-        assert_refused(lab(), path, "report --training trained -o page.html", &["curve.svg: is not the curve"]);
+        symlink("/etc/passwd", folder.join("trained/curve.svg")).expect("a link");
+        assert_refused(lab(), &folder, "report --training trained -o page.html", &["curve.svg: is not the curve"]);
     }
     fs::write(&file, text).expect("a file");
-    done(path, "report run -o page.html");
+    done(&folder, "report run -o page.html");
 }
 
 fn damaged_numbers_are_refused() {
     let folder = small_run();
-    let path = folder.path();
     let change = |name: &str, change: &dyn Fn(&mut Value)| {
-        let text = fs::read_to_string(path.join(name)).expect("a record");
+        let text = fs::read_to_string(folder.join(name)).expect("a record");
         let mut value: Value =
             serde_json::from_str(text.lines().next().filter(|_| name.ends_with('l')).unwrap_or(&text)).expect("JSON");
         change(&mut value);
-        fs::write(path.join(name), format!("{value}\n")).expect("a file");
+        fs::write(folder.join(name), format!("{value}\n")).expect("a file");
         text
     };
-    let refused = |parts: &[&str]| assert_refused(lab(), path, "report run -o page.html", parts);
+    let refused = |parts: &[&str]| assert_refused(lab(), &folder, "report run -o page.html", parts);
     for count in [1_000_000_000_000_000_000_u64, 10_000_001] {
         let whole = change("run/run.json", &|record| record["job_count"] = count.into());
         refused(&["run/run.json: job_count is", &count.to_string(), "at most 10000000"]);
-        fs::write(path.join("run/run.json"), whole).expect("a file");
+        fs::write(folder.join("run/run.json"), whole).expect("a file");
     }
     let journal = "run/scores-0-of-1.jsonl";
     for value in [json!(1.0e308), json!(-1.0e308), json!("none"), json!("1e300")] {
         let whole = change(journal, &|line| line["scores"][0]["values"][0][1] = value.clone());
         refused(&["scores-0-of-1.jsonl:1: is not of an evaluation", "psnr is"]);
-        fs::write(path.join(journal), whole).expect("a file");
+        fs::write(folder.join(journal), whole).expect("a file");
     }
     for value in [1.0e18, -1.0] {
         let whole = change(journal, &|line| line["scores"][0]["seconds"] = value.into());
         refused(&["scores-0-of-1.jsonl:1: is not of an evaluation", "seconds is"]);
-        fs::write(path.join(journal), whole).expect("a file");
+        fs::write(folder.join(journal), whole).expect("a file");
     }
-    done(path, "pareto toy --targets 20 --views 3 --size 16x16 --repeat 1 --device cpu -o sweep");
-    let text = fs::read_to_string(path.join("sweep/pareto.json")).expect("a sweep");
+    done(&folder, "pareto toy --targets 20 --views 3 --size 16x16 --repeat 1 --device cpu -o sweep");
+    let text = fs::read_to_string(folder.join("sweep/pareto.json")).expect("a sweep");
     for key in ["seconds", "encode_seconds", "gain", "truth_psnr"] {
         let mut record: Value = serde_json::from_str(&text).expect("JSON");
         record["devices"][0]["points"][1][key] = 1.0e300.into();
         folder.write("sweep/pareto.json", record.to_string());
         let parts = ["sweep/pareto.json: is not a record of viewfuse pareto", "out of its range"];
-        assert_refused(lab(), path, "report --pareto sweep -o page.html", &parts);
+        assert_refused(lab(), &folder, "report --pareto sweep -o page.html", &parts);
     }
     // An empty record of settings is that of a machine that lost its power: the evaluation goes on.
     folder.write("run/run.json", "");
     let run = "evaluate toy --protocol random --trials 2 --targets-per-trial 1 --pictures 1 --size 16x16 --device cpu";
-    assert!(done(path, &format!("{run} --weights mean -o run")).contains("0 jobs done; 2 of 2"));
+    assert!(done(&folder, &format!("{run} --weights mean -o run")).contains("0 jobs done; 2 of 2"));
 }

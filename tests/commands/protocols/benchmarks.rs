@@ -247,9 +247,8 @@ fn tables_without_a_folder() {
 }
 
 fn json_is_the_table() {
-    let scene = toy_twice();
-    let folder = scene.path();
-    let whole = json(folder, "toy --protocol llff:3 --size 32x32");
+    let folder = toy_twice();
+    let whole = json(&folder, "toy --protocol llff:3 --size 32x32");
     assert_eq!(whole["settings"]["protocol"], "llff:3");
     assert_eq!(whole["jobs"][0]["targets"], json!(["000000", "000008", "000016"]));
     let table = &whole["tables"][0];
@@ -263,29 +262,28 @@ fn json_is_the_table() {
     assert_eq!(table["comparisons"].as_array().map(Vec::len), Some(2 * 3));
     assert!(whole["published"]["withheld"].as_str().is_some_and(|why| why.contains("504x378")));
     // Without a protocol as well, a table a scene and one of all.
-    let plain = json(folder, "toy again --targets 20,21 --size 32x32");
+    let plain = json(&folder, "toy again --targets 20,21 --size 32x32");
     let titles: Vec<&str> = list_of(&plain["tables"]).iter().filter_map(|table| table["title"].as_str()).collect();
     assert_eq!(titles, ["toy: 2 targets", "again: 2 targets", "all 2 scenes: 4 targets"]);
     assert_eq!(plain["tables"][2]["unit"], "scenes");
 }
 
 fn nearest_with_targets() {
-    let scene = toy();
-    let folder = scene.path();
-    let whole = json(folder, "toy --protocol nearest:3 --targets 5,7 --size 24x24");
+    let folder = toy();
+    let whole = json(&folder, "toy --protocol nearest:3 --targets 5,7 --size 24x24");
     assert_eq!(whole["settings"]["protocol"], "nearest:3:5,7");
     assert_eq!(whole["jobs"].as_array().map(Vec::len), Some(2));
     assert!(whole["published"].is_null(), "{}", whole["published"]);
     assert_wrong_arguments(
         BINARY,
-        folder,
+        &folder,
         "evaluate toy --protocol llff:3 --targets 5",
         &["--targets cannot be used with --protocol llff:3", "nearest:K"],
     );
-    assert_refused(BINARY, folder, "evaluate toy --protocol nearest:3 --targets 99", &["toy: has no view '99'"]);
+    assert_refused(BINARY, &folder, "evaluate toy --protocol nearest:3 --targets 99", &["toy: has no view '99'"]);
     assert_refused(
         BINARY,
-        folder,
+        &folder,
         "evaluate toy --protocol blender:8",
         &["protocol 'blender:8' fits none of the scenes", "transforms_test.json"],
     );
