@@ -146,19 +146,19 @@ fn own_scene(criterion: &mut Criterion) {
     let (field, target) = (TrainingFree::default(), target_of(&scene, 0));
     let mut group = criterion.benchmark_group(format!("own scene, {} sources, {}x{}", sources.len(), size[0], size[1]));
     group.sample_size(10);
-    let views = Views { scene: &scene, album: &album, sources: &sources, options: &options, field: &field };
-    group.bench_function("cpu", |bencher| bencher.iter(|| views.picture(&Cpu, &target)));
+    let rendering = Rendering { scene: &scene, album: &album, sources: &sources, options: &options, field: &field };
+    group.bench_function("cpu", |bencher| bencher.iter(|| rendering.picture(&Cpu, &target)));
     if let Ok((instance, adapters)) = vulkan_devices() {
         for adapter in adapters.iter().filter(|adapter| adapter.missing.is_empty()) {
             let device = Vulkan::open(&instance, adapter, &GpuOptions::default()).expect("a device that lacks nothing");
-            group.bench_function(&adapter.name, |bencher| bencher.iter(|| views.picture(&device, &target)));
+            group.bench_function(&adapter.name, |bencher| bencher.iter(|| rendering.picture(&device, &target)));
         }
     }
     group.finish();
 }
 
 /// A scene with its photographs in memory.
-struct Views<'a> {
+struct Rendering<'a> {
     scene: &'a Scene,
     album: &'a Album<'a>,
     sources: &'a [usize],
@@ -166,10 +166,10 @@ struct Views<'a> {
     field: &'a TrainingFree,
 }
 
-impl Views<'_> {
+impl Rendering<'_> {
     /// From photographs to a picture.
     fn picture<D: Device + Sync>(&self, device: &D, target: &Target) -> Frame {
-        let Views { scene, album, sources, options, field } = self;
+        let Rendering { scene, album, sources, options, field } = self;
         let (weighting, progress) = (Weighting::default_scheme(), Silent);
         let renderer = On { device, field: *field };
         let mut stage = Stage::prepare(scene, album, sources, &renderer, options, &progress).expect("prepared");

@@ -202,8 +202,8 @@ fn without_a_denoiser() {
 
 #[test]
 fn estimates_are_read_and_unknown_ones_refused() {
-    let of = |tensors: Tensors| Architecture::of(&tensors.checkpoint()).expect("as it says").denoiser;
-    let estimate = |tensors| of(tensors).expect("a denoiser").estimate;
+    let denoiser = |tensors: Tensors| Architecture::of(&tensors.checkpoint()).expect("as it says").denoiser;
+    let estimate = |tensors| denoiser(tensors).expect("a denoiser").estimate;
     assert_eq!(estimate(Tensors::small()), Estimate::Published);
     assert_eq!(estimate(Tensors::small().saying("viewfuse.estimate", "colours")), Estimate::FromColours);
     Tensors::small()

@@ -135,41 +135,41 @@ fn depth() {
 
 #[test]
 fn too_much_of_everything() {
-    let of = |body: &[u8]| archive(&Pickle::new().raw(body).end(), &[]);
-    assert_refused(&of(&vec![b']'; 600_000]), &["byte ", "more than 500000 values"]);
-    assert_refused(&of(&vec![b'N'; 600_000]), &["more than 500000 values on the stack"]);
-    assert_refused(&of(&b"N0".repeat(2_100_000)), &["more than 4000000 opcodes"]);
+    let file = |body: &[u8]| archive(&Pickle::new().raw(body).end(), &[]);
+    assert_refused(&file(&vec![b']'; 600_000]), &["byte ", "more than 500000 values"]);
+    assert_refused(&file(&vec![b'N'; 600_000]), &["more than 500000 values on the stack"]);
+    assert_refused(&file(&b"N0".repeat(2_100_000)), &["more than 4000000 opcodes"]);
     let text = Pickle::new().text(&"x".repeat(6 << 20)).0;
-    assert_refused(&of(&text.repeat(3)), &["more than 16777216 bytes of text"]);
-    assert_refused(&of(&[b"c".as_slice(), &vec![b'x'; 5000]].concat()), &["more than 4096 bytes of a name"]);
+    assert_refused(&file(&text.repeat(3)), &["more than 16777216 bytes of text"]);
+    assert_refused(&file(&[b"c".as_slice(), &vec![b'x'; 5000]].concat()), &["more than 4096 bytes of a name"]);
     let memo: Vec<u8> = (0..600_000u32).flat_map(|number| [b"r".as_slice(), &number.to_le_bytes()].concat()).collect();
-    assert_refused(&of(&[b"N".as_slice(), &memo].concat()), &["more than 500000 remembered values"]);
+    assert_refused(&file(&[b"N".as_slice(), &memo].concat()), &["more than 500000 remembered values"]);
     // Lengths that the file does not have.
     for long in [b"X\xff\xff\xff\xff".as_slice(), b"B\xff\xff\xff\xff", b"\x8b\xff\xff\xff\x7f"] {
-        assert_refused(&of(long), &["the pickle ends too early"]);
+        assert_refused(&file(long), &["the pickle ends too early"]);
     }
     for long in [b"\x8d\xff\xff\xff\xff\xff\xff\xff\xff".as_slice(), b"\x8e\xff\xff\xff\xff\xff\xff\xff\x7f"] {
-        assert_refused(&of(long), &["the pickle ends too early"]);
+        assert_refused(&file(long), &["the pickle ends too early"]);
     }
 }
 
 #[test]
 fn opcodes_that_are_none_or_not_applicable() {
-    let of = |body: &[u8]| archive(&Pickle::new().raw(body).end(), &[]);
-    let start = of(b"").windows(2).position(|bytes| bytes == b"\x80\x02").expect("the pickle") + 2;
+    let file = |body: &[u8]| archive(&Pickle::new().raw(body).end(), &[]);
+    let start = file(b"").windows(2).position(|bytes| bytes == b"\x80\x02").expect("the pickle") + 2;
     for opcode in [0xffu8, 0x00, b'I', b'S', b'i', b'o', b'P', 0x82, 0x97] {
-        assert_refused(&of(&[opcode]), &[&format!("byte {start}: opcode 0x{opcode:02x} is not one that torch.save")]);
+        assert_refused(&file(&[opcode]), &[&format!("byte {start}: opcode 0x{opcode:02x} is not one that torch.save")]);
     }
     for empty in [b"0".as_slice(), b"a", b"R", b"b", b"s", b"u", b"t", b"\x87", b"\x93", b"Q", b"2", b"q\x00", b""] {
-        assert_refused(&of(empty), &["finds too few values on the stack"]);
+        assert_refused(&file(empty), &["finds too few values on the stack"]);
     }
-    assert_refused(&of(b"N(R"), &["finds too few values on the stack"]);
-    assert_refused(&of(b"NNa"), &["finds values that it does not apply to"]);
-    assert_refused(&of(b"}(Nu"), &["finds values that it does not apply to"]);
-    assert_refused(&of(b"NN\x93"), &["finds values that it does not apply to"]);
-    assert_refused(&of(b"h\x05"), &["memo 5 was never set"]);
-    assert_refused(&of(b"\x8c\x01\xff"), &["not UTF-8"]);
-    assert_refused(&of(b"}\x8c\x01aNQs"), &["holds no tensors"]);
+    assert_refused(&file(b"N(R"), &["finds too few values on the stack"]);
+    assert_refused(&file(b"NNa"), &["finds values that it does not apply to"]);
+    assert_refused(&file(b"}(Nu"), &["finds values that it does not apply to"]);
+    assert_refused(&file(b"NN\x93"), &["finds values that it does not apply to"]);
+    assert_refused(&file(b"h\x05"), &["memo 5 was never set"]);
+    assert_refused(&file(b"\x8c\x01\xff"), &["not UTF-8"]);
+    assert_refused(&file(b"}\x8c\x01aNQs"), &["holds no tensors"]);
 }
 
 #[test]

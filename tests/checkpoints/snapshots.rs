@@ -128,9 +128,9 @@ fn damaged_storages() {
 #[test]
 fn modules_without_end() {
     // A module that is its own part.
-    let own = Pickle::new().global("nets", "Net").raw(b")\x81q\x00}(").text("_parameters").raw(b"}").text("a");
-    let own = own.nested_tensor(&pair()[1]).raw(b"s").text("_buffers").raw(b"}").text("_modules").raw(b"}");
-    assert_refused(&own.text("me").raw(b"h\x00sub").end(), &["as if a module contained itself: 'me.me.me."]);
+    let contained = Pickle::new().global("nets", "Net").raw(b")\x81q\x00}(").text("_parameters").raw(b"}").text("a");
+    let contained = contained.nested_tensor(&pair()[1]).raw(b"s").text("_buffers").raw(b"}").text("_modules").raw(b"}");
+    assert_refused(&contained.text("me").raw(b"h\x00sub").end(), &["as if a module contained itself: 'me.me.me."]);
     // Each of 60 modules holds the next twice: 2^60 ways through them, with a tensor at the end or without one.
     for last in [Pickle::default().module(&pair()[1..], &[]), Pickle::default().module(&[], &[])] {
         let doubled = (1..60u8).fold(last.raw(b"q\x00"), |inner, level| {

@@ -1,6 +1,6 @@
 //! `viewfuse bench`: what it prints and what it returns.
 
-use super::{BINARY, done};
+use super::{BINARY, done, list_of};
 use serde_json::Value;
 use viewfuse_tests::command::{assert_wrong_arguments, files_below};
 use viewfuse_tests::scenes::Folder;
@@ -13,11 +13,11 @@ fn the_cpu_beside_its_limits() {
     let bench: Value = serde_json::from_str(&printed).expect("JSON");
     let device = &bench["devices"][0];
     assert!(device["device"].as_str().is_some_and(|name| name.starts_with("cpu")), "{device}");
-    let number = |of: &Value, key: &str| of[key].as_f64().unwrap_or(f64::NAN);
+    let number = |record: &Value, key: &str| record[key].as_f64().unwrap_or(f64::NAN);
     for key in ["copy_giga_bytes", "multiply_add_giga_operations", "giga_look_ups"] {
         assert!(number(device, key) > 0.0, "{key}: {device}");
     }
-    let kernels = device["kernels"].as_array().expect("a list");
+    let kernels = list_of(&device["kernels"]);
     for name in ["census_cost", "compare_views", "composite", "convolve", "gather_latents", "linear", "matrix_product"]
     {
         assert!(kernels.iter().any(|kernel| kernel["kernel"] == name), "{name}: {printed}");

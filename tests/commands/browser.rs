@@ -1,15 +1,12 @@
 //! A browser without a window.
 
 use image::RgbImage;
-use libtest_mimic::Trial;
 use serde_json::Value;
 use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::Arc;
 use viewfuse_tests::patience::end;
-use viewfuse_tests::trials::{is_required, needing};
 
 /// What people call it, in the order in which it is looked for.
 const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
@@ -19,21 +16,8 @@ pub(crate) struct Browser {
     program: PathBuf,
 }
 
-/// A test that looks at pages.
-pub(super) type InBrowser = fn(&Browser);
-
-/// The trials of tests that look at pages; ignored without a browser, unless one is required.
-pub(super) fn trials<const N: usize>(tests: [(&str, InBrowser); N]) -> [Trial; N] {
-    let browser = Browser::find().map(Arc::new);
-    tests.map(|(name, test)| {
-        let found = browser.clone();
-        let trial = Trial::test(name, move || {
-            test(&*found?);
-            Ok(())
-        });
-        needing(browser.as_ref().err().cloned(), is_required("VIEWFUSE_REQUIRE_BROWSER"), trial)
-    })
-}
+/// What lets tests fail that lack a browser.
+pub(super) const REQUIRE: &str = "VIEWFUSE_REQUIRE_BROWSER";
 
 /// What a page looks like.
 pub(super) struct Seen {
@@ -44,8 +28,18 @@ pub(super) struct Seen {
 }
 
 impl Browser {
+    /// What is missing, if there is none.
+    pub(super) fn missing() -> Option<String> {
+        Browser::find().err()
+    }
+
+    /// The one that a test needs.
+    pub(super) fn needed() -> Browser {
+        Browser::find().unwrap_or_else(|missing| panic!("{missing}"))
+    }
+
     /// The one that is there, or what is missing.
-    pub(crate) fn find() -> Result<Browser, String> {
+    fn find() -> Result<Browser, String> {
         if let Some(program) = env::var_os("VIEWFUSE_BROWSER") {
             return Ok(Browser { program: program.into() });
         }

@@ -1,6 +1,6 @@
 //! `--max-error` and `--max-time`.
 
-use super::{BINARY, done, read_json};
+use super::{BINARY, done, list_of, number_of, read_json, text_of};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -9,7 +9,7 @@ use viewfuse_tests::command::{assert_wrong_arguments, run, toy};
 
 viewfuse_tests::trials![
     a_bound_on_the_error_is_kept_and_recorded,
-    a_network_keeps_45_decibels_unless_options_say_what_is_left_out,
+    a_network_keeps_45_decibels_unless_options_say_what_is_omitted,
     a_time_that_is_too_short_is_said,
     an_evaluation_says_how_its_bound_is_kept,
     wrong_bounds_are_refused,
@@ -19,7 +19,7 @@ const NETWORK: &str = "--targets 20,21 --views 3 --size 32x32 --model body:16 --
 
 fn frames(folder: &Path) -> Vec<Value> {
     let record = read_json(folder.join("out/run.json"));
-    record["frames"].as_array().expect("frames").clone()
+    list_of(&record["frames"]).clone()
 }
 
 fn a_bound_on_the_error_is_kept_and_recorded() {
@@ -27,11 +27,11 @@ fn a_bound_on_the_error_is_kept_and_recorded() {
     let printed = done(folder.path(), &format!("render toy {NETWORK} --max-error 30dB -o out"));
     for frame in frames(folder.path()) {
         let kept = &frame["kept"];
-        let most = kept["most_error"].as_f64().expect("a bound");
+        let most = number_of(&kept["most_error"]);
         assert!((most - 10.0_f64.powf(-1.5)).abs() < 1.0e-6, "{kept}");
-        assert!(kept["error"]["upper"].as_f64().expect("an estimate") <= most, "{kept}");
+        assert!(number_of(&kept["error"]["upper"]) <= most, "{kept}");
         assert_eq!(kept["is_kept"], true);
-        let effort = kept["effort"].as_str().expect("an effort");
+        let effort = text_of(&kept["effort"]);
         assert!(printed.contains(effort), "{printed}");
     }
     // The same bound as a number gives the same pictures.
@@ -40,15 +40,15 @@ fn a_bound_on_the_error_is_kept_and_recorded() {
     fs::remove_dir_all(folder.path().join("out")).expect("removed");
     done(folder.path(), &format!("render toy {NETWORK} --max-error 0.0316228 -o out"));
     assert!(before == picture());
-    // Nothing may be left out for a bound that only the exact picture keeps.
+    // Nothing may be omitted for a bound that only the exact picture keeps.
     fs::remove_dir_all(folder.path().join("out")).expect("removed");
     done(folder.path(), &format!("render toy {NETWORK} --max-error 119dB -o out"));
     assert!(frames(folder.path()).iter().all(|frame| frame["kept"]["effort"] == "exact"));
 }
 
-/// With what was left out of these test networks before there was a default bound they are 24, 52 and 35 dB from their
+/// With what was omitted by these test networks before there was a default bound they are 24, 52 and 35 dB from their
 /// exact pictures.
-fn a_network_keeps_45_decibels_unless_options_say_what_is_left_out() {
+fn a_network_keeps_45_decibels_unless_options_say_what_is_omitted() {
     let folder = toy();
     let render = |options: &str| {
         if folder.path().join("out").exists() {
@@ -65,9 +65,9 @@ fn a_network_keeps_45_decibels_unless_options_say_what_is_left_out() {
         let (exact, kept, _) = render(&format!("{model} --exact"));
         assert!(kept.is_null(), "{kept}");
         let (picture, kept, printed) = render(model);
-        assert!((kept["most_error"].as_f64().expect("a bound") - 10.0_f64.powf(-2.25)).abs() < 1.0e-6, "{kept}");
+        assert!((number_of(&kept["most_error"]) - 10.0_f64.powf(-2.25)).abs() < 1.0e-6, "{kept}");
         assert!(kept["is_kept"] == true && printed.contains(" dB from exact (at least "), "{kept}: {printed}");
-        assert!(printed.contains(kept["effort"].as_str().expect("an effort")), "{kept}: {printed}");
+        assert!(printed.contains(text_of(&kept["effort"])), "{kept}: {printed}");
         let psnr = psnr_of_seen(&picture, &exact, None);
         assert!(psnr > 44.5, "{model}: {psnr} dB from exact");
     }
@@ -97,7 +97,7 @@ fn an_evaluation_says_how_its_bound_is_kept() {
     let outcome = run(BINARY, folder.path(), &format!("evaluate toy {NETWORK} --weights mean --max-error 30dB"));
     assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
     let all = format!("{}{}", outcome.stdout, outcome.stderr);
-    // Each of the two targets is left out by itself.
+    // Each of the two targets is held out by itself.
     assert_eq!(all.matches("mean: the bound is kept by 1 of 1 pictures: ").count(), 2, "{all}");
 }
 

@@ -1,6 +1,6 @@
 //! `viewfuse check`: what it prints and what it returns.
 
-use super::{BINARY, done};
+use super::{BINARY, done, list_of};
 use serde_json::Value;
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, files_below, run, toy};
 use viewfuse_tests::scenes::Folder;
@@ -29,7 +29,7 @@ fn json_says_the_same() {
     assert_eq!((&report["seed_count"], report["devices"].as_array().map(Vec::len)), (&1.into(), Some(1)));
     let device = &report["devices"][0];
     assert!(device["device"].as_str().is_some_and(|name| name.starts_with("cpu")), "{device}");
-    let kernels = device["kernels"].as_array().expect("a list");
+    let kernels = list_of(&device["kernels"]);
     let names: Vec<&str> = kernels.iter().filter_map(|kernel| kernel["kernel"].as_str()).collect();
     assert_eq!(names, Kernel::ALL.map(Kernel::name));
     for kernel in kernels {

@@ -1,6 +1,6 @@
 //! `viewfuse compare`.
 
-use super::{BINARY, assert_near, done, read_json};
+use super::{BINARY, assert_near, done, list_of, number_of, read_json};
 use image::DynamicImage;
 use image::metadata::Orientation;
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, f32_bytes, safetensors, toy};
@@ -27,8 +27,8 @@ fn one_picture_and_folders() {
     assert!(printed.starts_with("1 picture\n"), "{printed}");
     assert_eq!(row(&printed, "psnr")[1..], ["inf", "inf", "toy/rgb/000000.png"]);
     assert_eq!(row(&printed, "ssim")[1..3], ["1.0000", "1.0000"]);
-    for (name, of) in [("000001", "000001"), ("000002", "000007")] {
-        let bytes = std::fs::read(folder.file(&format!("toy/rgb/{of}.png"))).expect("a picture");
+    for (name, shown) in [("000001", "000001"), ("000002", "000007")] {
+        let bytes = std::fs::read(folder.file(&format!("toy/rgb/{shown}.png"))).expect("a picture");
         folder.write(&format!("made/{name}.png"), bytes);
     }
     folder.write("made/notes.txt", "no picture");
@@ -59,22 +59,17 @@ fn scores_are_those_of_render() {
         done(folder.path(), &render);
         let record = read_json(folder.path().join(out).join("run.json"));
         let scores = |name: &str| -> Vec<f64> {
-            record["frames"]
-                .as_array()
-                .expect("frames")
-                .iter()
-                .map(|frame| frame[name].as_f64().expect("a score"))
-                .collect()
+            list_of(&record["frames"]).iter().map(|frame| number_of(&frame[name])).collect()
         };
         let printed = done(folder.path(), &format!("compare {out}/ toy/rgb/"));
         assert!(printed.starts_with("4 pictures\n") && printed.contains(&format!("({out}/run.json)")), "{printed}");
         assert!(printed.contains("4 of 4 photographs are larger: resampled by area averages"), "{printed}");
         for metric in ["psnr", "ssim"] {
-            let own = scores(metric);
+            let again = scores(metric);
             // A picture with an alpha channel was rounded once more.
             let rounding = if more == "--alpha" { 0.05 } else { 0.0001 };
-            assert_near(number(&printed, metric, 1), own.iter().sum::<f64>() / 4.0, rounding);
-            assert_near(number(&printed, metric, 2), own.iter().copied().fold(f64::INFINITY, f64::min), rounding);
+            assert_near(number(&printed, metric, 1), again.iter().sum::<f64>() / 4.0, rounding);
+            assert_near(number(&printed, metric, 2), again.iter().copied().fold(f64::INFINITY, f64::min), rounding);
         }
         let printed = done(folder.path(), &format!("compare {out}/000020.png toy/rgb/000020.png"));
         assert_near(number(&printed, "psnr", 1), scores("psnr")[0], 0.05);

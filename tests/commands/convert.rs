@@ -72,7 +72,6 @@ fn refusals() {
 /// `--set` has said it, none does.
 fn an_unknown_max_pool_is_told() {
     let folder = toy();
-    let path = folder.path();
     let deterministic = formula_of_width(Some(8));
     let tensors =
         deterministic.shapes().iter().map(|(name, shape)| TensorShape { name: name.clone(), shape: shape.clone() });
@@ -81,7 +80,7 @@ fn an_unknown_max_pool_is_told() {
         (tensor, values)
     };
     let silent = Checkpoint::in_memory("it", tensors.map(value), BTreeMap::new());
-    silent.write_safetensors(&path.join("a.safetensors"), Precision::Kept, &Silent).expect("written");
+    silent.write_safetensors(&folder.join("a.safetensors"), Precision::Kept, &Silent).expect("written");
     let run = |model: &str| {
         let small = format!("--size 16x16 --device cpu --model {model}");
         [
@@ -92,26 +91,26 @@ fn an_unknown_max_pool_is_told() {
         ]
     };
     for arguments in run("a.safetensors") {
-        let Outcome { code, stderr, .. } = command::run(BINARY, path, &arguments);
+        let Outcome { code, stderr, .. } = command::run(BINARY, &folder, &arguments);
         let is_told =
             stderr.matches("viewfuse: warning: a.safetensors: what its tensors do not tell is assumed").count();
         assert_eq!((code, is_told), (Some(0), 1), "{arguments}\n{stderr}");
     }
-    let printed = words(path, "convert a.safetensors b.safetensors --set viewfuse.first_pool=0");
+    let printed = words(&folder, "convert a.safetensors b.safetensors --set viewfuse.first_pool=0");
     assert!(printed.contains("kept viewfuse.first_pool = 0"), "{printed}");
     for arguments in run("b.safetensors") {
-        let Outcome { code, stderr, .. } = command::run(BINARY, path, &arguments);
+        let Outcome { code, stderr, .. } = command::run(BINARY, &folder, &arguments);
         assert_eq!((code, stderr.contains("do not tell")), (Some(0), false), "{arguments}\n{stderr}");
     }
     for value in ["viewfuse.first_pool", "=0", "viewfuse.first_pool="] {
         let arguments = format!("convert a.safetensors c.safetensors --set {value}");
-        assert_wrong_arguments(BINARY, path, &arguments, &["--set", "for example viewfuse.first_pool=0"]);
+        assert_wrong_arguments(BINARY, &folder, &arguments, &["--set", "for example viewfuse.first_pool=0"]);
     }
     let keys = [&pixelnerf::KEYS[..], &genvs::KEYS[..]].concat();
     let refusal = format!("nothing reads the key viewfuse.first_pol; those that exist are {}", keys.join(", "));
     let misspelled = "convert a.safetensors c.safetensors --set viewfuse.first_pol=0";
-    assert_wrong_arguments(BINARY, path, misspelled, &["--set", &refusal]);
-    assert!(!path.join("c.safetensors").exists());
+    assert_wrong_arguments(BINARY, &folder, misspelled, &["--set", &refusal]);
+    assert!(!folder.join("c.safetensors").exists());
 }
 
 fn learned_attention_becomes_a_header() {

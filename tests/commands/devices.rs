@@ -1,7 +1,7 @@
 //! `viewfuse devices`, the option `--device`, and `check` of all devices. What is there is asked of the library: on a
 //! machine without Vulkan it is the CPU alone.
 
-use super::{BINARY, done, read_json};
+use super::{BINARY, done, list_of, read_json};
 use serde_json::{Value, json};
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, files_below, toy};
 use viewfuse_tests::devices::vulkan_devices;
@@ -47,7 +47,7 @@ fn devices_as_json() {
     let report: Value = serde_json::from_str(&done(Folder::new().path(), "devices --json")).expect("JSON");
     assert!(report["cpu"].as_str().is_some_and(|cpu| cpu.starts_with("cpu (")), "{report}");
     assert_eq!(report["vulkan_problem"], json!(problem));
-    let listed = report["vulkan"].as_array().expect("a list");
+    let listed = list_of(&report["vulkan"]);
     assert_eq!(listed.len(), adapters.len());
     for (device, adapter) in listed.iter().zip(&adapters) {
         assert_eq!(device["device"], format!("vulkan:{}", adapter.index));
@@ -72,11 +72,12 @@ fn devices_that_are_not_there_are_refused() {
     );
     let (adapters, problem) = adapters();
     // A number is an index, also where it stands in a device's name.
-    let in_names = adapters.iter().flat_map(|adapter| adapter.name.split(|own: char| !own.is_ascii_digit()));
+    let in_names = adapters.iter().flat_map(|adapter| adapter.name.split(|letter: char| !letter.is_ascii_digit()));
     let is_none = |number: &&str| number.parse().is_ok_and(|number: usize| number >= adapters.len());
     for wanted in in_names.filter(is_none).chain(["99", "'nonsense'", "'v'"]) {
         // Without any, that is what is said.
-        let counted: Vec<String> = adapters.iter().map(|own| format!("{} {}", own.index, own.name)).collect();
+        let counted: Vec<String> =
+            adapters.iter().map(|adapter| format!("{} {}", adapter.index, adapter.name)).collect();
         let are = if counted.len() == 1 { "is" } else { "are" };
         let said = format!("no Vulkan device {wanted}; there {are}: {}", counted.join(", "));
         let device = format!("vulkan:{}", wanted.trim_matches('\''));

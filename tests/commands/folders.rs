@@ -1,6 +1,6 @@
 //! Output folders that hold something already: a person's own files, an earlier run, a run that is not finished yet.
 
-use super::{BINARY, done, read_json};
+use super::{BINARY, done, list_of, read_json, text_of};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -130,10 +130,10 @@ fn two_runs_do_not_mix_in_one_folder() {
     let alone = Folder::new();
     done(folder.path(), &format!("export toy --layout colmap -o {}", alone.path().join("exported").display()));
     let files = |folder: &Path| -> Vec<(String, u64)> {
-        let of = |(path, length): (std::path::PathBuf, u64)| {
+        let named = |(path, length): (std::path::PathBuf, u64)| {
             (path.file_name().expect("a name").to_string_lossy().into_owned(), length)
         };
-        files_below(&folder.join("exported")).into_iter().map(of).collect()
+        files_below(&folder.join("exported")).into_iter().map(named).collect()
     };
     assert_eq!(files(folder.path()), files(alone.path()));
 }
@@ -167,37 +167,36 @@ fn an_earlier_run_is_replaced_as_a_whole_or_not_at_all() {
 /// The same settings are the same options and sources; what is there stays, whatever happens to the new run.
 fn a_target_is_added_to_a_run_of_the_same_settings() {
     let folder = toy();
-    let path = folder.path();
     let render = |more: &str, output: &str| {
         format!("render toy --sources 0..3 --size 24x24 --device cpu --weights mean --no-sheets {more} -o {output}")
     };
-    let record = |output: &str| -> Value { read_json(path.join(output).join("run.json")) };
+    let record = |output: &str| -> Value { read_json(folder.join(output).join("run.json")) };
     let targets = |record: &Value| -> Vec<String> {
-        let frames = record["frames"].as_array().expect("frames");
-        frames.iter().map(|frame| frame["target"].as_str().expect("a name").to_owned()).collect()
+        let frames = list_of(&record["frames"]);
+        frames.iter().map(|frame| text_of(&frame["target"]).to_owned()).collect()
     };
     let pictures = |output: &str| {
         let is_picture = |name: &String| name.ends_with(".png");
-        let names = names_in(&path.join(output)).into_iter().filter(is_picture);
-        names.map(|name| (name.clone(), fs::read(path.join(output).join(name)).expect("a picture"))).collect::<Vec<_>>()
+        let names = names_in(&folder.join(output)).into_iter().filter(is_picture);
+        names
+            .map(|name| (name.clone(), fs::read(folder.join(output).join(name)).expect("a picture")))
+            .collect::<Vec<_>>()
     };
-    done(path, &render("--targets 20", "out"));
-    let said = done(path, &render("--targets 21,22", "out"));
+    done(&folder, &render("--targets 20", "out"));
+    let said = done(&folder, &render("--targets 21,22", "out"));
     assert!(said.contains("\nadded to 1 of an earlier run with the same settings and sources\n"), "{said}");
-    done(path, &render("--targets 20,21,22", "whole"));
+    done(&folder, &render("--targets 20,21,22", "whole"));
     assert!(pictures("out") == pictures("whole"), "other pictures than those of one run");
     let (added, whole) = (record("out"), record("whole"));
     assert_eq!((&added["earlier"], &whole["earlier"]), (&1.into(), &0.into()));
     assert_eq!((targets(&added), &added["settings"]), (targets(&whole), &whole["settings"]));
-    for (own, other) in
-        added["frames"].as_array().expect("frames").iter().zip(whole["frames"].as_array().expect("frames"))
-    {
+    for (here, other) in list_of(&added["frames"]).iter().zip(list_of(&whole["frames"])) {
         for key in ["world_from_camera", "weights", "psnr"] {
-            assert_eq!(own[key].to_string().get(..8), other[key].to_string().get(..8), "{key}");
+            assert_eq!(here[key].to_string().get(..8), other[key].to_string().get(..8), "{key}");
         }
     }
     // One of them again: the others stay.
-    done(path, &render("--targets 20", "out"));
+    done(&folder, &render("--targets 20", "out"));
     assert_eq!(targets(&record("out")), ["000021", "000022", "000020"]);
     assert!(pictures("out") == pictures("whole"));
 
@@ -208,19 +207,19 @@ fn a_target_is_added_to_a_run_of_the_same_settings() {
         (render("--targets 2", "out"), "a source"),
         (render("--targets 23 --video webp", "out"), "a video is of all pictures of one run"),
     ] {
-        assert_refused(BINARY, path, &arguments, &[reason]);
+        assert_refused(BINARY, &folder, &arguments, &[reason]);
     }
     // A run that is killed while it adds loses nothing; only it may go on.
-    killed_when(BINARY, path, &render("--orbit 800", "out"), || path.join("out/orbit-002.png").exists());
+    killed_when(BINARY, &folder, &render("--orbit 800", "out"), || folder.join("out/orbit-002.png").exists());
     assert_eq!(targets(&record("out")), ["000021", "000022", "000020"]);
-    assert_refused(BINARY, path, &render("--targets 23", "out"), &["another run was interrupted there"]);
+    assert_refused(BINARY, &folder, &render("--targets 23", "out"), &["another run was interrupted there"]);
     assert!(whole_of(&pictures("whole"), &pictures("out")), "a picture is lost");
     // It may warn of what the sources do not show.
-    let rendered = |arguments: &str| assert_eq!(run(BINARY, path, arguments).code, Some(0), "{arguments}");
+    let rendered = |arguments: &str| assert_eq!(run(BINARY, &folder, arguments).code, Some(0), "{arguments}");
     rendered(&render("--orbit 3", "other"));
-    done(path, &render("--targets 20", "other"));
+    done(&folder, &render("--targets 20", "other"));
     // Fewer cameras of the same names are elsewhere.
-    assert_refused(BINARY, path, &render("--orbit 2", "other"), &["cameras of the same names were elsewhere"]);
+    assert_refused(BINARY, &folder, &render("--orbit 2", "other"), &["cameras of the same names were elsewhere"]);
     // A path that is whole is replaced, beside what stays.
     rendered(&render("--orbit 3", "other"));
     assert_eq!(targets(&record("other")), ["000020", "orbit-000", "orbit-001", "orbit-002"]);
@@ -228,7 +227,7 @@ fn a_target_is_added_to_a_run_of_the_same_settings() {
 
 /// Whether all of these are among others.
 fn whole_of(all: &[(String, Vec<u8>)], others: &[(String, Vec<u8>)]) -> bool {
-    all.iter().all(|own| others.contains(own))
+    all.iter().all(|file| others.contains(file))
 }
 
 /// `--cache` without `--model`: the default field has options, too.

@@ -1,6 +1,6 @@
 //! `viewfuse` with a GeNVS.
 
-use super::{BINARY, done, read_json, texts};
+use super::{BINARY, done, list_of, read_json, text_of, texts};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -15,10 +15,10 @@ viewfuse_tests::trials![
     a_picture_of_any_size_a_sheet_and_a_record_without_depth,
     unless_told_otherwise_the_size_is_the_networks,
     options_reach_the_run,
-    exact_leaves_nothing_out,
+    exact_omits_nothing,
     frames_start_from_the_ones_before,
     files_of_either_network,
-    sweeps_samplers_and_what_is_left_out,
+    sweeps_samplers_and_omissions,
 ];
 
 const RENDER: &str = "render toy --targets 20 --views 2 --size 16x16 --device cpu -o out";
@@ -34,21 +34,20 @@ fn picture(folder: &Path, options: &str) -> Vec<u8> {
     fs::read(folder.join("out/000020.png")).expect("a picture")
 }
 
-/// How much was left out, whether it was allowed to, and of how much, by what it is.
-fn left_out(record: &Value, what: &str) -> (u64, bool, u64) {
-    let lines = record["left_out"].as_array().expect("a list");
+/// How much was omitted, whether it was allowed to, and of how much, by what it is.
+fn omitted(record: &Value, what: &str) -> (u64, bool, u64) {
+    let lines = list_of(&record["left_out"]);
     let line = lines.iter().find(|line| line["what"] == what).expect(what);
     let count = |key: &str| line[key].as_u64().expect("a count");
     (count("left_out"), line["switch"] == true, count("of"))
 }
 
 fn a_picture_of_any_size_a_sheet_and_a_record_without_depth() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     // The depth map of an earlier run would belong to another picture.
-    done(folder, "render toy --targets 20 --size 16x16 --device cpu -o out");
+    done(&folder, "render toy --targets 20 --size 16x16 --device cpu -o out");
     let printed = done(
-        folder,
+        &folder,
         "render toy --targets 20 --views 3 --size 21x20 --model genvs:small --seed 5 --device cpu --steps 3 -o out",
     );
     assert!(printed.contains("1 view from 3 sources, error:alpha=1, genvs on cpu"), "{printed}");
@@ -64,7 +63,7 @@ fn a_picture_of_any_size_a_sheet_and_a_record_without_depth() {
     assert_eq!((&denoising["sampler"], &denoising["levels"]), (&"ipndm".into(), &3.into()));
     assert_eq!((&denoising["calls"], &denoising["saved_calls"]), (&3.into(), &0.into()));
     assert_eq!((&denoising["tolerance"], &denoising["reuse"]), (&Value::Null, &Value::Null));
-    assert!(left_out(&record, "encoded views").1 && left_out(&record, "volume rows").1);
+    assert!(omitted(&record, "encoded views").1 && omitted(&record, "volume rows").1);
 }
 
 fn unless_told_otherwise_the_size_is_the_networks() {
@@ -91,24 +90,24 @@ fn options_reach_the_run() {
     assert_eq!(denoising("--steps 3 --compute calls")["early_termination"], Value::Null);
 }
 
-fn exact_leaves_nothing_out() {
+fn exact_omits_nothing() {
     let scene = toy();
     let exact = record(scene.path(), "--model genvs:small --exact --weights distance:power=3");
     let denoising = &exact["denoising"];
     assert_eq!((&denoising["sampler"], &denoising["levels"]), (&"heun".into(), &25.into()));
     assert_eq!((&denoising["calls"], &denoising["saved_calls"]), (&49.into(), &0.into()));
-    assert_eq!(left_out(&exact, "encoded views"), (0, false, 2));
-    assert_eq!(left_out(&exact, "volume rows"), (0, false, 128));
-    assert_eq!(left_out(&exact, "denoiser calls"), (0, false, 49));
+    assert_eq!(omitted(&exact, "encoded views"), (0, false, 2));
+    assert_eq!(omitted(&exact, "volume rows"), (0, false, 128));
+    assert_eq!(omitted(&exact, "denoiser calls"), (0, false, 49));
     let shorter = record(scene.path(), "--model genvs:small --exact --steps 2");
     assert_eq!((&shorter["denoising"]["sampler"], &shorter["denoising"]["calls"]), (&"heun".into(), &3.into()));
     let rows = record(scene.path(), "--model genvs:small --compute rows --steps 1");
-    assert_eq!(left_out(&rows, "volume rows"), (0, false, 128));
+    assert_eq!(omitted(&rows, "volume rows"), (0, false, 128));
     let halves = record(scene.path(), "--model genvs:small --half-volumes --steps 1");
-    let (bytes, is_on, of) = left_out(&halves, "volume bytes");
-    assert!(is_on && bytes > 0 && 2 * bytes == of, "{bytes} of {of}");
-    assert_eq!((left_out(&halves, "volume rows").1, left_out(&rows, "volume bytes").0), (false, 0));
-    assert!(left_out(&rows, "encoded views").1 && left_out(&rows, "denoiser calls").1);
+    let (bytes, is_on, total) = omitted(&halves, "volume bytes");
+    assert!(is_on && bytes > 0 && 2 * bytes == total, "{bytes} of {total}");
+    assert_eq!((omitted(&halves, "volume rows").1, omitted(&rows, "volume bytes").0), (false, 0));
+    assert!(omitted(&rows, "encoded views").1 && omitted(&rows, "denoiser calls").1);
 }
 
 fn frames_start_from_the_ones_before() {
@@ -132,39 +131,37 @@ fn frames_start_from_the_ones_before() {
 
 /// Which network a file holds is said by its tensors, not by its name.
 fn files_of_either_network() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     let computed = genvs::test_networks::deterministic(&genvs::Architecture::small());
     computed.write_safetensors(&folder.join("one.safetensors"), Precision::Kept, &Silent).expect("a file");
     let computed = pixelnerf::test_networks::deterministic(&pixelnerf::Architecture::small(8));
     computed.write_safetensors(&folder.join("two.safetensors"), Precision::Kept, &Silent).expect("a file");
-    let genvs = picture(folder, "--steps 2 --model one.safetensors");
-    assert!(genvs == picture(folder, "--steps 2 --model genvs:small"), "a file is not what was written");
-    let pixelnerf = record(folder, "--samples 8,4,4 --model two.safetensors");
+    let genvs = picture(&folder, "--steps 2 --model one.safetensors");
+    assert!(genvs == picture(&folder, "--steps 2 --model genvs:small"), "a file is not what was written");
+    let pixelnerf = record(&folder, "--samples 8,4,4 --model two.safetensors");
     assert_eq!((&pixelnerf["field"], &pixelnerf["denoising"]), (&"pixelnerf".into(), &Value::Null));
     let without = genvs::Architecture { denoiser: None, ..genvs::Architecture::small() };
     genvs::test_networks::deterministic(&without)
         .write_safetensors(&folder.join("three.safetensors"), Precision::Kept, &Silent)
         .expect("a file");
-    let plain = record(folder, "--model three.safetensors");
+    let plain = record(&folder, "--model three.safetensors");
     assert_eq!((&plain["field"], &plain["denoising"]), (&"genvs".into(), &Value::Null));
     let arguments = "render toy --targets 20 --model three.safetensors --sampler heun -o new";
-    assert_wrong_arguments(BINARY, folder, arguments, &["--sampler cannot be used", "has no denoiser"]);
+    assert_wrong_arguments(BINARY, &folder, arguments, &["--sampler cannot be used", "has no denoiser"]);
     let other = safetensors(&[("mlp.weight", "F32", &[1], f32_bytes([1.0]))]);
-    scene.write("other.safetensors", other);
+    folder.write("other.safetensors", other);
     let parts = [
         "--model: other.safetensors: holds no supported network",
         "'encoder.model.' (PixelNeRF)",
         "'pixel_nerf_net.' (GeNVS)",
     ];
-    assert_refused(BINARY, folder, "render toy --targets 20 --model other.safetensors -o new", &parts);
+    assert_refused(BINARY, &folder, "render toy --targets 20 --model other.safetensors -o new", &parts);
 }
 
-fn sweeps_samplers_and_what_is_left_out() {
-    let scene = toy();
-    let folder = scene.path();
+fn sweeps_samplers_and_omissions() {
+    let folder = toy();
     let arguments = "pareto toy --targets 20,21 --views 2 --model genvs:small --size 16x16 --samples 8 --repeat 1 --device cpu -o out";
-    let mut sweep = command(BINARY, folder, arguments);
+    let mut sweep = command(BINARY, &folder, arguments);
     for words in ["heun, 8", "ipndm, 6", "ipndm, 12", "tolerance 0.03", "all, half", "all, reuse"] {
         sweep.args(["--only", words]);
     }
@@ -173,13 +170,13 @@ fn sweeps_samplers_and_what_is_left_out() {
     assert_eq!(names_in(&folder.join("out")), ["pareto.csv", "pareto.json", "pareto.svg"]);
     let record = read_json(folder.join("out/pareto.json"));
     assert_eq!((&record["field"], &record["size"]), (&"genvs".into(), &[16, 16][..].into()));
-    let points = record["devices"][0]["points"].as_array().expect("points");
-    let words: Vec<&str> = points.iter().map(|point| point["setting"].as_str().expect("words")).collect();
+    let points = list_of(&record["devices"][0]["points"]);
+    let words: Vec<&str> = points.iter().map(|point| text_of(&point["setting"])).collect();
     let all = ["exact", "heun, 8", "ipndm, 6", "ipndm, 12", "tolerance 0.03"];
     let all = all.into_iter().chain(["all, half the size", "all, reuse 20", "all, reuse 2"]);
     assert_eq!(words, all.collect::<Vec<_>>());
     assert!(words.iter().all(|setting| printed.contains(setting)), "{printed}");
-    let point = |setting: &str| &points[words.iter().position(|own| *own == setting).expect(setting)];
+    let point = |setting: &str| &points[words.iter().position(|word| *word == setting).expect(setting)];
     let psnr = |setting: &str| point(setting)["versus_exact"]["psnr"].as_f64().expect("not equal");
     let calls = |setting: &str| point(setting)["denoising"]["calls"].as_u64().expect("a count");
     // For both targets.

@@ -33,7 +33,7 @@ fn the_short_help_has_what_is_needed_first() {
         let [short, long] = ["-h", "--help"].map(|help| done(here, &format!("{command} {help}")));
         let [first, all] = [&short, &long].map(|help| options(help));
         assert!((8..=most).contains(&first.len()), "{command}: {first:?}");
-        assert!(all.len() > 2 * first.len() && first.iter().all(|own| all.contains(own)), "{command}: {all:?}");
+        assert!(all.len() > 2 * first.len() && first.iter().all(|option| all.contains(option)), "{command}: {all:?}");
         assert!(
             first.contains(&"weights") && !first.contains(&"probe-step") && all.contains(&"probe-step"),
             "{command}"

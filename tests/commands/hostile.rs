@@ -108,7 +108,7 @@ fn names_control_the_terminal_in_no_command() {
         });
         let outcome = command.args(words).env("VIEWFUSE_PROGRESS", "0").output().expect("it starts");
         let said = String::from_utf8([outcome.stdout, outcome.stderr].concat()).expect("text");
-        let controls = |own: char| !"\n\t".contains(own) && (own.is_control() || own == '\u{202e}');
+        let controls = |letter: char| !"\n\t".contains(letter) && (letter.is_control() || letter == '\u{202e}');
         assert!(!said.contains(controls), "{arguments}: {said:?}");
         shown += said.matches("\\u001b").count();
         if !outcome.status.success() {
@@ -117,7 +117,7 @@ fn names_control_the_terminal_in_no_command() {
     }
     // Those that have nothing to do: a message is a message.
     let refused = ["pose", "convert", "verify"];
-    let is_refused = |arguments: &str| refused.iter().any(|own| arguments.contains(own));
+    let is_refused = |arguments: &str| refused.iter().any(|words| arguments.contains(words));
     assert!(failed.iter().all(|(arguments, _)| is_refused(arguments)), "{failed:#?}");
     assert!(shown > 60, "names are shown: {shown}");
 }

@@ -1,6 +1,6 @@
 //! `viewfuse inspect`: a good scene raises no warning, a bad one its own.
 
-use super::{done, numbers, read_json, texts};
+use super::{done, list_of, number_of, numbers, read_json, texts};
 use serde_json::Value;
 use viewfuse_tests::command::{change_poses, names_in, run, toy};
 use viewfuse_tests::scenes::Folder;
@@ -12,9 +12,9 @@ viewfuse_tests::trials![
     a_scene_in_a_map,
     a_background_of_many_colours_is_a_fault_only_of_an_object,
     what_the_cameras_cover,
-    the_quality_is_what_photographs_that_are_left_out_have,
+    the_quality_is_that_of_held_out_photographs,
     views_are_listed_with_their_neighbours,
-    what_is_left_out_is_said_and_recorded,
+    what_is_excluded_is_said_and_recorded,
     conventions_are_said_and_recorded,
 ];
 
@@ -42,9 +42,9 @@ fn a_good_scene() {
     assert_eq!((numbers(&inspection["size"]), numbers(&inspection["focal"])), (vec![128.0; 2], vec![131.25; 2]));
     assert!(numbers(&inspection["focus"]).iter().all(|x| x.abs() < 1.0e-4));
     assert!(numbers(&inspection["distances"]).iter().all(|distance| (distance - 1.3).abs() < 1.0e-4));
-    let (near, far) = (inspection["near"].as_f64().expect("near"), inspection["far"].as_f64().expect("far"));
+    let (near, far) = (number_of(&inspection["near"]), number_of(&inspection["far"]));
     assert!(0.5 < near && near < 1.3 && 1.3 < far && far < 2.0);
-    let corners = inspection["object"].as_array().expect("an object");
+    let corners = list_of(&inspection["object"]);
     assert!(numbers(&corners[0]).iter().all(|x| *x < 0.0) && numbers(&corners[1]).iter().all(|x| *x > 0.0));
     assert!(done(scene.path(), "inspect toy").contains("warnings   none"));
 }
@@ -56,15 +56,14 @@ fn views_are_listed_with_their_neighbours() {
     let row = lines.iter().find(|words| words.first() == Some(&"#3")).unwrap_or_else(|| panic!("{printed}"));
     assert_eq!(row[..3], ["#3", "000003", "128x128"], "{printed}");
     let listed: Value = serde_json::from_str(&done(scene.path(), "inspect toy --views --json")).expect("JSON");
-    let listed = listed.as_array().expect("a list");
+    let listed = list_of(&listed);
     assert_eq!(listed.len(), 24);
     for (index, view) in listed.iter().enumerate() {
         assert_eq!((view["index"].as_u64(), view["has_photograph"].as_bool()), (Some(index as u64), Some(true)));
-        let angles =
-            numbers(&view["neighbours"].as_array().expect("a list").iter().map(|own| own["degrees"].clone()).collect());
+        let neighbours = list_of(&view["neighbours"]).iter();
+        let angles = numbers(&neighbours.clone().map(|neighbour| neighbour["degrees"].clone()).collect());
         assert!(angles.len() == 3 && angles.is_sorted() && angles[0] > 0.0 && angles[2] < 90.0, "{view}");
-        let others: Vec<u64> =
-            view["neighbours"].as_array().expect("a list").iter().filter_map(|own| own["index"].as_u64()).collect();
+        let others: Vec<u64> = neighbours.filter_map(|neighbour| neighbour["index"].as_u64()).collect();
         assert!(!others.contains(&(index as u64)), "{view}");
     }
     // By index, wherever views are named.
@@ -78,7 +77,7 @@ fn views_are_listed_with_their_neighbours() {
             format!("render toy {arguments} --size 16x16 --weights mean --device cpu --no-sheets --replace -o out");
         done(scene.path(), &render);
         let written = names_in(&scene.path().join("out"));
-        assert!(names.iter().all(|name| written.iter().any(|own| own == name)), "{written:?}");
+        assert!(names.iter().all(|name| written.iter().any(|file| file == name)), "{written:?}");
     }
     let error = run(super::BINARY, scene.path(), "render toy --targets 0000020 --size 16x16 -o elsewhere");
     assert_eq!(error.code, Some(0), "a number, however it is written");
@@ -186,33 +185,33 @@ fn a_background_of_many_colours_is_a_fault_only_of_an_object() {
 
 fn what_the_cameras_cover() {
     let scene = toy();
-    let own = inspection(&scene);
-    let gaps = numbers(&own["gaps"]);
+    let inspected = inspection(&scene);
+    let gaps = numbers(&inspected["gaps"]);
     assert!(10.0 < gaps[0] && gaps[0] < gaps[1] && gaps[1] < 40.0, "{gaps:?}");
-    assert_eq!(own["arc"], 360.0);
+    assert_eq!(inspected["arc"], 360.0);
     let printed = done(scene.path(), "inspect toy");
     let line = format!(
         "\nneighbours {:.0} degrees apart (median), at most {:.0}\ncoverage   all around the focus, from ",
         gaps[0], gaps[1]
     );
     assert!(printed.contains(&line), "{printed}");
-    assert!(own.get("quality").is_none() && printed.contains("\nexpected   --quality "), "{printed}");
+    assert!(inspected.get("quality").is_none() && printed.contains("\nexpected   --quality "), "{printed}");
 }
 
-fn the_quality_is_what_photographs_that_are_left_out_have() {
+fn the_quality_is_that_of_held_out_photographs() {
     let scene = toy();
     let quality = |arguments: &str| -> Value {
         let printed = done(scene.path(), &format!("inspect toy --json --quality{arguments}"));
         serde_json::from_str::<Value>(&printed).expect("JSON")["quality"].clone()
     };
-    let own = quality("");
-    let scores: Vec<f64> =
-        own["left_out"].as_array().expect("views").iter().map(|one| one["psnr"].as_f64().expect("a score")).collect();
+    let judged = quality("");
+    let held_out = list_of(&judged["left_out"]);
+    let scores: Vec<f64> = held_out.iter().map(|view| number_of(&view["psnr"])).collect();
     assert_eq!(scores.len(), 6);
     let mean = scores.iter().sum::<f64>() / 6.0;
-    let expected = own["expected"]["psnr"].as_f64().expect("a score");
-    // A view between neighbours has nearer sources than a view that is left out.
-    assert!(20.0 < mean && mean < expected && expected < 45.0, "{own}");
+    let expected = number_of(&judged["expected"]["psnr"]);
+    // A view between neighbours has nearer sources than a held-out view.
+    assert!(20.0 < mean && mean < expected && expected < 45.0, "{judged}");
     let printed = done(scene.path(), "inspect toy --quality");
     let said = format!("\nleft out   6 photographs, rendered from the others: PSNR {mean:.1} dB, from ");
     assert!(
@@ -227,13 +226,13 @@ fn the_quality_is_what_photographs_that_are_left_out_have() {
     });
     let wrong = quality("");
     assert!(
-        wrong["expected"].is_null() && wrong["problem"].as_str().is_some_and(|own| own.contains("silhouettes")),
+        wrong["expected"].is_null() && wrong["problem"].as_str().is_some_and(|problem| problem.contains("silhouettes")),
         "{wrong}"
     );
     assert!(done(scene.path(), "inspect toy --quality").contains("\nexpected   not measured: toy: the silhouettes"));
 }
 
-fn what_is_left_out_is_said_and_recorded() {
+fn what_is_excluded_is_said_and_recorded() {
     let (folder, room) = (Folder::new(), viewfuse_tests::places::data("room"));
     for name in names_in(&room.join("images")) {
         std::fs::copy(room.join("images").join(&name), folder.file(&format!("room/images/{name}"))).expect("a copy");

@@ -130,7 +130,7 @@ fn a_photograph_longer_than_its_pixels_is_refused() {
             assert_command_refused(limited(folder.path(), arguments), folder.path(), &[photograph, said]);
         }
     }
-    // Among photographs without poses it is left out by name.
+    // Among photographs without poses it is excluded by name.
     for view in [0, 2] {
         fs::copy(folder.path().join(format!("room/images/00{view}.jpg")), folder.file(&format!("bare/{view}.jpg")))
             .expect("a copy");

@@ -1,6 +1,6 @@
 //! What other programs take from the weights: arrays, tables, and lists of the few views that targets need.
 
-use super::{BINARY, assert_near, done, numbers, texts};
+use super::{BINARY, assert_near, done, list_of, number_of, numbers, texts};
 use serde_json::Value;
 use std::fs;
 use viewfuse_tests::command::{assert_wrong_arguments, toy};
@@ -19,16 +19,15 @@ fn json(text: &str) -> Value {
 }
 
 fn weights_of_many_targets() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     let what = "weights toy --orbit 3 --sources 0..5 --weights mean --weights half=error:alpha=0.5";
-    let listed = json(&done(folder, &format!("{what} --json")));
-    let targets = listed.as_array().expect("a list");
+    let listed = json(&done(&folder, &format!("{what} --json")));
+    let targets = list_of(&listed);
     assert_eq!(targets.len(), 3);
-    let csv = done(folder, &format!("{what} --csv"));
+    let csv = done(&folder, &format!("{what} --csv"));
     let lines: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
     assert_eq!((lines[0].join(","), lines.len()), ("scheme,target,source,weight".to_owned(), 1 + 2 * 3 * 6));
-    let axes = json(&done(folder, &format!("{what} --npy weights.npy")));
+    let axes = json(&done(&folder, &format!("{what} --npy weights.npy")));
     assert_eq!((texts(&axes["schemes"]), numbers(&axes["shape"])), (vec!["mean", "half"], vec![2.0, 3.0, 6.0]));
     let bytes = fs::read(folder.join("weights.npy")).expect("an array");
     let array: Vec<f64> = bytes[bytes.len() - 4 * 36..]
@@ -54,10 +53,9 @@ fn weights_of_many_targets() {
 }
 
 fn the_few_sources_of_a_target() {
-    let scene = toy();
-    let folder = scene.path();
-    let all = json(&done(folder, "weights toy --target 20 --weights error:alpha=1 --json"));
-    let selected = json(&done(folder, "select toy -k 3 --targets 20 --json"));
+    let folder = toy();
+    let all = json(&done(&folder, "weights toy --target 20 --weights error:alpha=1 --json"));
+    let selected = json(&done(&folder, "select toy -k 3 --targets 20 --json"));
     let target = &selected["targets"][0];
     assert_eq!((&target["target"], target["index"].as_u64()), (&"000020".into(), Some(20)));
     // Those of greatest weight, in that order.
@@ -66,23 +64,23 @@ fn the_few_sources_of_a_target() {
     order.sort_by(|a, b| weights[*b].total_cmp(&weights[*a]));
     let greatest: Vec<&str> = order[..3].iter().map(|&source| texts(&all["sources"])[source]).collect();
     assert_eq!(texts(&target["sources"]), greatest);
-    assert_near(target["share"].as_f64().expect("a share"), order[..3].iter().map(|&one| weights[one]).sum(), 1.0e-5);
+    assert_near(number_of(&target["share"]), order[..3].iter().map(|&one| weights[one]).sum(), 1.0e-5);
     assert_near(numbers(&target["weights"]).iter().sum(), 1.0, 1.0e-5);
     let views = texts(&selected["views"]);
     let indices: Vec<usize> = numbers(&target["indices"]).into_iter().map(|index| index as usize).collect();
     assert_eq!(indices.iter().map(|&index| views[index]).collect::<Vec<_>>(), greatest);
     // As lines, and as an index file.
-    let line = done(folder, "select toy --count 3 --targets 20 --lines -o views.txt");
+    let line = done(&folder, "select toy --count 3 --targets 20 --lines -o views.txt");
     assert_eq!(line, "views.txt\n");
     let expected: Vec<String> = indices.iter().map(usize::to_string).collect();
     assert_eq!(
         fs::read_to_string(folder.join("views.txt")).expect("a list"),
         format!("000020 {}\n", expected.join(" "))
     );
-    let index = json(&done(folder, "select toy -k 3 --targets 20,21 --index"));
+    let index = json(&done(&folder, "select toy -k 3 --targets 20,21 --index"));
     assert_eq!((numbers(&index["toy"]["target"]), numbers(&index["toy"]["context"]).len()), (vec![20.0, 21.0], 3));
-    assert_wrong_arguments(BINARY, folder, "select toy -k 2 --orbit 3 --index", &["--index needs targets"]);
-    let table = done(folder, "select toy -k 2 --targets 20");
+    assert_wrong_arguments(BINARY, &folder, "select toy -k 2 --orbit 3 --index", &["--index needs targets"]);
+    let table = done(&folder, "select toy -k 2 --targets 20");
     assert!(table.contains(greatest[0]) && table.contains("for all together: "), "{table}");
 }
 
@@ -96,25 +94,19 @@ fn the_few_sources_of_a_path() {
     let share = numbers(&together["share"]);
     assert!(share[0] >= share[1] && share[1] > 0.0 && share[0] < 1.0, "{share:?}");
     // Each target alone has more of the weight than of what serves all.
-    let own: Vec<f64> = selected["targets"]
-        .as_array()
-        .expect("targets")
-        .iter()
-        .map(|one| one["share"].as_f64().expect("a share"))
-        .collect();
-    assert!(own.iter().sum::<f64>() / 12.0 >= share[0] - 1.0e-6);
+    let numbers: Vec<f64> = list_of(&selected["targets"]).iter().map(|one| number_of(&one["share"])).collect();
+    assert!(numbers.iter().sum::<f64>() / 12.0 >= share[0] - 1.0e-6);
 }
 
 fn labels_name_schemes() {
-    let scene = toy();
-    let folder = scene.path();
-    done(folder, "render toy --targets 20 --size 16x16 --weights near=error:alpha=0.5 --device cpu -o out");
+    let folder = toy();
+    done(&folder, "render toy --targets 20 --size 16x16 --weights near=error:alpha=0.5 --device cpu -o out");
     let record = json(&fs::read_to_string(folder.join("out/run.json")).expect("a record"));
     assert_eq!(record["weighting"], "near");
-    assert_wrong_arguments(BINARY, folder, "weights toy --target 20 --weights a/b=mean", &["'a/b' is not a label"]);
+    assert_wrong_arguments(BINARY, &folder, "weights toy --target 20 --weights a/b=mean", &["'a/b' is not a label"]);
     // One that means another scheme would be read as that.
     let taken = "weights toy --target 20 --weights mean=error:alpha=1";
-    assert_wrong_arguments(BINARY, folder, taken, &["'mean' is a weighting itself"]);
+    assert_wrong_arguments(BINARY, &folder, taken, &["'mean' is a weighting itself"]);
 }
 
 fn nothing_counts_twice_in_a_table() {

@@ -48,7 +48,14 @@ use std::process::ExitCode;
 use std::sync::LazyLock;
 use viewfuse_tests::command;
 
-viewfuse_tests::trials![help_fits_and_gives_examples,];
+viewfuse_tests::trials![
+    [
+        bench, budget, check, clouds, compare, convert, devices, errors, folders, genvs, help, hostile, inspect,
+        interrupt, kill, races, limits, lists, masks, memory, moving, optimise, outputs, pareto, pose, progress,
+        protocols, python, readme, render, report, scenes, tables, train, trained, verify, view,
+    ];
+    help_fits_and_gives_examples,
+];
 
 const BINARY: &str = env!("CARGO_BIN_EXE_viewfuse");
 
@@ -81,47 +88,7 @@ fn main() -> ExitCode {
         return viewfuse_lab::main();
     }
     let arguments = Arguments::from_args();
-    let trials = [
-        trials(),
-        bench::trials(),
-        budget::trials(),
-        check::trials(),
-        clouds::trials(),
-        compare::trials(),
-        convert::trials(),
-        devices::trials(),
-        errors::trials(),
-        folders::trials(),
-        genvs::trials(),
-        help::trials(),
-        hostile::trials(),
-        inspect::trials(),
-        interrupt::trials(),
-        kill::trials(),
-        races::trials(),
-        limits::trials(),
-        lists::trials(),
-        masks::trials(),
-        memory::trials(),
-        moving::trials(),
-        optimise::trials(),
-        outputs::trials(),
-        pareto::trials(),
-        pose::trials(),
-        progress::trials(),
-        protocols::trials(),
-        python::trials(),
-        readme::trials(),
-        render::trials(),
-        report::trials(),
-        scenes::trials(),
-        tables::trials(),
-        train::trials(),
-        trained::trials(),
-        verify::trials(),
-        view::trials(),
-    ];
-    run(&arguments, trials.into_iter().flatten().collect()).exit_code()
+    run(&arguments, trials()).exit_code()
 }
 
 /// Runs a command in a folder; it must succeed and say nothing on standard error.
@@ -137,16 +104,32 @@ fn read_json(path: impl AsRef<Path>) -> Value {
     serde_json::from_slice(&bytes).unwrap_or_else(|error| panic!("{}: {error}", path.as_ref().display()))
 }
 
+/// What a JSON list holds.
+#[track_caller]
+fn list_of(value: &Value) -> &Vec<Value> {
+    value.as_array().unwrap_or_else(|| panic!("{value} is no list"))
+}
+
+#[track_caller]
+fn number_of(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+#[track_caller]
+fn text_of(value: &Value) -> &str {
+    value.as_str().unwrap_or_else(|| panic!("{value} is no text"))
+}
+
 /// The numbers of a JSON list.
 #[track_caller]
 fn numbers(list: &Value) -> Vec<f64> {
-    list.as_array().expect("a list").iter().map(|number| number.as_f64().expect("a number")).collect()
+    list_of(list).iter().map(number_of).collect()
 }
 
 /// The texts of a JSON list.
 #[track_caller]
 fn texts(list: &Value) -> Vec<&str> {
-    list.as_array().expect("a list").iter().map(|text| text.as_str().expect("a text")).collect()
+    list_of(list).iter().map(text_of).collect()
 }
 
 #[track_caller]

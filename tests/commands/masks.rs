@@ -1,6 +1,6 @@
 //! `--masks`: what masks and alpha channels hide takes no part in pictures and scores.
 
-use super::{BINARY, done, read_json};
+use super::{BINARY, done, number_of, read_json};
 use image::{DynamicImage, GrayImage, ImageFormat, Luma, Rgb, RgbImage, Rgba, RgbaImage};
 use viewfuse_tests::command::{Outcome, assert_refused, assert_wrong_arguments, run, sample};
 use viewfuse_tests::scenes::Folder;
@@ -35,7 +35,7 @@ fn rendered(folder: &Folder, more: &str) -> (f64, String) {
     let Outcome { code, stderr, .. } = run(BINARY, folder.path(), &format!("{render} --replace {more}"));
     assert_eq!(code, Some(0), "{stderr}");
     let record = read_json(folder.path().join("out/run.json"));
-    (record["frames"][0]["psnr"].as_f64().expect("a score"), stderr)
+    (number_of(&record["frames"][0]["psnr"]), stderr)
 }
 
 /// The score where nothing is said.

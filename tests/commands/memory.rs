@@ -1,23 +1,18 @@
 //! What a render takes of memory.
 
 use super::{BINARY, read_json};
-use libtest_mimic::Trial;
 use std::fs;
 use std::path::Path;
 use std::process::Stdio;
 use std::thread::sleep;
 use std::time::Duration;
 use viewfuse_tests::command::{command, toy};
-use viewfuse_tests::trials::{needing, trial};
+use viewfuse_tests::trials::lacking;
 
-pub(crate) fn trials() -> Vec<Trial> {
-    let missing = (!cfg!(target_os = "linux")).then(|| "the system does not say what a process takes".to_owned());
-    let tests: [(&str, fn()); 2] = [
-        ("commands::memory::more_samples_take_no_more", more_samples_take_no_more),
-        ("commands::memory::a_larger_picture_takes_no_more", a_larger_picture_takes_no_more),
-    ];
-    tests.map(|(name, test)| needing(missing.clone(), false, trial(name, test))).into()
-}
+viewfuse_tests::trials![;
+    lacking(cfg!(target_os = "linux"), "the system does not say what a process takes") =>
+        more_samples_take_no_more, a_larger_picture_takes_no_more,
+];
 
 /// Largest resident set in KiB of a command that must succeed, as the system counts it; looked at until it ends.
 fn most_memory(folder: &Path, arguments: &str) -> u64 {

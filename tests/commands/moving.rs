@@ -1,43 +1,29 @@
 //! Videos and animated pictures of paths: their content by other readers, and runs that are killed and continued.
 
-use super::{BINARY, done, read_json};
+use super::{BINARY, done, list_of, number_of, numbers, read_json};
 use image::codecs::webp::WebPDecoder;
 use image::{AnimationDecoder, Rgb, RgbImage};
-use libtest_mimic::Trial;
 use serde_json::{Value, json};
 use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::Path;
 use std::process::Command;
 use viewfuse_tests::command::{Outcome, command, files_below, killed_when, names_in, toy, without_progress};
-use viewfuse_tests::trials::{is_required, needing, trial};
+use viewfuse_tests::trials::lacking;
 
-pub(crate) fn trials() -> Vec<Trial> {
-    let is_there = Command::new("ffmpeg").arg("-version").output().is_ok_and(|output| output.status.success());
-    let missing = (!is_there).then(|| "no ffmpeg".to_owned());
-    let real = trial("commands::moving::mp4_by_ffmpeg_shows_the_pictures", mp4_by_ffmpeg_shows_the_pictures);
-    let mut trials = always();
-    trials.push(needing(missing, is_required("VIEWFUSE_REQUIRE_FFMPEG"), real));
-    trials
-}
+viewfuse_tests::trials![
+    a_path_as_animated_webp_and_as_y4m,
+    a_run_that_was_killed_twice_ends_with_the_same_bytes,
+    more_frames_than_a_gif_can_show_keep_their_pace,
+    another_run_begins_anew,
+    an_ffmpeg_gets_the_video_or_there_is_y4m,
+    depths_and_opacity_for_other_programs,
+    camera_paths_from_files;
+    lacking(has_ffmpeg(), "no ffmpeg"), "VIEWFUSE_REQUIRE_FFMPEG" => mp4_by_ffmpeg_shows_the_pictures,
+];
 
-/// Those that need nothing else.
-fn always() -> Vec<Trial> {
-    vec![
-        trial("commands::moving::a_path_as_animated_webp_and_as_y4m", a_path_as_animated_webp_and_as_y4m),
-        trial(
-            "commands::moving::a_run_that_was_killed_twice_ends_with_the_same_bytes",
-            a_run_that_was_killed_twice_ends_with_the_same_bytes,
-        ),
-        trial(
-            "commands::moving::more_frames_than_a_gif_can_show_keep_their_pace",
-            more_frames_than_a_gif_can_show_keep_their_pace,
-        ),
-        trial("commands::moving::another_run_begins_anew", another_run_begins_anew),
-        trial("commands::moving::an_ffmpeg_gets_the_video_or_there_is_y4m", an_ffmpeg_gets_the_video_or_there_is_y4m),
-        trial("commands::moving::depths_and_opacity_for_other_programs", depths_and_opacity_for_other_programs),
-        trial("commands::moving::camera_paths_from_files", camera_paths_from_files),
-    ]
+fn has_ffmpeg() -> bool {
+    Command::new("ffmpeg").arg("-version").output().is_ok_and(|output| output.status.success())
 }
 
 const PATH: &str = "render toy --between 2 6 --frames 5 --size 24x24 --weights error:alpha=1 --device cpu --no-sheets";
@@ -85,7 +71,7 @@ fn a_path_as_animated_webp_and_as_y4m() {
             let shown = rgb_of(&frame, 24, x as usize, y as usize);
             own.iter()
                 .zip(shown)
-                .for_each(|(own, shown)| assert!((f64::from(*own) - shown).abs() < 3.0, "{own} {shown}"));
+                .for_each(|(level, shown)| assert!((f64::from(*level) - shown).abs() < 3.0, "{level} {shown}"));
         }
     }
     assert!(video.read_frame().is_err(), "a sixth frame");
@@ -130,7 +116,7 @@ fn more_frames_than_a_gif_can_show_keep_their_pace() {
     while let Some(frame) = decoder.read_next_frame().expect("a frame") {
         delays.push(frame.delay);
     }
-    // Five frames of 1/120 s: those that would be shown for less than 2 hundredths are left out.
+    // Five frames of 1/120 s: those that would be shown for less than 2 hundredths are dropped.
     assert_eq!(delays, [2, 2]);
 }
 
@@ -143,19 +129,18 @@ fn killed(folder: &Path, arguments: &str, frames: usize) {
 }
 
 fn a_run_that_was_killed_twice_ends_with_the_same_bytes() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     let arguments = "render toy --orbit 120 --size 24x24 --device cpu --no-sheets --depth npy --video webp,y4m -o";
-    done(folder, &format!("{arguments} whole"));
+    done(&folder, &format!("{arguments} whole"));
     let arguments = format!("{arguments} cut");
-    killed(folder, &arguments, 3);
+    killed(&folder, &arguments, 3);
     // What a kill leaves in the middle of a line and of a frame.
     let journal = folder.join("cut/frames.jsonl");
     let text = fs::read_to_string(&journal).expect("a journal");
     fs::write(&journal, format!("{text}{{\"frame\":")).expect("a journal");
     fs::remove_file(folder.join("cut/orbit-001_depth.npy")).expect("a file");
-    killed(folder, &arguments, 60);
-    let printed = done(folder, &arguments);
+    killed(&folder, &arguments, 60);
+    let printed = done(&folder, &arguments);
     let there: usize = printed
         .lines()
         .find_map(|line| line.strip_prefix("continued: ")?.split_once(" of them were there")?.0.parse().ok())
@@ -173,23 +158,22 @@ fn a_run_that_was_killed_twice_ends_with_the_same_bytes() {
     // The record is complete, and in the order of the path.
     let record = |run: &str| -> Value { read_json(folder.join(run).join("run.json")) };
     let targets = |record: &Value| -> Vec<Value> {
-        record["frames"].as_array().expect("frames").iter().map(|frame| frame["target"].clone()).collect()
+        list_of(&record["frames"]).iter().map(|frame| frame["target"].clone()).collect()
     };
     assert_eq!(targets(&record("cut")), targets(&record("whole")));
     assert_eq!((record("cut")["continued"].as_u64(), &record("whole")["continued"]), (Some(there as u64), &json!(0)));
 }
 
 fn another_run_begins_anew() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     let arguments = "render toy --orbit 60 --size 24x24 --device cpu --no-sheets --replace -o cut";
-    killed(folder, arguments, 2);
-    let printed = done(folder, &format!("{PATH} --replace -o cut"));
+    killed(&folder, arguments, 2);
+    let printed = done(&folder, &format!("{PATH} --replace -o cut"));
     assert!(!printed.contains("continued"), "{printed}");
     // Other weights make other pictures.
-    killed(folder, arguments, 2);
+    killed(&folder, arguments, 2);
     let printed =
-        done(folder, "render toy --orbit 4 --size 24x24 --device cpu --no-sheets --weights mean --replace -o cut");
+        done(&folder, "render toy --orbit 4 --size 24x24 --device cpu --no-sheets --weights mean --replace -o cut");
     assert!(!printed.contains("continued"), "{printed}");
     assert!(!folder.join("cut/frames.jsonl").exists() && folder.join("cut/run.json").is_file());
 }
@@ -203,11 +187,10 @@ fn with_programs(folder: &Path, programs: &Path, arguments: &str) -> Outcome {
 
 /// The ffmpeg of this machine: what it wrote, it decodes to the pictures again, up to its compression.
 fn mp4_by_ffmpeg_shows_the_pictures() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     // Odd sides, which the format does not have: a row and a column are added.
     done(
-        folder,
+        &folder,
         "render toy --between 2 6 --frames 5 --size 63x63 --device cpu --no-sheets --video mp4 --fps 10 -o out",
     );
     let video = folder.join("out/video.mp4");
@@ -227,20 +210,19 @@ fn mp4_by_ffmpeg_shows_the_pictures() {
         levels.sum::<f64>() / f64::from(3 * 63 * 63)
     };
     for (at, frame) in frames.iter().enumerate() {
-        let own = difference(frame, &pictures[at]);
-        assert!(own < 6.0, "frame {at} differs by {own}");
+        let apart = difference(frame, &pictures[at]);
+        assert!(apart < 6.0, "frame {at} differs by {apart}");
         // It is that picture and no other.
         let other = difference(frame, &pictures[(at + 2) % 5]);
-        assert!(other > 1.5 * own, "frame {at}: {own}, another picture {other}");
+        assert!(other > 1.5 * apart, "frame {at}: {apart}, another picture {other}");
     }
 }
 
 fn an_ffmpeg_gets_the_video_or_there_is_y4m() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     let programs = folder.join("programs");
     fs::create_dir(&programs).expect("a folder");
-    let run = with_programs(folder, &programs, &format!("{PATH} --video mp4 -o out"));
+    let run = with_programs(&folder, &programs, &format!("{PATH} --video mp4 -o out"));
     assert_eq!(run.code, Some(0), "{}", run.stderr);
     assert_eq!(run.stderr, "viewfuse: out/video.y4m, not mp4, is written: there is no ffmpeg on the path\n");
     assert!(run.stdout.contains("\nout/video.y4m\n"), "{}", run.stdout);
@@ -249,14 +231,14 @@ fn an_ffmpeg_gets_the_video_or_there_is_y4m() {
         return;
     }
     // A program of that name that keeps what it reads, and says how it was called.
-    scene.script("programs/ffmpeg", "for last; do :; done\nexec /bin/cat > \"$last\"\n");
-    let run = with_programs(folder, &programs, &format!("{PATH} --video mp4 -o out"));
+    folder.script("programs/ffmpeg", "for last; do :; done\nexec /bin/cat > \"$last\"\n");
+    let run = with_programs(&folder, &programs, &format!("{PATH} --video mp4 -o out"));
     assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
     assert!(fs::read(folder.join("out/video.mp4")).expect("a video") == video, "the program got another video");
     assert!(!folder.join("out/video.y4m").exists(), "the video of the run before is left");
     // One that fails.
-    scene.script("programs/ffmpeg", "echo no such encoder >&2\nexit 3\n");
-    let run = with_programs(folder, &programs, &format!("{PATH} --video mp4 -o out"));
+    folder.script("programs/ffmpeg", "echo no such encoder >&2\nexit 3\n");
+    let run = with_programs(&folder, &programs, &format!("{PATH} --video mp4 -o out"));
     assert_eq!(run.code, Some(1));
     assert!(run.stderr.contains("video.mp4: ffmpeg could not write it: no such encoder"), "{}", run.stderr);
     assert!(names_in(&folder.join("out")).iter().all(|name| !name.ends_with("mp4")));
@@ -272,15 +254,14 @@ fn npy(path: &Path) -> (String, Vec<f32>) {
 }
 
 fn depths_and_opacity_for_other_programs() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     // Wider than high, so that rows and columns differ.
-    scene.write(
+    folder.write(
         "wide.csv",
         "name,x,y,z,look_x,look_y,look_z,fx,fy,cx,cy,width,height\nwide,1,0.7,0.5,0,0,0,60,60,24,16,48,32\n",
     );
     let arguments = "render toy --camera-path wide.csv --device cpu --no-sheets";
-    done(folder, &format!("{arguments} --alpha --depth png,exr,npy -o out"));
+    done(&folder, &format!("{arguments} --alpha --depth png,exr,npy -o out"));
     let out = folder.join("out");
     assert_eq!(names_in(&out), ["run.json", "wide.png", "wide_depth.exr", "wide_depth.npy", "wide_depth.png"]);
     let (header, depths) = npy(&out.join("wide_depth.npy"));
@@ -293,7 +274,7 @@ fn depths_and_opacity_for_other_programs() {
     assert_eq!(read, depths);
     // The steps of the PNG, by the record.
     let record = read_json(out.join("run.json"));
-    let step = record["frames"][0]["depth_step"].as_f64().expect("a step");
+    let step = number_of(&record["frames"][0]["depth_step"]);
     assert!(record["depth_units"]["depth"].as_str().is_some_and(|words| words.contains("units of the scene's files")));
     let levels = image::open(out.join("wide_depth.png")).expect("a map").to_luma16();
     for (level, depth) in levels.pixels().zip(&depths) {
@@ -301,45 +282,39 @@ fn depths_and_opacity_for_other_programs() {
     }
     // Opacity is that of the object; colour and background make the picture without alpha.
     let with_alpha = image::open(out.join("wide.png")).expect("a picture").into_rgba8();
-    done(folder, &format!("{arguments} -o plain"));
+    done(&folder, &format!("{arguments} -o plain"));
     let plain = png(&folder.join("plain"), "wide.png");
-    let background: Vec<f64> = record["background"]["used"]
-        .as_array()
-        .expect("a colour")
-        .iter()
-        .map(|level| level.as_f64().expect("a level"))
-        .collect();
+    let background: Vec<f64> = numbers(&record["background"]["used"]);
     let opaque = with_alpha.pixels().filter(|pixel| pixel[3] == 255).count();
     let empty = with_alpha.pixels().filter(|pixel| pixel[3] == 0).count();
     assert!(opaque > 100 && empty > 300, "{opaque} {empty}");
-    for (own, plain) in with_alpha.pixels().zip(plain.pixels()) {
-        let alpha = f64::from(own[3]) / 255.0;
+    for (pixel, plain) in with_alpha.pixels().zip(plain.pixels()) {
+        let alpha = f64::from(pixel[3]) / 255.0;
         for channel in 0..3 {
-            let mixed = alpha * f64::from(own[channel]) + (1.0 - alpha) * background[channel];
+            let mixed = alpha * f64::from(pixel[channel]) + (1.0 - alpha) * background[channel];
             // Faint pixels round their alpha.
-            assert!((mixed - f64::from(plain[channel])).abs() <= 2.0, "{own:?} over the background is not {plain:?}");
+            assert!((mixed - f64::from(plain[channel])).abs() <= 2.0, "{pixel:?} over the background is not {plain:?}");
         }
     }
 }
 
 fn camera_paths_from_files() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     let record = |run: &str| -> Value { read_json(folder.join(run).join("run.json")) };
-    done(folder, "render toy --targets 20 --sources 0..11 --size 24x24 --device cpu --no-sheets -o view");
+    done(&folder, "render toy --targets 20 --sources 0..11 --size 24x24 --device cpu --no-sheets -o view");
     let pose = record("view")["frames"][0]["world_from_camera"].clone();
     // The same camera by a table, and by nerfstudio's viewer with axes turned around.
-    let number = |row: usize, column: usize| pose[row][column].as_f64().expect("a number");
+    let number = |row: usize, column: usize| number_of(&pose[row][column]);
     let entries: Vec<String> = (0..12).map(|k| number(k / 4, k % 4).to_string()).collect();
     let names: Vec<String> = (0..12).map(|k| format!("m{}{}", k / 4, k % 4)).collect();
-    scene.write("poses.csv", format!("name,{}\nview,{}\n", names.join(","), entries.join(",")));
+    folder.write("poses.csv", format!("name,{}\nview,{}\n", names.join(","), entries.join(",")));
     let opengl: Vec<f64> =
         (0..16).map(|k| number(k / 4, k % 4) * if k % 4 == 1 || k % 4 == 2 { -1.0 } else { 1.0 }).collect();
     let frame = json!({ "file_path": "view", "transform_matrix": opengl.chunks(4).collect::<Vec<_>>() });
-    scene.write("poses.json", json!({ "frames": [frame], "fps": 10 }).to_string());
+    folder.write("poses.json", json!({ "frames": [frame], "fps": 10 }).to_string());
     for file in ["poses.csv", "poses.json"] {
         let arguments = format!("--camera-path {file} --sources 0..11 --size 24x24 --device cpu --no-sheets");
-        done(folder, &format!("render toy {arguments} --video y4m -o path"));
+        done(&folder, &format!("render toy {arguments} --video y4m -o path"));
         assert!(png(&folder.join("path"), "view.png") == png(&folder.join("view"), "000020.png"), "{file}");
         let video = y4m::decode(File::open(folder.join("path/video.y4m")).expect("a file")).expect("y4m");
         assert_eq!(video.get_framerate().num, if file == "poses.json" { 10 } else { 30 });

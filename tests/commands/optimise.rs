@@ -13,7 +13,7 @@ use viewfuse_tests::command::{
 use viewfuse_tests::patience::{end, send, wait_while_running};
 
 viewfuse_tests::trials![
-    views_left_out_are_scored_on_the_way,
+    held_out_views_are_scored_on_the_way,
     it_ends_with_the_weights_of_a_view,
     the_number_follows_the_pixels,
     ctrl_c_keeps_what_there_is,
@@ -32,7 +32,7 @@ fn gaussians(path: &Path) -> GaussianScene {
     GaussianScene::read(path, &SceneFrame::FILE).expect("a file of Gaussians")
 }
 
-/// Iteration and decibels of the lines about views that are left out.
+/// Iteration and decibels of the lines about held-out views.
 fn scores(text: &str) -> Vec<(u32, f64)> {
     let score = |line: &str| {
         let (iteration, rest) = line.strip_prefix("iteration ")?.split_once(" of ")?;
@@ -42,11 +42,11 @@ fn scores(text: &str) -> Vec<(u32, f64)> {
     text.lines().filter_map(score).collect()
 }
 
-fn views_left_out_are_scored_on_the_way() {
+fn held_out_views_are_scored_on_the_way() {
     let folder = toy();
     let text = done(folder.path(), &format!("{OPTIMISE} --left-out 20,21 -o a.ply"));
     let scores = scores(&text);
-    assert_eq!(scores.iter().map(|own| own.0).collect::<Vec<_>>(), [40, 80, 120, 160, 200, 240], "{text}");
+    assert_eq!(scores.iter().map(|score| score.0).collect::<Vec<_>>(), [40, 80, 120, 160, 200, 240], "{text}");
     assert!(scores[5].1 > scores[0].1 + 3.0, "it becomes better: {text}");
     assert!(!text.contains("fit: "), "{text}");
     let count = gaussians(&folder.path().join("a.ply")).gaussians.len();
@@ -54,8 +54,8 @@ fn views_left_out_are_scored_on_the_way() {
     // The last score is that of `render` with the file, from the same sources.
     let rendered = done(folder.path(), "render toy --gaussians a.ply --targets 20,21 --size 48x48 --device cpu -o out");
     let psnr = |line: &str| line.split("PSNR ").nth(1)?.split(" dB").next()?.parse::<f64>().ok();
-    let own: Vec<f64> = rendered.lines().filter_map(psnr).collect();
-    assert!(own.len() == 2 && (own.iter().sum::<f64>() / 2.0 - scores[5].1).abs() < 0.02, "{rendered}\n{text}");
+    let again: Vec<f64> = rendered.lines().filter_map(psnr).collect();
+    assert!(again.len() == 2 && (again.iter().sum::<f64>() / 2.0 - scores[5].1).abs() < 0.02, "{rendered}\n{text}");
     // The same seed, any number of threads.
     done(folder.path(), &format!("{OPTIMISE} --left-out 20,21 --threads 1 -o b.ply"));
     let read = |name: &str| fs::read(folder.path().join(name)).expect("a file");
@@ -74,7 +74,7 @@ fn it_ends_with_the_weights_of_a_view() {
         (optimised("", "a.ply"), optimised("--towards 20", "b.ply"), optimised("--towards 21", "c.ply"));
     // The same up to there, then 60 iterations more, which differ by the view and by the scheme.
     assert_eq!(one.0[..6], without.0[..]);
-    assert_eq!(one.0[6..].iter().map(|own| own.0).collect::<Vec<_>>(), [280, 300]);
+    assert_eq!(one.0[6..].iter().map(|score| score.0).collect::<Vec<_>>(), [280, 300]);
     assert!(one.1 != other.1, "both views have the same weights");
     let mean = optimised("--towards 20 --weights mean", "d.ply");
     assert!(mean.1 != one.1, "the scheme does not count");
@@ -86,8 +86,8 @@ fn the_number_follows_the_pixels() {
         done(folder.path(), &format!("optimise toy --device cpu --iterations 4 {options} -o toy.ply"));
         gaussians(&folder.path().join("toy.ply")).gaussians.len()
     };
-    let own = count("--size 32x32");
-    assert!(own > 200 && own <= 32 * 32 * 3 / 2, "{own} Gaussians for 32x32 pixels");
+    let usual = count("--size 32x32");
+    assert!(usual > 200 && usual <= 32 * 32 * 3 / 2, "{usual} Gaussians for 32x32 pixels");
     let fewer = count("--size 32x32 --count 300");
     assert!(fewer > 200 && fewer <= 300, "{fewer}");
 }
@@ -122,7 +122,7 @@ fn after_a_kill_it_goes_on_from_the_file() {
     // file.
     let (first, second) = (resumed("a.ply"), resumed("b.ply"));
     assert!(first == second, "two scenes from one file");
-    assert_eq!(first.0.iter().map(|own| own.0).collect::<Vec<_>>(), [200, 240]);
+    assert_eq!(first.0.iter().map(|score| score.0).collect::<Vec<_>>(), [200, 240]);
     let rendered = done(folder.path(), "render toy --gaussians toy.ply --targets 20 --size 48x48 --device cpu -o out");
     let psnr = rendered.split("PSNR ").nth(1).and_then(|rest| rest.split(' ').next()).expect("a score");
     assert!(first.0[1].1 > psnr.parse().expect("a number"), "{rendered} {:?}", first.0);
@@ -174,8 +174,8 @@ fn more_quality_is_tried_on_sources_and_has_colours_by_direction() {
     // The last score is that of the file, harmonics included.
     let rendered = done(folder.path(), "render toy --gaussians a.ply --targets 20,21 --size 48x48 --device cpu -o out");
     let psnr = |line: &str| line.split("PSNR ").nth(1)?.split(" dB").next()?.parse::<f64>().ok();
-    let own: Vec<f64> = rendered.lines().filter_map(psnr).collect();
-    assert!(own.len() == 2 && (own.iter().sum::<f64>() / 2.0 - sharp).abs() < 0.02, "{rendered}\n{text}");
+    let again: Vec<f64> = rendered.lines().filter_map(psnr).collect();
+    assert!(again.len() == 2 && (again.iter().sum::<f64>() / 2.0 - sharp).abs() < 0.02, "{rendered}\n{text}");
     // It goes on from the file with its harmonics: the first score of few iterations is no worse.
     let more = "--resume a.ply --left-out 20,21 --quality standard --iterations 40 -o c.ply";
     let resumed = scores(&done(folder.path(), &format!("{OPTIMISE} {more}")));

@@ -9,9 +9,8 @@ mod helper;
 mod on_the_way;
 mod stopped;
 
-use super::{BINARY, read_json};
+use super::{BINARY, list_of, read_json};
 use image::{DynamicImage, ImageFormat, RgbImage, imageops};
-use libtest_mimic::Trial;
 use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
@@ -24,7 +23,7 @@ use viewfuse_tests::command::{
 use viewfuse_tests::patience::wait_while_running;
 use viewfuse_tests::places::data;
 use viewfuse_tests::scenes::{FILM, Folder, ORIENTATION, with_exif};
-use viewfuse_tests::trials::{is_required, needing, trial};
+use viewfuse_tests::trials::lacking;
 
 /// What lets tests fail that lack the program.
 const REQUIRE: &str = "VIEWFUSE_REQUIRE_POSE";
@@ -35,34 +34,31 @@ const ROOM_FILM: u16 = 32;
 /// Photographs of a set whose poses a played solver says.
 const COUNT_ALONE: usize = 5;
 
-/// A test that needs the program.
-fn needs(name: &str, test: fn()) -> Trial {
-    let missing = program().is_none().then(|| "no viewfuse-openmvg: `cargo openmvg` builds it".to_owned());
-    needing(missing, is_required(REQUIRE), trial(&format!("commands::pose::{name}"), test))
+/// Why there is no program, if there is none.
+fn no_program() -> Option<String> {
+    lacking(program().is_some(), "no viewfuse-openmvg: `cargo openmvg` builds it")
 }
 
-pub(crate) fn trials() -> Vec<Trial> {
-    let own = vec![
-        needs("eight_photographs_to_a_picture", eight_photographs_to_a_picture),
-        needs("what_does_not_belong_is_left_out_by_name", what_does_not_belong_is_left_out_by_name),
-        needs("sizes_and_orientations_may_differ", sizes_and_orientations_may_differ),
-        needs("a_step_leaves_few_enough", a_step_leaves_few_enough),
-        needs("photographs_of_nothing_in_common", photographs_of_nothing_in_common),
-        needs("ctrl_c_leaves_nothing", ctrl_c_leaves_nothing),
-        trial("commands::pose::formats_that_are_not_read", formats_that_are_not_read),
-        trial("commands::pose::too_many_and_too_few", too_many_and_too_few),
-        trial("commands::pose::without_the_program", without_the_program),
-        trial("commands::pose::what_lies_beside_the_output_stays", what_lies_beside_the_output_stays),
-        trial("commands::pose::bare_photographs_say_how", bare_photographs_say_how),
-    ];
-    own.into_iter()
-        .chain(colmap::trials())
-        .chain(diagnosis::trials())
-        .chain(helper::trials())
-        .chain(on_the_way::trials())
-        .chain(stopped::trials())
-        .collect()
+/// Why no script can play a program, if that is so.
+fn no_scripts() -> Option<String> {
+    lacking(cfg!(unix), "no scripts of a shell")
 }
+
+viewfuse_tests::trials![
+    [colmap, diagnosis, helper, on_the_way, stopped];
+    formats_that_are_not_read,
+    too_many_and_too_few,
+    without_the_program,
+    what_lies_beside_the_output_stays,
+    bare_photographs_say_how;
+    no_program(), REQUIRE =>
+        eight_photographs_to_a_picture,
+        what_does_not_belong_is_excluded_by_name,
+        sizes_and_orientations_may_differ,
+        a_step_leaves_few_enough,
+        photographs_of_nothing_in_common,
+        ctrl_c_leaves_nothing,
+];
 
 /// The program, if there is one.
 fn program() -> Option<PathBuf> {
@@ -117,9 +113,9 @@ fn worst_rotation(scene: &Scene) -> f32 {
     let mut worst = 0.0_f32;
     for a in &scene.views {
         for b in &scene.views {
-            let (own, true_one) = (relative(scene, &a.name, &b.name), relative(&known, &a.name, &b.name));
+            let (found, true_one) = (relative(scene, &a.name, &b.name), relative(&known, &a.name, &b.name));
             // trace(A B^T) = 1 + 2 cos
-            let trace: f32 = own.iter().zip(&true_one).map(|(own, true_one)| own.dot(*true_one)).sum();
+            let trace: f32 = found.iter().zip(&true_one).map(|(row, true_one)| row.dot(*true_one)).sum();
             worst = worst.max((0.5 * (trace - 1.0)).clamp(-1.0, 1.0).acos().to_degrees());
         }
     }
@@ -136,7 +132,7 @@ fn eight_photographs_to_a_picture() {
     let worst = worst_rotation(&scene);
     assert!(worst < 1.5, "{worst} degrees");
     let record = read_json(folder.path().join("posed/pose.json"));
-    let accepted = record["accepted"].as_array().expect("a list");
+    let accepted = list_of(&record["accepted"]);
     assert_eq!(accepted.iter().filter(|photo| photo["verdict"] == "sure").count(), 8, "{record}");
     // Features are found in enlarged photographs; cameras are those of the photographs.
     let camera = &scene.views[0].camera.pinhole;
@@ -155,7 +151,7 @@ fn eight_photographs_to_a_picture() {
     assert!(psnr > 21.0, "{psnr} dB");
 }
 
-fn what_does_not_belong_is_left_out_by_name() {
+fn what_does_not_belong_is_excluded_by_name() {
     let folder = bare(0..5);
     let cut = room(5);
     folder.write("bare/cut.jpg", &cut[..cut.len() / 2]);
@@ -242,7 +238,7 @@ fn ctrl_c_leaves_nothing() {
     };
     let threads_have = || {
         let tasks = fs::read_dir(format!("/proc/{process}/task")).into_iter().flatten().flatten();
-        tasks.into_iter().any(|task| fs::read_to_string(task.path().join("children")).is_ok_and(|own| !own.is_empty()))
+        tasks.into_iter().any(|task| fs::read_to_string(task.path().join("children")).is_ok_and(|all| !all.is_empty()))
     };
     wait_while_running(&mut child, || has_child() || threads_have());
     interrupt(child, "-INT");

@@ -104,14 +104,13 @@ const COMMANDS: [(&str, &[&str]); 13] = [
 ];
 
 fn every_long_command_names_its_stages() {
-    let scene = toy_twice();
-    let folder = scene.path();
+    let folder = toy_twice();
     for (from, to) in [("weighting.json", "weighting.json"), ("pixelnerf_small.safetensors", "pixelnerf.safetensors")] {
         fs::copy(data(from), folder.join(to)).expect("a copy");
     }
     let mut has_time = false;
     for (arguments, expected) in COMMANDS {
-        let lines = lines(folder, arguments);
+        let lines = lines(&folder, arguments);
         assert_stages(&lines, expected, arguments);
         has_time |= lines.iter().any(|line| line.has_time);
     }
@@ -119,17 +118,16 @@ fn every_long_command_names_its_stages() {
 }
 
 fn training_and_its_scenes_name_their_stages() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     let make = "scenes make cars learn --train 2 --val 1 --test 0 --views 8 --test-views 8 --size 64";
-    let told = lines(folder, make);
+    let told = lines(&folder, make);
     assert_stages(&told, &["making scenes"], make);
     assert!(told.len() > 20, "a step for each of 24 views: {told:#?}");
     let train = "train pixelnerf learn/cars --width 8 --objects 1 --rays 8 --coarse 4 --fine 2 --side 16 --steps 12 \
         --validate-every 4 --write-every 0 -o net";
-    assert_stages(&lines(folder, train), &["reading the scenes", "training"], train);
+    assert_stages(&lines(&folder, train), &["reading the scenes", "training"], train);
     let photograph = "scenes photograph room shoot --views 3 --size 32x24";
-    assert_stages(&lines(folder, photograph), &["photographing"], photograph);
+    assert_stages(&lines(&folder, photograph), &["photographing"], photograph);
 }
 
 /// Without its variable a line every five seconds; here every second, of work that is ended once it has told enough.

@@ -8,17 +8,4 @@ mod cluster;
 mod folders;
 mod summaries;
 
-pub(crate) fn trials() -> Vec<libtest_mimic::Trial> {
-    [
-        baselines::trials(),
-        benchmarks::trials(),
-        choice::trials(),
-        #[cfg(unix)]
-        cluster::trials(),
-        folders::trials(),
-        summaries::trials(),
-    ]
-    .into_iter()
-    .flatten()
-    .collect()
-}
+viewfuse_tests::trials![[baselines, benchmarks, choice, #[cfg(unix)] cluster, folders, summaries];];

@@ -1,25 +1,19 @@
 //! The Python package. Its wheel is built and tested by `host/python/test`, which takes minutes and the network: only
 //! with `VIEWFUSE_REQUIRE_PYTHON=1`. That it is built from the same crates as the command is tested always.
 
-use super::BINARY;
-use libtest_mimic::Trial;
+use super::{BINARY, list_of};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::process::Command;
 use viewfuse_tests::places::repository;
-use viewfuse_tests::trials::{is_required, needing, trial};
 
 /// What has the wheel built and tested.
 const REQUIRE: &str = "VIEWFUSE_REQUIRE_PYTHON";
 
-pub(crate) fn trials() -> Vec<Trial> {
-    let wheel = trial("commands::python::the_wheel_in_an_empty_environment", the_wheel_in_an_empty_environment);
-    let missing = (!is_required(REQUIRE)).then(|| format!("minutes, and the network; {REQUIRE}=1 runs it"));
-    vec![
-        needing(missing, is_required(REQUIRE), wheel),
-        trial("commands::python::it_is_built_from_the_same_crates", it_is_built_from_the_same_crates),
-    ]
-}
+viewfuse_tests::trials![
+    it_is_built_from_the_same_crates;
+    Some(format!("minutes, and the network; {REQUIRE}=1 runs it")), REQUIRE => the_wheel_in_an_empty_environment,
+];
 
 fn the_wheel_in_an_empty_environment() {
     let output = Command::new(repository().join("host/python/test"))
@@ -64,11 +58,12 @@ fn it_is_built_from_the_same_crates() {
     }
     assert!(needed.len() > 60, "{needed:?}");
     for (name, version, needs) in of_python.iter().filter(|(name, ..)| needed.contains(name.as_str())) {
-        let versions: Vec<&String> = ours.iter().filter(|own| own.0 == *name).map(|own| &own.1).collect();
+        let versions: Vec<&String> =
+            ours.iter().filter(|package| package.0 == *name).map(|package| &package.1).collect();
         assert!(versions.contains(&version), "{name}: {version}, and {versions:?} in Cargo.lock");
-        let packages = metadata["packages"].as_array().expect("packages");
+        let packages = list_of(&metadata["packages"]);
         let Some(package) = packages.iter().find(|package| package["name"] == name.as_str()) else { continue };
-        let dependencies = package["dependencies"].as_array().expect("a list").iter();
+        let dependencies = list_of(&package["dependencies"]).iter();
         let always = dependencies.filter(|need| need["kind"].is_null() && need["optional"] == false);
         for need in always.filter(|need| need["target"].is_null()).filter_map(|need| need["name"].as_str()) {
             assert!(needs.contains(need), "{name} needs {need}: run cargo in host/python, without --locked");

@@ -1,7 +1,7 @@
 //! The READMEs: their commands are run as they stand there, but for fewer pictures; their links and those of the
 //! results' reports lead somewhere, and every published package has its own.
 
-use super::{BINARY, examples, lab};
+use super::{BINARY, examples, lab, list_of, text_of};
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
@@ -163,18 +163,18 @@ fn every_package_can_stand_alone() {
     let ours = licences(&repository().join("host"));
     // The core's, the kernels' and the main README are compiled with the tests' library.
     let elsewhere = read(&repository().join("tests/src/lib.rs"));
-    for package in metadata["packages"].as_array().expect("packages") {
-        let name = package["name"].as_str().expect("a name");
+    for package in list_of(&metadata["packages"]) {
+        let name = text_of(&package["name"]);
         if package["publish"].is_array() {
             continue;
         }
-        let folder = Path::new(package["manifest_path"].as_str().expect("a path")).with_file_name("");
+        let folder = Path::new(text_of(&package["manifest_path"])).with_file_name("");
         assert!(licences(&folder) == ours, "{name}");
         // What the registry asks for.
         for field in ["description", "repository", "license", "readme"] {
             assert!(package[field].is_string(), "{name}: {field}");
         }
-        let targets = package["targets"].as_array().expect("targets");
+        let targets = list_of(&package["targets"]);
         let is_there = |kind: &str| targets.iter().any(|target| target["kind"] == serde_json::json!([kind]));
         // The command's library is its binary's.
         if is_there("lib") && !is_there("bin") {

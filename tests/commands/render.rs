@@ -1,6 +1,6 @@
 //! `viewfuse render`.
 
-use super::{BINARY, assert_near, done, numbers, read_json, texts};
+use super::{BINARY, assert_near, done, list_of, number_of, numbers, read_json, texts};
 use image::{ColorType, DynamicImage};
 use serde_json::Value;
 use std::fs;
@@ -9,7 +9,7 @@ use viewfuse_tests::command::{Outcome, change_poses, names_in, run, toy};
 
 viewfuse_tests::trials![
     writes_a_picture_a_depth_map_a_sheet_and_a_record,
-    leaves_out_what_counts_little,
+    drops_what_counts_little,
     orbits,
     an_orbit_stays_where_photographs_are,
     cameras_of_a_map_stay_in_its_coordinates,
@@ -38,10 +38,9 @@ fn pictures(folder: &Path) -> Vec<(String, Vec<u8>)> {
 }
 
 fn writes_a_picture_a_depth_map_a_sheet_and_a_record() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     let printed =
-        done(folder, "render toy --targets 20 --size 64x64 --seed 7 --leave-out 0 --device cpu -o out/deeper");
+        done(&folder, "render toy --targets 20 --size 64x64 --seed 7 --leave-out 0 --device cpu -o out/deeper");
     assert!(
         printed.contains("out/deeper/000020.png  PSNR ") && printed.contains("1 view from 23 sources"),
         "{printed}"
@@ -56,17 +55,17 @@ fn writes_a_picture_a_depth_map_a_sheet_and_a_record() {
     let sheet = picture(&output, "000020_sheet.png");
     assert!(sheet.width() > 64 && sheet.height() > 64);
 
-    let record = record(folder, "out/deeper");
+    let record = record(&folder, "out/deeper");
     assert_eq!((&record["seed"], &record["scene"], &record["size"]), (&7.into(), &"toy".into(), &[64, 64][..].into()));
     assert!(record["device"].as_str().is_some_and(|device| device.starts_with("cpu")), "{record}");
-    // The default is the choice for the scene: six sources were left out, and the best scheme is used.
+    // The default is the choice for the scene: six sources were held out, and the best scheme is used.
     assert_eq!(record["chosen"]["left_out"].as_array().map(Vec::len), Some(6), "{}", record["chosen"]);
-    let candidates = record["chosen"]["candidates"].as_array().expect("what was tried");
+    let candidates = list_of(&record["chosen"]["candidates"]);
     assert!(candidates.iter().any(|candidate| candidate["weighting"] == record["weighting"]), "{record}");
     assert!(record["frames"][0]["expected"]["psnr"].is_number(), "{record}");
     let expected: Vec<String> = (0..24).filter(|view| *view != 20).map(|view| format!("{view:06}")).collect();
     assert_eq!(texts(&record["sources"]), expected);
-    let time = |name: &str| record["times"][name].as_f64().expect("a time in seconds");
+    let time = |name: &str| number_of(&record["times"][name]);
     let stages: f64 = ["open", "photographs", "prepare", "encode", "frames"].map(time).iter().sum();
     assert!(stages > 0.0 && stages <= time("total"), "{}", record["times"]);
 
@@ -81,29 +80,29 @@ fn writes_a_picture_a_depth_map_a_sheet_and_a_record() {
     assert!(frame["ssim"].as_f64().is_some_and(|ssim| ssim > 0.8 && ssim <= 1.0));
 
     // The depth map in world units: the lorry is within 0.55 of the origin, the camera 1.3 from it.
-    let step = frame["depth_step"].as_f64().expect("the unit of the depth map");
+    let step = number_of(&frame["depth_step"]);
     let depths: Vec<f64> = depth.to_luma16().pixels().map(|pixel| step * f64::from(pixel[0])).collect();
     assert!(depths.iter().filter(|z| **z > 0.0).count() > 300);
     assert!(depths.iter().all(|z| *z == 0.0 || (0.7..1.9).contains(z)));
 }
 
-fn leaves_out_what_counts_little() {
+fn drops_what_counts_little() {
     let scene = toy();
     done(scene.path(), "render toy --targets 20 --size 32x32 --leave-out 0.2 --weights error:alpha=1 -o out");
     let record = record(scene.path(), "out");
     assert_eq!((&record["weighting"], &record["chosen"]), (&"error:alpha=1".into(), &Value::Null));
     let frame = &record["frames"][0];
     let (used, before) = (numbers(&frame["weights"]), numbers(&frame["weights_before"]));
-    let (sources, left_out) = (texts(&record["sources"]), texts(&frame["left_out"]));
-    assert!(!left_out.is_empty() && left_out.len() < 23);
-    let omitted: f64 = (0..23).filter(|&view| left_out.contains(&sources[view])).map(|view| before[view]).sum();
+    let (sources, dropped) = (texts(&record["sources"]), texts(&frame["left_out"]));
+    assert!(!dropped.is_empty() && dropped.len() < 23);
+    let omitted: f64 = (0..23).filter(|&view| dropped.contains(&sources[view])).map(|view| before[view]).sum();
     assert!(omitted <= 0.2 + 1.0e-6);
-    assert_near(frame["left_out_weight"].as_f64().expect("a number"), omitted, 1.0e-6);
+    assert_near(number_of(&frame["left_out_weight"]), omitted, 1.0e-6);
     assert_near(used.iter().sum(), 1.0, 1.0e-5);
-    let most_left_out = (0..23).filter(|&v| left_out.contains(&sources[v])).map(|v| before[v]).fold(0.0, f64::max);
+    let most_dropped = (0..23).filter(|&v| dropped.contains(&sources[v])).map(|v| before[v]).fold(0.0, f64::max);
     for view in 0..23 {
-        assert_eq!(used[view] == 0.0, left_out.contains(&sources[view]), "view {view}");
-        assert!(used[view] == 0.0 || before[view] >= most_left_out, "view {view} counts less and was kept");
+        assert_eq!(used[view] == 0.0, dropped.contains(&sources[view]), "view {view}");
+        assert!(used[view] == 0.0 || before[view] >= most_dropped, "view {view} counts less and was kept");
     }
 }
 
@@ -132,7 +131,7 @@ fn an_orbit_stays_where_photographs_are() {
     let scene = toy();
     let shares = |output: &str| -> Vec<f64> {
         let frames = record(scene.path(), output)["frames"].as_array().expect("frames").clone();
-        frames.iter().map(|frame| frame["seen"].as_f64().expect("a share")).collect()
+        frames.iter().map(|frame| number_of(&frame["seen"])).collect()
     };
     // Two views that are neighbours.
     let orbit = |count: &str, output: &str| {
@@ -158,7 +157,7 @@ fn an_orbit_stays_where_photographs_are() {
     let full = shares("full");
     assert!(full.iter().filter(|share| **share < 0.1).count() >= 2, "{full:?}");
     let warnings = record(scene.path(), "full")["warnings"].clone();
-    assert!(texts(&warnings).iter().any(|own| own.contains(warning)), "{warnings}");
+    assert!(texts(&warnings).iter().any(|text| text.contains(warning)), "{warnings}");
 }
 
 fn cameras_of_a_map_stay_in_its_coordinates() {
@@ -184,12 +183,11 @@ fn cameras_of_a_map_stay_in_its_coordinates() {
 }
 
 fn the_same_run_makes_the_same_pictures() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     let arguments = "render toy --targets 20,22 --size 48x48";
-    done(folder, &format!("{arguments} -o first"));
-    done(folder, &format!("{arguments} -o second"));
-    done(folder, &format!("{arguments} --threads 1 -o third"));
+    done(&folder, &format!("{arguments} -o first"));
+    done(&folder, &format!("{arguments} -o second"));
+    done(&folder, &format!("{arguments} --threads 1 -o third"));
     let first = pictures(&folder.join("first"));
     assert_eq!(first.len(), 6);
     assert!(first == pictures(&folder.join("second")), "two runs differ");
@@ -215,15 +213,14 @@ fn chooses_sources() {
 }
 
 fn weights_change_the_picture() {
-    let scene = toy();
-    let folder = scene.path();
+    let folder = toy();
     for (output, scheme) in [("a", "mean"), ("b", "error:alpha=1"), ("c", "cross-attention")] {
-        done(folder, &format!("render toy --targets 20 --size 32x32 --leave-out 0 --weights {scheme} -o {output}"));
-        assert_eq!(record(folder, output)["weighting"], scheme);
+        done(&folder, &format!("render toy --targets 20 --size 32x32 --leave-out 0 --weights {scheme} -o {output}"));
+        assert_eq!(record(&folder, output)["weighting"], scheme);
     }
-    let mean = numbers(&record(folder, "a")["frames"][0]["weights"]);
+    let mean = numbers(&record(&folder, "a")["frames"][0]["weights"]);
     mean.iter().for_each(|weight| assert_near(*weight, 1.0 / 23.0, 1.0e-7));
-    let prediction = |output: &str| picture(folder, &format!("{output}/000020.png")).to_rgb8();
+    let prediction = |output: &str| picture(&folder, &format!("{output}/000020.png")).to_rgb8();
     assert!(prediction("a") != prediction("b") && prediction("b") != prediction("c"));
 }
 

@@ -4,47 +4,39 @@
 //! and say why; with `VIEWFUSE_REQUIRE_BROWSER=1` they fail instead. Pictures of the page, to be looked at, are left in
 //! `tmp/report` of the target folder.
 
-use super::browser::{self, Browser, InBrowser};
-use super::{done, lab};
-use libtest_mimic::Trial;
+use super::browser::{Browser, REQUIRE};
+use super::{done, lab, list_of, text_of};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, files_below, toy};
 use viewfuse_tests::scenes::Folder;
-use viewfuse_tests::trials::trial;
 
 const SMALL: &str =
     "--size 24x24 --device cpu --weights mean --weights distance:power=2 --weights error:alpha=1,angle=full";
 
-pub(crate) fn trials() -> Vec<Trial> {
-    let mut trials = vec![
-        trial("commands::report::the_page_holds_everything", the_page_holds_everything),
-        trial("commands::report::evaluations_under_way_are_shown", evaluations_under_way_are_shown),
-        trial("commands::report::what_is_no_record_is_refused", what_is_no_record_is_refused),
-        trial("commands::report::a_received_folder_shows_only_its_own", a_received_folder_shows_only_its_own),
-        trial("commands::report::damaged_numbers_are_refused", damaged_numbers_are_refused),
-    ];
-    let tests: [(&str, InBrowser); 3] = [
-        ("report::browser::a_person_sees_what_was_measured", a_person_sees_what_was_measured),
-        ("report::browser::light_and_dark", light_and_dark),
-        ("report::browser::the_looks_at_the_page_can_fail", the_looks_at_the_page_can_fail),
-    ];
-    trials.extend(browser::trials(tests));
-    trials
-}
+viewfuse_tests::trials![
+    the_page_holds_everything,
+    evaluations_under_way_are_shown,
+    what_is_no_record_is_refused,
+    a_received_folder_shows_only_its_own,
+    damaged_numbers_are_refused;
+    Browser::missing(), REQUIRE =>
+        a_person_sees_what_was_measured,
+        light_and_dark,
+        the_looks_at_the_page_can_fail,
+];
 
 /// The sample scene twice, three evaluations of it, a sweep and a training.
 fn runs() -> Folder {
     let folder = toy();
-    let path = folder.path();
-    for (file, _) in files_below(&path.join("toy")).into_iter().filter(|(file, _)| file.is_file()) {
-        let inside = file.strip_prefix(path.join("toy")).expect("inside").display().to_string();
+    for (file, _) in files_below(&folder.join("toy")).into_iter().filter(|(file, _)| file.is_file()) {
+        let inside = file.strip_prefix(folder.join("toy")).expect("inside").display().to_string();
         fs::copy(&file, folder.file(&format!("lorry/{inside}"))).expect("a copy");
     }
-    done(path, &format!("evaluate toy lorry --protocol count:sources=2+4+8 {SMALL} -o count"));
-    done(path, &format!("evaluate toy lorry --protocol random {SMALL} --pictures 1 -o random"));
-    done(path, "pareto toy --targets 20 --views 3 --size 16x16 --repeat 1 --device cpu -o sweep");
+    done(&folder, &format!("evaluate toy lorry --protocol count:sources=2+4+8 {SMALL} -o count"));
+    done(&folder, &format!("evaluate toy lorry --protocol random {SMALL} --pictures 1 -o random"));
+    done(&folder, "pareto toy --targets 20 --views 3 --size 16x16 --repeat 1 --device cpu -o sweep");
     folder.write(
         "trained/record.json",
         json!({"steps": 12, "settings": {"rate": 0.001}, "scores": (0..20).collect::<Vec<_>>()}).to_string(),
@@ -106,21 +98,19 @@ fn the_page_holds_everything() {
 
 fn evaluations_under_way_are_shown() {
     let folder = toy();
-    let path = folder.path();
-    done(path, &format!("evaluate toy --protocol random --trials 5 {SMALL} --shard 1/2 -o half"));
-    done(path, "report half -o page.html");
-    assert!(page(path).contains("<strong>Not finished: </strong>2 of 5 jobs"), "{}", page(path));
-    assert!(page(path).contains("Missing: 0, 2, 4."));
+    done(&folder, &format!("evaluate toy --protocol random --trials 5 {SMALL} --shard 1/2 -o half"));
+    done(&folder, "report half -o page.html");
+    assert!(page(&folder).contains("<strong>Not finished: </strong>2 of 5 jobs"), "{}", page(&folder));
+    assert!(page(&folder).contains("Missing: 0, 2, 4."));
     // Nothing at all is done yet.
-    fs::remove_file(path.join("half/scores-1-of-2.jsonl")).expect("a journal");
-    done(path, "report half -o page.html");
-    assert!(page(path).contains("0 of 5 jobs") && !page(path).contains("warped copy"));
+    fs::remove_file(folder.join("half/scores-1-of-2.jsonl")).expect("a journal");
+    done(&folder, "report half -o page.html");
+    assert!(page(&folder).contains("0 of 5 jobs") && !page(&folder).contains("warped copy"));
 }
 
 fn what_is_no_record_is_refused() {
     let folder = toy();
-    let path = folder.path();
-    let refused = |arguments: &str, parts: &[&str]| assert_refused(lab(), path, arguments, parts);
+    let refused = |arguments: &str, parts: &[&str]| assert_refused(lab(), &folder, arguments, parts);
     refused("report toy -o page.html", &["toy/run.json: cannot be read"]);
     refused(
         "report --pareto toy/intrinsics.txt -o page.html",
@@ -128,11 +118,11 @@ fn what_is_no_record_is_refused() {
     );
     refused("report --training toy -o page.html", &["toy/record.json: cannot be read"]);
     refused("report --training toy -o toy", &["toy: cannot be written: it is a folder"]);
-    assert_wrong_arguments(lab(), path, "report -o page.html", &["required"]);
-    done(path, &format!("evaluate toy --protocol random {SMALL} -o out"));
-    fs::remove_file(path.join("out/pictures/job-00000-truth.png")).expect("a picture");
+    assert_wrong_arguments(lab(), &folder, "report -o page.html", &["required"]);
+    done(&folder, &format!("evaluate toy --protocol random {SMALL} -o out"));
+    fs::remove_file(folder.join("out/pictures/job-00000-truth.png")).expect("a picture");
     refused("report out -o page.html", &["out/pictures/job-00000-truth.png: cannot be read"]);
-    fs::write(path.join("out/pictures/job-00000.json"), "{}").expect("a file");
+    fs::write(folder.join("out/pictures/job-00000.json"), "{}").expect("a file");
     refused("report out -o page.html", &["out/pictures/job-00000.json: does not describe pictures"]);
 }
 
@@ -146,8 +136,8 @@ fn number(text: &str) -> f64 {
 /// marked.
 #[track_caller]
 fn assert_marks(table: &Value) {
-    let header: Vec<&str> = table["header"].as_array().expect("a header").iter().filter_map(Value::as_str).collect();
-    let rows: Vec<&Vec<Value>> = table["rows"].as_array().expect("rows").iter().filter_map(Value::as_array).collect();
+    let header: Vec<&str> = list_of(&table["header"]).iter().filter_map(Value::as_str).collect();
+    let rows: Vec<&Vec<Value>> = list_of(&table["rows"]).iter().filter_map(Value::as_array).collect();
     assert!(rows.len() > 3 || !header[0].contains("weighting"), "{table}");
     for (column, title) in header.iter().enumerate() {
         let larger_is_better = title.ends_with('↑');
@@ -158,7 +148,7 @@ fn assert_marks(table: &Value) {
         let bold = rows.iter().filter(|row| !row[column]["bold"].is_null()).count();
         assert!(bold < rows.len(), "{title}: {table}");
         let key = |row: &&Vec<Value>| {
-            let value = number(row[column]["text"].as_str().expect("a text"));
+            let value = number(text_of(&row[column]["text"]));
             if larger_is_better { -value } else { value }
         };
         let best = rows.iter().map(key).fold(f64::INFINITY, f64::min);
@@ -170,7 +160,8 @@ fn assert_marks(table: &Value) {
     }
 }
 
-fn a_person_sees_what_was_measured(browser: &Browser) {
+fn a_person_sees_what_was_measured() {
+    let browser = &Browser::needed();
     let folder = runs();
     done(folder.path(), REPORT);
     let page = page(folder.path());
@@ -190,7 +181,7 @@ fn a_person_sees_what_was_measured(browser: &Browser) {
         // Three metrics with a figure and one of differences each, and the sweep.
         assert_eq!((&view["scripts"], &view["figures"]), (&json!(0), &json!(7)), "at {width}");
         assert!(view["smallestText"].as_f64().is_some_and(|size| size >= 11.0), "{}", view["smallestText"]);
-        let tables = view["tables"].as_array().expect("tables");
+        let tables = list_of(&view["tables"]);
         assert_eq!(tables.len(), 3 + 1 + 1);
         tables.iter().for_each(|table| assert_marks(table));
     }
@@ -198,23 +189,24 @@ fn a_person_sees_what_was_measured(browser: &Browser) {
     let printed = done(folder.path(), &format!("evaluate toy lorry --protocol random {SMALL} --pictures 1 -o random"));
     let row = printed.lines().find(|line| line.starts_with(" distance:power=2")).expect("a row");
     let words = |text: &str| text.replace(['*', '~'], "").split_whitespace().map(str::to_owned).collect::<Vec<_>>();
-    let rows = views[0]["tables"][3]["rows"].as_array().expect("rows");
-    let own = rows.iter().filter_map(Value::as_array).find(|row| row[0]["text"] == "distance:power=2").expect("a row");
-    let shown: Vec<String> = own.iter().flat_map(|cell| words(cell["text"].as_str().expect("a text"))).collect();
+    let rows = list_of(&views[0]["tables"][3]["rows"]);
+    let cells =
+        rows.iter().filter_map(Value::as_array).find(|row| row[0]["text"] == "distance:power=2").expect("a row");
+    let shown: Vec<String> = cells.iter().flat_map(|cell| words(text_of(&cell["text"]))).collect();
     assert_eq!(shown, words(row));
     // What is bold has its mark on the terminal, and nothing else.
     let counted = done(folder.path(), &format!("evaluate toy lorry --protocol count:sources=2+4+8 {SMALL} -o count"));
-    let tables = views[0]["tables"].as_array().expect("tables");
+    let tables = list_of(&views[0]["tables"]);
     let mut marks = [0, 0];
     for (printed, tables) in [(&counted, &tables[..3]), (&printed, &tables[3..4])] {
-        let rows = tables.iter().flat_map(|table| table["rows"].as_array().expect("rows").iter());
+        let rows = tables.iter().flat_map(|table| list_of(&table["rows"]).iter());
         let schemes: Vec<&str> = rows.clone().filter_map(|row| row[0]["text"].as_str()).collect();
-        let is_row = |line: &&str| schemes.iter().any(|own| line.trim_start().starts_with(&format!("{own} ")));
+        let is_row = |line: &&str| schemes.iter().any(|scheme| line.trim_start().starts_with(&format!("{scheme} ")));
         let lines: Vec<&str> = printed.lines().filter(is_row).collect();
         assert_eq!(lines.len(), schemes.len(), "{printed}");
         for (row, line) in rows.zip(lines) {
-            for cell in row.as_array().expect("cells").iter().skip(1) {
-                let text = cell["text"].as_str().expect("a text");
+            for cell in list_of(row).iter().skip(1) {
+                let text = text_of(&cell["text"]);
                 let is_marked = !text.is_empty() && line.contains(&format!("* {text} "));
                 assert_eq!(!cell["bold"].is_null(), is_marked, "{text} of {line}");
                 marks[usize::from(is_marked)] += 1;
@@ -225,7 +217,8 @@ fn a_person_sees_what_was_measured(browser: &Browser) {
 }
 
 /// The negative control: pages on which something is wrong are not taken for good ones.
-fn the_looks_at_the_page_can_fail(browser: &Browser) {
+fn the_looks_at_the_page_can_fail() {
+    let browser = &Browser::needed();
     let folder = toy();
     done(folder.path(), &format!("evaluate toy --protocol random {SMALL} --pictures 0 -o out"));
     done(folder.path(), "report out -o page.html");
@@ -248,7 +241,8 @@ fn the_looks_at_the_page_can_fail(browser: &Browser) {
     assert!(std::panic::catch_unwind(|| assert_marks(table)).is_err());
 }
 
-fn light_and_dark(browser: &Browser) {
+fn light_and_dark() {
+    let browser = &Browser::needed();
     let folder = small_run();
     done(folder.path(), "report run -o page.html");
     let pictures = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report");
@@ -264,7 +258,7 @@ fn light_and_dark(browser: &Browser) {
         let brightness = (background[0] + background[1] + background[2]) / 3;
         assert!(if is_dark { brightness < 60 } else { brightness > 240 }, "{name}: {background:?}");
         let far = |pixel: &image::Rgb<u8>| {
-            pixel.0.iter().zip(background).any(|(own, other)| u32::from(*own).abs_diff(other) > 120)
+            pixel.0.iter().zip(background).any(|(level, other)| u32::from(*level).abs_diff(other) > 120)
         };
         assert!(picture.pixels().filter(|pixel| far(pixel)).count() > 1000, "{name} shows nothing");
     }
@@ -281,14 +275,13 @@ fn small_run() -> Folder {
 /// A folder that somebody sent must not bring files of whoever makes the page onto the page.
 fn a_received_folder_shows_only_its_own() {
     let folder = small_run();
-    let path = folder.path();
     folder.write("secret.png", "a key").write("run/secret.png", "a key").write("run/pictures/key.txt", "a key");
     folder.write("run/pictures/false.png", "a key");
-    let file = path.join("run/pictures/job-00000.json");
+    let file = folder.join("run/pictures/job-00000.json");
     let text = fs::read_to_string(&file).expect("a description");
     let truth = "job-00000-truth.png";
     assert!(text.contains(truth));
-    let absolute = path.join("secret.png");
+    let absolute = folder.join("secret.png");
     for name in [
         absolute.to_str().expect("text"),
         "../secret.png",
@@ -303,65 +296,64 @@ fn a_received_folder_shows_only_its_own() {
         for old in [truth, "job-00000-source-000.png", "job-00000-scheme-000.png"] {
             fs::write(&file, text.replace(old, name)).expect("a file");
             let parts = ["run/pictures/job-00000.json: names", "no picture in the folder"];
-            assert_refused(lab(), path, "report run -o page.html", &parts);
+            assert_refused(lab(), &folder, "report run -o page.html", &parts);
         }
     }
     fs::write(&file, text.replace(truth, "false.png")).expect("a file");
-    assert_refused(lab(), path, "report run -o page.html", &["run/pictures/false.png: is not a PNG"]);
+    assert_refused(lab(), &folder, "report run -o page.html", &["run/pictures/false.png: is not a PNG"]);
     #[cfg(unix)]
     {
         use std::os::unix::fs::symlink;
-        fs::copy(path.join("toy/rgb/000000.png"), path.join("mine.png")).expect("a picture");
-        symlink(path.join("mine.png"), path.join("run/pictures/link.png")).expect("a link");
+        fs::copy(folder.join("toy/rgb/000000.png"), folder.join("mine.png")).expect("a picture");
+        symlink(folder.join("mine.png"), folder.join("run/pictures/link.png")).expect("a link");
         fs::write(&file, text.replace(truth, "link.png")).expect("a file");
-        assert_refused(lab(), path, "report run -o page.html", &["link.png", "no picture in the folder"]);
+        assert_refused(lab(), &folder, "report run -o page.html", &["link.png", "no picture in the folder"]);
         folder.write("trained/record.json", "{}");
-        symlink("/etc/passwd", path.join("trained/curve.svg")).expect("a link");
-        assert_refused(lab(), path, "report --training trained -o page.html", &["curve.svg: is not the curve"]);
+        symlink("/etc/passwd", folder.join("trained/curve.svg")).expect("a link");
+        assert_refused(lab(), &folder, "report --training trained -o page.html", &["curve.svg: is not the curve"]);
     }
     fs::write(&file, text).expect("a file");
-    done(path, "report run -o page.html");
+    done(&folder, "report run -o page.html");
 }
 
 fn damaged_numbers_are_refused() {
     let folder = small_run();
-    let path = folder.path();
     let change = |name: &str, change: &dyn Fn(&mut Value)| {
-        let text = fs::read_to_string(path.join(name)).expect("a record");
+        let text = fs::read_to_string(folder.join(name)).expect("a record");
         let mut value: Value =
             serde_json::from_str(text.lines().next().filter(|_| name.ends_with('l')).unwrap_or(&text)).expect("JSON");
         change(&mut value);
-        fs::write(path.join(name), format!("{value}\n")).expect("a file");
+        fs::write(folder.join(name), format!("{value}\n")).expect("a file");
         text
     };
-    let refused = |parts: &[&str]| assert_refused(lab(), path, "report run -o page.html", parts);
+    let refused = |parts: &[&str]| assert_refused(lab(), &folder, "report run -o page.html", parts);
     for count in [1_000_000_000_000_000_000_u64, 10_000_001] {
         let whole = change("run/run.json", &|record| record["job_count"] = count.into());
         refused(&["run/run.json: job_count is", &count.to_string(), "at most 10000000"]);
-        fs::write(path.join("run/run.json"), whole).expect("a file");
+        fs::write(folder.join("run/run.json"), whole).expect("a file");
     }
     let journal = "run/scores-0-of-1.jsonl";
     for value in [json!(1.0e308), json!(-1.0e308), json!("none"), json!("1e300")] {
         let whole = change(journal, &|line| line["scores"][0]["values"][0][1] = value.clone());
         refused(&["scores-0-of-1.jsonl:1: is not of an evaluation", "psnr is"]);
-        fs::write(path.join(journal), whole).expect("a file");
+        fs::write(folder.join(journal), whole).expect("a file");
     }
     for value in [1.0e18, -1.0] {
         let whole = change(journal, &|line| line["scores"][0]["seconds"] = value.into());
         refused(&["scores-0-of-1.jsonl:1: is not of an evaluation", "seconds is"]);
-        fs::write(path.join(journal), whole).expect("a file");
+        fs::write(folder.join(journal), whole).expect("a file");
     }
-    done(path, "pareto toy --targets 20 --views 3 --size 16x16 --repeat 1 --device cpu -o sweep");
-    let text = fs::read_to_string(path.join("sweep/pareto.json")).expect("a sweep");
+    done(&folder, "pareto toy --targets 20 --views 3 --size 16x16 --repeat 1 --device cpu -o sweep");
+    let text = fs::read_to_string(folder.join("sweep/pareto.json")).expect("a sweep");
     for key in ["seconds", "encode_seconds", "gain", "truth_psnr"] {
         let mut record: Value = serde_json::from_str(&text).expect("JSON");
         record["devices"][0]["points"][1][key] = 1.0e300.into();
         folder.write("sweep/pareto.json", record.to_string());
         let parts = ["sweep/pareto.json: is not a record of viewfuse pareto", "out of its range"];
-        assert_refused(lab(), path, "report --pareto sweep -o page.html", &parts);
+        assert_refused(lab(), &folder, "report --pareto sweep -o page.html", &parts);
     }
     // An empty record of settings is that of a machine that lost its power: the evaluation goes on.
     folder.write("run/run.json", "");
     let run = "evaluate toy --protocol random --trials 2 --targets-per-trial 1 --pictures 1 --size 16x16 --device cpu";
-    assert!(done(path, &format!("{run} --weights mean -o run")).contains("0 jobs done; 2 of 2"));
+    assert!(done(&folder, &format!("{run} --weights mean -o run")).contains("0 jobs done; 2 of 2"));
 }

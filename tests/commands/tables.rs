@@ -1,6 +1,6 @@
 //! `viewfuse weights` and `viewfuse evaluate`: tables for people, JSON and CSV for programs.
 
-use super::{BINARY, assert_near, done, numbers, read_json, texts};
+use super::{BINARY, assert_near, done, number_of, numbers, read_json, texts};
 use serde_json::Value;
 use std::fs;
 use viewfuse::weighting::scheme_names;
@@ -81,11 +81,11 @@ fn evaluates_schemes_against_the_nearest_copy() {
     let rows: Vec<Vec<&str>> = lines.collect();
     assert_eq!(rows.len(), 2 * 5 * 2, "{csv}");
     let score = |scene: &str, scheme: &str, target: &str| -> [f64; 2] {
-        let own: Vec<_> = rows.iter().filter(|row| row[..3] == [scene, scheme, target]).collect();
-        assert_eq!(own.len(), 1, "{scene}, {scheme}, {target} in\n{csv}");
-        assert_eq!(own[0][3], "23");
-        assert!(own[0][7].parse::<f64>().expect("a time") >= 0.0);
-        [own[0][4], own[0][5]].map(|number| number.parse().expect("a number"))
+        let found: Vec<_> = rows.iter().filter(|row| row[..3] == [scene, scheme, target]).collect();
+        assert_eq!(found.len(), 1, "{scene}, {scheme}, {target} in\n{csv}");
+        assert_eq!(found[0][3], "23");
+        assert!(found[0][7].parse::<f64>().expect("a time") >= 0.0);
+        [found[0][4], found[0][5]].map(|number| number.parse().expect("a number"))
     };
     for scene in ["toy", "again"] {
         for target in ["000020", "000021"] {
@@ -119,16 +119,16 @@ fn auto_is_a_row_and_leaves_the_others_alone() {
         };
         csv.lines().skip(1).map(line).collect()
     };
-    let of = |scores: &[(String, f64)], scheme: &str| {
-        scores.iter().find(|(own, _)| own == scheme).unwrap_or_else(|| panic!("no row {scheme}")).1
+    let score = |scores: &[(String, f64)], scheme: &str| {
+        scores.iter().find(|(name, _)| name == scheme).unwrap_or_else(|| panic!("no row {scheme}")).1
     };
     let (both, alone) = (scores("--weights auto --weights mean"), scores("--weights mean"));
-    assert_near(of(&both, "mean"), of(&alone, "mean"), 1.0e-6);
+    assert_near(score(&both, "mean"), score(&alone, "mean"), 1.0e-6);
     // The same choice as `render` makes without being told a scheme.
     let outcome = run(BINARY, scene.path(), &format!("render {job} -o out"));
     assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
     let record = read_json(scene.path().join("out/run.json"));
-    assert_near(of(&both, "auto"), record["frames"][0]["psnr"].as_f64().expect("a score"), 1.0e-4);
+    assert_near(score(&both, "auto"), number_of(&record["frames"][0]["psnr"]), 1.0e-4);
 }
 
 /// `viewfuse ... | head` closes the pipe early: no panic, and the files are written all the same.

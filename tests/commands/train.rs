@@ -48,40 +48,39 @@ fn kill(folder: &Path, arguments: &str, state: &str) {
 
 fn a_killed_run_goes_on_and_ends_in_the_same_numbers() {
     let folder = scenes();
-    let path = folder.path();
-    let said = done(path, &format!("{PIXELNERF} -o whole"));
+    let said = done(&folder, &format!("{PIXELNERF} -o whole"));
     assert!(said.contains("30 steps in") && said.ends_with("whole/model.safetensors\n"), "{said}");
     assert_eq!(
-        names_in(&path.join("whole")),
+        names_in(&folder.join("whole")),
         ["curve.csv", "curve.svg", "model.safetensors", "record.json", "state.safetensors",]
     );
-    let record: serde_json::Value = serde_json::from_slice(&bytes(path, "whole/record.json")).expect("a record");
+    let record: serde_json::Value = serde_json::from_slice(&bytes(&folder, "whole/record.json")).expect("a record");
     assert_eq!((&record["steps"], record["scores"].as_array().map(Vec::len)), (&30.into(), Some(3)));
-    assert!(String::from_utf8_lossy(&bytes(path, "whole/curve.svg")).starts_with("<svg"));
+    assert!(String::from_utf8_lossy(&bytes(&folder, "whole/curve.svg")).starts_with("<svg"));
 
-    kill(path, &format!("{PIXELNERF} -o parts"), "parts/state.safetensors");
-    let half: serde_json::Value = serde_json::from_slice(&bytes(path, "parts/record.json")).expect("a record");
+    kill(&folder, &format!("{PIXELNERF} -o parts"), "parts/state.safetensors");
+    let half: serde_json::Value = serde_json::from_slice(&bytes(&folder, "parts/record.json")).expect("a record");
     assert!(half["steps"].as_u64() < Some(30), "it was killed too late to tell anything");
     // On another number of threads, too.
-    done(path, &format!("{PIXELNERF} -o parts --threads 1"));
-    assert_eq!(bytes(path, "parts/model.safetensors"), bytes(path, "whole/model.safetensors"));
+    done(&folder, &format!("{PIXELNERF} -o parts --threads 1"));
+    assert_eq!(bytes(&folder, "parts/model.safetensors"), bytes(&folder, "whole/model.safetensors"));
     // And what it learned is a model that renders.
     let scene = "learn/cars_val/000000";
     done(
-        path,
+        &folder,
         &format!("render {scene} --model whole/model.safetensors --sources 0,1,2 --targets 5 --size 16x16 -o out"),
     );
 
     // A run of other settings is not gone on with, and nothing of it is lost.
-    let before = bytes(path, "whole/state.safetensors");
+    let before = bytes(&folder, "whole/state.safetensors");
     let other = PIXELNERF.replace("--rays 12", "--rays 13");
     assert_refused(
         lab(),
-        path,
+        &folder,
         &format!("{other} -o whole"),
         &["whole/state.safetensors", "settings.rays was 12 and is 13"],
     );
-    assert_eq!(bytes(path, "whole/state.safetensors"), before);
+    assert_eq!(bytes(&folder, "whole/state.safetensors"), before);
 
     // The weighting for it: the same again, with both embeddings; a scheme that evaluate knows.
     for embedding in ["fourier", "flat"] {
@@ -89,70 +88,72 @@ fn a_killed_run_goes_on_and_ends_in_the_same_numbers() {
             "train weighting whole/model.safetensors learn/cars --embedding {embedding} --objects 1 --rays 6 --steps 4 \
              --validate-every 4 --write-every 0"
         );
-        done(path, &format!("{weighting} -o {embedding}"));
-        kill(path, &format!("{weighting} -o {embedding}2"), &format!("{embedding}2/state.safetensors"));
-        done(path, &format!("{weighting} -o {embedding}2"));
+        done(&folder, &format!("{weighting} -o {embedding}"));
+        kill(&folder, &format!("{weighting} -o {embedding}2"), &format!("{embedding}2/state.safetensors"));
+        done(&folder, &format!("{weighting} -o {embedding}2"));
         let model = format!("{embedding}/model.safetensors");
-        assert_eq!(bytes(path, &format!("{embedding}2/model.safetensors")), bytes(path, &model));
-        let table = done(path, &format!("weights {scene} --sources 0,1,2 --target 5 --weights attention:{model}"));
+        assert_eq!(bytes(&folder, &format!("{embedding}2/model.safetensors")), bytes(&folder, &model));
+        let table = done(&folder, &format!("weights {scene} --sources 0,1,2 --target 5 --weights attention:{model}"));
         assert!(table.contains("attention") && table.contains(&model), "{table}");
     }
 }
 
 fn ctrl_c_writes_the_state_first() {
     let folder = scenes();
-    let path = folder.path();
     let long = PIXELNERF.replace("--steps 30", "--steps 100000").replace("--write-every 0", "--write-every 1000");
     // The first state appears when the run is asked to end: nothing else writes it.
     let arguments = format!("{long} --validate-every 5 -o run").replace(" --validate-every 10", "");
-    let mut child = start(lab(), path, &arguments);
+    let mut child = start(lab(), &folder, &arguments);
     let mut news = BufReader::new(child.stdout.take().expect("its output"));
     let mut first = String::new();
     news.read_line(&mut first).expect("text");
     assert!(first.starts_with("step 5: "), "{first}");
     interrupt(child, "-INT");
-    let record: serde_json::Value = serde_json::from_slice(&bytes(path, "run/record.json")).expect("a record");
-    assert!(record["steps"].as_u64() >= Some(5) && path.join("run/state.safetensors").exists(), "{record}");
+    let record: serde_json::Value = serde_json::from_slice(&bytes(&folder, "run/record.json")).expect("a record");
+    assert!(record["steps"].as_u64() >= Some(5) && folder.join("run/state.safetensors").exists(), "{record}");
 }
 
 fn genvs_goes_on_too() {
     let folder = scenes();
-    let path = folder.path();
-    done(path, &format!("{GENVS} -o whole"));
-    kill(path, &format!("{GENVS} -o parts"), "parts/state.safetensors");
-    done(path, &format!("{GENVS} -o parts"));
-    assert_eq!(bytes(path, "parts/model.safetensors"), bytes(path, "whole/model.safetensors"));
+    done(&folder, &format!("{GENVS} -o whole"));
+    kill(&folder, &format!("{GENVS} -o parts"), "parts/state.safetensors");
+    done(&folder, &format!("{GENVS} -o parts"));
+    assert_eq!(bytes(&folder, "parts/model.safetensors"), bytes(&folder, "whole/model.safetensors"));
 
     // From what it learned, a network goes on as it was: at a rate of zero it stays so, to the bit.
     let model = "whole/model.safetensors";
     let from = GENVS.replace("--width 4", &format!("--from {model} --rate 0"));
-    done(path, &format!("{from} -o more"));
-    assert_eq!(bytes(path, "more/model.safetensors"), bytes(path, model));
+    done(&folder, &format!("{from} -o more"));
+    assert_eq!(bytes(&folder, "more/model.safetensors"), bytes(&folder, model));
     let small = from.replace("--samples 8", "--samples 8 --side 32");
-    assert_refused(lab(), path, &format!("{small} -o out"), &[model, "for pictures of 64x64 pixels", "not of 32x32"]);
-    assert_wrong_arguments(lab(), path, &format!("{from} --width 4 -o out"), &["--from", "--width"]);
+    assert_refused(
+        lab(),
+        &folder,
+        &format!("{small} -o out"),
+        &[model, "for pictures of 64x64 pixels", "not of 32x32"],
+    );
+    assert_wrong_arguments(lab(), &folder, &format!("{from} --width 4 -o out"), &["--from", "--width"]);
 }
 
 fn data_are_told_by_what_is_in_them() {
     let folder = scenes();
-    let path = folder.path();
     let first = PIXELNERF.replace("--steps 30", "--steps 2");
-    done(path, &format!("{first} -o run"));
+    done(&folder, &format!("{first} -o run"));
     let from = first.replace("--width 16", "--from run/model.safetensors --rate 0");
-    done(path, &format!("{from} -o more"));
-    assert_eq!(bytes(path, "more/model.safetensors"), bytes(path, "run/model.safetensors"));
+    done(&folder, &format!("{from} -o more"));
+    assert_eq!(bytes(&folder, "more/model.safetensors"), bytes(&folder, "run/model.safetensors"));
 
     // A run goes on where its scenes lie elsewhere now, and does not where they are others under the same names.
-    fs::rename(path.join("learn"), path.join("moved")).expect("a folder");
-    done(path, &format!("{} -o run", first.replace("learn/", "moved/")));
-    done(path, "scenes make cars learn --train 2 --val 1 --test 0 --views 10 --test-views 10 --size 64 --seed 2");
-    assert_refused(lab(), path, &format!("{first} -o run"), &["run/state.safetensors", "settings", "data was"]);
+    fs::rename(folder.join("learn"), folder.join("moved")).expect("a folder");
+    done(&folder, &format!("{} -o run", first.replace("learn/", "moved/")));
+    done(&folder, "scenes make cars learn --train 2 --val 1 --test 0 --views 10 --test-views 10 --size 64 --seed 2");
+    assert_refused(lab(), &folder, &format!("{first} -o run"), &["run/state.safetensors", "settings", "data was"]);
     // Nor from another network of the same name.
     let moved = from.replace("learn/", "moved/");
-    done(path, &format!("{moved} -o more"));
-    done(path, &format!("{} --seed 3 -o other", first.replace("learn/", "moved/")));
-    fs::rename(path.join("other/model.safetensors"), path.join("run/model.safetensors")).expect("a file");
-    assert_refused(lab(), path, &format!("{moved} -o more"), &["more/state.safetensors", "checkpoint was"]);
+    done(&folder, &format!("{moved} -o more"));
+    done(&folder, &format!("{} --seed 3 -o other", first.replace("learn/", "moved/")));
+    fs::rename(folder.join("other/model.safetensors"), folder.join("run/model.safetensors")).expect("a file");
+    assert_refused(lab(), &folder, &format!("{moved} -o more"), &["more/state.safetensors", "checkpoint was"]);
 }
 
 fn wrong_input_is_told() {
@@ -279,29 +280,28 @@ fn a_loss_is_shown_once_there_is_one() {
 /// on a report's page.
 fn curves_are_there_while_it_runs() {
     let folder = scenes();
-    let path = folder.path();
     let long = PIXELNERF.replace("--steps 30", "--steps 100000").replace("--write-every 0", "--write-every 1000");
-    let mut run = command(lab(), path, &format!("{long} -o run"));
+    let mut run = command(lab(), &folder, &format!("{long} -o run"));
     let run = run.env("VIEWFUSE_PROGRESS", "0").stdout(Stdio::null()).stderr(Stdio::piped());
     let mut child = run.spawn().expect("the command starts");
-    let curve = || fs::read_to_string(path.join("run/curve.csv")).unwrap_or_default();
+    let curve = || fs::read_to_string(folder.join("run/curve.csv")).unwrap_or_default();
     patience::wait_while_running(&mut child, || curve().lines().count() > 2);
-    done(path, "report --training run -o page.html");
-    assert!(!path.join("run/state.safetensors").exists());
+    done(&folder, "report --training run -o page.html");
+    assert!(!folder.join("run/state.safetensors").exists());
     child.kill().expect("a process to kill");
     let said = String::from_utf8(child.wait_with_output().expect("a dead process").stderr).expect("text");
     let live = said.lines().filter(|line| line.contains(" %, training: step "));
     let live: Vec<&str> = live.collect();
     assert!(live.iter().any(|line| line.contains(" step 9, loss 0.") && !line.contains("PSNR")), "{said}");
     assert!(live.iter().any(|line| line.contains(" step 19, loss 0.") && line.contains(", PSNR dB ")), "{said}");
-    let page = fs::read_to_string(path.join("page.html")).expect("a page");
+    let page = fs::read_to_string(folder.join("page.html")).expect("a page");
     assert!(page.contains("<strong>Not finished: </strong>") && page.contains(" of 100000 steps"), "{page:.300}");
     assert!(page.contains("data:image/svg+xml;base64,"));
 
     // The table has the points of the record.
-    done(path, &format!("{} -o whole", PIXELNERF.replace("--steps 30", "--steps 70")));
-    let record: serde_json::Value = serde_json::from_slice(&bytes(path, "whole/record.json")).expect("a record");
-    let table = fs::read_to_string(path.join("whole/curve.csv")).expect("a table");
+    done(&folder, &format!("{} -o whole", PIXELNERF.replace("--steps 30", "--steps 70")));
+    let record: serde_json::Value = serde_json::from_slice(&bytes(&folder, "whole/record.json")).expect("a record");
+    let table = fs::read_to_string(folder.join("whole/curve.csv")).expect("a table");
     let cells: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
     assert_eq!(cells[0], ["step", "loss", "PSNR dB"]);
     for (column, key, count) in [(1, "losses", 1), (2, "scores", 7)] {
@@ -311,8 +311,8 @@ fn curves_are_there_while_it_runs() {
         assert_eq!(points.len(), count, "{table}");
         assert_eq!(serde_json::Value::from(points), record[key], "{table}");
     }
-    done(path, "report --training whole -o page.html");
-    assert!(!fs::read_to_string(path.join("page.html")).expect("a page").contains("Not finished"));
+    done(&folder, "report --training whole -o page.html");
+    assert!(!fs::read_to_string(folder.join("page.html")).expect("a page").contains("Not finished"));
 }
 
 fn number(text: &str) -> f64 {
@@ -321,22 +321,21 @@ fn number(text: &str) -> f64 {
 
 fn more_steps_go_on_from_fewer() {
     let folder = scenes();
-    let path = folder.path();
     let run = |steps: u32| format!("{} -o run", PIXELNERF.replace("--steps 30", &format!("--steps {steps}")));
-    let record = || serde_json::from_slice::<serde_json::Value>(&bytes(path, "run/record.json")).expect("a record");
-    done(path, &run(4));
+    let record = || serde_json::from_slice::<serde_json::Value>(&bytes(&folder, "run/record.json")).expect("a record");
+    done(&folder, &run(4));
     assert!(record()["extended"].is_null(), "{}", record());
-    let short = bytes(path, "run/model.safetensors");
-    let said = done(path, &run(7));
+    let short = bytes(&folder, "run/model.safetensors");
+    let said = done(&folder, &run(7));
     assert!(said.starts_with("goes on at step 4 of a run of 4: from here the rate is that of 7 steps\n"), "{said}");
     assert!(said.contains("7 steps in"), "{said}");
     assert_eq!((&record()["steps"], &record()["extended"]), (&7.into(), &serde_json::json!([[4, 4]])));
-    let long = bytes(path, "run/model.safetensors");
+    let long = bytes(&folder, "run/model.safetensors");
     assert!(long != short, "it learned");
     // Once more: there is nothing to do, and nothing is said of it.
-    assert!(!done(path, &run(7)).contains("goes on"));
-    assert_eq!(bytes(path, "run/model.safetensors"), long);
+    assert!(!done(&folder, &run(7)).contains("goes on"));
+    assert_eq!(bytes(&folder, "run/model.safetensors"), long);
     assert_eq!(record()["extended"], serde_json::json!([[4, 4]]));
     // Fewer steps are another run.
-    assert_refused(lab(), path, &run(5), &["run/state.safetensors", "schedule.steps was 7"]);
+    assert_refused(lab(), &folder, &run(5), &["run/state.safetensors", "schedule.steps was 7"]);
 }

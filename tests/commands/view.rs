@@ -22,17 +22,13 @@ mod requests;
 
 use super::BINARY;
 use devtools::Tab;
-use libtest_mimic::Trial;
 use std::fs;
 use std::path::Path;
 use viewfuse_tests::command::run;
 use viewfuse_tests::places::repository;
 use viewfuse_tests::viewer::Program;
 
-pub(crate) fn trials() -> Vec<Trial> {
-    let pages = page::trials().into_iter().chain(moves::trials()).chain(one_file::trials());
-    requests::trials().into_iter().chain(attacks::trials()).chain(pages).collect()
-}
+viewfuse_tests::trials![[attacks, moves, one_file, page, requests];];
 
 /// The viewer on the CPU.
 #[track_caller]

@@ -1,6 +1,6 @@
 //! Arguments that are not a kernel's own, devices that lack something or are not there.
 
-use crate::candidate::{Candidate, Test, assert_works};
+use crate::candidate::{Candidate, assert_works, tests};
 use bytemuck::bytes_of;
 use libtest_mimic::Failed;
 use viewfuse_core::fuse::FuseBlock;
@@ -8,14 +8,14 @@ use viewfuse_kernels::network::linear::LinearBlock;
 use viewfuse_vulkan::kernel::Kernel;
 use viewfuse_vulkan::{Adapter, Gpu, GpuOptions, Limits, Missing, VulkanError};
 
-pub(crate) const TESTS: &[Test] = &[
-    Test::new("wrong_arguments_are_refused", wrong_arguments_are_refused),
-    Test::new("arrays_of_other_elements_are_refused", arrays_of_other_elements_are_refused),
-    Test::new("arrays_of_another_device_are_refused", arrays_of_another_device_are_refused),
-    Test::new("nothing_to_do_is_done", nothing_to_do_is_done),
-    Test::new("a_device_that_lacks_something_is_not_opened", a_device_that_lacks_something_is_not_opened),
-    Test::new("devices_are_chosen_by_number_and_name", devices_are_chosen_by_number_and_name),
-];
+tests!(
+    wrong_arguments_are_refused,
+    arrays_of_other_elements_are_refused,
+    arrays_of_another_device_are_refused,
+    nothing_to_do_is_done,
+    a_device_that_lacks_something_is_not_opened,
+    devices_are_chosen_by_number_and_name
+);
 
 const BLOCK: FuseBlock = FuseBlock { view_count: 2, stride: 3, channel_count: 1, weight_stride: 0 };
 
@@ -82,8 +82,8 @@ fn arrays_of_other_elements_are_refused(candidate: &Candidate) -> Result<(), Fai
 
 fn arrays_of_another_device_are_refused(candidate: &Candidate) -> Result<(), Failed> {
     let (gpu, other) = (candidate.gpu(&GpuOptions::default())?, candidate.gpu(&GpuOptions::default())?);
-    let [own, foreign] = [gpu.zeros::<f32>(6)?, other.zeros::<f32>(6)?];
-    let (downloaded, arrays) = (gpu.download(&foreign), [own.bind(), foreign.bind(), own.bind()]);
+    let [ours, foreign] = [gpu.zeros::<f32>(6)?, other.zeros::<f32>(6)?];
+    let (downloaded, arrays) = (gpu.download(&foreign), [ours.bind(), foreign.bind(), ours.bind()]);
     let dispatched = gpu.dispatch(Kernel::FuseViews, bytes_of(&BLOCK), 0..3, &arrays);
     for outcome in [downloaded.map(|_| ()), dispatched] {
         let is_refused = matches!(&outcome, Err(VulkanError::OtherDevice(_, owner)) if *owner == other.name());

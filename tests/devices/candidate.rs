@@ -21,6 +21,15 @@ impl Test {
     }
 }
 
+/// The tests of a module, by their names.
+macro_rules! tests {
+    ($($test:ident),+ $(,)?) => {
+        pub(crate) const TESTS: &[$crate::candidate::Test] =
+            &[$($crate::candidate::Test::new(stringify!($test), $test)),+];
+    };
+}
+pub(crate) use tests;
+
 /// A device, not yet opened: every trial opens it for itself.
 pub(crate) struct Candidate {
     pub(crate) instance: Arc<Instance>,

@@ -1,6 +1,6 @@
 //! What the tests need of the drivers that they know; and dispatches that are small before a kernel's time is known.
 
-use crate::candidate::{Candidate, Test};
+use crate::candidate::{Candidate, tests};
 use bytemuck::bytes_of;
 use libtest_mimic::Failed;
 use std::time::Duration;
@@ -8,10 +8,7 @@ use viewfuse_core::fuse::FuseBlock;
 use viewfuse_vulkan::kernel::Kernel;
 use viewfuse_vulkan::{Gpu, GpuOptions, VulkanError};
 
-pub(crate) const TESTS: &[Test] = &[
-    Test::new("a_known_driver_has_what_tests_need", a_known_driver_has_what_tests_need),
-    Test::new("an_unknown_kernel_begins_with_a_small_dispatch", an_unknown_kernel_begins_with_a_small_dispatch),
-];
+tests!(a_known_driver_has_what_tests_need, an_unknown_kernel_begins_with_a_small_dispatch);
 
 /// Elements of a dispatch that has more than one piece, if pieces are short.
 const MANY: u32 = 1 << 17;

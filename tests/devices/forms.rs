@@ -2,7 +2,7 @@
 //! a driver compiles wrongly, or for subgroups of another size, is not used. Faults are made on every device
 //! ([`Faults`]).
 
-use crate::candidate::{Candidate, Test};
+use crate::candidate::{Candidate, tests};
 use bytemuck::bytes_of;
 use libtest_mimic::Failed;
 use viewfuse_kernels::network::convolve::ConvolveBlock;
@@ -10,11 +10,11 @@ use viewfuse_kernels::network::linear::LinearBlock;
 use viewfuse_vulkan::kernel::{Form, Kernel, tile_elements};
 use viewfuse_vulkan::{AdapterKind, Bound, Faults, Gpu, GpuOptions, VulkanError};
 
-pub(crate) const TESTS: &[Test] = &[
-    Test::new("measuring_leaves_the_other_channels_alone", measuring_leaves_the_other_channels_alone),
-    Test::new("a_form_with_other_results_is_not_used", a_form_with_other_results_is_not_used),
-    Test::new("a_form_of_other_subgroups_is_not_used", a_form_of_other_subgroups_is_not_used),
-];
+tests!(
+    measuring_leaves_the_other_channels_alone,
+    a_form_with_other_results_is_not_used,
+    a_form_of_other_subgroups_is_not_used
+);
 
 fn numbers(count: u32) -> Vec<f32> {
     (0..count).map(|at| (at * 7919 % 1000) as f32 / 1000.0 - 0.5).collect()

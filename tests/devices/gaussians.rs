@@ -1,6 +1,6 @@
 //! Gaussians of the sample scene on each device: derivatives, and pictures of a scene that is optimised.
 
-use crate::candidate::{Candidate, Test};
+use crate::candidate::{Candidate, tests};
 use libtest_mimic::Failed;
 use std::sync::OnceLock;
 use viewfuse::device::choice::AnyDevice;
@@ -22,10 +22,7 @@ use viewfuse_kernels::rows::GaussianBlock;
 use viewfuse_tests::places::data;
 use viewfuse_vulkan::GpuOptions;
 
-pub(crate) const TESTS: &[Test] = &[
-    Test::new("derivatives_of_a_scene_are_the_cpus", derivatives_are_the_cpus),
-    Test::new("a_scene_is_as_good_as_the_cpus", a_scene_is_as_good),
-];
+tests!(derivatives_of_a_scene_are_the_cpus, a_scene_is_as_good_as_the_cpus);
 
 /// Most splats of a tile: fewer than those whose loops Mesa's llvmpipe ends (`viewfuse_field::gaussians::optimised`).
 const MAX_LISTED: u32 = 100;
@@ -77,12 +74,12 @@ fn camera() -> CameraBlock {
 }
 
 /// The longest list of splats of a tile.
-fn longest_list(own: &Optimised) -> u32 {
-    let (camera, gaussian_count) = (camera(), own.gaussians.len() as u32);
-    let block = SplatBlock { camera, near: own.near, gaussian_count, padding: [0; 2] };
-    let mut splats = Cpu.zeros(own.gaussians.len()).expect("memory");
-    Cpu.project_gaussians(&block, &own.gaussians, &mut splats).expect("splats");
-    let lists = Tiles::of(&TileBlock::new(camera.width, camera.height, own.background), &splats);
+fn longest_list(made: &Optimised) -> u32 {
+    let (camera, gaussian_count) = (camera(), made.gaussians.len() as u32);
+    let block = SplatBlock { camera, near: made.near, gaussian_count, padding: [0; 2] };
+    let mut splats = Cpu.zeros(made.gaussians.len()).expect("memory");
+    Cpu.project_gaussians(&block, &made.gaussians, &mut splats).expect("splats");
+    let lists = Tiles::of(&TileBlock::new(camera.width, camera.height, made.background), &splats);
     lists.starts.windows(2).map(|part| part[1] - part[0]).max().unwrap_or(0)
 }
 
@@ -95,11 +92,11 @@ fn thinned() -> Optimised {
 }
 
 /// Derivatives by the Gaussians of a loss whose derivatives by the first source's pixels have all signs.
-fn derivatives<D: Device>(device: &D, own: &Optimised) -> Vec<GaussianBlock> {
-    let splatter = Splatter { device, near: own.near, background: own.background };
+fn derivatives<D: Device>(device: &D, made: &Optimised) -> Vec<GaussianBlock> {
+    let splatter = Splatter { device, near: made.near, background: made.background };
     let camera = camera();
-    let uploaded = device.upload(&own.gaussians).expect("Gaussians");
-    let picture = splatter.picture(&uploaded, own.gaussians.len(), &camera).expect("a picture");
+    let uploaded = device.upload(&made.gaussians).expect("Gaussians");
+    let picture = splatter.picture(&uploaded, made.gaussians.len(), &camera).expect("a picture");
     let by = |index: usize| [0, 1, 2, 3].map(|channel| ((index * 7 + channel * 5) % 11) as f32 / 5.0 - 1.0);
     let by_pixels: Vec<[f32; 4]> = (0..(camera.width * camera.height) as usize).map(by).collect();
     splatter.gradients(&uploaded, &picture, &by_pixels).expect("derivatives")
@@ -108,10 +105,10 @@ fn derivatives<D: Device>(device: &D, own: &Optimised) -> Vec<GaussianBlock> {
 /// Some of a Gaussian's parameters.
 type Part = fn(&GaussianBlock) -> Vec<f32>;
 
-fn derivatives_are_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
+fn derivatives_of_a_scene_are_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
     let device = candidate.vulkan(&GpuOptions::default())?;
-    let own = thinned();
-    let (cpu, ours) = (derivatives(&Cpu, &own), derivatives(&device, &own));
+    let made = thinned();
+    let (cpu, ours) = (derivatives(&Cpu, &made), derivatives(&device, &made));
     let groups: [(&str, Part); 5] = [
         ("position", |gaussian| gaussian.position.to_vec()),
         ("opacity", |gaussian| vec![gaussian.opacity]),
@@ -120,39 +117,39 @@ fn derivatives_are_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
         ("colour", |gaussian| gaussian.colour.to_vec()),
     ];
     let norm = |values: &[f32]| values.iter().map(|value| f64::from(*value).powi(2)).sum::<f64>().sqrt();
-    for (name, of) in groups {
-        let [a, b] = [&cpu, &ours].map(|all| all.iter().flat_map(of).collect::<Vec<f32>>());
+    for (name, part) in groups {
+        let [a, b] = [&cpu, &ours].map(|all| all.iter().flat_map(part).collect::<Vec<f32>>());
         let apart: Vec<f32> = a.iter().zip(&b).map(|(a, b)| a - b).collect();
         let (difference, all) = (norm(&apart), norm(&a));
         assert!(
             all > 0.0 && difference <= MAX_DIFFERENCE * all,
             "{name}: {difference:e} of {all:e}, {} Gaussians",
-            own.gaussians.len()
+            made.gaussians.len()
         );
     }
     Ok(())
 }
 
 /// The PSNR of the Gaussians at the sources, decibels.
-fn score(own: &Optimised) -> f64 {
+fn score(made: &Optimised) -> f64 {
     let images = &start().0;
-    let splatter = Splatter { device: &Cpu, near: own.near, background: own.background };
-    let of = |index: usize| {
+    let splatter = Splatter { device: &Cpu, near: made.near, background: made.background };
+    let score = |index: usize| {
         let camera = images.images[index].camera.block(0);
-        let rendered = splatter.rendered(&own.gaussians, own.gaussians.len(), &camera, 0.5).expect("a picture");
+        let rendered = splatter.rendered(&made.gaussians, made.gaussians.len(), &camera, 0.5).expect("a picture");
         let picture = to_rgb8(&rendered.colours, [rendered.width, rendered.height]);
         psnr(picture.as_raw(), images.picture(index).as_raw())
     };
-    (0..images.images.len()).map(of).sum::<f64>() / images.images.len() as f64
+    (0..images.images.len()).map(score).sum::<f64>() / images.images.len() as f64
 }
 
-fn a_scene_is_as_good(candidate: &Candidate) -> Result<(), Failed> {
+fn a_scene_is_as_good_as_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
     let device = candidate.vulkan(&GpuOptions::default())?;
     let ours = scene(&device);
     if device.is_software() {
         assert_eq!(&ours, cpus_scene(), "by the CPU's own loops");
     }
-    let (own, cpus) = (score(&ours), score(cpus_scene()));
-    assert!(own > 15.0 && own > cpus - MAX_LOSS, "{own} dB, on the CPU {cpus} dB");
+    let (score, cpus) = (score(&ours), score(cpus_scene()));
+    assert!(score > 15.0 && score > cpus - MAX_LOSS, "{score} dB, on the CPU {cpus} dB");
     Ok(())
 }

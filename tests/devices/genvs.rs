@@ -2,7 +2,7 @@
 //! values take minutes on a software driver: the CPU has them (`fields/genvs/values.rs`), and these pictures are the
 //! CPU's.
 
-use crate::candidate::{Candidate, Test};
+use crate::candidate::{Candidate, tests};
 use libtest_mimic::Failed;
 use std::error::Error;
 use viewfuse::device::cpu::Cpu;
@@ -18,11 +18,11 @@ use viewfuse_tests::lorry::{photographs, target};
 use viewfuse_vulkan::GpuOptions;
 use viewfuse_vulkan::kernel::Kernel;
 
-pub(crate) const TESTS: &[Test] = &[
-    Test::new("genvss_pictures_are_the_cpus", genvss_pictures_are_the_cpus),
-    Test::new("genvs_without_denoiser_runs_no_kernel_of_it", genvs_without_denoiser_runs_no_kernel_of_it),
-    Test::new("genvss_feature_image_stays_on_the_device", genvss_feature_image_stays_on_the_device),
-];
+tests!(
+    genvss_pictures_are_the_cpus,
+    genvs_without_denoiser_runs_no_kernel_of_it,
+    genvss_feature_image_stays_on_the_device
+);
 
 /// Largest difference of a channel, whose range is 1. Sums of products run in another order than the CPU's, through
 /// three calls of the denoiser.

@@ -1,7 +1,7 @@
 //! A device with lowered limits: work is cut into pieces, and the picture is the same; where nothing can be cut any
 //! finer, the error names the limit.
 
-use crate::candidate::{Candidate, Test, assert_works};
+use crate::candidate::{Candidate, assert_works, tests};
 use crate::picture::{KERNELS, Rendering, SIDE, SOURCE_COUNT};
 use bytemuck::bytes_of;
 use libtest_mimic::Failed;
@@ -12,14 +12,14 @@ use viewfuse_core::fuse::FuseBlock;
 use viewfuse_vulkan::kernel::Kernel;
 use viewfuse_vulkan::{GpuOptions, Limits, VulkanError};
 
-pub(crate) const TESTS: &[Test] = &[
-    Test::new("a_lower_buffer_range_gives_the_same_picture", a_lower_buffer_range_gives_the_same_picture),
-    Test::new("a_lower_allocation_gives_the_same_picture", a_lower_allocation_gives_the_same_picture),
-    Test::new("fewer_workgroups_give_the_same_picture", fewer_workgroups_give_the_same_picture),
-    Test::new("all_limits_lowered_give_the_same_picture", all_limits_lowered_give_the_same_picture),
-    Test::new("what_cannot_be_cut_names_the_limit", what_cannot_be_cut_names_the_limit),
-    Test::new("a_picture_that_cannot_be_cut_names_the_limit", a_picture_that_cannot_be_cut_names_the_limit),
-];
+tests!(
+    a_lower_buffer_range_gives_the_same_picture,
+    a_lower_allocation_gives_the_same_picture,
+    fewer_workgroups_give_the_same_picture,
+    all_limits_lowered_give_the_same_picture,
+    what_cannot_be_cut_names_the_limit,
+    a_picture_that_cannot_be_cut_names_the_limit
+);
 
 /// Ten rows or more of a sweep's widest array: a band with its halo of eight. No power of two, so that pages are
 /// shorter.

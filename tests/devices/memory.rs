@@ -1,16 +1,12 @@
 //! Out of memory: the error says the requested and the available memory, and the device goes on working.
 
-use crate::candidate::{Candidate, Test, assert_works};
+use crate::candidate::{Candidate, assert_works, tests};
 use libtest_mimic::Failed;
 use std::env;
 use std::path::PathBuf;
 use viewfuse_vulkan::{Adapter, Gpu, GpuOptions, Instance, InstanceOptions, Limits, VulkanError};
 
-pub(crate) const TESTS: &[Test] = &[
-    Test::new("memory_that_is_not_there_is_refused", memory_that_is_not_there_is_refused),
-    Test::new("memory_that_the_driver_refuses_is_refused", memory_that_the_driver_refuses_is_refused),
-    Test::new("memory_is_given_back", memory_is_given_back),
-];
+tests!(memory_that_is_not_there_is_refused, memory_that_the_driver_refuses_is_refused, memory_is_given_back);
 
 fn lowered(candidate: &Candidate, allocation: u64, memory: u64) -> Result<Gpu, VulkanError> {
     let limits = Limits { allocation, memory, ..GpuOptions::default().limits };

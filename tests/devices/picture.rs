@@ -1,6 +1,6 @@
 //! A whole picture of the sample scene on each device.
 
-use crate::candidate::{Candidate, Test};
+use crate::candidate::{Candidate, tests};
 use image::RgbImage;
 use libtest_mimic::Failed;
 use std::sync::OnceLock;
@@ -19,7 +19,7 @@ use viewfuse_tests::places::data;
 use viewfuse_vulkan::Tally;
 use viewfuse_vulkan::kernel::Kernel;
 
-pub(crate) const TESTS: &[Test] = &[Test::new("the_picture_is_the_cpus", the_picture_is_the_cpus)];
+tests!(the_picture_is_the_cpus);
 
 /// Width and height; software devices take a second for so much.
 pub(crate) const SIDE: u32 = 48;

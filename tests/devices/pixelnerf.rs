@@ -1,7 +1,7 @@
 //! A small PixelNeRF on each device: the reference values, and whole pictures with everything and with nothing left
 //! out.
 
-use crate::candidate::{Candidate, Test};
+use crate::candidate::{Candidate, tests};
 use libtest_mimic::Failed;
 use viewfuse::check::verify::verify;
 use viewfuse::device::cpu::Cpu;
@@ -18,11 +18,11 @@ use viewfuse_tests::fields::largest_difference;
 use viewfuse_tests::places::data;
 use viewfuse_vulkan::{GpuOptions, Limits};
 
-pub(crate) const TESTS: &[Test] = &[
-    Test::new("pixelnerf_has_the_reference_values", pixelnerf_has_the_reference_values),
-    Test::new("pixelnerfs_pictures_are_the_cpus", pixelnerfs_pictures_are_the_cpus),
-    Test::new("pixelnerfs_sample_lists_stay_on_the_device", pixelnerfs_sample_lists_stay_on_the_device),
-];
+tests!(
+    pixelnerf_has_the_reference_values,
+    pixelnerfs_pictures_are_the_cpus,
+    pixelnerfs_sample_lists_stay_on_the_device
+);
 
 const SIDE: u32 = 20;
 const COARSE_COUNT: u32 = 32;
@@ -64,13 +64,13 @@ fn picture<D: Device + Sync>(device: &D, omissions: Omissions, targets: &str) ->
 
 fn pixelnerfs_pictures_are_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
     // With its own limits, and with buffers so short that rays and points are taken in several pieces.
-    let own = GpuOptions::default();
-    let short = GpuOptions { limits: Limits { buffer_range: 260 << 10, ..own.limits }, ..own };
+    let usual = GpuOptions::default();
+    let short = GpuOptions { limits: Limits { buffer_range: 260 << 10, ..usual.limits }, ..usual };
     for omissions in [Omissions::NONE, Omissions::default()] {
         let reference = picture(&Cpu, omissions, "20").expect("a picture on the CPU");
         let opaque = reference.iter().filter(|colour| colour[3] > 0.9).count();
         assert!(opaque > 20 && opaque < reference.len() / 2, "a body before nothing: {opaque}");
-        for options in if omissions == Omissions::NONE { vec![own] } else { vec![own, short] } {
+        for options in if omissions == Omissions::NONE { vec![usual] } else { vec![usual, short] } {
             let device = candidate.vulkan(&options)?;
             let ours = picture(&device, omissions, "20").map_err(|error| format!("{error:?}"))?;
             let worst = largest_difference(&ours, &reference);

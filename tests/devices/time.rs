@@ -1,6 +1,6 @@
 //! A kernel that takes too long.
 
-use crate::candidate::{Candidate, Test, assert_works};
+use crate::candidate::{Candidate, assert_works, tests};
 use crate::child;
 use bytemuck::bytes_of;
 use libtest_mimic::Failed;
@@ -10,11 +10,7 @@ use viewfuse_tests::patience::PATIENCE;
 use viewfuse_vulkan::kernel::Kernel;
 use viewfuse_vulkan::{AdapterKind, Gpu, GpuOptions, VulkanError};
 
-pub(crate) const TESTS: &[Test] = &[
-    Test::new("a_time_limit_expires", a_time_limit_expires),
-    Test::new("a_busy_machine_is_no_failure", a_busy_machine_is_no_failure),
-    Test::new("a_device_that_works_on_is_left_alone", a_device_that_works_on_is_left_alone),
-];
+tests!(a_time_limit_expires, a_busy_machine_is_no_failure, a_device_that_works_on_is_left_alone);
 
 const LIMIT: Duration = Duration::from_millis(5);
 /// Elements of the long kernel.

@@ -1,17 +1,17 @@
 //! Arrays there and back.
 
-use crate::candidate::{Candidate, Test};
+use crate::candidate::{Candidate, tests};
 use bytemuck::Pod;
 use libtest_mimic::Failed;
 use std::fmt::Debug;
 use viewfuse_vulkan::{Gpu, GpuOptions, Limits, VulkanError};
 
-pub(crate) const TESTS: &[Test] = &[
-    Test::new("arrays_of_any_length_come_back", arrays_of_any_length_come_back),
-    Test::new("arrays_larger_than_a_transfer_come_back", arrays_larger_than_a_transfer_come_back),
-    Test::new("arrays_in_pieces_come_back", arrays_in_pieces_come_back),
-    Test::new("uploads_do_not_wait_for_one_another", uploads_do_not_wait_for_one_another),
-];
+tests!(
+    arrays_of_any_length_come_back,
+    arrays_larger_than_a_transfer_come_back,
+    arrays_in_pieces_come_back,
+    uploads_do_not_wait_for_one_another,
+);
 
 /// Numbers without a pattern that a shifted or repeated stretch would share.
 fn number(index: usize) -> u64 {

@@ -1,6 +1,6 @@
 //! core's feature `defmt`: every public error and value can be logged on a microcontroller.
 
-use libtest_mimic::{Failed, Trial};
+use libtest_mimic::Failed;
 use std::path::Path;
 use std::process::Command;
 use viewfuse_tests::places::repository;
@@ -20,12 +20,7 @@ const PARAMETERS: [&str; 7] = [
 ];
 const DERIVED: &str = "derive(defmt::Format)";
 
-pub(crate) fn trials() -> Vec<Trial> {
-    vec![
-        Trial::test("every_value_has_a_format", every_value_has_a_format),
-        Trial::test("the_formats_compile", the_formats_compile),
-    ]
-}
+viewfuse_tests::trials![every_value_has_a_format, the_formats_compile,];
 
 /// Public types of a source that derive `Debug`, and whether they derive `Format`.
 fn values(source: &str) -> Vec<(String, bool)> {

@@ -2,8 +2,7 @@
 
 use std::error::Error;
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{LazyLock, Mutex};
+use std::sync::LazyLock;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::auto::{self, Chosen, HOLD_OUT, choose, schemes};
 use viewfuse::field::pixelnerf::{Architecture, PixelNerf, PixelNerfOptions, test_networks};
@@ -15,6 +14,7 @@ use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::{FewShot, Selection};
 use viewfuse::scene::photographs::Album;
 use viewfuse_lab::scenes::{generate, write_shoot};
+use viewfuse_tests::listener::Listener;
 
 const SIZE: [u32; 2] = [64, 48];
 
@@ -41,12 +41,13 @@ fn chosen(
     scene: &Scene,
     sources: &[usize],
     field: &(impl Field + Sync),
+    options: &RenderOptions,
     progress: &dyn Progress,
 ) -> Result<Chosen, RenderError> {
-    let (renderer, options) = (On { device: &Cpu, field }, options());
+    let renderer = On { device: &Cpu, field };
     let album = Album::open(scene, sources.iter().copied(), &Silent)?;
-    let stage = Stage::prepare(scene, &album, sources, &renderer, &options, &Silent)?;
-    choose(&stage, &renderer, &options, progress)
+    let stage = Stage::prepare(scene, &album, sources, &renderer, options, &Silent)?;
+    choose(&stage, &renderer, options, progress)
 }
 
 /// A run with what is chosen.
@@ -110,11 +111,11 @@ fn the_choice_is_the_best_that_was_tried_or_the_default() -> Result<(), Box<dyn 
     let given_up = |candidate: &&auto::Candidate| candidate.scores.len() < held_out.len();
     assert!(candidates.iter().filter(given_up).all(|candidate| candidate.psnr.is_none()), "{candidates:?}");
     let score = |candidate: &auto::Candidate| candidate.psnr;
-    let own = candidates
+    let tried = candidates
         .iter()
         .find(|one| one.weighting == weighting.to_string() && one.options.settings() == options.settings());
-    let own = own.map(score).ok_or("the choice was tried")?;
-    assert!(own >= score(&candidates[0]), "{own:?} is below the default");
+    let psnr = tried.map(score).ok_or("the choice was tried")?;
+    assert!(psnr >= score(&candidates[0]), "{psnr:?} is below the default");
     let expected = chosen.expected(&frames[0]).ok_or("a score to expect")?;
     let truth = frames[0].truth.as_ref().ok_or("a truth")?.psnr;
     println!("expected {expected:?}, true {truth:.2} dB");
@@ -184,31 +185,21 @@ fn two_sources_give_the_default_and_no_expectation() -> Result<(), Box<dyn Error
     Ok(())
 }
 
-/// Remembers the warnings.
-#[derive(Default)]
-struct Warnings(Mutex<Vec<String>>);
-
-impl Progress for Warnings {
-    fn warn(&self, warning: &str) {
-        self.0.lock().expect("a list").push(warning.to_owned());
-    }
-}
-
 #[test]
 fn a_scene_on_which_copies_are_better_is_told() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     let scene = room(folder.path(), 5);
-    let warnings = Warnings::default();
-    let chosen_here = chosen(&scene, &[0, 1, 2, 3, 4], &TrainingFree::default(), &warnings)?;
+    let listener = Listener::default();
+    let chosen_here = chosen(&scene, &[0, 1, 2, 3, 4], &TrainingFree::default(), &options(), &listener)?;
     assert!(chosen_here.held_out.iter().all(|source| source.copy_psnr > 5.0));
-    assert_eq!(*warnings.0.lock().expect("a list"), [""; 0]);
+    assert_eq!(listener.warnings(), [""; 0]);
     // The same photograph for each camera: the camera poses are wrong, and a copy is perfect.
     let mut wrong = scene.clone();
     for view in &mut wrong.views {
         view.image.clone_from(&scene.views[0].image);
     }
-    chosen(&wrong, &[0, 1, 2, 3, 4], &TrainingFree::default(), &warnings)?;
-    let warnings = warnings.0.into_inner()?;
+    chosen(&wrong, &[0, 1, 2, 3, 4], &TrainingFree::default(), &options(), &listener)?;
+    let warnings = listener.warnings();
     assert!(warnings.iter().any(|warning| warning.contains("pictures may be worse than a copy")), "{warnings:?}");
     Ok(())
 }
@@ -219,27 +210,9 @@ fn a_field_without_scalars_has_its_scheme_chosen() -> Result<(), Box<dyn Error>>
     let scene = room(folder.path(), 3);
     let network = test_networks::body(&Architecture::small(16));
     let field = PixelNerf::new(&network, PixelNerfOptions::default())?;
-    let chosen = chosen(&scene, &[0, 1, 2], &field, &Silent)?;
+    let chosen = chosen(&scene, &[0, 1, 2], &field, &options(), &Silent)?;
     assert_eq!((chosen.candidates.len(), chosen.options.settings().len()), (schemes().len(), 0));
     Ok(())
-}
-
-/// Counts how often it is asked whether to stop: work asks often.
-#[derive(Default)]
-struct Asked {
-    times: AtomicUsize,
-    warnings: AtomicUsize,
-}
-
-impl Progress for Asked {
-    fn is_cancelled(&self) -> bool {
-        self.times.fetch_add(1, Ordering::Relaxed);
-        false
-    }
-
-    fn warn(&self, _warning: &str) {
-        self.warnings.fetch_add(1, Ordering::Relaxed);
-    }
 }
 
 #[test]
@@ -250,13 +223,11 @@ fn a_choice_is_kept_for_the_same_sources_and_options_alone() -> Result<(), Box<d
     let field = TrainingFree { cache: Some(Cache::open(folder.path())?), ..TrainingFree::default() };
     let sources = middle(scene).sources;
     // The choice, how much work it took, and the warnings.
-    let choose = |sources: &[usize], size: [u32; 2], leave_out: f32| -> Result<(Chosen, [usize; 2]), Box<dyn Error>> {
+    let choose = |sources: &[usize], size: [u32; 2], leave_out: f32| -> Result<(Chosen, [usize; 2]), RenderError> {
         let options = RenderOptions { size: Some(size), leave_out, ..RenderOptions::default() };
-        let (renderer, asked) = (On { device: &Cpu, field: &field }, Asked::default());
-        let album = Album::open(scene, sources.iter().copied(), &Silent)?;
-        let stage = Stage::prepare(scene, &album, sources, &renderer, &options, &Silent)?;
-        let chosen = choose(&stage, &renderer, &options, &asked)?;
-        Ok((chosen, [asked.times.into_inner(), asked.warnings.into_inner()]))
+        let listener = Listener::default();
+        let chosen = chosen(scene, sources, &field, &options, &listener)?;
+        Ok((chosen, [listener.asked(), listener.warnings().len()]))
     };
     let (first, [work, warnings]) = choose(&sources, SMALL, 0.01)?;
     let is_first = |other: &Chosen| {
@@ -290,22 +261,13 @@ fn a_choice_is_kept_for_the_same_sources_and_options_alone() -> Result<(), Box<d
     Ok(())
 }
 
-/// Stops after so many looks.
-struct Patience(AtomicUsize);
-
-impl Progress for Patience {
-    fn is_cancelled(&self) -> bool {
-        self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1)).is_err()
-    }
-}
-
 #[test]
 fn it_can_be_stopped() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     let scene = room(folder.path(), 4);
     for looks in [0, 5, 40] {
-        let patience = Patience(AtomicUsize::new(looks));
-        let Err(error) = chosen(&scene, &[0, 1, 2, 3], &TrainingFree::default(), &patience) else {
+        let patience = Listener::stops_after(looks);
+        let Err(error) = chosen(&scene, &[0, 1, 2, 3], &TrainingFree::default(), &options(), &patience) else {
             panic!("{looks} looks are not enough");
         };
         let mut cause: Option<&(dyn Error + 'static)> = Some(&error);

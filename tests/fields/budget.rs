@@ -5,15 +5,15 @@ use viewfuse::device::choice::AnyDevice;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::budget::{Bound, Kept};
 use viewfuse::field::options::Given;
-use viewfuse::field::render::{Frame, RenderOptions, Stage, open_album};
+use viewfuse::field::render::{Frame, RenderOptions};
 use viewfuse::field::rows::{self, ROWS};
 use viewfuse::field::{AnyField, Renderer};
 use viewfuse::job::progress::Silent;
 use viewfuse::nn::checkpoint::Checkpoint;
 use viewfuse::scene::Scene;
-use viewfuse::scene::few_shot::{FewShot, Selection};
+use viewfuse::scene::few_shot::FewShot;
 use viewfuse::weighting::Weighting;
-use viewfuse_tests::fields::rms;
+use viewfuse_tests::fields::{job, on_scene, rms, sample};
 use viewfuse_tests::places;
 
 /// The most pictures whose error exceeds its bound, as a share.
@@ -21,16 +21,6 @@ const MAX_MISSED: f64 = 0.05;
 /// The most that one of them exceeds it, as a factor: 1.08 was measured, and 1.6 where a corner of a small picture was
 /// lost.
 const MAX_EXCESS: f64 = 1.25;
-
-fn scene(name: &str) -> Scene {
-    Scene::open(places::data(name)).expect("a scene")
-}
-
-fn job(scene: &Scene, sources: &str, targets: &str) -> FewShot {
-    let selection =
-        Selection { targets: Some(targets.to_owned()), sources: Some(sources.to_owned()), ..Selection::default() };
-    selection.resolve(scene, 2).expect("views")
-}
 
 fn network(name: &str, seed: u64) -> AnyField {
     let checkpoint = match name.split_once(':') {
@@ -61,7 +51,7 @@ struct Case {
 fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     let mut case = |name: &str, field: AnyField, folder: &str, sources: &str, targets: &str, side, bounds| {
-        let scene = scene(folder);
+        let scene = sample(folder);
         let job = job(&scene, sources, targets);
         cases.push(Case { name: name.to_owned(), field, scene, job, side, bounds });
     };
@@ -93,17 +83,14 @@ fn frames(case: &Case, renderer: &dyn Renderer, bound: Option<Bound>) -> Vec<Fra
     let leave_out = if bound.is_some() { 0.01 } else { 0.0 };
     let options = RenderOptions { size, bound, early_termination, leave_out, ..RenderOptions::default() };
     let weighting = Weighting::open("error:alpha=1").expect("a scheme");
-    let targets = case.job.targets.iter().filter_map(|target| target.truth);
-    let shown = case.job.sources.iter().copied().chain(targets);
-    let album = open_album(&case.scene, shown, renderer, &options, &Silent).expect("photographs");
-    let mut stage =
-        Stage::prepare(&case.scene, &album, &case.job.sources, renderer, &options, &Silent).expect("prepared");
-    if bound.is_none() && !stage.efforts().is_empty() {
-        stage.set_effort(stage.efforts().len() - 1, &Silent).expect("an effort");
-    }
-    stage.weigh(&weighting, &Silent).expect("weighed");
-    let frame = |target| stage.frame(&weighting, target, &Silent).expect("a frame");
-    case.job.targets.iter().map(frame).collect()
+    on_scene(&case.scene, &case.job, renderer, &options, |stage| {
+        if bound.is_none() && !stage.efforts().is_empty() {
+            stage.set_effort(stage.efforts().len() - 1, &Silent).expect("an effort");
+        }
+        stage.weigh(&weighting, &Silent).expect("weighed");
+        let frame = |target| stage.frame(&weighting, target, &Silent).expect("a frame");
+        case.job.targets.iter().map(frame).collect()
+    })
 }
 
 #[test]
@@ -141,7 +128,7 @@ fn errors_stay_below_their_bounds() {
 #[test]
 fn no_corner_of_a_small_picture_is_lost() {
     let device = AnyDevice::Cpu(Cpu);
-    let (scene, bound) = (scene("car"), 1.0e-2);
+    let (scene, bound) = (sample("car"), 1.0e-2);
     let job = job(&scene, "16,72,136", "8,24,32,40,48,56,64,80,88,96,104,112,120,128");
     let field = network("pixelnerf_cars.safetensors", 1);
     let case = Case { name: "pixelnerf, cars".to_owned(), field, scene, job, side: 24, bounds: &[] };

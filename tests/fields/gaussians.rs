@@ -6,27 +6,15 @@ use viewfuse::device::cpu::Cpu;
 use viewfuse::field::auto;
 use viewfuse::field::budget::Bound;
 use viewfuse::field::gaussians::Recipe;
-use viewfuse::field::render::{RenderOptions, Stage, open_album};
+use viewfuse::field::render::{RenderOptions, Stage};
 use viewfuse::field::training_free::{Gaussians, TrainingFree};
 use viewfuse::field::{AnyField, Renderer};
 use viewfuse::job::progress::Silent;
-use viewfuse::scene::Scene;
-use viewfuse::scene::few_shot::{FewShot, Selection};
+use viewfuse::scene::few_shot::FewShot;
 use viewfuse::weighting::Weighting;
-use viewfuse_tests::fields::rms;
-use viewfuse_tests::places;
+use viewfuse_tests::fields::{job, on_scene, rms, sample};
 
 const DEVICE: AnyDevice = AnyDevice::Cpu(Cpu);
-
-fn toy() -> Scene {
-    Scene::open(places::data("toy")).expect("a scene")
-}
-
-fn job(scene: &Scene, sources: &str) -> FewShot {
-    let selection =
-        Selection { targets: Some("21".to_owned()), sources: Some(sources.to_owned()), ..Selection::default() };
-    selection.resolve(scene, 2).expect("views")
-}
 
 /// Calls `visit` with the views of the sample scene, prepared by a field.
 fn with_stage<T>(
@@ -35,13 +23,9 @@ fn with_stage<T>(
     options: &RenderOptions,
     visit: impl FnOnce(&mut Stage<'_>, &FewShot, &dyn Renderer) -> T,
 ) -> T {
-    let scene = toy();
-    let job = job(&scene, sources);
-    let renderer = field.on(&DEVICE);
-    let shown = job.sources.iter().copied().chain(job.targets.iter().filter_map(|target| target.truth));
-    let album = open_album(&scene, shown, renderer.as_ref(), options, &Silent).expect("photographs");
-    let mut stage = Stage::prepare(&scene, &album, &job.sources, renderer.as_ref(), options, &Silent).expect("a stage");
-    visit(&mut stage, &job, renderer.as_ref())
+    let scene = sample("toy");
+    let (job, renderer) = (job(&scene, sources, "21"), field.on(&DEVICE));
+    on_scene(&scene, &job, renderer.as_ref(), options, |stage| visit(stage, &job, renderer.as_ref()))
 }
 
 /// With few iterations.
@@ -115,19 +99,19 @@ fn a_bound_on_the_error_is_kept_with_fewer_iterations() {
     let (exact, _) = frame(1.0e-5);
     for most in [0.05, 0.15] {
         let (first, second) = frame(most);
-        for own in [&first, &second] {
-            let kept = own.kept.as_ref().expect("a record of the bound");
-            let error = rms(&own.colours, &exact.colours);
+        for frame in [&first, &second] {
+            let kept = frame.kept.as_ref().expect("a record of the bound");
+            let error = rms(&frame.colours, &exact.colours);
             assert!(kept.effort.contains("iterations") && kept.is_kept, "{kept:?}");
             assert!(error > 1.0e-4 && error <= f64::from(most), "{error} of {most}: {kept:?}");
         }
     }
 }
 
-/// Few photographs of an object: its sources that are left out are better with Gaussians; of many, the hull alone is, and
+/// Few photographs of an object: its held-out sources are better with Gaussians; of many, the hull alone is, and
 /// schemes are tried only then.
 #[test]
-fn the_hull_is_mixed_with_gaussians_where_sources_that_are_left_out_gain() {
+fn the_hull_is_mixed_with_gaussians_where_held_out_sources_gain() {
     let options =
         RenderOptions { background: viewfuse::scene::photographs::BackgroundChoice::Auto, ..RenderOptions::default() };
     let mixture = |sources: &str| {

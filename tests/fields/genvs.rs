@@ -14,7 +14,7 @@ use viewfuse::field::genvs::{Architecture, Estimate, Genvs, GenvsOptions, Omissi
 use viewfuse::field::{FieldError, Record, Rendered};
 use viewfuse::job::progress::{Progress, Silent};
 use viewfuse::scene::photographs::SourceImages;
-use viewfuse::weighting::sources::{MAX_SOURCES, SourceWeights};
+use viewfuse::weighting::sources::SourceWeights;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::weights::Weights;
@@ -28,7 +28,7 @@ pub(super) fn exact() -> GenvsOptions {
     GenvsOptions { plan, omissions: Omissions::NONE, ..GenvsOptions::default() }
 }
 
-fn leaving_out(omissions: Omissions) -> GenvsOptions {
+fn omitting(omissions: Omissions) -> GenvsOptions {
     GenvsOptions { omissions, ..exact() }
 }
 
@@ -44,13 +44,6 @@ pub(super) fn without_denoiser(options: GenvsOptions) -> Genvs {
 /// The lorry from some sides, on white.
 fn sources(count: u32) -> SourceImages {
     photographs(count, 32)
-}
-
-/// Weights of the first views; the others have none.
-fn weights<const N: usize>(scores: [f32; N], count: u32) -> SourceWeights {
-    let mut all = [0.0; MAX_SOURCES];
-    all[..N].copy_from_slice(&scores);
-    Weights::from_scores(&all, count)
 }
 
 fn try_picture(
@@ -100,22 +93,22 @@ fn an_estimate_from_colours_adds_what_noise_hides() {
         architecture.denoiser.iter_mut().for_each(|denoiser| denoiser.estimate = estimate);
         Genvs::new(test_networks::deterministic(&architecture), exact()).expect("a made network")
     };
-    let (published, own) = (made(Estimate::Published), made(Estimate::FromColours));
-    assert_eq!(own.architecture().denoiser.as_ref().map(|denoiser| denoiser.estimate), Some(Estimate::FromColours));
+    let (published, ours) = (made(Estimate::Published), made(Estimate::FromColours));
+    assert_eq!(ours.architecture().denoiser.as_ref().map(|denoiser| denoiser.estimate), Some(Estimate::FromColours));
     let sources = sources(1);
-    let feature_count = own.architecture().encoder.feature_count;
+    let feature_count = ours.architecture().encoder.feature_count;
     let wave = |scale: f32| move |index: usize| scale * (0.7 * index as f32).sin();
     let noisy: Vec<f32> = (0..16 * 16 * 3).map(wave(3.0)).collect();
     let features: Vec<f32> = (0..16 * 16 * feature_count).map(wave(0.4)).collect();
     for level in [0.1, 1.0, 80.0] {
-        let of = |field: &Genvs| {
+        let denoised = |field: &Genvs| {
             let reference = Reference::new(field, &Cpu, &sources, &Silent).expect("sources");
             reference.denoised(&noisy, &features, [16, 16], level).expect("a picture")
         };
         let share = f64::from(level).powi(2) / (f64::from(level).powi(2) + 0.25);
-        for (index, (own, published)) in of(&own).iter().zip(of(&published)).enumerate() {
+        for (index, (ours, published)) in denoised(&ours).iter().zip(denoised(&published)).enumerate() {
             let shown = 1.0 - f64::from(features[index / 3 * feature_count + index % 3]);
-            let difference = f64::from(*own) - f64::from(published);
+            let difference = f64::from(*ours) - f64::from(published);
             // Two sums of numbers of at most 4, each rounded three times.
             assert!((difference - share * shown).abs() < 2.0e-6, "{index} at {level}: {difference}");
         }

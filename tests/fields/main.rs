@@ -1,4 +1,4 @@
-//! Fields as a whole, on the CPU: pictures of scenes whose geometry is known, extremes, and what may be left out.
+//! Fields as a whole, on the CPU: pictures of scenes whose geometry is known, extremes, and what may be omitted.
 
 mod auto;
 mod budget;

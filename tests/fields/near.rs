@@ -3,17 +3,17 @@
 
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::On;
-use viewfuse::field::render::{Frame, RenderOptions, Stage, open_album};
+use viewfuse::field::render::{Frame, RenderOptions, Stage};
 use viewfuse::field::scores::psnr_of_seen;
 use viewfuse::field::training_free::TrainingFree;
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
-use viewfuse::scene::few_shot::Target;
+use viewfuse::scene::few_shot::{FewShot, Target};
 use viewfuse::weighting::Weighting;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::pose::Pose;
-use viewfuse_tests::places;
+use viewfuse_tests::fields::{on_scene, sample};
 
 /// Schemes, and whether a photograph has all the weight at its own place.
 const SCHEMES: [(&str, bool); 10] = [
@@ -30,8 +30,8 @@ const SCHEMES: [(&str, bool); 10] = [
 ];
 /// Shares of the way to the next photograph, from the middle to the photograph itself.
 const AWAY: [f32; 7] = [0.5, 0.3, 0.15, 0.08, 0.03, 0.01, 0.0];
-/// How much of the weight is omitted, and with how many of the schemes it is tried.
-const LEFT_OUT: [(f32, usize); 3] = [(0.01, 10), (0.0, 3), (0.2, 3)];
+/// How much of the weight is dropped, and with how many of the schemes it is tried.
+const DROPPED: [(f32, usize); 3] = [(0.01, 10), (0.0, 3), (0.2, 3)];
 /// Most decibels that a picture loses as its camera comes nearer.
 const MAX_LOSS: f64 = 0.5;
 /// Decibels of a picture at a photograph that has all the weight, and share of it that two photographs show.
@@ -55,43 +55,43 @@ fn frame(stage: &mut Stage<'_>, weighting: &Weighting, camera: Camera) -> Frame 
 
 #[test]
 fn pictures_become_the_photograph_as_the_camera_comes_nearer() {
-    for (leave_out, count) in LEFT_OUT {
+    for (leave_out, count) in DROPPED {
         nearer_is_better(leave_out, &SCHEMES[..count]);
     }
 }
 
 fn nearer_is_better(leave_out: f32, schemes: &[(&str, bool)]) {
-    let scene = Scene::open(places::data("room")).expect("a scene");
-    let field = TrainingFree::default();
-    let renderer = On { device: &Cpu, field: &field };
+    let scene = sample("room");
+    let sources = (0..scene.views.len()).collect();
+    let job = FewShot { sources, targets: Vec::new(), frames_per_second: None };
+    let renderer = On { device: &Cpu, field: &TrainingFree::default() };
     let options = RenderOptions { size: Some([48, 36]), leave_out, ..RenderOptions::default() };
-    let sources: Vec<usize> = (0..scene.views.len()).collect();
-    let album = open_album(&scene, sources.iter().copied(), &renderer, &options, &Silent).expect("photographs");
-    let mut stage = Stage::prepare(&scene, &album, &sources, &renderer, &options, &Silent).expect("prepared");
+    on_scene(&scene, &job, &renderer, &options, |stage| {
+        schemes.iter().for_each(|scheme| nearer(stage, &scene, leave_out, *scheme));
+    });
+}
+
+fn nearer(stage: &mut Stage<'_>, scene: &Scene, leave_out: f32, (scheme, is_all): (&str, bool)) {
     let (at, next) = (5, 6);
     let photograph = stage.images.picture(at);
-    let [own, other] = [at, next].map(|view: usize| scene.views[view].camera);
-    let step = other.pose.distance(&own.pose);
-    let beside = own.pose.centre_world() - own.pose.down_world() * step;
-    for &(scheme, is_all) in schemes {
-        let weighting = Weighting::open(scheme).expect("a scheme");
-        stage.weigh(&weighting, &Silent).expect("weighed");
-        for (way, to, ahead) in [
-            ("between", other.pose.centre_world(), other.pose.forward_world()),
-            ("beside", beside, own.pose.forward_world()),
-        ] {
-            let frames = AWAY.map(|share| frame(&mut stage, &weighting, away(&own, to, ahead, share)));
-            let scores = frames.each_ref().map(|frame| psnr_of_seen(&frame.picture, &photograph, None));
-            println!("{scheme}, {leave_out} left out, {way}: {scores:.1?}");
-            let worst = scores.windows(2).map(|pair| pair[0] - pair[1]).fold(f64::MIN, f64::max);
-            assert!(
-                worst <= MAX_LOSS,
-                "{scheme}, {leave_out} left out, {way}: {worst:.1} dB lost on the way, {scores:.1?}"
-            );
-            if let ([.., at], true, Some(seen)) = (&scores[..], is_all, frames[AWAY.len() - 1].seen) {
-                assert!(*at >= MIN_AT, "{scheme}: {at:.1} dB at the photograph");
-                assert!(seen.by_none + seen.by_one < 1.0 - MIN_CONFIRMED, "{scheme}: {seen:?} at the photograph");
-            }
+    let [camera, other] = [at, next].map(|view: usize| scene.views[view].camera);
+    let step = other.pose.distance(&camera.pose);
+    let beside = camera.pose.centre_world() - camera.pose.down_world() * step;
+    let weighting = Weighting::open(scheme).expect("a scheme");
+    stage.weigh(&weighting, &Silent).expect("weighed");
+    for (way, to, ahead) in [
+        ("between", other.pose.centre_world(), other.pose.forward_world()),
+        ("beside", beside, camera.pose.forward_world()),
+    ] {
+        let frames = AWAY.map(|share| frame(stage, &weighting, away(&camera, to, ahead, share)));
+        let scores = frames.each_ref().map(|frame| psnr_of_seen(&frame.picture, &photograph, None));
+        let way = format!("{scheme}, {leave_out} dropped, {way}");
+        println!("{way}: {scores:.1?}");
+        let worst = scores.windows(2).map(|pair| pair[0] - pair[1]).fold(f64::MIN, f64::max);
+        assert!(worst <= MAX_LOSS, "{way}: {worst:.1} dB lost on the way, {scores:.1?}");
+        if let ([.., at], true, Some(seen)) = (&scores[..], is_all, frames[AWAY.len() - 1].seen) {
+            assert!(*at >= MIN_AT, "{scheme}: {at:.1} dB at the photograph");
+            assert!(seen.by_none + seen.by_one < 1.0 - MIN_CONFIRMED, "{scheme}: {seen:?} at the photograph");
         }
     }
 }

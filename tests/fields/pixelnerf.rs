@@ -31,12 +31,12 @@ pub(super) fn mist(options: PixelNerfOptions) -> PixelNerf {
     PixelNerf::new(&test_networks::deterministic(&Architecture::small(WIDTH)), options).expect("a made network")
 }
 
-fn leaving_out(omissions: Omissions) -> PixelNerfOptions {
+fn omitting(omissions: Omissions) -> PixelNerfOptions {
     PixelNerfOptions { omissions, ..PixelNerfOptions::default() }
 }
 
 pub(super) fn exact() -> PixelNerfOptions {
-    leaving_out(Omissions::NONE)
+    omitting(Omissions::NONE)
 }
 
 /// The lorry from some sides, on white.

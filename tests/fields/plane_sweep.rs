@@ -2,15 +2,12 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::render::{RenderOptions, Stage, render_all};
 use viewfuse::field::training_free::{Cache, Sweep, TrainingFree};
 use viewfuse::field::{DepthMap, On, Rendered};
 use viewfuse::job::digest::{SEAL, sealed, sha256};
 use viewfuse::job::progress::{Progress, Silent};
-use viewfuse::scene::Scene;
-use viewfuse::scene::few_shot::Selection;
 use viewfuse::scene::photographs::{SourceImage, SourceImages};
 use viewfuse::weighting::Weighting;
 use viewfuse::weighting::sources::SourceWeights;
@@ -19,7 +16,8 @@ use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::metrics::psnr;
 use viewfuse_core::pose::Pose;
 use viewfuse_core::weights::Weights;
-use viewfuse_tests::places::repository;
+use viewfuse_tests::fields::{job, on_sources, sample};
+use viewfuse_tests::listener::Listener;
 use viewfuse_tests::scenes::Folder;
 
 /// Distance of the painted wall.
@@ -68,14 +66,11 @@ pub(super) fn wall(gains: [f32; 3]) -> SourceImages {
     sources(centres.iter().zip(gains).map(|(centre, gain)| photograph(camera(*centre, 72, 54), gain)).collect())
 }
 
-/// Equal weights of all others for each source.
-fn relevance(count: usize) -> Vec<SourceWeights> {
-    let of = |own: usize| {
-        let mut scores = [0.0; viewfuse::weighting::sources::MAX_SOURCES];
-        (0..count).filter(|other| *other != own).for_each(|other| scores[other] = 1.0);
-        Weights::from_scores(&scores, count as u32)
-    };
-    (0..count).map(of).collect()
+/// Equal weights of the first views but one, of so many.
+fn without(view: usize, first: usize, count: usize) -> SourceWeights {
+    let mut scores = [0.0; viewfuse::weighting::sources::MAX_SOURCES];
+    (0..first).filter(|other| *other != view).for_each(|other| scores[other] = 1.0);
+    Weights::from_scores(&scores, count as u32)
 }
 
 /// A picture with equal weights.
@@ -89,37 +84,30 @@ fn picture_of(field: &TrainingFree, sources: &SourceImages, target: &Camera) -> 
 
 fn picture_saying(field: &TrainingFree, sources: &SourceImages, target: &Camera, progress: &dyn Progress) -> Rendered {
     let weights = Weights::mean(sources.images.len() as u32);
-    let renderer = On { device: &Cpu, field };
-    let options = RenderOptions::default();
-    let mut stage = Stage::of_sources(Arc::new(sources.clone()), &renderer, &options, progress).expect("a stage");
-    stage.weigh_by(&relevance(sources.images.len()), progress).expect("a weighting");
-    stage.picture(target, &weights, 0.0, progress).expect("a picture")
-}
-
-/// Warnings that differ.
-#[derive(Default)]
-struct Warnings(Mutex<BTreeSet<String>>);
-
-impl Progress for Warnings {
-    fn warn(&self, warning: &str) {
-        self.0.lock().expect("no panic").insert(warning.to_owned());
-    }
+    on_stage(field, sources, progress, |stage| stage.picture(target, &weights, 0.0, progress).expect("a picture"))
 }
 
 /// The depths of the sources, before any picture.
 fn depths_of(field: &TrainingFree, sources: &SourceImages) -> Vec<DepthMap> {
-    on_stage(field, sources, |stage| {
+    on_stage(field, sources, &Silent, |stage| {
         stage.encode_all(&Silent).expect("encoded sources");
         stage.source_depths().expect("depths")
     })
 }
 
-fn on_stage<T>(field: &TrainingFree, sources: &SourceImages, act: impl FnOnce(&mut Stage<'_>) -> T) -> T {
-    let renderer = On { device: &Cpu, field };
-    let options = RenderOptions::default();
-    let mut stage = Stage::of_sources(Arc::new(sources.clone()), &renderer, &options, &Silent).expect("a stage");
-    stage.weigh_by(&relevance(sources.images.len()), &Silent).expect("a weighting");
-    act(&mut stage)
+/// Calls `act` where each source has equal weights of all others.
+fn on_stage<T>(
+    field: &TrainingFree,
+    sources: &SourceImages,
+    progress: &dyn Progress,
+    act: impl FnOnce(&mut Stage<'_>) -> T,
+) -> T {
+    let count = sources.images.len();
+    let relevance: Vec<SourceWeights> = (0..count).map(|view| without(view, count, count)).collect();
+    on_sources(sources, field, progress, |stage| {
+        stage.weigh_by(&relevance, progress).expect("a weighting");
+        act(stage)
+    })
 }
 
 /// Root mean square difference of the colours away from the border.
@@ -162,13 +150,7 @@ fn exposures_are_made_equal() {
 /// The sources' depth maps with this share of geometric consistency.
 fn depths_with(consistency_share: f32, sources: &SourceImages) -> Vec<DepthMap> {
     let sweep = Sweep { consistency_share, ..Sweep::default() };
-    let field = TrainingFree { sweep, ..TrainingFree::default() };
-    let renderer = On { device: &Cpu, field: &field };
-    let options = RenderOptions::default();
-    let mut stage = Stage::of_sources(Arc::new(sources.clone()), &renderer, &options, &Silent).expect("a stage");
-    stage.weigh_by(&relevance(sources.images.len()), &Silent).expect("a weighting");
-    stage.encode_all(&Silent).expect("depths");
-    stage.source_depths().expect("depths")
+    depths_of(&TrainingFree { sweep, ..TrainingFree::default() }, sources)
 }
 
 #[test]
@@ -228,23 +210,20 @@ fn sources_without_a_weight_change_no_bit() {
     let with_fourth = |gain: f32| {
         let mut sources = wall([0.8, 1.0, 1.25]);
         sources.images.push(photograph(camera(Vec3::new(0.2, 0.2, 0.0), 72, 54), gain));
-        let (field, count) = (TrainingFree::default(), 4);
-        let renderer = On { device: &Cpu, field: &field };
-        let options = RenderOptions::default();
-        let mut stage = Stage::of_sources(Arc::new(sources.clone()), &renderer, &options, &Silent).expect("a stage");
-        let among_three = |own: usize| {
-            let mut scores = [0.0; viewfuse::weighting::sources::MAX_SOURCES];
-            (0..3).filter(|other| *other != own).for_each(|other| scores[other] = 1.0);
-            Weights::from_scores(&scores, count)
-        };
-        stage.weigh_by(&(0..4).map(among_three).collect::<Vec<_>>(), &Silent).expect("a weighting");
-        let picture = stage.picture(&target, &among_three(3), 0.0, &Silent).expect("a picture");
-        let [line] = &stage.record().left_out[..] else { panic!("one line") };
-        assert_eq!((line.what, line.left_out, line.of), ("encoded views", 1, 4));
-        // A later target that uses all four does not change what an earlier one would give.
-        stage.picture(&target, &Weights::mean(count), 0.0, &Silent).expect("a picture");
-        assert_eq!(stage.picture(&target, &among_three(3), 0.0, &Silent).expect("a picture"), picture);
-        picture
+        let among_three = |view| without(view, 3, 4);
+        on_sources(&sources, &TrainingFree::default(), &Silent, |stage| {
+            stage.weigh_by(&[0, 1, 2, 3].map(among_three), &Silent).expect("a weighting");
+            let render = |stage: &mut Stage<'_>, weights: &SourceWeights| {
+                stage.picture(&target, weights, 0.0, &Silent).expect("a picture")
+            };
+            let picture = render(stage, &among_three(3));
+            let [line] = &stage.record().left_out[..] else { panic!("one line") };
+            assert_eq!((line.what, line.left_out, line.of), ("encoded views", 1, 4));
+            // A later target that uses all four does not change what an earlier one would give.
+            render(stage, &Weights::mean(4));
+            assert_eq!(render(stage, &among_three(3)), picture);
+            picture
+        })
     };
     let (alone, beside) = (with_fourth(0.0), with_fourth(0.6));
     assert_eq!(alone, beside, "bit for bit");
@@ -303,9 +282,8 @@ fn extremes_give_finite_pictures() {
 
 #[test]
 fn the_room_is_better_than_a_copy() {
-    let scene = Scene::open(repository().join("tests/data/room")).expect("the sample");
-    let selection = Selection { targets: Some("2,5,8".to_owned()), ..Selection::default() };
-    let job = selection.resolve(&scene, 2).expect("a job");
+    let scene = sample("room");
+    let job = job(&scene, "0,1,3,4,6,7,9,10", "2,5,8");
     let options = RenderOptions { size: Some([160, 120]), ..RenderOptions::default() };
     let weighting = Weighting::open("error:alpha=1").expect("a scheme");
     let renderer = On { device: &Cpu, field: &TrainingFree::default() };
@@ -378,10 +356,10 @@ fn what_is_kept_of_the_sources_is_used_and_gives_the_same_picture() {
     let name = points.file_stem().expect("a name").to_string_lossy();
     for body in [Vec::new(), [f32::NAN; 3].map(f32::to_le_bytes).concat()] {
         std::fs::write(points, sealed(&name, &body)).expect("written");
-        let said = Warnings::default();
+        let said = Listener::default();
         assert_eq!(picture_saying(&field, &sources, &target, &said), expected);
-        let said = said.0.into_inner().expect("no panic");
-        let told = said.iter().filter(|own| own.contains("are not as they were kept")).count();
+        let said = BTreeSet::from_iter(said.warnings());
+        let told = said.iter().filter(|warning| warning.contains("are not as they were kept")).count();
         assert_eq!(told, 1, "{said:?}");
         assert_eq!(&std::fs::read(points).expect("made again"), bytes);
     }
@@ -408,7 +386,7 @@ fn second_disparities_are_the_same_bits_whether_the_first_comparison_is_kept_or_
     assert_eq!(picture_of(&cached, &sources, &target), expected, "compared again");
     // The second picture of a stage has what the first one kept.
     let weights = Weights::mean(sources.images.len() as u32);
-    let twice = on_stage(&fresh, &sources, |stage| {
+    let twice = on_stage(&fresh, &sources, &Silent, |stage| {
         [(); 2].map(|()| stage.picture(&target, &weights, 0.0, &Silent).expect("a picture"))
     });
     assert_eq!(twice, [expected.clone(), expected]);

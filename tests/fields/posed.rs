@@ -89,23 +89,23 @@ fn true_poses_pass() {
     let found = found(1.0, |_, _| 0.0);
     let verdict = found.verdict.as_ref().expect("true poses");
     assert_eq!(verdict.photos, (0..COUNT).collect::<Vec<_>>());
-    for own in &verdict.verified {
+    for image in &verdict.verified {
         assert!(
-            own.rotation_difference < 1.0e-6 && own.held_out.gain() > 1.0 && own.held_out.sharpness() > 1.0,
-            "{own:?}"
+            image.rotation_difference < 1.0e-6 && image.held_out.gain() > 1.0 && image.held_out.sharpness() > 1.0,
+            "{image:?}"
         );
     }
 }
 
 #[test]
-fn one_wrong_pose_is_left_out_by_name() {
+fn one_wrong_pose_is_excluded_by_name() {
     let found = found(1.0, |_, photo| if photo == 2 { 5.0 } else { 0.0 });
     let verdict = found.verdict.as_ref().expect("the others are true");
     assert!(!verdict.photos.contains(&2) && verdict.photos.len() >= 3, "{:?}", verdict.photos);
-    let left_out = found.excluded(Some(verdict));
+    let excluded = found.excluded(Some(verdict));
     assert!(
-        left_out.iter().any(|(name, why)| name == "002.jpg" && why.contains("left out and rendered")),
-        "{left_out:?}"
+        excluded.iter().any(|(name, why)| name == "002.jpg" && why.contains("left out and rendered")),
+        "{excluded:?}"
     );
 }
 

@@ -232,5 +232,4 @@ fn samplers_have_names() {
     let error = "huen".parse::<Sampler>().expect_err("no sampler");
     let names = Sampler::ALL.map(Sampler::name).join(", ");
     assert_eq!(error.to_string(), format!("unknown sampler; there are: {names}"));
-    assert_eq!(names, "heun, unipc, ipndm");
 }

@@ -10,20 +10,21 @@ use viewfuse::device::choice::AnyDevice;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::AnyField;
 use viewfuse::field::options::Given;
-use viewfuse::field::render::{RenderOptions, Stage, open_album};
+use viewfuse::field::render::RenderOptions;
 use viewfuse::field::rows;
 use viewfuse::job::progress::Silent;
 use viewfuse::nn::checkpoint::Checkpoint;
 use viewfuse::output::weights::WeightTable;
-use viewfuse::scene::few_shot::{Selection, Target};
 use viewfuse::scene::unit::{RigUnit, SRN_DISTANCE};
 use viewfuse::scene::write::{Layout, write};
 use viewfuse::scene::{Scene, SceneFrame};
+use viewfuse::weighting::sources::SourcePoses;
 use viewfuse::weighting::{Weighting, scheme_names};
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::pose::Pose;
-use viewfuse_tests::places::{data, repository};
+use viewfuse_tests::fields::{job, on_scene, sample};
+use viewfuse_tests::places::repository;
 
 const SCALES: [f64; 10] = [1.0e-9, 1.0e-7, 1.0e-5, 1.0e-3, 1.0e-1, 1.0e1, 1.0e3, 1.0e5, 1.0e7, 1.0e9];
 /// Those and the schemes of the pictures in the ordinary tests.
@@ -54,26 +55,18 @@ fn all() -> bool {
     std::env::var_os("VIEWFUSE_ALL_SCALES").is_some()
 }
 
-fn selection(sources: &str, target: &str) -> Selection {
-    Selection { sources: Some(sources.into()), targets: Some(target.into()), ..Selection::default() }
-}
-
 #[test]
 fn weights_are_the_same() {
     for (name, sources, target) in [("toy", "0..19", "20"), ("room", "0,1,3,4,6,7", "2"), ("car", "16,72,136", "48")] {
-        let scene = Scene::open(data(name)).expect("a scene");
-        let selection = selection(sources, target);
+        let scene = sample(name);
         let weightings: Vec<Weighting> =
             schemes().iter().map(|scheme| Weighting::open(scheme).expect("a scheme")).collect();
-        let table = |scene: &Scene| {
-            let job = selection.resolve(scene, 1).expect("a job");
-            WeightTable::of(scene, &job, &weightings).expect("weights")
-        };
+        let table = |scene: &Scene| WeightTable::of(scene, &job(scene, sources, target), &weightings).expect("weights");
         let expected = table(&scene);
         // Not all alike: a scheme that ignores the cameras would be the same at every scale, too.
         let gaussian = schemes().iter().position(|scheme| scheme.starts_with("gaussian")).expect("a scheme");
-        let own = expected.weights(gaussian, 0);
-        assert!(own.iter().any(|weight| (weight - own[0]).abs() > 0.01), "{name}: {own:?}");
+        let weights = expected.weights(gaussian, 0);
+        assert!(weights.iter().any(|weight| (weight - weights[0]).abs() > 0.01), "{name}: {weights:?}");
         for scale in SCALES {
             let (_folder, scene) = scaled(&scene, scale);
             let found = table(&scene);
@@ -95,29 +88,25 @@ fn weights_are_the_same() {
 /// The pictures of a target with each of these schemes.
 fn pictures(
     scene: &Scene,
-    selection: &Selection,
+    [sources, target]: [&str; 2],
     field: &AnyField,
     size: [u32; 2],
     schemes: &[String],
 ) -> Vec<Vec<u8>> {
-    let job = selection.resolve(scene, field.about().least_sources).expect("a job");
-    let device = AnyDevice::Cpu(Cpu);
-    let renderer = field.on(&device);
+    let (job, device) = (job(scene, sources, target), AnyDevice::Cpu(Cpu));
     let options = RenderOptions { size: Some(size), ..RenderOptions::default() };
-    let album =
-        open_album(scene, job.sources.iter().copied(), renderer.as_ref(), &options, &Silent).expect("photographs");
-    let mut stage = Stage::prepare(scene, &album, &job.sources, renderer.as_ref(), &options, &Silent).expect("sources");
-    let target = Target { truth: None, ..job.targets[0].clone() };
-    let of_scheme = |scheme: &String| {
-        let weighting = Weighting::open(scheme).expect("a scheme");
-        stage.weigh(&weighting, &Silent).expect("encoded");
-        stage.frame(&weighting, &target, &Silent).expect("a picture").picture.into_raw()
-    };
-    schemes.iter().map(of_scheme).collect()
+    on_scene(scene, &job, field.on(&device).as_ref(), &options, |stage| {
+        let picture = |scheme: &String| {
+            let weighting = Weighting::open(scheme).expect("a scheme");
+            stage.weigh(&weighting, &Silent).expect("encoded");
+            stage.frame(&weighting, &job.targets[0], &Silent).expect("a picture").picture.into_raw()
+        };
+        schemes.iter().map(picture).collect()
+    })
 }
 
 #[track_caller]
-fn assert_same_pictures(field: &str, name: &str, [sources, target]: [&str; 2], size: [u32; 2]) {
+fn assert_same_pictures(field: &str, name: &str, views: [&str; 2], size: [u32; 2]) {
     let opened = match field {
         "training-free" => AnyField::default(),
         model => {
@@ -129,14 +118,13 @@ fn assert_same_pictures(field: &str, name: &str, [sources, target]: [&str; 2], s
         true => (SCALES.to_vec(), schemes()),
         false => (FEW.0.to_vec(), FEW.1.map(str::to_owned).to_vec()),
     };
-    let scene = Scene::open(data(name)).expect("a scene");
-    let selection = selection(sources, target);
-    let expected = pictures(&scene, &selection, &opened, size, &schemes);
+    let scene = sample(name);
+    let expected = pictures(&scene, views, &opened, size, &schemes);
     let is_something = |picture: &Vec<u8>| picture.iter().any(|level| level.abs_diff(picture[0]) > 32);
     assert!(expected.iter().all(is_something), "{field}, {name}: an empty picture");
     for scale in scales {
         let (_folder, scene) = scaled(&scene, scale);
-        let made = pictures(&scene, &selection, &opened, size, &schemes);
+        let made = pictures(&scene, views, &opened, size, &schemes);
         let apart = |(a, b): (&Vec<u8>, &Vec<u8>)| a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0);
         let (worst, scheme) = made.iter().zip(&expected).map(apart).zip(&schemes).max().expect("a scheme");
         let scheme =
@@ -164,14 +152,14 @@ fn ring(radius: f32) -> Vec<Camera> {
 
 #[test]
 fn srn_keeps_its_bits_and_other_units_become_its_own() {
-    let own = ring(SRN_DISTANCE);
-    assert!(RigUnit::of(&own).is_world());
+    let unscaled = ring(SRN_DISTANCE);
+    assert!(RigUnit::of(&unscaled).is_world());
     for scale in [1.0e-9_f32, 3.0e-4, 0.5, 2.0, 777.0, 1.0e9] {
         let scaled = ring(SRN_DISTANCE * scale);
         let unit = RigUnit::of(&scaled);
         assert!((unit.length() / scale - 1.0).abs() < 1.0e-5, "{scale}: {unit:?}");
-        for (own, scaled) in own.iter().zip(&scaled) {
-            let apart = own.pose.distance(&unit.pose(&scaled.pose));
+        for (camera, scaled) in unscaled.iter().zip(&scaled) {
+            let apart = camera.pose.distance(&unit.pose(&scaled.pose));
             assert!(apart < 1.0e-5, "{scale}: {apart}");
             assert_eq!(unit.pose(&scaled.pose).forward_world(), scaled.pose.forward_world());
         }
@@ -201,8 +189,7 @@ fn mirrored_neighbours_have_equal_weights() {
             let centre = radius * (Vec3::new(angle.cos(), angle.sin(), 0.3)).normalize();
             unit.pose(&Pose::look_at(centre, Vec3::ZERO, Vec3::Z).expect("a pose"))
         };
-        let sources =
-            viewfuse::weighting::sources::SourcePoses::new(&[at(1.0 - turn), at(1.0 + turn)]).expect("sources");
+        let sources = SourcePoses::new(&[at(1.0 - turn), at(1.0 + turn)]).expect("sources");
         let weights = weighting.weigh(&sources, &at(1.0));
         assert!((weights.get(0) - 0.5).abs() < 1.0e-5, "{turn}: {:?}", &weights.values()[..2]);
     }

@@ -80,7 +80,7 @@ pub(crate) const ALL: [Row; 26] = [
     ("gaussians", || Box::new(gaussians::Gaussians::new())),
     ("shell", || Box::new(shell::Shell)),
     ("specs", || Box::new(parsers::Specs)),
-    ("views", || Box::new(parsers::Views::new())),
+    ("views", || Box::new(parsers::ViewLists::new())),
     ("capi", || Box::new(capi::Face::new())),
 ];
 
@@ -95,7 +95,7 @@ const FALLING: [Row; 5] = [
 
 /// The target of this name.
 pub(crate) fn named(name: &str) -> Box<dyn Target> {
-    let row = ALL.iter().chain(&FALLING).find(|(own, _)| *own == name);
+    let row = ALL.iter().chain(&FALLING).find(|(known, _)| *known == name);
     row.map_or_else(|| panic!("there is no target {name}"), |(_, make)| make())
 }
 

@@ -29,9 +29,9 @@ fn assert_same_census(swept: &Swept, grey: &Vec<Planes>, evidence: &Vec<Planes>,
     for group in part * row_len..row_count * row_len {
         bodies::census_cost(frustum, pairs, grey, evidence, &mut costs[..], group);
     }
-    let mut own = vec![none; costs.len()];
-    Cpu.census_cost(frustum, part, row_count - part, pairs, grey, evidence, &mut own).expect("the CPU computes");
-    assert_eq!(bits(&own), bits(&costs), "{what}");
+    let mut parts = vec![none; costs.len()];
+    Cpu.census_cost(frustum, part, row_count - part, pairs, grey, evidence, &mut parts).expect("the CPU computes");
+    assert_eq!(bits(&parts), bits(&costs), "{what}");
 }
 
 #[test]

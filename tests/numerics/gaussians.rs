@@ -47,7 +47,7 @@ fn by_pixel(column: u32, row: u32) -> [f32; 4] {
 }
 
 /// The loss, a sum over pixels and channels, in `f64`. The opacity at which splats begin to count is a step of the
-/// loss: pixels where a splat's is near it are left out, the same for all evaluations.
+/// loss: pixels where a splat's is near it are excluded, the same for all evaluations.
 fn loss(gaussians: &[GaussianBlock], counted: &[bool]) -> f64 {
     let [width, height] = SIZE;
     let splats: Vec<ProjectedGaussian> = gaussians.iter().map(rounded).collect();
@@ -95,10 +95,10 @@ fn counted(gaussians: &[GaussianBlock]) -> Vec<bool> {
 }
 
 /// The 14 parameters of a Gaussian, in the order of its fields.
-fn parameters(own: &mut GaussianBlock) -> [&mut f32; 14] {
-    let ([x, y, z], [a, b, c]) = (&mut own.position, &mut own.log_scales);
-    let ([w, i, j, k], [red, green, blue]) = (&mut own.rotation, &mut own.colour);
-    [x, y, z, &mut own.opacity, a, b, c, w, i, j, k, red, green, blue]
+fn parameters(gaussian: &mut GaussianBlock) -> [&mut f32; 14] {
+    let ([x, y, z], [a, b, c]) = (&mut gaussian.position, &mut gaussian.log_scales);
+    let ([w, i, j, k], [red, green, blue]) = (&mut gaussian.rotation, &mut gaussian.colour);
+    [x, y, z, &mut gaussian.opacity, a, b, c, w, i, j, k, red, green, blue]
 }
 
 #[test]
@@ -113,24 +113,24 @@ fn the_fast_exponential_is_within_its_error() {
 
 #[test]
 fn derivatives_are_those_of_differences() {
-    let (own, [width, height]) = (gaussians(), SIZE);
-    let counted = counted(&own);
+    let (gaussians, [width, height]) = (gaussians(), SIZE);
+    let counted = counted(&gaussians);
     assert!(counted.iter().filter(|counted| **counted).count() > counted.len() / 2, "most pixels are compared");
     let splatter = Splatter { device: &Cpu, near: NEAR, background: BACKGROUND };
-    let uploaded = Cpu.upload(&own).expect("memory");
-    let picture = splatter.picture(&uploaded, own.len(), &camera()).expect("a picture");
+    let uploaded = Cpu.upload(&gaussians).expect("memory");
+    let picture = splatter.picture(&uploaded, gaussians.len(), &camera()).expect("a picture");
     let pixels = 0..width * height;
     let by_pixels: Vec<[f32; 4]> = pixels
         .map(|pixel| if counted[pixel as usize] { by_pixel(pixel % width, pixel / width) } else { [0.0; 4] })
         .collect();
     let mut gradients = splatter.gradients(&uploaded, &picture, &by_pixels).expect("derivatives");
     assert!(picture.lists.in_sight.iter().all(|in_sight| *in_sight));
-    for index in 0..own.len() {
+    for index in 0..gaussians.len() {
         let analytic = parameters(&mut gradients[index]).map(|value| f64::from(*value));
         let largest = analytic.iter().map(|value| value.abs()).fold(0.0, f64::max);
         for (parameter, analytic) in analytic.into_iter().enumerate() {
             let at = |offset: f32| {
-                let mut moved = own.clone();
+                let mut moved = gaussians.clone();
                 let value = &mut *parameters(&mut moved[index])[parameter];
                 *value += offset;
                 (f64::from(*value), loss(&moved, &counted))

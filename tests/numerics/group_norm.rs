@@ -37,14 +37,14 @@ fn expected(inputs: &[f32], weights: &[f32], bias: &[f32], block: &GroupNormBloc
     let input = |pixel: usize, channel: usize| f64::from(inputs[first + pixel * pitch + channel]);
     let mut expected = vec![0.0; pixels * channels];
     for group in 0..groups {
-        let own = channels / groups * group..channels / groups * (group + 1);
+        let members = channels / groups * group..channels / groups * (group + 1);
         let values: Vec<f64> =
-            own.clone().flat_map(|channel| (0..pixels).map(move |pixel| input(pixel, channel))).collect();
+            members.clone().flat_map(|channel| (0..pixels).map(move |pixel| input(pixel, channel))).collect();
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64;
         let spread = variance + f64::from(block.variance_floor);
         let factor = if spread > 0.0 { 1.0 / spread.sqrt() } else { 0.0 };
-        for channel in own {
+        for channel in members {
             for pixel in 0..pixels {
                 let value = (input(pixel, channel) - mean) * factor * f64::from(weights[channel]);
                 let value = value + f64::from(bias[channel]);

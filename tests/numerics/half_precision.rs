@@ -126,7 +126,7 @@ fn half_the_memory() {
     let halves = line(&in_halves, "volume bytes");
     assert_eq!((whole.switch, whole.left_out), (false, 0));
     assert_eq!((halves.switch, halves.left_out * 2, halves.of), (true, whole.of, whole.of));
-    // Rows cannot be left out then: what they are made of is not kept.
+    // Rows cannot be omitted then: what they are made of is not kept.
     assert!(line(&in_whole, "volume rows").switch);
     let rows = line(&in_halves, "volume rows");
     assert_eq!((rows.switch, rows.left_out, rows.of), (false, 0, u64::from(VIEWS * SIDE)));

@@ -86,10 +86,10 @@ fn most(embedding: &FourierEmbedding, used: &QuantisedAttention, distance: f32, 
     for _ in 0..draws {
         let (sources, target) = (random.sources(distance), random.pose(distance));
         let change = difference(&quantised_attention(used, &sources, &target), &exact(embedding, &sources, &target));
-        let own = change_bound(embedding, &told, &sources, &target);
-        broken += usize::from(!(change <= own.weight + ARITHMETIC));
+        let allowed = change_bound(embedding, &told, &sources, &target);
+        broken += usize::from(!(change <= allowed.weight + ARITHMETIC));
         seen = seen.max(change);
-        bound = Change { logit: bound.logit.max(own.logit), weight: bound.weight.max(own.weight) };
+        bound = Change { logit: bound.logit.max(allowed.logit), weight: bound.weight.max(allowed.weight) };
     }
     (seen, bound, broken)
 }
@@ -194,8 +194,8 @@ fn readings_equal_numbers<T: Reading>(readings: [[T; 5]; VIEWS], weights: &Weigh
 fn readings_are_fused_as_their_numbers() {
     let weights = Weights::from_scores(&[0.3, 1.0, 0.0, 2.5, 0.1, 0.7, 0.9, 4.0], 7);
     let whole = |view: usize, channel: usize| (view * 7919 + channel * 104_729) as u32;
-    let of = |view: usize| std::array::from_fn(|channel| whole(view, channel));
-    let words: [[u32; 5]; VIEWS] = std::array::from_fn(of);
+    let row = |view: usize| std::array::from_fn(|channel| whole(view, channel));
+    let words: [[u32; 5]; VIEWS] = std::array::from_fn(row);
     readings_equal_numbers(words.map(|view| view.map(|word| word as u8)), &weights);
     readings_equal_numbers(words.map(|view| view.map(|word| word as u16)), &weights);
     readings_equal_numbers(words.map(|view| view.map(|word| word as i16)), &weights);

@@ -34,8 +34,8 @@ fn beyond_an_image_its_border_goes_on() {
     // The border shows the object: the image cuts it off, and says nothing of what is beyond.
     assert_eq!(alpha(&world), 1.0);
     assert!(shade(&world) != EMPTY);
-    let own = first.first_texel as usize..(first.first_texel + first.width * first.height) as usize;
-    let last_column = own.skip(first.width as usize - 1).step_by(first.width as usize);
+    let texels = first.first_texel as usize..(first.first_texel + first.width * first.height) as usize;
+    let last_column = texels.skip(first.width as usize - 1).step_by(first.width as usize);
     last_column.for_each(|texel| world.texels[texel] = [0.0; 4]);
     // The border shows background: the object ends inside the image.
     assert_eq!(alpha(&world), 0.0);

@@ -116,7 +116,7 @@ fn the_omission_bound_is_reached_and_can_fail() {
 }
 
 #[test]
-fn nothing_is_left_out_for_free() {
+fn nothing_is_omitted_for_free() {
     let weights = Weights::from_scores(&[0.0_f32, 0.5, 0.5], 3);
     for total in [0.0, -1.0, f32::NAN] {
         let omission = weights.without_least(total);

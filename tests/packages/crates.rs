@@ -31,15 +31,15 @@ const PROGRAMS: [&str; 2] = ["viewfuse-cli", "viewfuse-lab"];
 
 /// What is wrong with the dependencies of these packages.
 fn disorder(packages: &[Value]) -> Vec<String> {
-    let place = |name: &str| ORDER.iter().position(|own| *own == name);
+    let place = |name: &str| ORDER.iter().position(|row| *row == name);
     let mut problems = Vec::new();
     for package in packages {
         let name = text(package, "name");
         // Tests may use everything.
         for dependency in list(package, "dependencies").iter().filter(|dependency| dependency["kind"] != "dev") {
             let other = text(dependency, "name");
-            if let (Some(own), Some(used)) = (place(name), place(other))
-                && used >= own
+            if let (Some(user), Some(used)) = (place(name), place(other))
+                && used >= user
             {
                 problems.push(format!("{name} uses {other}, which stands behind it"));
             }

@@ -208,10 +208,10 @@ fn faults_inside(folder: &Path, inside: Option<&str>) -> Vec<String> {
             continue;
         }
         for (line, used) in uses(&Source::read(&path).code, parts.len(), &root, inside) {
-            if let (Some(own), Some(other)) = (place(&parts[0]), place(&used))
-                && (other > own || other == own && used != parts[0])
+            if let (Some(user), Some(other)) = (place(&parts[0]), place(&used))
+                && (other > user || other == user && used != parts[0])
             {
-                let place = if other > own { "listed behind" } else { "of the same kind as" };
+                let place = if other > user { "listed behind" } else { "of the same kind as" };
                 faults.push(format!("{}:{line} uses {used}, which is {place} {}", file.display(), parts[0]));
             }
         }
@@ -232,7 +232,7 @@ fn modules_stand_in_the_order_of_the_data() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// The list of modules names no field: those have a row in `rows.rs`, and no other module is left out.
+/// The list of modules names no field: those have a row in `rows.rs`, and no other module is missing.
 #[test]
 fn modules_that_are_not_named_are_fields() {
     let source = repository().join("host/field/src");

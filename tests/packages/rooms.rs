@@ -60,7 +60,7 @@ fn every_test_is_run() {
 #[test]
 fn no_path_leads_out_of_the_repository() {
     let beside = concat!("../", "shared");
-    let comparisons = ["", "_gaussians", "_genvs", "_training"].map(|of| format!("tests/compare_pytorch{of}"));
+    let comparisons = ["", "_gaussians", "_genvs", "_training"].map(|suffix| format!("tests/compare_pytorch{suffix}"));
     let scripts = ["tests/run", ".ci/run", "README.md", "Cargo.toml"].map(str::to_owned).into_iter().chain(comparisons);
     let mut paths: Vec<PathBuf> = scripts.map(|file| repository().join(file)).collect();
     for extension in ["rs", "toml", "md", "c", "h", "py"] {

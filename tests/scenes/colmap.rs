@@ -1,4 +1,4 @@
-//! COLMAP's models: both forms, where they stand, what is left out and what is refused.
+//! COLMAP's models: both forms, where they stand, what is dropped and what is refused.
 
 use super::made::*;
 use viewfuse::scene::Scene;
@@ -59,7 +59,7 @@ fn extensions_may_have_changed_and_points_may_be_missing() {
 }
 
 #[test]
-fn missing_photographs_are_left_out_and_counted_once() {
+fn missing_photographs_are_dropped_and_counted_once() {
     for folder in [colmap_text(), colmap_binary()] {
         folder.remove("images/b 2.png");
         let scene = open(&folder);

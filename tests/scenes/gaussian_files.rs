@@ -83,23 +83,23 @@ fn nerfstudios_world_is_undone() {
 #[test]
 fn properties_and_comments_mean_what_their_writers_mean() {
     let scene = drawn(3, 0, 2);
-    let own = |to: &str| changed(&scene, &[("comment viewfuse\n", &format!("comment {to}\n"))]);
+    let by = |to: &str| changed(&scene, &[("comment viewfuse\n", &format!("comment {to}\n"))]);
     for mip in ["SplatRenderMode: mip", "antialiased 1"] {
-        assert!(own(mip).expect(mip).scene.is_antialiased);
+        assert!(by(mip).expect(mip).scene.is_antialiased);
     }
-    assert!(!own("SplatRenderMode: default").expect("the default").scene.is_antialiased);
+    assert!(!by("SplatRenderMode: default").expect("the default").scene.is_antialiased);
     for (comment, word) in [
         ("SplatRenderMode: banana", "this way of drawing is not known"),
         ("kernel_size 0.1", "dilated by 0.3"),
         ("ColorSpace: linear", "only sRGB"),
         ("SH order: coefficient-major", "\"SH order: coefficient-major\""),
     ] {
-        match own(comment) {
+        match by(comment) {
             Err(told) => assert!(told.contains(":66: ") && told.contains(word), "{told}"),
             Ok(file) => assert!(file.notes[0].contains(word), "{:?}", file.notes),
         }
     }
-    assert!(own("by nobody").expect("a file").notes[0].contains("\"by nobody\" is not known"));
+    assert!(by("by nobody").expect("a file").notes[0].contains("\"by nobody\" is not known"));
     // mip-splatting's filter: wider, and as much fainter.
     let folder = folder();
     let path = folder.path().join("a.ply");
@@ -204,13 +204,16 @@ fn compressed_ply_is_read() {
     let folder = folder();
     let path = folder.path().join("a.ply");
     std::fs::write(&path, bytes).expect("a file");
-    let own = read(&path).expect("a file").scene.gaussians[0];
-    assert_eq!((own.position, own.log_scales), ([1.0, -2.0, 3.0], [-5.0; 3]));
+    let first = read(&path).expect("a file").scene.gaussians[0];
+    assert_eq!((first.position, first.log_scales), ([1.0, -2.0, 3.0], [-5.0; 3]));
     let root = std::f32::consts::FRAC_1_SQRT_2;
     let close = |a: f32, b: f32| (a - b).abs() < 2.0e-3;
     // The greatest is x; w is at the end of its range.
-    assert!(close(own.rotation[0], root) && close(own.rotation[1], root) && close(own.rotation[2], 0.0), "{own:?}");
-    assert!(close(own.f_dc[0], 0.5 / 0.282_094_8) && close(own.f_dc[1], -0.5 / 0.282_094_8), "{own:?}");
+    assert!(
+        close(first.rotation[0], root) && close(first.rotation[1], root) && close(first.rotation[2], 0.0),
+        "{first:?}"
+    );
+    assert!(close(first.f_dc[0], 0.5 / 0.282_094_8) && close(first.f_dc[1], -0.5 / 0.282_094_8), "{first:?}");
 }
 
 /// What strict readers demand of a header, by their documents and sources. `Err` is what they stumble over.
@@ -228,13 +231,13 @@ fn properties<'a>(lines: &[&'a str]) -> Vec<&'a str> {
 fn sibr(lines: &[&str]) -> Result<(), String> {
     need(lines[0] == "ply" && lines[2].starts_with("element vertex "), "the third line")?;
     let properties = properties(lines);
-    need(properties.len() == 62 && properties.iter().all(|own| own.starts_with("float ")), "62 floats")?;
+    need(properties.len() == 62 && properties.iter().all(|line| line.starts_with("float ")), "62 floats")?;
     need(properties[3] == "float nx" && properties[9] == "float f_rest_0" && properties[54] == "float opacity", "order")
 }
 
 /// INRIA's `load_ply`: 45 coefficients are asserted.
 fn inria(lines: &[&str]) -> Result<(), String> {
-    need(properties(lines).iter().filter(|own| own.contains(" f_rest_")).count() == 45, "45 f_rest")
+    need(properties(lines).iter().filter(|line| line.contains(" f_rest_")).count() == 45, "45 f_rest")
 }
 
 /// antimatter15's converter: little endian, an element vertex; values are looked up by name.
@@ -248,7 +251,7 @@ fn antimatter(lines: &[&str]) -> Result<(), String> {
 /// gsplat.js (PLYLoader.ts): the header is in the first 10 KiB; every property is a float or an int.
 fn gsplat(lines: &[&str]) -> Result<(), String> {
     need(lines.iter().map(|line| line.len() + 1).sum::<usize>() < 10 * 1024, "10 KiB")?;
-    need(properties(lines).iter().all(|own| own.starts_with("float ") || own.starts_with("int ")), "types")
+    need(properties(lines).iter().all(|line| line.starts_with("float ") || line.starts_with("int ")), "types")
 }
 
 /// PlayCanvas and SuperSplat (the engine's ply.js, read-ply.ts of splat-transform): known words only, a text behind
@@ -269,7 +272,7 @@ fn three(lines: &[&str]) -> Result<(), String> {
     let comments = lines.iter().filter(|line| line.starts_with("comment"));
     let words = ["packed_", "f_rest_", "end_header", "element chunk"];
     need(!comments.into_iter().any(|line| words.iter().any(|word| line.contains(word))), "comments")?;
-    let count = properties(lines).iter().filter(|own| own.contains(" f_rest_")).count();
+    let count = properties(lines).iter().filter(|line| line.contains(" f_rest_")).count();
     need([0, 9, 24, 45].contains(&count) && lines.last() == Some(&"end_header"), "degree")
 }
 

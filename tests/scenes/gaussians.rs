@@ -52,9 +52,9 @@ fn a_scene_that_was_moved_and_scaled_keeps_its_place_in_its_files() {
     let scene = drawn(40, 1, 9);
     let frame = SceneFrame { origin: DVec3::new(4.0e6, -7.0e6, 120.0), scale: 250.0 };
     let (_folder, path) = written(&scene, &frame);
-    let own = GaussianScene::read(&path, &frame).expect("our own file");
-    assert_eq!(own.f_rest, scene.f_rest);
-    for (read, kept) in own.gaussians.iter().zip(&scene.gaussians) {
+    let file = GaussianScene::read(&path, &frame).expect("our own file");
+    assert_eq!(file.f_rest, scene.f_rest);
+    for (read, kept) in file.gaussians.iter().zip(&scene.gaussians) {
         assert_eq!((read.f_dc, read.rotation, read.opacity), (kept.f_dc, kept.rotation, kept.opacity));
         (0..3).for_each(|axis| assert!((read.position[axis] - kept.position[axis]).abs() < 1.0e-6));
         (0..3).for_each(|axis| assert!((read.log_scales[axis] - kept.log_scales[axis]).abs() < 1.0e-6));

@@ -117,8 +117,8 @@ fn a_real_photograph_through_nerfstudios_polynomial() {
         let inner = |x: u32, y: u32| (20..width - 20).contains(&x) && (20..height - 20).contains(&y);
         let pixels = truth.enumerate_pixels().filter(|(x, y, _)| inner(*x, *y));
         let errors: Vec<f64> = pixels
-            .flat_map(|(x, y, own)| {
-                [0, 1, 2].map(|c| (f64::from(own[c]) - f64::from(found.get_pixel(x, y)[c])).powi(2))
+            .flat_map(|(x, y, colour)| {
+                [0, 1, 2].map(|c| (f64::from(colour[c]) - f64::from(found.get_pixel(x, y)[c])).powi(2))
             })
             .collect();
         10.0 * (255.0 * 255.0 * errors.len() as f64 / errors.iter().sum::<f64>()).log10()
@@ -168,7 +168,7 @@ fn what_the_lens_did_not_see_is_not_scored() {
         let scale = SIZE[0] / size[0];
         let exact = RgbImage::from_fn(size[0], size[1], |x, y| {
             let covered = (0..scale).flat_map(|i| (0..scale).map(move |j| pixel_centre(x * scale + i, y * scale + j)));
-            let sum = covered.map(colour).fold([0.0; 3], |sum, own| [0, 1, 2].map(|c| sum[c] + own[c]));
+            let sum = covered.map(colour).fold([0.0; 3], |sum, texel| [0, 1, 2].map(|c| sum[c] + texel[c]));
             Rgb(sum.map(|sum| (sum / f64::from(scale * scale)).round() as u8))
         });
         let mut wrong_outside = exact.clone();
@@ -187,11 +187,11 @@ fn what_the_lens_did_not_see_is_not_scored() {
         assert!(over_all < psnr - 10.0, "{over_all} {psnr}");
         // The metrics of an evaluation agree.
         let metrics = Metrics::plain(&Cpu);
-        let of = |prediction: &RgbImage| {
+        let scores = |prediction: &RgbImage| {
             let scored = metrics.score(prediction, &truth.picture, truth.seen.as_ref()).expect("scores");
             (scored[0].value, scored[1].value)
         };
-        assert_eq!((of(&exact), of(&wrong_outside)), ((psnr, ssim), (psnr, ssim)));
+        assert_eq!((scores(&exact), scores(&wrong_outside)), ((psnr, ssim), (psnr, ssim)));
         let small = image::GrayImage::new(3, 3);
         assert!(metrics.score(&exact, &truth.picture, Some(&small)).is_err());
     }

@@ -38,7 +38,7 @@ fn a_page_of_forty_thousand_gaussians_is_small() {
     assert!(!page.contains("{{"), "a value is missing");
     // Whatever it refers to is in it.
     let outside = ["src=\"http", "href=\"http", "@import", "<link rel=\"stylesheet"];
-    assert!(outside.iter().all(|own| !page.contains(own)));
+    assert!(outside.iter().all(|word| !page.contains(word)));
 }
 
 #[test]

@@ -106,8 +106,8 @@ fn the_world_of_nerfstudios_training() {
     let open_path =
         || CameraPath::open(&folder.path().join("run/camera_path.json"), &scene, &scene.views[0].camera.pinhole);
     let camera = open_path().expect("a path").cameras[0].camera;
-    let own = scene.views[0].camera.pose.to_opencv();
-    for (row, expected) in camera.pose.to_opencv().iter().zip(own) {
+    let rows = scene.views[0].camera.pose.to_opencv();
+    for (row, expected) in camera.pose.to_opencv().iter().zip(rows) {
         row.iter().zip(expected).for_each(|(value, expected)| assert!((value - expected).abs() < 1.0e-5, "{row:?}"));
     }
     folder.write(

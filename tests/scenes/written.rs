@@ -4,10 +4,11 @@ use super::made::*;
 use glam::DVec3;
 use serde_json::json;
 use std::path::Path;
-use viewfuse::job::progress::{Progress, Silent};
+use viewfuse::job::progress::Silent;
 use viewfuse::scene::write::{Layout, WriteSceneError, Written, write};
 use viewfuse::scene::{MaskChoice, MaskMeaning, Scene, Split, View};
 use viewfuse_core::lens::{Lens, Projection};
+use viewfuse_tests::listener::Listener;
 use viewfuse_tests::scenes::{self, Folder};
 
 fn written(scene: &Scene, layout: Layout) -> (Folder, Scene, Written) {
@@ -224,14 +225,8 @@ fn what_a_layout_cannot_hold_is_refused_and_leaves_nothing() {
     let scene = open(&broken);
     broken.write("images/1.png", "no image");
     assert!(matches!(write(&scene, Layout::Srn, &path, &Silent), Err(WriteSceneError::Scene(_))));
-    struct Stopped;
-    impl Progress for Stopped {
-        fn is_cancelled(&self) -> bool {
-            true
-        }
-    }
-    let scene = open(&colmap);
-    assert!(matches!(write(&scene, Layout::Colmap, &path, &Stopped), Err(WriteSceneError::Interrupted(_))));
+    let (scene, stopping) = (open(&colmap), Listener::stops_after(0));
+    assert!(matches!(write(&scene, Layout::Colmap, &path, &stopping), Err(WriteSceneError::Interrupted(_))));
     assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 0);
     // What is there stays; an empty folder is filled.
     folder.write("out/mine.txt", "mine");
@@ -395,7 +390,7 @@ fn hostile_names_are_given_back_or_refused() {
                     let read = Scene::open(&path).unwrap_or_else(|error| panic!("{layout}: {error}"));
                     assert_eq!(read.views.len(), 2, "{layout}: {name:?}");
                     for (index, view) in scene.views.iter().enumerate() {
-                        let back = read.views.iter().position(|own| own.name == view.name);
+                        let back = read.views.iter().position(|known| known.name == view.name);
                         let back = back.unwrap_or_else(|| panic!("{layout}: {name:?}: {:?}", self::names(&read)));
                         assert_eq!(scene.photograph(index).ok(), read.photograph(back).ok(), "{layout}: {name:?}");
                         let centre = |scene: &Scene, view: usize| scene.views[view].camera.pose.centre_world();

@@ -35,7 +35,7 @@ fn by_value(source: &str) -> Vec<String> {
     let with_itself = words.windows(4).filter(|four| {
         let [left, sign, equal, right] = four else { return false };
         // Of a constant, what stands before it is compared: `x & BITS != BITS`.
-        let is_name = left.starts_with(|own: char| own.is_lowercase());
+        let is_name = left.starts_with(|first: char| first.is_lowercase());
         is_name && left == right && sign == "!" && equal == "="
     });
     named.chain(with_itself.map(|four| four.concat())).collect()
@@ -65,9 +65,9 @@ fn a_test_by_value_in_a_source_is_seen() {
 fn tests_by_value(module: &Module) -> Vec<&Instruction> {
     // Not `x == x`: the compiler writes it for every conversion to a whole number, whose result for NaN is 0.
     const INEQUALITIES: [Op; 2] = [Op::FOrdNotEqual, Op::FUnordNotEqual];
-    let is_one = |own: &&Instruction| match own.class.opcode {
+    let is_one = |instruction: &&Instruction| match instruction.class.opcode {
         Op::IsNan | Op::IsInf | Op::IsFinite | Op::IsNormal | Op::Ordered | Op::Unordered => true,
-        code => INEQUALITIES.contains(&code) && own.operands[0] == own.operands[1],
+        code => INEQUALITIES.contains(&code) && instruction.operands[0] == instruction.operands[1],
     };
     module.all_inst_iter().filter(is_one).collect()
 }
@@ -80,13 +80,13 @@ fn no_compiled_kernel_tests_by_value() {
         let mut found = BTreeMap::new();
         tests_by_value(&module)
             .into_iter()
-            .for_each(|own| *found.entry(format!("{:?}", own.class.opcode)).or_insert(0) += 1);
+            .for_each(|instruction| *found.entry(format!("{:?}", instruction.class.opcode)).or_insert(0) += 1);
         assert!(found.is_empty(), "{found:?}");
         // The search sees one.
         let block = &mut module.functions[0].blocks[0];
         let x = Operand::IdRef(1);
-        let own = Instruction::new(Op::FUnordNotEqual, Some(2), Some(3), vec![x.clone(), x]);
-        block.instructions.insert(0, own);
+        let test = Instruction::new(Op::FUnordNotEqual, Some(2), Some(3), vec![x.clone(), x]);
+        block.instructions.insert(0, test);
         assert_eq!(tests_by_value(&module).len(), 1);
     }
 }

@@ -258,7 +258,8 @@ fn a_loop_is_straightened_and_computes_the_same() {
         // The exit is gone, and with it the second decision.
         let left = &module.functions[0].blocks;
         let decisions = left.iter().flat_map(|block| &block.instructions);
-        let decisions = decisions.filter(|own| matches!(own.class.opcode, Op::BranchConditional | Op::SelectionMerge));
+        let decisions = decisions
+            .filter(|instruction| matches!(instruction.class.opcode, Op::BranchConditional | Op::SelectionMerge));
         assert_eq!((left.len(), decisions.count()), (blocks - 1, 1));
         assert_eq!(straighten(&mut module), 0);
     }

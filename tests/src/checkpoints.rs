@@ -241,6 +241,19 @@ pub fn changed(made: &Checkpoint, change: impl FnOnce(&mut Vec<(TensorShape, Vec
     Checkpoint::in_memory("changed", tensors, made.metadata().clone())
 }
 
+/// Times this, every weight of a made network is finite still; what becomes of numbers that meet several of them is not.
+pub const LARGE: f32 = 1.9e38;
+
+/// A checkpoint with all numbers of the tensors of which this is true multiplied; there is one.
+#[track_caller]
+pub fn multiplied(made: &Checkpoint, is_one: impl Fn(&str) -> bool, factor: f32) -> Checkpoint {
+    changed(made, |tensors| {
+        let chosen: Vec<_> = tensors.iter_mut().filter(|(tensor, _)| is_one(&tensor.name)).collect();
+        assert!(!chosen.is_empty(), "none of these tensors");
+        chosen.into_iter().flat_map(|(_, values)| values).for_each(|value| *value *= factor);
+    })
+}
+
 /// A file with these bytes, in a folder that goes away.
 pub fn file(bytes: &[u8]) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a folder");

@@ -76,13 +76,13 @@ impl Emulator {
             cargo.env_remove(name);
         }
         let mut is_compiled = false;
-        for own in boards {
-            cargo.args(["--target", own.board.target]);
-            is_compiled |= own.compiles_the_library();
-            match &own.library {
+        for firmware in boards {
+            cargo.args(["--target", firmware.board.target]);
+            is_compiled |= firmware.compiles_the_library();
+            match &firmware.library {
                 Library::Installed | Library::Component => {}
                 Library::Sources(folder) => _ = cargo.env("__CARGO_TESTS_ONLY_SRC_ROOT", folder),
-                Library::Archive(archive) => _ = cargo.env("__CARGO_TESTS_ONLY_SRC_ROOT", own.unpacked(archive)?),
+                Library::Archive(archive) => _ = cargo.env("__CARGO_TESTS_ONLY_SRC_ROOT", firmware.unpacked(archive)?),
             }
         }
         if is_compiled {

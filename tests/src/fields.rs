@@ -4,14 +4,58 @@ use std::sync::Arc;
 use viewfuse::device::Device;
 use viewfuse::device::choice::AnyDevice;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::field::render::{RenderOptions, Stage};
-use viewfuse::field::{AnyField, Field, FieldError, LeftOut, On, Record, Rendered};
+use viewfuse::field::render::{RenderOptions, Stage, open_album};
+use viewfuse::field::{AnyField, Field, FieldError, LeftOut, On, Record, Rendered, Renderer};
 use viewfuse::job::progress::{Progress, Silent};
+use viewfuse::scene::Scene;
+use viewfuse::scene::few_shot::{FewShot, Selection};
 use viewfuse::scene::photographs::SourceImages;
 use viewfuse::weighting::Weighting;
 use viewfuse::weighting::sources::{MAX_SOURCES, SourcePoses, SourceWeights};
 use viewfuse_core::camera::Camera;
 use viewfuse_core::weights::Weights;
+
+/// A scene of `tests/data`.
+pub fn sample(name: &str) -> Scene {
+    Scene::open(crate::places::data(name)).expect("a scene")
+}
+
+/// Targets from sources, each as an option names them.
+pub fn job(scene: &Scene, sources: &str, targets: &str) -> FewShot {
+    let [sources, targets] = [sources, targets].map(|views| Some(views.to_owned()));
+    Selection { targets, sources, ..Selection::default() }.resolve(scene, 1).expect("views")
+}
+
+/// Weights of the first of so many views, by their scores; the others have none.
+pub fn weights<const N: usize>(scores: [f32; N], count: u32) -> SourceWeights {
+    let mut all = [0.0; MAX_SOURCES];
+    all[..N].copy_from_slice(&scores);
+    Weights::from_scores(&all, count)
+}
+
+/// Calls `act` with the sources of a job, prepared; the photographs of its targets are there.
+pub fn on_scene<T>(
+    scene: &Scene,
+    job: &FewShot,
+    renderer: &dyn Renderer,
+    options: &RenderOptions,
+    act: impl FnOnce(&mut Stage<'_>) -> T,
+) -> T {
+    let shown = job.sources.iter().copied().chain(job.targets.iter().filter_map(|target| target.truth));
+    let album = open_album(scene, shown, renderer, options, &Silent).expect("photographs");
+    act(&mut Stage::prepare(scene, &album, &job.sources, renderer, options, &Silent).expect("a stage"))
+}
+
+/// Calls `act` with sources in memory, on the CPU and with the usual options; nothing weighs them yet.
+pub fn on_sources<T>(
+    sources: &SourceImages,
+    field: &(impl Field + Sync),
+    progress: &dyn Progress,
+    act: impl FnOnce(&mut Stage<'_>) -> T,
+) -> T {
+    let (renderer, options) = (On { device: &Cpu, field }, RenderOptions::default());
+    act(&mut Stage::of_sources(Arc::new(sources.clone()), &renderer, &options, progress).expect("a stage"))
+}
 
 /// One target on a device, from sources that nothing is known of, and the field's record of it.
 ///
@@ -34,7 +78,7 @@ pub fn picture<D: Device + Sync, F: Field + Sync>(
     Ok((picture, stage.record()))
 }
 
-/// What a record says of something that may be left out.
+/// What a record says of something that may be omitted.
 ///
 /// # Panics
 /// If it says nothing.

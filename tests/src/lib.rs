@@ -9,6 +9,7 @@ pub mod contract;
 pub mod devices;
 pub mod emulator;
 pub mod fields;
+pub mod listener;
 pub mod lorry;
 pub mod mixture;
 pub mod module;

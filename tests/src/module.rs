@@ -131,40 +131,40 @@ impl<'a> Declarations<'a> {
         self.packed_bytes(self.definition(id_of(pointer, 1)))
     }
 
-    fn packed_bytes(&self, of: &Instruction) -> usize {
-        let inner = || self.packed_bytes(self.definition(id_of(of, 0)));
-        match of.class.opcode {
-            Op::TypeInt | Op::TypeFloat => of.operands[0].unwrap_literal_bit32() as usize / 8,
-            Op::TypeVector => of.operands[1].unwrap_literal_bit32() as usize * inner(),
-            Op::TypeArray => self.constant(id_of(of, 1)) as usize * inner(),
+    fn packed_bytes(&self, kind: &Instruction) -> usize {
+        let inner = || self.packed_bytes(self.definition(id_of(kind, 0)));
+        match kind.class.opcode {
+            Op::TypeInt | Op::TypeFloat => kind.operands[0].unwrap_literal_bit32() as usize / 8,
+            Op::TypeVector => kind.operands[1].unwrap_literal_bit32() as usize * inner(),
+            Op::TypeArray => self.constant(id_of(kind, 1)) as usize * inner(),
             other => panic!("{other:?} is not known here"),
         }
     }
 
     /// Bytes from the first of a type to its last.
-    fn bytes(&self, of: &Instruction) -> usize {
-        match of.class.opcode {
-            Op::TypeInt | Op::TypeFloat => of.operands[0].unwrap_literal_bit32() as usize / 8,
+    fn bytes(&self, kind: &Instruction) -> usize {
+        match kind.class.opcode {
+            Op::TypeInt | Op::TypeFloat => kind.operands[0].unwrap_literal_bit32() as usize / 8,
             Op::TypeArray => {
-                let stride = self.decorated(of.result_id.expect("a type"), Decoration::ArrayStride);
-                stride.expect("a stride") as usize * self.constant(id_of(of, 1)) as usize
+                let stride = self.decorated(kind.result_id.expect("a type"), Decoration::ArrayStride);
+                stride.expect("a stride") as usize * self.constant(id_of(kind, 1)) as usize
             }
             Op::TypeStruct => {
-                let ends = (0..of.operands.len())
-                    .map(|member| self.offset(of, member) + self.bytes(self.definition(id_of(of, member))));
+                let ends = (0..kind.operands.len())
+                    .map(|member| self.offset(kind, member) + self.bytes(self.definition(id_of(kind, member))));
                 ends.max().unwrap_or_default()
             }
             other => panic!("{other:?} has no layout that is known here"),
         }
     }
 
-    fn offset(&self, of: &Instruction, member: usize) -> usize {
+    fn offset(&self, kind: &Instruction, member: usize) -> usize {
         let is_its = |annotation: &&Instruction| {
             annotation.class.opcode == Op::MemberDecorate
                 && annotation.operands[1] == Operand::LiteralBit32(member as u32)
                 && annotation.operands[2] == Operand::Decoration(Decoration::Offset)
         };
-        let offset = self.annotations_of(of.result_id.expect("a type")).find(is_its).expect("a member's offset");
+        let offset = self.annotations_of(kind.result_id.expect("a type")).find(is_its).expect("a member's offset");
         offset.operands[3].unwrap_literal_bit32() as usize
     }
 

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::io::Cursor;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 
 use image::{DynamicImage, ImageFormat, Rgb, RgbImage};
@@ -16,10 +17,24 @@ pub const WORLD_FROM_CAMERA: [f64; 16] =
 /// A world point; by hand, that camera sees it at (0.5, -0.25, 2).
 pub const POINT_WORLD: [f32; 3] = [3.0, 2.5, 2.75];
 
-/// A folder that is deleted with this value.
+/// A folder that is deleted with this value; where its path is asked for, it is that.
 #[derive(Debug)]
 pub struct Folder {
     folder: TempDir,
+}
+
+impl Deref for Folder {
+    type Target = Path;
+
+    fn deref(&self) -> &Path {
+        self.path()
+    }
+}
+
+impl AsRef<Path> for Folder {
+    fn as_ref(&self) -> &Path {
+        self.path()
+    }
 }
 
 impl Folder {
@@ -115,8 +130,8 @@ pub fn png_checksum(bytes: &[u8]) -> u32 {
 
 /// A piece of a PNG.
 pub fn png_chunk(kind: &[u8], content: &[u8]) -> Vec<u8> {
-    let own = [kind, content].concat();
-    [&(content.len() as u32).to_be_bytes()[..], &own, &png_checksum(&own).to_be_bytes()].concat()
+    let chunk = [kind, content].concat();
+    [&(content.len() as u32).to_be_bytes()[..], &chunk, &png_checksum(&chunk).to_be_bytes()].concat()
 }
 
 /// Numbers with blanks between them.

@@ -26,8 +26,8 @@ impl Source {
     fn add(&mut self, tokens: TokenStream, text: &str, end: &mut usize) {
         for token in tokens {
             // A comment of documentation is tokens, all in the comment's place.
-            let own = &text[token.span().byte_range()];
-            if own.starts_with("//") || own.starts_with("/*") {
+            let comment = &text[token.span().byte_range()];
+            if comment.starts_with("//") || comment.starts_with("/*") {
                 continue;
             }
             match token {
@@ -54,15 +54,15 @@ impl Source {
         self.code.extend(std::iter::repeat_n('\n', lines));
         self.code.push_str(rest);
         *end = place.end;
-        let own = &text[place];
-        match (own.find('"'), own.rfind('"')) {
+        let literal = &text[place];
+        match (literal.find('"'), literal.rfind('"')) {
             (Some(first), Some(last)) if first < last => {
-                self.strings.push((span.start().line, own[first + 1..last].to_owned()));
+                self.strings.push((span.start().line, literal[first + 1..last].to_owned()));
                 self.code.push_str("\"\"");
-                self.code.extend(own.matches('\n').map(|_| '\n'));
+                self.code.extend(literal.matches('\n').map(|_| '\n'));
             }
-            _ if own.len() > 1 && own.ends_with('\'') => self.code.push_str("''"),
-            _ => self.code.push_str(own),
+            _ if literal.len() > 1 && literal.ends_with('\'') => self.code.push_str("''"),
+            _ => self.code.push_str(literal),
         }
     }
 

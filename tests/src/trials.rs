@@ -1,15 +1,34 @@
 //! Rooms of tests without the harness of the standard library: what is known only at run time, such as which devices or
 //! programs there are, decides which of their trials exist and which are ignored.
 
-use libtest_mimic::Trial;
+use libtest_mimic::{Failed, Trial};
 
-/// A test that panics where something is wrong, as a trial. Its name is its path without the room's.
-pub fn trial(path: &str, test: fn()) -> Trial {
-    let name = path.split_once("::").map_or(path, |(_, name)| name);
-    Trial::test(name, move || {
-        test();
+/// What a room has as a test: it panics where something is wrong, or says it.
+pub trait Test: Send + 'static {
+    /// Runs it.
+    ///
+    /// # Errors
+    /// What is wrong.
+    fn run(self) -> Result<(), Failed>;
+}
+
+impl Test for fn() {
+    fn run(self) -> Result<(), Failed> {
+        self();
         Ok(())
-    })
+    }
+}
+
+impl Test for fn() -> Result<(), Failed> {
+    fn run(self) -> Result<(), Failed> {
+        self()
+    }
+}
+
+/// A test as a trial. Its name is its path without the room's.
+pub fn trial(path: &str, test: impl Test) -> Trial {
+    let name = path.split_once("::").map_or(path, |(_, name)| name);
+    Trial::test(name, move || test.run())
 }
 
 /// Whether an environment variable such as `VIEWFUSE_REQUIRE_VULKAN` is 1: what is missing then is a failure.
@@ -25,18 +44,50 @@ pub fn needing(missing: Option<String>, is_required: bool, trial: Trial) -> Tria
     }
 }
 
-/// Makes `trials()` of functions in this module, those with `#[cfg(..)]` before them where that holds. A test that is not
-/// listed is dead code, which is a warning.
+/// Why something is missing, unless it is there.
+pub fn lacking(is_there: bool, why: &str) -> Option<String> {
+    (!is_there).then(|| why.to_owned())
+}
+
+/// Makes `trials()` of functions in this module, those with `#[cfg(..)]` before them where that holds. Behind `;` stand
+/// what is missing, if anything, the variable that makes this a failure, if there is one, and the functions that need
+/// it; before all, as `[..];`, the modules within this one that have tests. A test that is not listed is dead code, which
+/// is a warning.
 #[macro_export]
 macro_rules! trials {
-    ($($(#[$attribute:meta])? $test:ident),* $(,)?) => {
+    (
+        $([$($(#[$platform:meta])? $module:ident),+ $(,)?];)?
+        $($(#[$attribute:meta])? $test:ident),* $(,)?
+        $(; $missing:expr $(, $variable:expr)? => $($needing:ident),+ $(,)?)*
+    ) => {
         /// The tests of this module.
         pub(crate) fn trials() -> Vec<libtest_mimic::Trial> {
-            let trials = [$(
+            let plain = [$(
                 $(#[$attribute])?
-                $crate::trials::trial(concat!(module_path!(), "::", stringify!($test)), $test),
+                $crate::trial!($test),
             )*];
-            trials.into()
+            let all: Vec<Vec<libtest_mimic::Trial>> = vec![
+                plain.into(),
+                $({
+                    let (missing, is_required) = ($missing, false $(|| $crate::trials::is_required($variable))?);
+                    let trials = [$($crate::trial!($needing)),+];
+                    trials.map(|trial| $crate::trials::needing(missing.clone(), is_required, trial)).into()
+                },)*
+            ];
+            let within: Vec<Vec<libtest_mimic::Trial>> = [$($(
+                $(#[$platform])?
+                $module::trials(),
+            )+)?]
+            .into();
+            all.into_iter().chain(within).flatten().collect()
         }
+    };
+}
+
+/// A function of this module as a trial, by its name.
+#[macro_export]
+macro_rules! trial {
+    ($test:ident) => {
+        $crate::trials::trial(concat!(module_path!(), "::", stringify!($test)), $test as fn() -> _)
     };
 }

@@ -252,9 +252,9 @@ pub fn blend_gradient(
 
 /// The sum of what several tiles say of a splat, in the order of the fields that are no padding.
 pub fn sums_of(parts: &[SplatGradient]) -> [Bounded; 9] {
-    let numbers = |own: &SplatGradient| {
-        let ([x, y], [xx, xy, yy], [red, green, blue]) = (own.along, own.squares, own.colour);
-        [own.opacity, x, y, xx, xy, yy, red, green, blue]
+    let numbers = |gradient: &SplatGradient| {
+        let ([x, y], [xx, xy, yy], [red, green, blue]) = (gradient.along, gradient.squares, gradient.colour);
+        [gradient.opacity, x, y, xx, xy, yy, red, green, blue]
     };
     [0, 1, 2, 3, 4, 5, 6, 7, 8].map(|index| Bounded::sum(parts.iter().map(|part| f64::from(numbers(part)[index]))))
 }
@@ -300,8 +300,8 @@ fn by_axes(ellipse: &Ellipse, splat: &ProjectedGaussian, sums: &[Bounded; 9]) ->
     let (lower, last) = (b * xx + c * xy, b * xy + c * yy);
     let covariance = [-(left * a + middle * b), -(left * b + middle * c), -(lower * b + last * c)];
     let [right, down] = ellipse.image_axes;
-    let of = |first: Bounded, second: Bounded| scaled(plus(scaled(right, first), scaled(down, second)), two());
-    [of(covariance[0], covariance[1]), of(covariance[1], covariance[2])]
+    let product = |first: Bounded, second: Bounded| scaled(plus(scaled(right, first), scaled(down, second)), two());
+    [product(covariance[0], covariance[1]), product(covariance[1], covariance[2])]
 }
 
 fn by_place(

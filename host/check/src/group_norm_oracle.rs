@@ -46,14 +46,16 @@ pub fn group_norm_statistics(partials: &[[f32; 2]], block: &GroupNormBlock, grou
     let part_count = (block.pixel_count as usize).div_ceil(PART as usize);
     let sizes = (0..part_count).map(|part| (block.pixel_count as usize - part * PART as usize).min(PART as usize));
     let sizes: Vec<f64> = sizes.map(|pixels| pixels as f64 * channels).collect();
-    let own: Vec<[f32; 2]> = partials.iter().skip(group).step_by(block.group_count as usize).copied().collect();
+    let parts: Vec<[f32; 2]> = partials.iter().skip(group).step_by(block.group_count as usize).copied().collect();
     let all: f64 = sizes.iter().sum();
     let exactly = |moment: f32| f64::from(moment);
-    let mean = sizes.iter().zip(&own).map(|(size, own)| size * exactly(own[0])).sum::<f64>() / all;
-    let inside_and_between = |(size, own): (&f64, &[f32; 2])| exactly(own[1]) + size * (exactly(own[0]) - mean).powi(2);
-    let variance = sizes.iter().zip(&own).map(inside_and_between).sum::<f64>() / all;
-    let (mut running_mean, mut deviations, mut count) = (Bounded::from(own[0][0]), Bounded::from(own[0][1]), sizes[0]);
-    for (size, [own_mean, own_deviations]) in sizes.iter().zip(&own).skip(1) {
+    let mean = sizes.iter().zip(&parts).map(|(size, part)| size * exactly(part[0])).sum::<f64>() / all;
+    let inside_and_between =
+        |(size, part): (&f64, &[f32; 2])| exactly(part[1]) + size * (exactly(part[0]) - mean).powi(2);
+    let variance = sizes.iter().zip(&parts).map(inside_and_between).sum::<f64>() / all;
+    let (mut running_mean, mut deviations, mut count) =
+        (Bounded::from(parts[0][0]), Bounded::from(parts[0][1]), sizes[0]);
+    for (size, [own_mean, own_deviations]) in sizes.iter().zip(&parts).skip(1) {
         let share = Bounded { value: size / (count + size), error: DIVISION * size / (count + size) };
         let difference = Bounded::from(*own_mean) - running_mean;
         running_mean = running_mean + difference * share;
@@ -63,7 +65,7 @@ pub fn group_norm_statistics(partials: &[[f32; 2]], block: &GroupNormBlock, grou
     }
     let running = deviations / Bounded { value: all, error: 0.0 };
     // Parts that are all the same constant leave nothing to round.
-    let is_constant = own.iter().all(|statistics| *statistics == [own[0][0], 0.0]);
+    let is_constant = parts.iter().all(|statistics| *statistics == [parts[0][0], 0.0]);
     let [mean_error, variance_error] = if is_constant { [0.0; 2] } else { [running_mean.error, running.error] };
     let spread = Bounded { value: variance, error: variance_error } + block.variance_floor.into();
     let factor = if spread.value > 0.0 { Bounded::ONE / spread.square_root() } else { Bounded::ZERO };

@@ -94,8 +94,8 @@ impl WidePose {
         let mut sum = [0.0; 3];
         for axis in 0..3 {
             let component = dot(other.axes[axis], v);
-            for (total, own) in sum.iter_mut().zip(self.axes[axis]) {
-                *total += own * component;
+            for (total, part) in sum.iter_mut().zip(self.axes[axis]) {
+                *total += part * component;
             }
         }
         sum

@@ -104,8 +104,8 @@ pub fn place_point(rays: &[TargetRay], depths: &[f32], sample_count: u32, sample
     let (count, sample) = (sample_count as usize, sample as usize);
     let ray = &rays[sample / count];
     let [x, y, z] = along(point(ray.origin), point(ray.direction), depths[sample].into());
-    let own = &depths[sample / count * count..][..count];
-    let behind = own.get(sample % count + 1).copied().unwrap_or(ray.far);
+    let along = &depths[sample / count * count..][..count];
+    let behind = along.get(sample % count + 1).copied().unwrap_or(ray.far);
     let length = (Bounded::from(behind) - Bounded::from(depths[sample])).greater(Bounded::ZERO);
     let [across, below, ahead] = point(ray.direction);
     [x, y, z, length, across, below, ahead, (sample as f32).into()]

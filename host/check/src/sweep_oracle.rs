@@ -75,8 +75,8 @@ fn mixed(node: impl Fn(usize, usize) -> Bounded, columns: &Tents, rows: &Tents) 
         }
     }
     // Two shares and their product, a product and three sums.
-    let own = 6.0 * ROUNDING * least.abs().max(greatest.abs());
-    Bounded { value, error: (columns.error + rows.error) * (greatest - least + 2.0 * brought) + brought + own }
+    let rounding = 6.0 * ROUNDING * least.abs().max(greatest.abs());
+    Bounded { value, error: (columns.error + rows.error) * (greatest - least + 2.0 * brought) + brought + rounding }
 }
 
 /// Bilinear look-up of premultiplied RGBA.

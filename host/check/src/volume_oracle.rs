@@ -85,15 +85,15 @@ pub fn weigh_features(raw: &[f32], points: &[RayPoint], block: &FeatureBlock) ->
         } else {
             block.last_length.into()
         };
-        let own = density * length;
-        sum = sum + own;
+        let optical = density * length;
+        sum = sum + optical;
         let behind = passing(sum);
         let stopped = before - behind;
         before = behind;
         if block.inclusive == 0 {
             return stopped;
         }
-        let weight = stopped * passing(own);
+        let weight = stopped * passing(optical);
         // What a device may flush to 0.
         Bounded { error: weight.error + f64::from(f32::MIN_POSITIVE), ..weight }
     });
@@ -121,10 +121,10 @@ pub fn summed_feature(weights: &[f32], fused: &[f32], raw: &[f32], block: &Featu
 
 /// A number of the denoiser's input.
 pub fn denoiser_input(noisy: &[f32], condition: &[f32], block: &DenoiserInputBlock, element: usize) -> Bounded {
-    let [own, beside] = [block.picture_channels, block.condition_channels].map(|count| count as usize);
-    let (pixel, channel) = (element / (own + beside), element % (own + beside));
-    let value = match channel.checked_sub(own) {
-        None => noisy[pixel * own + channel],
+    let [pictured, beside] = [block.picture_channels, block.condition_channels].map(|count| count as usize);
+    let (pixel, channel) = (element / (pictured + beside), element % (pictured + beside));
+    let value = match channel.checked_sub(pictured) {
+        None => noisy[pixel * pictured + channel],
         Some(channel) => condition[pixel * beside + channel],
     };
     Bounded::from(value) * block.scale.into()

@@ -181,12 +181,12 @@ pub fn change_depths(depths: &mut [f32]) {
 }
 
 /// Random weights that sum to 1; one of them, and that of `own`, is 0.
-fn simplex(numbers: &mut Numbers, count: usize, own: Option<usize>) -> Vec<f32> {
+fn simplex(numbers: &mut Numbers, count: usize, single: Option<usize>) -> Vec<f32> {
     let mut weights: Vec<f32> = (0..count).map(|_| numbers.between(0.05, 1.0)).collect();
-    let zero = own.map_or(count - 1, |own| (own + 2) % count);
+    let zero = single.map_or(count - 1, |single| (single + 2) % count);
     weights[zero] = 0.0;
-    if let Some(own) = own {
-        weights[own] = 0.0;
+    if let Some(single) = single {
+        weights[single] = 0.0;
     }
     let sum: f32 = weights.iter().sum();
     weights.iter().map(|weight| weight / sum).collect()

@@ -275,14 +275,14 @@ impl Evaluator<'_> {
         let groups = source_groups(scene, selection, self.renderer.about().least_sources)?;
         let used = groups.iter().flat_map(|(sources, targets)| sources.iter().chain(targets).copied());
         // Reading takes far less than what follows.
-        let of = 1 + READINGS_A_GROUP * groups.len();
-        self.progress.stage("reading photographs", 0..1, of);
+        let parts = 1 + READINGS_A_GROUP * groups.len();
+        self.progress.stage("reading photographs", 0..1, parts);
         let album = open_album(scene, used, self.renderer, self.options, self.progress)?;
         let mut scores = Vec::new();
         for (index, (sources, targets)) in groups.iter().enumerate() {
             let subject = Subject { scene, album: &album, masked: None };
             let place = 1 + READINGS_A_GROUP * index;
-            let progress = &Part::begin(self.progress, "", place..place + READINGS_A_GROUP, of);
+            let progress = &Part::begin(self.progress, "", place..place + READINGS_A_GROUP, parts);
             let part = Evaluator { progress, ..*self };
             scores.extend(part.score(subject, sources, targets, |_, _, _, _| {})?);
         }

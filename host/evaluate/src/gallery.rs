@@ -180,8 +180,8 @@ impl Gallery {
             let distance = |source: usize| sources.images[source].camera.pose.distance(&frame.target.camera.pose);
             self.copy = nearest(0..sources.images.len(), distance, 1).pop().map(|source| {
                 let (width, height) = truth.picture.dimensions();
-                let own = sources.picture(source);
-                (source, imageops::resize(&own, width, height, imageops::FilterType::Triangle))
+                let picture = sources.picture(source);
+                (source, imageops::resize(&picture, width, height, imageops::FilterType::Triangle))
             });
         }
         let finite = |(name, value): &(String, f64)| (name.clone(), Some(*value).filter(|value| value.is_finite()));

@@ -6,7 +6,7 @@
 //! metrics      metrics of pictures
 //! baseline     baselines without a field: copies and warps of the nearest sources
 //! score_json   numbers of scores as JSON
-//! evaluator    each weighting scheme on views that are left out      Evaluator
+//! evaluator    each weighting scheme on held-out views               Evaluator
 //! protocol     which views are sources, which are targets
 //! pareto       error against run time
 //! run_folder   an evaluation that resumes after a kill, in shards

@@ -64,7 +64,7 @@ impl Measured {
     /// How the exact pictures differ from those of another device.
     pub fn exact_versus(&self, other: &Measured) -> Difference {
         let mut difference = Difference::default();
-        self.exact.iter().zip(&other.exact).for_each(|(own, others)| difference.add(own, others));
+        self.exact.iter().zip(&other.exact).for_each(|(picture, others)| difference.add(picture, others));
         difference
     }
 }
@@ -97,12 +97,12 @@ impl Subject<'_> {
         round_count: u32,
         progress: &dyn Progress,
     ) -> Result<Measured, RenderError> {
-        let of = settings.len() * (round_count as usize + 1);
+        let parts = settings.len() * (round_count as usize + 1);
         let begin = |round: usize, index: usize| {
             let place = round * settings.len() + index;
             let label = &settings[index].label;
             let name = if round == 0 { label.clone() } else { format!("{label}, round {round} of {round_count}") };
-            progress.stage(&name, place..place + 1, of);
+            progress.stage(&name, place..place + 1, parts);
             progress.expect(self.job.targets.len());
         };
         let images = self.images(settings, progress)?;

@@ -244,13 +244,13 @@ pub fn table(observations: &[Observation<'_>]) -> Table {
 type Means<'a> = BTreeMap<(&'a str, &'a str), BTreeMap<Counted<'a>, f64>>;
 
 fn cell(means: &Means<'_>, scheme: &str, metric: &str) -> Option<Cell> {
-    let own = means.get(&(scheme, metric))?;
+    let scores = means.get(&(scheme, metric))?;
     let versus = |other: &str| {
         let other = means.get(&(other, metric)).filter(|_| scheme != other)?;
-        Interval::of_differences(own, other)
+        Interval::of_differences(scores, other)
     };
     Some(Cell {
-        value: Interval::of(&own.values().copied().collect::<Vec<_>>())?,
+        value: Interval::of(&scores.values().copied().collect::<Vec<_>>())?,
         versus_reference: versus(REFERENCE),
         versus_copy: versus(Baseline::NearestCopy.name()),
         place: 0,
@@ -270,8 +270,8 @@ fn place(rows: &mut [Row], column: usize, metric: &Metric) {
     values.sort_by(|a, b| if metric.larger_is_better { b.total_cmp(a) } else { a.total_cmp(b) });
     values.dedup();
     for row in rows {
-        let own = written(row, column, metric);
-        let place = values.iter().position(|value| Some(*value) == own).map_or(values.len(), |place| place) + 1;
+        let shown = written(row, column, metric);
+        let place = values.iter().position(|value| Some(*value) == shown).map_or(values.len(), |place| place) + 1;
         if let Some(cell) = &mut row.cells[column] {
             cell.place = place;
         }
@@ -289,8 +289,8 @@ fn lead(rows: &mut [Row], column: usize, metric: &Metric, means: &Means<'_>) {
         .iter()
         .map(|row| {
             let Some(cell) = &row.cells[column] else { return false };
-            let own = means.get(&(row.scheme.as_str(), metric.name.as_str()));
-            let difference = own.and_then(|means| Interval::of_differences(best, means));
+            let scores = means.get(&(row.scheme.as_str(), metric.name.as_str()));
+            let difference = scores.and_then(|means| Interval::of_differences(best, means));
             // Where the interval is unknown, as for infinite scores, the printed values decide.
             let is_close =
                 difference.is_some_and(|interval| interval.half_width.is_some() && !interval.excludes_zero());

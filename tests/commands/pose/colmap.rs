@@ -1,8 +1,7 @@
 //! `--from`: a person's own COLMAP, played by a script that says what the room's poses are, or something else.
 
-use super::{COUNT_ALONE, bare, needs, posed, worst_rotation};
-use crate::{BINARY, read_json};
-use libtest_mimic::Trial;
+use super::{COUNT_ALONE, REQUIRE, bare, no_program, no_scripts, posed, worst_rotation};
+use crate::{BINARY, list_of, read_json, text_of};
 use std::f64::consts::PI;
 use std::fmt::Write;
 use std::fs;
@@ -13,7 +12,6 @@ use viewfuse::scene::rig::Rig;
 use viewfuse_tests::command::{Outcome, assert_command_refused, assert_wrong_arguments, command, files_below};
 use viewfuse_tests::places::data;
 use viewfuse_tests::scenes::Folder;
-use viewfuse_tests::trials::trial;
 
 /// Plays `colmap`: it keeps a list of its calls, and its mapper writes a model that lies beside it, by the features
 /// asked for.
@@ -42,20 +40,12 @@ if [ "$step" = mapper ]; then
 fi
 "#;
 
-pub(super) fn trials() -> Vec<Trial> {
-    let mut all = vec![
-        trial("commands::pose::colmap::python_without_pycolmap", python_without_pycolmap),
-        trial("commands::pose::colmap::not_installed", not_installed),
-    ];
-    if cfg!(unix) {
-        all.extend([
-            trial("commands::pose::colmap::in_place_of_openmvg", in_place_of_openmvg),
-            trial("commands::pose::colmap::what_it_cannot_do_is_said", what_it_cannot_do_is_said),
-            needs("colmap::as_a_second_opinion", as_a_second_opinion),
-        ]);
-    }
-    all
-}
+viewfuse_tests::trials![
+    python_without_pycolmap,
+    not_installed;
+    no_scripts() => in_place_of_openmvg, what_it_cannot_do_is_said;
+    no_scripts().or_else(no_program), REQUIRE => as_a_second_opinion,
+];
 
 /// Writes the room's first photographs and their true poses as COLMAP's text model, each turned about its down axis by
 /// as many degrees as `turn` says.
@@ -114,8 +104,9 @@ fn in_place_of_openmvg() {
     let scene = Scene::open(folder.path().join("posed")).expect("a scene");
     assert!(worst_rotation(&scene) < 0.1 && scene.points.len() == 40, "{}", worst_rotation(&scene));
     let record = read_json(folder.path().join("posed/pose.json"));
-    let attempts = record["attempts"].as_array().expect("a list");
-    let told: Vec<_> = attempts.iter().map(|own| (own["solver"].as_str(), own["features"].as_str())).collect();
+    let attempts = list_of(&record["attempts"]);
+    let told: Vec<_> =
+        attempts.iter().map(|attempt| (attempt["solver"].as_str(), attempt["features"].as_str())).collect();
     assert_eq!(told, [(Some("COLMAP 9.8.7"), Some("sift")), (Some("COLMAP 9.8.7"), Some("dsp-sift"))]);
     // What it was asked: the known camera and the seed, and of the options only those that it has.
     let calls = fs::read_to_string(folder.path().join("bin/calls")).expect("calls");
@@ -135,13 +126,13 @@ fn as_a_second_opinion() {
     assert!(said.starts_with("registered 5 of 5 photographs\n"), "{said}");
     assert!(worst_rotation(&Scene::open(folder.path().join("posed")).expect("a scene")) < 1.5);
     let record = read_json(folder.path().join("posed/pose.json"));
-    let attempts = record["attempts"].as_array().expect("a list");
+    let attempts = list_of(&record["attempts"]);
     let solver =
         |own: &serde_json::Value| own["solver"].as_str().unwrap_or_default().split(' ').next().map(str::to_owned);
     let solvers: Vec<_> = attempts.iter().filter_map(solver).collect();
     assert_eq!(solvers, ["openmvg-sfm", "openmvg-sfm", "COLMAP", "COLMAP"]);
     // The wrong attempt is known as one.
-    let refused = attempts[3]["refused"].as_str().expect("a reason");
+    let refused = text_of(&attempts[3]["refused"]);
     assert!(refused.contains("no other attempt has the same rotations"), "{refused}");
     assert!(attempts[2]["refused"].is_null(), "{}", attempts[2]);
 }

@@ -1,25 +1,17 @@
 //! What is said where poses are not found, or found in part: which photographs match which, where they fall apart, and
 //! which poses are doubtful whenever their scene is opened.
 
-use super::bare;
+use super::{bare, no_scripts};
 use crate::{BINARY, done};
-use libtest_mimic::Trial;
 use serde_json::json;
 use std::process::Command;
 use viewfuse_tests::command::{Outcome, assert_command_refused, command, names_in, run, toy};
 use viewfuse_tests::scenes::Folder;
-use viewfuse_tests::trials::trial;
 
-pub(super) fn trials() -> Vec<Trial> {
-    let mut all = vec![trial("commands::pose::diagnosis::later_commands_say_it", later_commands_say_it)];
-    if cfg!(unix) {
-        all.extend([
-            trial("commands::pose::diagnosis::where_it_broke", where_it_broke),
-            trial("commands::pose::diagnosis::the_picture_replaces_nothing_that_is_read", the_picture_replaces_nothing),
-        ]);
-    }
-    all
-}
+viewfuse_tests::trials![
+    later_commands_say_it;
+    no_scripts() => where_it_broke, the_picture_replaces_nothing_that_is_read,
+];
 
 /// Five photographs and a program that matches some of them, and finds no poses.
 fn matched() -> Folder {
@@ -69,7 +61,7 @@ fn where_it_broke() {
     assert!(red > 200, "five photographs without a pose: {red}");
 }
 
-fn the_picture_replaces_nothing() {
+fn the_picture_replaces_nothing_that_is_read() {
     let folder = matched();
     for (file, part) in [("bare/graph.png", "lies in bare"), ("posed/graph.png", "lies in posed")] {
         let before = names_in(&folder.path().join("bare"));

@@ -1,28 +1,22 @@
 //! Programs in the place of `viewfuse-openmvg` that stay, say too much, or are left alone: the command ends, and with it
 //! what it started.
 
-use super::bare;
+use super::{bare, no_scripts};
 use crate::BINARY;
-use libtest_mimic::Trial;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 use viewfuse_tests::command::{assert_command_refused, command, interrupt, names_in, spawn};
 use viewfuse_tests::patience::{end, send, wait_until, wait_while_running};
 use viewfuse_tests::scenes::Folder;
-use viewfuse_tests::trials::trial;
 
-pub(super) fn trials() -> Vec<Trial> {
-    match cfg!(unix) {
-        true => vec![
-            trial("commands::pose::helper::one_that_stays_is_ended", one_that_stays_is_ended),
-            trial("commands::pose::helper::one_that_says_too_much_is_ended", one_that_says_too_much_is_ended),
-            trial("commands::pose::helper::none_outlives_the_command", none_outlives_the_command),
-            trial("commands::pose::helper::scratch_of_a_kill_goes_with_the_next_run", scratch_of_a_kill_goes),
-        ],
-        false => Vec::new(),
-    }
-}
+viewfuse_tests::trials![;
+    no_scripts() =>
+        one_that_stays_is_ended,
+        one_that_says_too_much_is_ended,
+        none_outlives_the_command,
+        scratch_of_a_kill_goes_with_the_next_run,
+];
 
 /// Photographs of the room beside a program `openmvg` of this script, which has `ready` written when it has begun, with
 /// the numbers of processes.
@@ -119,7 +113,7 @@ fn none_outlives_the_command() {
     }
 }
 
-fn scratch_of_a_kill_goes() {
+fn scratch_of_a_kill_goes_with_the_next_run() {
     let folder = with_script(STAYS);
     let scratch = folder.path().join("scratch");
     let mut child = spawn(pose(&folder, "openmvg"));

@@ -1,21 +1,17 @@
 //! `--pose` of commands that open a scene: bare photographs become a scene on the way.
 
-use super::{bare, needs, posed};
+use super::{REQUIRE, bare, no_program, posed};
 use crate::BINARY;
-use libtest_mimic::Trial;
 use serde_json::Value;
 use std::fs;
 use viewfuse_tests::command::{Outcome, assert_refused, command, files_below};
 use viewfuse_tests::scenes::Folder;
-use viewfuse_tests::trials::trial;
 
-pub(super) fn trials() -> Vec<Trial> {
-    vec![
-        needs("on_the_way::from_bare_photographs_to_a_picture", from_bare_photographs_to_a_picture),
-        trial("commands::pose::on_the_way::what_is_posed_already_stays", what_is_posed_already_stays),
-        trial("commands::pose::on_the_way::another_folder_is_not_taken", another_folder_is_not_taken),
-    ]
-}
+viewfuse_tests::trials![
+    what_is_posed_already_stays,
+    another_folder_is_not_taken;
+    no_program(), REQUIRE => from_bare_photographs_to_a_picture,
+];
 
 fn from_bare_photographs_to_a_picture() {
     let folder = bare(0..4);

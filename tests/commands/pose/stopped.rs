@@ -1,8 +1,7 @@
 //! Runs that are killed or interrupted go on behind the attempts that they had finished.
 
-use super::{bare, needs, posed, program};
+use super::{REQUIRE, bare, no_program, no_scripts, posed, program};
 use crate::{BINARY, read_json};
-use libtest_mimic::Trial;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -10,15 +9,9 @@ use viewfuse_tests::command::{Outcome, command, files_below, interrupt, spawn};
 use viewfuse_tests::patience::{end, wait_while_running};
 use viewfuse_tests::scenes::Folder;
 
-pub(super) fn trials() -> Vec<Trial> {
-    match cfg!(unix) {
-        true => vec![
-            needs("stopped::a_killed_run_goes_on", a_killed_run_goes_on),
-            needs("stopped::an_interrupted_run_keeps_what_it_has", an_interrupted_run_keeps_what_it_has),
-        ],
-        false => Vec::new(),
-    }
-}
+viewfuse_tests::trials![;
+    no_scripts().or_else(no_program), REQUIRE => a_killed_run_goes_on, an_interrupted_run_keeps_what_it_has,
+];
 
 /// Photographs of the room and a program that counts how often it is asked, in a file of the run's own: what a killed
 /// run has started may still count.
@@ -45,7 +38,7 @@ fn asked(folder: &Folder, run: &str) -> usize {
 /// The answers that are kept for `posed`.
 fn kept(folder: &Folder) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder.path().join(".posed.attempts")).into_iter().flatten().flatten();
-    entries.map(|entry| entry.path()).filter(|path| path.extension().is_some_and(|own| own == "json")).collect()
+    entries.map(|entry| entry.path()).filter(|path| path.extension().is_some_and(|end| end == "json")).collect()
 }
 
 /// The first run has left nothing but finished attempts; the second one makes the others, and what it writes is what a

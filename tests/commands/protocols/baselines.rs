@@ -155,7 +155,7 @@ fn sources_of_another_size_are_resampled() {
 
 fn points_come_before_bounds_and_bounds_before_the_focus() {
     let looked_at = Vec3::new(0.1, 0.2, 4.0);
-    let cameras: Vec<Camera> = around().into_iter().map(|own| camera(own.pose.centre_world(), looked_at)).collect();
+    let cameras: Vec<Camera> = around().into_iter().map(|view| camera(view.pose.centre_world(), looked_at)).collect();
     let view = target();
     // Half of the points at 2, half at 6: the mean disparity is that of 3. Those outside the picture do not count.
     let seen = |z: f32| Vec3::new(0.0, 0.1, z);

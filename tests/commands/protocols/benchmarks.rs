@@ -1,6 +1,6 @@
 //! Protocols of few-shot papers: the views they take, what they refuse, what is printed beside them.
 
-use crate::{BINARY, read_json};
+use crate::{BINARY, list_of, number_of, read_json, text_of};
 use image::{GrayImage, Luma};
 use serde_json::{Value, json};
 use std::fs;
@@ -130,8 +130,8 @@ fn dtu_takes_the_published_views() {
 }
 
 fn blender_takes_views_of_its_splits() {
-    let of = |split, count: usize| (0..count).map(move |view| (format!("{split}_r_{view}"), Some(split)));
-    let whole = scene(of(Split::Train, 100).chain(of(Split::Validation, 5)).chain(of(Split::Test, 200)));
+    let views = |split, count: usize| (0..count).map(move |view| (format!("{split}_r_{view}"), Some(split)));
+    let whole = scene(views(Split::Train, 100).chain(views(Split::Validation, 5)).chain(views(Split::Test, 200)));
     let job = &jobs("blender:8", &whole)[0];
     assert_eq!(job.sources, [2, 16, 26, 55, 73, 75, 86, 93]);
     assert_eq!((job.targets.len(), job.targets[0], job.targets[1], job.targets[24]), (25, 105, 113, 297));
@@ -150,7 +150,7 @@ fn blender_takes_views_of_its_splits() {
         ),
         "{error}"
     );
-    let half = scene(of(Split::Train, 100));
+    let half = scene(views(Split::Train, 100));
     assert!(refusal("blender:8", &half).contains("has no views of a test split"), "{}", refusal("blender:8", &half));
 }
 
@@ -174,16 +174,16 @@ fn blender_on_a_scene_in_its_layout() {
         folder.write(&format!("lorry/transforms_{split}.json"), transforms.to_string());
     }
     let scene = Scene::open(folder.path().join("lorry")).expect("a scene");
-    let of = |split| scene.views.iter().filter(|view| view.split == Some(split)).count();
-    assert_eq!([Split::Train, Split::Validation, Split::Test].map(of), [8, 1, 4]);
+    let count = |split| scene.views.iter().filter(|view| view.split == Some(split)).count();
+    assert_eq!([Split::Train, Split::Validation, Split::Test].map(count), [8, 1, 4]);
     assert!(scene.photograph(0).is_ok_and(|photograph| photograph.has_alpha));
     let expected = sphere.pinhole;
     assert!(scene.views.iter().all(|view| (view.camera.pinhole.focal()[0] - expected.focal()[0]).abs() < 1e-4));
     let whole = json(folder.path(), "lorry --protocol blender:8");
     assert_eq!(whole["jobs"][0]["targets"], json!(["test_r_0", "test_r_40", "test_r_104"]));
     assert_eq!(whole["settings"]["protocol"], "blender:8");
-    let rows = whole["tables"][0]["rows"].as_array().expect("rows");
-    let psnr = |row: usize| rows[row]["cells"][0]["value"]["mean"].as_f64().expect("a number");
+    let rows = list_of(&whole["tables"][0]["rows"]);
+    let psnr = |row: usize| number_of(&rows[row]["cells"][0]["value"]["mean"]);
     // Of the object over white; a copy of a source is far worse.
     assert!(psnr(3) > psnr(0) + 3.0 && psnr(3) > 18.0, "{rows:?}");
     assert!(
@@ -247,14 +247,13 @@ fn tables_without_a_folder() {
 }
 
 fn json_is_the_table() {
-    let scene = toy_twice();
-    let folder = scene.path();
-    let whole = json(folder, "toy --protocol llff:3 --size 32x32");
+    let folder = toy_twice();
+    let whole = json(&folder, "toy --protocol llff:3 --size 32x32");
     assert_eq!(whole["settings"]["protocol"], "llff:3");
     assert_eq!(whole["jobs"][0]["targets"], json!(["000000", "000008", "000016"]));
     let table = &whole["tables"][0];
     assert_eq!((&table["unit"], &table["target_count"]), (&"views".into(), &3.into()));
-    let rows = table["rows"].as_array().expect("rows");
+    let rows = list_of(&table["rows"]);
     let schemes: Vec<&str> = rows.iter().filter_map(|row| row["scheme"].as_str()).collect();
     assert_eq!(schemes, ["nearest copy", "warped copy", "warped blend", "mean", "l1"]);
     assert_eq!(rows[0]["is_baseline"], true);
@@ -263,30 +262,28 @@ fn json_is_the_table() {
     assert_eq!(table["comparisons"].as_array().map(Vec::len), Some(2 * 3));
     assert!(whole["published"]["withheld"].as_str().is_some_and(|why| why.contains("504x378")));
     // Without a protocol as well, a table a scene and one of all.
-    let plain = json(folder, "toy again --targets 20,21 --size 32x32");
-    let titles: Vec<&str> =
-        plain["tables"].as_array().expect("tables").iter().filter_map(|table| table["title"].as_str()).collect();
+    let plain = json(&folder, "toy again --targets 20,21 --size 32x32");
+    let titles: Vec<&str> = list_of(&plain["tables"]).iter().filter_map(|table| table["title"].as_str()).collect();
     assert_eq!(titles, ["toy: 2 targets", "again: 2 targets", "all 2 scenes: 4 targets"]);
     assert_eq!(plain["tables"][2]["unit"], "scenes");
 }
 
 fn nearest_with_targets() {
-    let scene = toy();
-    let folder = scene.path();
-    let whole = json(folder, "toy --protocol nearest:3 --targets 5,7 --size 24x24");
+    let folder = toy();
+    let whole = json(&folder, "toy --protocol nearest:3 --targets 5,7 --size 24x24");
     assert_eq!(whole["settings"]["protocol"], "nearest:3:5,7");
     assert_eq!(whole["jobs"].as_array().map(Vec::len), Some(2));
     assert!(whole["published"].is_null(), "{}", whole["published"]);
     assert_wrong_arguments(
         BINARY,
-        folder,
+        &folder,
         "evaluate toy --protocol llff:3 --targets 5",
         &["--targets cannot be used with --protocol llff:3", "nearest:K"],
     );
-    assert_refused(BINARY, folder, "evaluate toy --protocol nearest:3 --targets 99", &["toy: has no view '99'"]);
+    assert_refused(BINARY, &folder, "evaluate toy --protocol nearest:3 --targets 99", &["toy: has no view '99'"]);
     assert_refused(
         BINARY,
-        folder,
+        &folder,
         "evaluate toy --protocol blender:8",
         &["protocol 'blender:8' fits none of the scenes", "transforms_test.json"],
     );
@@ -336,8 +333,8 @@ fn masks_serve_the_metric() {
     }
     let run = |scene: &str, protocol: &str| json(folder.path(), &format!("{scene} --protocol {protocol} --size 32x32"));
     let names = |whole: &Value| -> Vec<String> {
-        let metrics = whole["tables"][0]["metrics"].as_array().expect("metrics").clone();
-        metrics.iter().map(|metric| metric["label"].as_str().expect("a label").to_owned()).collect()
+        let metrics = list_of(&whole["tables"][0]["metrics"]).clone();
+        metrics.iter().map(|metric| text_of(&metric["label"]).to_owned()).collect()
     };
     let bare = run("bare", "dtu:3");
     assert_eq!(names(&bare), ["PSNR", "SSIM", "PSNR corrected"]);

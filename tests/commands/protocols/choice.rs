@@ -91,25 +91,25 @@ fn random_hangs_on_seed_name_and_trial_alone() {
     let renamed = scene(&one.path().join("lorry"));
     let jobs = |scenes: &[Scene], draws| plan("random", scenes, draws).jobs;
 
-    let own = jobs(std::slice::from_ref(&elsewhere), DRAWS);
-    assert_eq!(own.len(), 5);
-    for (trial, job) in own.iter().enumerate() {
+    let alone = jobs(std::slice::from_ref(&elsewhere), DRAWS);
+    assert_eq!(alone.len(), 5);
+    for (trial, job) in alone.iter().enumerate() {
         assert_sound(job);
         assert_eq!((job.trial as usize, job.sources.len(), job.targets.len()), (trial, 3, 4));
     }
-    let different: HashSet<_> = own.iter().map(|job| (&job.sources, &job.targets)).collect();
+    let different: HashSet<_> = alone.iter().map(|job| (&job.sources, &job.targets)).collect();
     assert_eq!(different.len(), 5);
 
     // The order of the scenes, and where they lie, change nothing.
     let mixed = jobs(&[renamed.clone(), elsewhere.clone()], DRAWS);
     let of_second: Vec<Job> = mixed[5..].iter().map(|job| Job { scene: 0, ..job.clone() }).collect();
-    assert_eq!(of_second, own);
+    assert_eq!(of_second, alone);
     assert_eq!(here.views.len(), renamed.views.len());
-    assert_ne!(mixed[0].targets, own[0].targets);
+    assert_ne!(mixed[0].targets, alone[0].targets);
     // More trials only add some.
-    assert_eq!(jobs(std::slice::from_ref(&elsewhere), Draws { trial_count: 9, ..DRAWS })[..5], own);
+    assert_eq!(jobs(std::slice::from_ref(&elsewhere), Draws { trial_count: 9, ..DRAWS })[..5], alone);
     let other_seed = jobs(std::slice::from_ref(&elsewhere), Draws { seed: 8, ..DRAWS });
-    assert!(own.iter().zip(&other_seed).all(|(a, b)| a.targets != b.targets));
+    assert!(alone.iter().zip(&other_seed).all(|(a, b)| a.targets != b.targets));
 }
 
 /// Over many trials every view is a source about as often as any other.

@@ -6,7 +6,6 @@
 
 use super::folders::finished;
 use crate::{BINARY, lab};
-use libtest_mimic::Trial;
 use serde_json::Value;
 use std::fs;
 use std::net::TcpListener;
@@ -19,27 +18,27 @@ use tempfile::TempDir;
 use viewfuse_tests::command::done;
 use viewfuse_tests::patience::wait_until;
 use viewfuse_tests::places::repository;
-use viewfuse_tests::trials::{is_required, needing, trial};
+use viewfuse_tests::trials::lacking;
 
 const REQUIRED: &str = "VIEWFUSE_REQUIRE_CLUSTER";
 /// What the recipes do, made small.
 const SMALL: &str = "--protocol random --trials 4 --targets-per-trial 1 --size 64x64 --device cpu --weights mean";
 
-pub(crate) fn trials() -> Vec<Trial> {
-    let missing = |programs: &[&str]| {
-        let paths = std::env::var_os("PATH").unwrap_or_default();
-        let is_there = |program: &&str| std::env::split_paths(&paths).any(|folder| folder.join(program).is_file());
-        programs.iter().find(|program| !is_there(program)).map(|program| format!("no {program}"))
-    };
-    let slurm = missing(&["slurmctld", "slurmd", "sbatch"]).or_else(|| {
-        let user = Command::new("id").arg("-u").output().map(|output| output.stdout);
-        (!user.is_ok_and(|user| user == b"0\n")).then(|| "Slurm's node needs root".to_owned())
-    });
-    let module = |name: &str| format!("{}::{name}", module_path!());
-    vec![
-        needing(missing(&["parallel"]), is_required(REQUIRED), trial(&module("gnu_parallel"), gnu_parallel)),
-        needing(slurm, is_required(REQUIRED), trial(&module("slurm"), slurm_on_one_node)),
-    ]
+viewfuse_tests::trials![;
+    missing(&["parallel"]), REQUIRED => gnu_parallel;
+    missing(&["slurmctld", "slurmd", "sbatch"]).or_else(no_root), REQUIRED => slurm_on_one_node,
+];
+
+/// The first of these programs that is not on the path.
+fn missing(programs: &[&str]) -> Option<String> {
+    let paths = std::env::var_os("PATH").unwrap_or_default();
+    let is_there = |program: &&str| std::env::split_paths(&paths).any(|folder| folder.join(program).is_file());
+    programs.iter().find(|program| !is_there(program)).map(|program| format!("no {program}"))
+}
+
+fn no_root() -> Option<String> {
+    let user = Command::new("id").arg("-u").output().map(|output| output.stdout);
+    lacking(user.is_ok_and(|user| user == b"0\n"), "Slurm's node needs root")
 }
 
 /// The block of code that begins like this, of the README.

@@ -139,7 +139,7 @@ fn nothing_leads_within_the_interval() {
 
 fn words_say_what_is_below_a_baseline() {
     let table = &tables(&[views(&[[20.0, 15.0, 20.5], [21.0, 16.5, 20.0], [22.0, 17.0, 23.0]])], false)[0];
-    let standing: Vec<Standing> = table.comparisons.iter().map(|own| own.standing).collect();
+    let standing: Vec<Standing> = table.comparisons.iter().map(|comparison| comparison.standing).collect();
     assert_eq!(standing, [Standing::Below, Standing::NotBelow]);
     let words = table.verdicts();
     assert_eq!(words.len(), 2, "{words:?}");

@@ -3,7 +3,6 @@
 
 use super::super::BINARY;
 use super::start;
-use libtest_mimic::Trial;
 use socket2::SockRef;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -13,7 +12,7 @@ use std::time::Duration;
 use viewfuse_tests::command::toy;
 use viewfuse_tests::patience::PATIENCE;
 use viewfuse_tests::scenes::Folder;
-use viewfuse_tests::trials::{needing, trial};
+use viewfuse_tests::trials::lacking;
 use viewfuse_tests::viewer::{Connection, Program, request};
 
 /// Most memory of the program under any attack, in KiB.
@@ -22,21 +21,15 @@ const MAX_MEMORY: u64 = 100_000;
 /// What a connection may send at most until it has to be refused, or to wait.
 const MAX_SENT: usize = 1 << 28;
 
-pub(super) fn trials() -> Vec<Trial> {
-    let taken = TcpListener::bind("127.0.0.1:80").err().map(|error| format!("port 80: {error}"));
-    let on_port_80 = trial("commands::view::attacks::port_80_needs_no_number", port_80_needs_no_number);
-    let no_count = (!cfg!(target_os = "linux")).then(|| "the system does not say what a process takes".to_owned());
-    let counted = |name, test: fn()| needing(no_count.clone(), false, trial(name, test));
-    vec![
-        needing(taken, false, on_port_80),
-        trial("commands::view::attacks::a_length_that_is_too_great_is_refused", great_lengths),
-        trial("commands::view::attacks::idle_connections_keep_nobody_out", idle_connections),
-        trial("commands::view::attacks::a_slow_body_holds_up_nobody", slow_bodies),
-        counted("commands::view::attacks::pipelined_requests_do_not_queue", pipelined_requests),
-        counted("commands::view::attacks::an_endless_request_line_takes_no_memory", endless_lines),
-        trial("commands::view::attacks::resets_are_not_reported", resets),
-    ]
-}
+viewfuse_tests::trials![
+    a_length_that_is_too_great_is_refused,
+    idle_connections_keep_nobody_out,
+    a_slow_body_holds_up_nobody,
+    resets_are_not_reported;
+    TcpListener::bind("127.0.0.1:80").err().map(|error| format!("port 80: {error}")) => port_80_needs_no_number;
+    lacking(cfg!(target_os = "linux"), "the system does not say what a process takes") =>
+        pipelined_requests_do_not_queue, an_endless_request_line_takes_no_memory,
+];
 
 struct Attacked {
     program: Program,
@@ -72,8 +65,8 @@ impl Attacked {
 
     /// An open tab and a new one get what they ask for.
     fn tabs_are_served(&self, open: &mut Connection<'_>) {
-        let own = [("Host", self.program.host.as_str())];
-        assert_eq!(open.ask("GET", &format!("{}status", self.program.path), &own, b"").status, 200);
+        let headers = [("Host", self.program.host.as_str())];
+        assert_eq!(open.ask("GET", &format!("{}status", self.program.path), &headers, b"").status, 200);
         let start = &self.program.scene()["start"];
         self.program.connect().picture(&request("new", start, true)).unpacked();
     }
@@ -89,7 +82,7 @@ impl Attacked {
     }
 }
 
-fn great_lengths() {
+fn a_length_that_is_too_great_is_refused() {
     let mut attacked = Attacked::start();
     let (host, path) = (&attacked.program.host, &attacked.program.path);
     for (length, expected) in [
@@ -117,7 +110,7 @@ fn great_lengths() {
     attacked.ends();
 }
 
-fn idle_connections() {
+fn idle_connections_keep_nobody_out() {
     let mut attacked = Attacked::start();
     let mut open = attacked.program.connect();
     attacked.tabs_are_served(&mut open);
@@ -135,13 +128,13 @@ fn idle_connections() {
     drop((idle, begun));
 }
 
-fn slow_bodies() {
+fn a_slow_body_holds_up_nobody() {
     let mut attacked = Attacked::start();
     let path = format!("{}picture", attacked.program.path);
     let mut open = attacked.program.connect();
-    let own = &attacked.program.host;
+    let host = &attacked.program.host;
     let slow: Vec<TcpStream> =
-        [("/", "evil.example", 1000), (&path, own, 1000), ("/", "evil.example", 5000), (&path, own, 5000)]
+        [("/", "evil.example", 1000), (&path, host, 1000), ("/", "evil.example", 5000), (&path, host, 5000)]
             .into_iter()
             .map(|(path, host, length)| {
                 let mut stream = attacked.raw();
@@ -159,7 +152,7 @@ fn slow_bodies() {
     attacked.ends();
 }
 
-fn pipelined_requests() {
+fn pipelined_requests_do_not_queue() {
     const REQUESTS: usize = 80_000;
     let mut attacked = Attacked::start();
     let mut open = attacked.program.connect();
@@ -184,8 +177,8 @@ fn pipelined_requests() {
     let stream = attacked.raw();
     let answered = scope(|scope| {
         let sending = scope.spawn(|| (&stream).write_all(&all.as_bytes()[..1000 * text.len()]));
-        let mut own = attacked.program.connection_of(stream.try_clone().expect("the same connection"));
-        let answered = (0..1000).filter(|_| own.receive().status == 403).count();
+        let mut connection = attacked.program.connection_of(stream.try_clone().expect("the same connection"));
+        let answered = (0..1000).filter(|_| connection.receive().status == 403).count();
         sending.join().expect("no panic").expect("all are taken");
         answered
     });
@@ -194,7 +187,7 @@ fn pipelined_requests() {
     attacked.ends();
 }
 
-fn endless_lines() {
+fn an_endless_request_line_takes_no_memory() {
     let mut attacked = Attacked::start();
     let mut open = attacked.program.connect();
     let head = format!("GET / HTTP/1.1\r\nHost: {}\r\nX: ", attacked.program.host);
@@ -220,7 +213,7 @@ fn endless_lines() {
 
 /// Connections that are reset: by a client that does not linger, also before the server saw them, and by one that
 /// leaves an answer unread.
-fn resets() {
+fn resets_are_not_reported() {
     let mut attacked = Attacked::start();
     let mut open = attacked.program.connect();
     for number in 0..400 {
@@ -248,8 +241,8 @@ fn port_80_needs_no_number() {
     for host in ["127.0.0.1", "localhost", "127.0.0.1:80", "localhost:80"] {
         assert_eq!(program.connect().ask("GET", &path, &[("Host", host)], b"").status, 200, "{host}");
         let origin = format!("http://{host}");
-        let own = [("Host", host), ("Origin", origin.as_str())];
-        assert_eq!(program.connect().ask("GET", &path, &own, b"").status, 200, "{origin}");
+        let headers = [("Host", host), ("Origin", origin.as_str())];
+        assert_eq!(program.connect().ask("GET", &path, &headers, b"").status, 200, "{origin}");
     }
     assert_eq!(program.connect().ask("GET", &path, &[("Host", "127.0.0.1:81")], b"").status, 403);
 }

@@ -2,6 +2,7 @@
 //! messages that end in a zero byte.
 
 use super::super::browser::Browser;
+use crate::{number_of, text_of};
 use serde_json::{Value, json};
 use std::cell::{Cell, RefCell};
 use std::io::{BufRead, BufReader, Write};
@@ -104,9 +105,9 @@ impl Chromium {
     #[track_caller]
     pub(super) fn open(&self, address: &str, [width, height]: [u32; 2], is_phone: bool) -> Tab<'_> {
         let target = self.call(None, "Target.createTarget", json!({"url": "about:blank"}));
-        let target = target["targetId"].as_str().expect("a tab").to_owned();
+        let target = text_of(&target["targetId"]).to_owned();
         let session = self.call(None, "Target.attachToTarget", json!({"targetId": target, "flatten": true}));
-        let session = session["sessionId"].as_str().expect("a session").to_owned();
+        let session = text_of(&session["sessionId"]).to_owned();
         let tab = Tab { chromium: self, session, target };
         for domain in ["Page.enable", "Runtime.enable", "Log.enable"] {
             tab.call(domain, json!({}));
@@ -216,7 +217,7 @@ impl Tab<'_> {
             "(() => {{ const own = document.querySelector('{selector}'); own.scrollIntoView({{block: 'nearest'}}); \
              const box = own.getBoundingClientRect(); return [box.x + box.width / 2, box.y + box.height / 2]; }})()"
         ));
-        [0, 1].map(|axis| place[axis].as_f64().expect("a place"))
+        [0, 1].map(|axis| number_of(&place[axis]))
     }
 
     /// What the console of this tab was told: messages of scripts, exceptions, failed requests.
@@ -224,20 +225,20 @@ impl Tab<'_> {
         // Whatever was sent before the answer to this call has arrived.
         self.evaluate("0");
         let events = self.chromium.events.borrow();
-        let own = events.iter().filter(|event| event["sessionId"] == self.session.as_str());
+        let received = events.iter().filter(|event| event["sessionId"] == self.session.as_str());
         let is_message = |event: &&Value| {
             ["Runtime.consoleAPICalled", "Runtime.exceptionThrown", "Log.entryAdded"]
                 .iter()
                 .any(|method| event["method"] == *method)
         };
-        own.filter(is_message).map(|event| event["params"].to_string()).collect()
+        received.filter(is_message).map(|event| event["params"].to_string()).collect()
     }
 
     /// The window, as PNG.
     pub(super) fn picture(&self) -> Vec<u8> {
         use base64::Engine;
         let result = self.call("Page.captureScreenshot", json!({"format": "png"}));
-        let text = result["data"].as_str().expect("a picture");
+        let text = text_of(&result["data"]);
         base64::engine::general_purpose::STANDARD.decode(text).expect("base64")
     }
 

@@ -1,14 +1,14 @@
 //! Pictures that follow a hand that drags, and that memory does not grow.
 
-use super::super::browser::{self, Browser, InBrowser};
-use super::super::{done, numbers};
+use super::super::browser::{Browser, REQUIRE};
+use super::super::{done, list_of, number_of, numbers};
 use super::devtools::{Chromium, Tab};
 use super::{COUNT, keep, room, start, weights};
-use libtest_mimic::Trial;
 use serde_json::json;
 use viewfuse_tests::command::toy;
 use viewfuse_tests::patience::wait_until;
 use viewfuse_tests::places::repository;
+use viewfuse_tests::trials::lacking;
 use viewfuse_tests::viewer::Program;
 
 /// So many moves are sent in the test of memory, unless `VIEWFUSE_VIEW_MOVES` says otherwise.
@@ -20,28 +20,25 @@ const SIXTEENTHS: [f64; 6] = [16.0, 13.0, 10.0, 8.0, 6.0, 4.0];
 /// So many pictures are waited for while dragging.
 const PICTURES: f64 = 30.0;
 
-pub(super) fn trials() -> Vec<Trial> {
-    if cfg!(not(target_os = "linux")) {
-        // The system does not say what a process takes.
-        return Vec::new();
-    }
-    let tests: [(&str, InBrowser); 3] = [
-        ("view::browser::pictures_of_gaussians_follow_the_hand", pictures_of_gaussians_follow_the_hand),
-        ("view::browser::pictures_of_the_room_follow_the_hand", pictures_of_the_room_follow_the_hand),
-        ("view::browser::many_moves_of_a_hand_take_no_memory", many_moves_of_a_hand_take_no_memory),
-    ];
-    browser::trials(tests).into()
-}
+viewfuse_tests::trials![;
+    lacking(cfg!(target_os = "linux"), "the system does not say what a process takes").or_else(Browser::missing),
+    REQUIRE =>
+        pictures_of_gaussians_follow_the_hand,
+        pictures_of_the_room_follow_the_hand,
+        many_moves_of_a_hand_take_no_memory,
+];
 
 fn moves() -> usize {
     std::env::var("VIEWFUSE_VIEW_MOVES").map_or(MOVES, |text| text.parse().expect("a number of moves"))
 }
 
-fn pictures_of_the_room_follow_the_hand(browser: &Browser) {
+fn pictures_of_the_room_follow_the_hand() {
+    let browser = &Browser::needed();
     pictures_follow_the_hand(browser, "tests/data/room", [160.0, 120.0], "room.png");
 }
 
-fn pictures_of_gaussians_follow_the_hand(browser: &Browser) {
+fn pictures_of_gaussians_follow_the_hand() {
+    let browser = &Browser::needed();
     let folder = toy();
     done(folder.path(), "optimise toy --size 96x96 --device cpu -o toy.ply");
     let scene = format!("{0}/toy --gaussians {0}/toy.ply", folder.path().display());
@@ -69,13 +66,14 @@ fn pictures_follow_the_hand(browser: &Browser, scene: &str, finest: [f64; 2], ke
     let seen = tab.evaluate("({sizes: drawnSizes, numbers: drawnNumbers, weights: weightsTold})");
     weights(&tab);
     keep(&tab, kept);
-    let (told, drawn) = (seen["weights"].as_f64().expect("a number"), numbers(&seen["numbers"]));
+    let (told, drawn) = (number_of(&seen["weights"]), numbers(&seen["numbers"]));
     assert!(told >= drawn.len() as f64, "weights were drawn {told} times for {} pictures", drawn.len());
     assert!(drawn.is_sorted(), "an older picture replaced a newer one: {drawn:?}");
-    for size in seen["sizes"].as_array().expect("sizes") {
-        let own = numbers(size);
-        let is_coarse = SIXTEENTHS.iter().any(|share| (0..2).all(|i| (own[i] - finest[i] * share / 16.0).abs() < 1.0));
-        assert!(is_coarse, "{own:?} while dragging");
+    for size in list_of(&seen["sizes"]) {
+        let sides = numbers(size);
+        let is_coarse =
+            SIXTEENTHS.iter().any(|share| (0..2).all(|i| (sides[i] - finest[i] * share / 16.0).abs() < 1.0));
+        assert!(is_coarse, "{sides:?} while dragging");
     }
     tab.wait_for("shows.shown.full && shows.shown.pose === shows.pose");
     assert_eq!(tab.console(), [""; 0]);
@@ -105,7 +103,8 @@ fn memory(program: &Program, tab: &Tab<'_>) -> [f64; 2] {
     [program.memory() as f64, number("usedSize") + number("backingStorageSize")]
 }
 
-fn many_moves_of_a_hand_take_no_memory(browser: &Browser) {
+fn many_moves_of_a_hand_take_no_memory() {
+    let browser = &Browser::needed();
     let program = room("--sources 003..006 --size 96x72 --weights error:alpha=1");
     let chromium = Chromium::start(browser);
     let tab = chromium.open(&program.address(), [900, 700], false);

@@ -1,13 +1,12 @@
 //! A scene of Gaussians as one page, in a browser: its picture beside core's, the weights of the view on the screen, a
 //! hand, a phone.
 
-use super::super::browser::{self, Browser, InBrowser};
-use super::super::done;
+use super::super::browser::{Browser, REQUIRE};
+use super::super::{done, numbers};
 use super::devtools::{Chromium, Tab};
 use super::keep;
 use glam::{Quat, Vec3};
 use image::{Rgb, RgbImage};
-use libtest_mimic::Trial;
 use serde_json::json;
 use std::path::Path;
 use tempfile::TempDir;
@@ -21,14 +20,12 @@ use viewfuse_core::sources::Sources;
 use viewfuse_core::weighting::{Scheme, weigh};
 use viewfuse_tests::command::toy;
 
-pub(super) fn trials() -> [Trial; 3] {
-    let tests: [(&str, InBrowser); 3] = [
-        ("view::browser::the_page_of_a_command_opens", the_page_of_a_command_opens),
-        ("view::browser::a_page_shows_the_gaussians_of_core", a_page_shows_the_gaussians_of_core),
-        ("view::browser::a_page_follows_a_hand_and_a_finger", a_page_follows_a_hand_and_a_finger),
-    ];
-    browser::trials(tests)
-}
+viewfuse_tests::trials![;
+    Browser::missing(), REQUIRE =>
+        the_page_of_a_command_opens,
+        a_page_shows_the_gaussians_of_core,
+        a_page_follows_a_hand_and_a_finger,
+];
 
 const VIEWS: usize = 5;
 const WIDTH: usize = 240;
@@ -85,7 +82,7 @@ fn cameras() -> [(String, Camera); VIEWS] {
 fn expected(scene: &GaussianScene, camera: &Camera) -> RgbImage {
     let block = camera.block(0);
     let blocks = scene.blocks(camera.pose.centre_world());
-    let projected: Vec<ProjectedGaussian> = blocks.iter().map(|own| project(own, &block, 0.02)).collect();
+    let projected: Vec<ProjectedGaussian> = blocks.iter().map(|gaussian| project(gaussian, &block, 0.02)).collect();
     let mut order = vec![0; projected.len()];
     nearest_first(&projected, &mut order);
     let mut picture = RgbImage::new(WIDTH as u32, HEIGHT as u32);
@@ -146,10 +143,11 @@ fn complaints(tab: &Tab<'_>) -> Vec<String> {
 fn weights(tab: &Tab<'_>) -> Vec<f64> {
     let list =
         tab.evaluate("[...document.querySelectorAll('#sources output')].map((own) => Number(own.dataset.weight))");
-    list.as_array().expect("weights").iter().map(|own| own.as_f64().expect("a weight")).collect()
+    numbers(&list)
 }
 
-fn a_page_shows_the_gaussians_of_core(browser: &Browser) {
+fn a_page_shows_the_gaussians_of_core() {
+    let browser = &Browser::needed();
     let (_folder, address) = written();
     let (scene, cameras) = (scene(), cameras());
     let chromium = Chromium::start(browser);
@@ -168,17 +166,18 @@ fn a_page_shows_the_gaussians_of_core(browser: &Browser) {
         tab.evaluate(&format!("document.querySelectorAll('#sources button')[{view}].click()"));
         tab.wait_for(STILL);
         let picture = shown(&tab, [WIDTH, HEIGHT]);
-        let (own, other) =
+        let (right, other) =
             (psnr(&picture, &expected(&scene, &cameras[view].1)), psnr(&picture, &expected(&scene, &cameras[4].1)));
-        assert!(own >= MIN_PSNR, "view {view}: {own} dB");
+        assert!(right >= MIN_PSNR, "view {view}: {right} dB");
         assert!(other < 25.0, "any picture would do: {other} dB");
-        assert!(weights(&tab).iter().enumerate().all(|(index, own)| *own == f64::from(u8::from(index == view))));
+        assert!(weights(&tab).iter().enumerate().all(|(index, weight)| *weight == f64::from(u8::from(index == view))));
     }
     keep(&tab, "one_file.png");
     assert_eq!(complaints(&tab), [""; 0]);
 }
 
-fn a_page_follows_a_hand_and_a_finger(browser: &Browser) {
+fn a_page_follows_a_hand_and_a_finger() {
+    let browser = &Browser::needed();
     let (_folder, address) = written();
     let chromium = Chromium::start(browser);
     let tab = chromium.open(&address, [1000, 900], false);
@@ -211,11 +210,11 @@ fn a_page_follows_a_hand_and_a_finger(browser: &Browser) {
         let pose = Pose::look_at(centre, rig.focus, rig.up).expect("a pose");
         weigh(scheme, &sources, &pose).values().map(f64::from)
     };
-    let own = weights(&tab);
-    let gap = |expected: [f64; VIEWS]| own.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let weighed = weights(&tab);
+    let gap = |expected: [f64; VIEWS]| weighed.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     let (one, two) = (gap(at(&turned)), gap(at(&other)));
-    assert!(one.min(two) < 1.0e-4, "{own:?}: {one} {two}");
-    assert!((own.iter().sum::<f64>() - 1.0).abs() < 1.0e-9 && own[2] < 0.999_9, "{own:?}");
+    assert!(one.min(two) < 1.0e-4, "{weighed:?}: {one} {two}");
+    assert!((weighed.iter().sum::<f64>() - 1.0).abs() < 1.0e-9 && weighed[2] < 0.999_9, "{weighed:?}");
     assert_eq!(complaints(&tab), [""; 0]);
 
     let phone = chromium.open(&address, [390, 844], true);
@@ -243,7 +242,8 @@ fn a_page_follows_a_hand_and_a_finger(browser: &Browser) {
 }
 
 /// The page that `optimise` writes, beside `render` with the file that it writes.
-fn the_page_of_a_command_opens(browser: &Browser) {
+fn the_page_of_a_command_opens() {
+    let browser = &Browser::needed();
     let folder = toy();
     for output in ["toy.ply", "toy.html"] {
         done(
@@ -269,10 +269,10 @@ fn the_page_of_a_command_opens(browser: &Browser) {
         done(folder.path(), &format!("render toy --gaussians toy.ply {options} -o {view}"));
         image::open(folder.path().join(format!("{view}/00000{view}.png"))).expect("a picture").to_rgb8()
     };
-    let (own, other) = (psnr(&picture, &rendered("3")), psnr(&picture, &rendered("5")));
-    println!("the command's page: {own:.2} dB, another view {other:.2} dB");
+    let (right, other) = (psnr(&picture, &rendered("3")), psnr(&picture, &rendered("5")));
+    println!("the command's page: {right:.2} dB, another view {other:.2} dB");
     keep(&tab, "optimised.png");
-    assert!(own >= MIN_PSNR, "{own} dB");
+    assert!(right >= MIN_PSNR, "{right} dB");
     assert!(other < 25.0, "any picture would do: {other} dB");
     assert_eq!(complaints(&tab), [""; 0]);
 }

@@ -1,11 +1,10 @@
 //! The page in a browser: a hand, two hands on a phone, keys, menus, tabs, and what is taken elsewhere.
 
-use super::super::browser::{self, Browser, InBrowser};
-use super::super::{BINARY, assert_near, numbers, read_json};
+use super::super::browser::{Browser, REQUIRE};
+use super::super::{BINARY, assert_near, number_of, numbers, read_json};
 use super::devtools::{Chromium, Tab};
 use super::{FOLLOWED, NOTE_PICTURES, WEIGHTS, done_with_warnings, keep, room, weights};
 use image::{RgbImage, RgbaImage};
-use libtest_mimic::Trial;
 use serde_json::{Value, json};
 use std::fs;
 use std::process::Command;
@@ -16,19 +15,17 @@ use viewfuse_tests::places::data;
 use viewfuse_tests::scenes::Folder;
 use viewfuse_tests::viewer::{Program, request};
 
-pub(super) fn trials() -> [Trial; 8] {
-    let tests: [(&str, InBrowser); 8] = [
-        ("view::browser::a_hand_turns_the_view", a_hand_turns_the_view),
-        ("view::browser::tabs_come_and_go", tabs_come_and_go),
-        ("view::browser::a_phone_shows_all_of_it", a_phone_shows_all_of_it),
-        ("view::browser::a_view_is_taken_elsewhere", a_view_is_taken_elsewhere),
-        ("view::browser::a_path_goes_through_keyframes", a_path_goes_through_keyframes),
-        ("view::browser::the_scheme_becomes_that_of_render", the_scheme_becomes_that_of_render),
-        ("view::browser::where_nothing_was_photographed_it_is_said", where_nothing_was_photographed_it_is_said),
-        ("view::browser::names_from_files_are_no_commands", names_from_files_are_no_commands),
-    ];
-    browser::trials(tests)
-}
+viewfuse_tests::trials![;
+    Browser::missing(), REQUIRE =>
+        a_hand_turns_the_view,
+        tabs_come_and_go,
+        a_phone_shows_all_of_it,
+        a_view_is_taken_elsewhere,
+        a_path_goes_through_keyframes,
+        the_scheme_becomes_that_of_render,
+        where_nothing_was_photographed_it_is_said,
+        names_from_files_are_no_commands,
+];
 
 /// The full picture of the view as it is now.
 const FULL: &str = "window.shows && shows.shown && shows.shown.full && shows.shown.pose === shows.pose";
@@ -52,7 +49,8 @@ fn difference(a: &RgbaImage, b: &RgbaImage) -> f64 {
     sum as f64 / a.as_raw().len() as f64
 }
 
-fn a_hand_turns_the_view(browser: &Browser) {
+fn a_hand_turns_the_view() {
+    let browser = &Browser::needed();
     let program = room(SMALL);
     let chromium = Chromium::start(browser);
     let tab = chromium.open(&program.address(), [1280, 860], false);
@@ -137,7 +135,8 @@ fn schemes_and_layers(tab: &Tab<'_>) {
     tab.wait_for(&format!("{FULL} && {WEIGHTS}[0] === Math.max(...{WEIGHTS})"));
 }
 
-fn tabs_come_and_go(browser: &Browser) {
+fn tabs_come_and_go() {
+    let browser = &Browser::needed();
     let mut program = room(SMALL);
     let chromium = Chromium::start(browser);
     let first = chromium.open(&program.address(), [900, 700], false);
@@ -173,7 +172,8 @@ fn tabs_come_and_go(browser: &Browser) {
     assert!(third.text("document.getElementById('problem').textContent").contains("does not answer"));
 }
 
-fn a_phone_shows_all_of_it(browser: &Browser) {
+fn a_phone_shows_all_of_it() {
+    let browser = &Browser::needed();
     let program = room(SMALL);
     let chromium = Chromium::start(browser);
     let tab = chromium.open(&program.address(), [390, 844], true);
@@ -210,7 +210,8 @@ fn a_phone_shows_all_of_it(browser: &Browser) {
 
 /// From behind the wall: words, a dimmed picture, and the same again when the view is back. For people who see it dark
 /// and small, too.
-fn where_nothing_was_photographed_it_is_said(browser: &Browser) {
+fn where_nothing_was_photographed_it_is_said() {
+    let browser = &Browser::needed();
     let program = room(SMALL);
     let chromium = Chromium::start(browser);
     for (size, is_phone, name) in [([1280, 800], false, "unseen.png"), ([390, 844], true, "unseen_phone.png")] {
@@ -243,7 +244,8 @@ fn where_nothing_was_photographed_it_is_said(browser: &Browser) {
 }
 
 /// A pose is saved as a file that viewfuse reads, and the command line says how this view is rendered.
-fn a_view_is_taken_elsewhere(browser: &Browser) {
+fn a_view_is_taken_elsewhere() {
+    let browser = &Browser::needed();
     let program = room(SMALL);
     let chromium = Chromium::start(browser);
     let tab = chromium.open(&program.address(), [1280, 860], false);
@@ -265,8 +267,8 @@ fn a_view_is_taken_elsewhere(browser: &Browser) {
     let scene = viewfuse::scene::Scene::open(folder.path()).expect("a scene");
     let pose = scene.views[0].camera.pose.to_opencv();
     let shown: Vec<f64> = numbers(&tab.evaluate("matrixOf(shows.pose).flat()"));
-    for (own, shown) in pose.iter().flatten().zip(shown) {
-        assert_near(f64::from(*own), shown, 1.0e-6);
+    for (number, shown) in pose.iter().flatten().zip(shown) {
+        assert_near(f64::from(*number), shown, 1.0e-6);
     }
     tab.call("Page.bringToFront", json!({}));
     tab.evaluate("document.getElementById('copy').click()");
@@ -289,12 +291,12 @@ fn a_view_is_taken_elsewhere(browser: &Browser) {
     wait_until("no picture is saved", || names_in(&files).len() == 3 && files.join("run.json").exists());
     let of_page = image::open(files.join("view.png")).expect("a picture").to_rgb8();
     assert!(of_page == rendered, "another picture is saved");
-    let (own, run) = (read_json(files.join("run.json")), read_json(folder.path().join("out/run.json")));
+    let (saved, run) = (read_json(files.join("run.json")), read_json(folder.path().join("out/run.json")));
     for key in ["viewfuse", "device", "field", "weighting", "chosen", "size", "background", "sources", "depth_units"] {
-        assert_eq!(own[key], run[key], "{key}");
+        assert_eq!(saved[key], run[key], "{key}");
     }
     for key in ["world_from_camera", "weights", "left_out", "depth_step"] {
-        assert_near_all(&own["frames"][0][key], &run["frames"][0][key], key);
+        assert_near_all(&saved["frames"][0][key], &run["frames"][0][key], key);
     }
     // A view of the scene that is no source has a name.
     tab.evaluate("goTo(shows.scene.others[0].pose)");
@@ -305,21 +307,22 @@ fn a_view_is_taken_elsewhere(browser: &Browser) {
 
 /// Values of two records are the same but for the rounding of a pose that went through a file.
 #[track_caller]
-fn assert_near_all(own: &Value, other: &Value, what: &str) {
-    match (own.as_array(), other.as_array()) {
+fn assert_near_all(one: &Value, other: &Value, what: &str) {
+    match (one.as_array(), other.as_array()) {
         (Some(all), Some(others)) => {
             assert_eq!(all.len(), others.len(), "{what}");
-            all.iter().zip(others).for_each(|(own, other)| assert_near_all(own, other, what));
+            all.iter().zip(others).for_each(|(one, other)| assert_near_all(one, other, what));
         }
-        _ => match (own.as_f64(), other.as_f64()) {
-            (Some(own), Some(other)) => assert_near(own, other, 1.0e-5),
-            _ => assert_eq!(own, other, "{what}"),
+        _ => match (one.as_f64(), other.as_f64()) {
+            (Some(one), Some(other)) => assert_near(one, other, 1.0e-5),
+            _ => assert_eq!(one, other, "{what}"),
         },
     }
 }
 
 /// Views are added, removed and played, and the path that is saved is one that `render` takes.
-fn a_path_goes_through_keyframes(browser: &Browser) {
+fn a_path_goes_through_keyframes() {
+    let browser = &Browser::needed();
     let program = room(SMALL);
     let chromium = Chromium::start(browser);
     let tab = chromium.open(&program.address(), [1280, 860], false);
@@ -368,7 +371,7 @@ fn a_path_goes_through_keyframes(browser: &Browser) {
     tab.wait_for("document.getElementById('save-video').textContent === 'Save video'");
     if format == "webp" {
         let bytes = fs::read(&film).expect("a video");
-        assert!(bytes.starts_with(b"RIFF") && bytes.windows(4).filter(|own| own == b"ANMF").count() == 3);
+        assert!(bytes.starts_with(b"RIFF") && bytes.windows(4).filter(|word| word == b"ANMF").count() == 3);
     }
     fs::remove_file(film).expect("a file");
     click("save-path");
@@ -381,16 +384,16 @@ fn a_path_goes_through_keyframes(browser: &Browser) {
     done_with_warnings(folder.path(), line.strip_prefix("viewfuse ").expect("the command"));
     let written = names_in(&folder.path().join("out"));
     for name in ["view_0.png", "view_1.png", "view_2.png", "video.webp"] {
-        assert!(written.iter().any(|own| own == name), "{name} is not in {written:?}");
+        assert!(written.iter().any(|file| file == name), "{name} is not in {written:?}");
     }
     // Around the subject: in the middle as far from it as at both ends, within the scene's own units.
     let scene = read_json(saved);
     let about = tab.evaluate("({focus: shows.focus, origin: shows.scene.origin, scale: shows.scene.scale})");
     let (focus, origin) = (numbers(&about["focus"]), numbers(&about["origin"]));
-    let scale = about["scale"].as_f64().expect("a number");
+    let scale = number_of(&about["scale"]);
     let place = |frame: usize, axis: usize| {
         let matrix = &scene["frames"][frame]["transform_matrix"];
-        (matrix[axis][3].as_f64().expect("a number") - origin[axis]) / scale
+        (number_of(&matrix[axis][3]) - origin[axis]) / scale
     };
     let distance = |frame: usize| (0..3).map(|axis| (place(frame, axis) - focus[axis]).powi(2)).sum::<f64>().sqrt();
     assert_near(distance(1), distance(0), 1.0e-6);
@@ -399,7 +402,8 @@ fn a_path_goes_through_keyframes(browser: &Browser) {
 }
 
 /// Without `--weights` the page begins at once, and shows the scheme that `render` takes when it is known.
-fn the_scheme_becomes_that_of_render(browser: &Browser) {
+fn the_scheme_becomes_that_of_render() {
+    let browser = &Browser::needed();
     let folder = toy();
     let options = "--sources 000000..000011 --size 48x48";
     let program = super::start(folder.path(), &format!("toy {options}"));
@@ -429,7 +433,8 @@ fn the_scheme_becomes_that_of_render(browser: &Browser) {
 }
 
 /// Whoever made a scene chose the names of its folder and of its views: pasted into a shell, they are words.
-fn names_from_files_are_no_commands(browser: &Browser) {
+fn names_from_files_are_no_commands() {
+    let browser = &Browser::needed();
     const NAME: &str = "$(touch pwned)';touch pwned;#{weights} $& \u{1b}[201~";
     let folder = toy();
     let scene = folder.path().join("{view}$'{weights}");

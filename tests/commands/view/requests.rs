@@ -1,10 +1,9 @@
 //! The server by requests alone: who may ask, what is answered, and that it ends.
 
-use super::super::{BINARY, assert_near, numbers};
+use super::super::{BINARY, assert_near, list_of, number_of, numbers};
 use super::{done_with_warnings, room, start};
 use image::codecs::webp::WebPDecoder;
 use image::{AnimationDecoder, DynamicImage};
-use libtest_mimic::Trial;
 use serde_json::{Value, json};
 use std::io::Cursor;
 use std::path::Path;
@@ -14,34 +13,33 @@ use viewfuse_tests::devices::vulkan_devices;
 use viewfuse_tests::patience::wait_until;
 use viewfuse_tests::places::{data, repository};
 use viewfuse_tests::scenes::Folder;
-use viewfuse_tests::trials::{is_required, needing, trial};
+use viewfuse_tests::trials::lacking;
 use viewfuse_tests::viewer::{Answer, Connection, Program, request};
 
-pub(super) fn trials() -> Vec<Trial> {
-    let has_vulkan = vulkan_devices().is_ok_and(|(_, adapters)| adapters.iter().any(|own| own.missing.is_empty()));
-    let missing = (!has_vulkan).then(|| "no Vulkan device".to_owned());
-    let on_vulkan = trial("commands::view::a_vulkan_device_shows_the_same", a_vulkan_device_shows_the_same);
-    vec![
-        needing(missing, is_required("VIEWFUSE_REQUIRE_VULKAN"), on_vulkan),
-        trial("commands::view::other_hosts_and_addresses_get_nothing", other_hosts_and_addresses_get_nothing),
-        trial("commands::view::how_much_was_photographed_is_told", how_much_was_photographed_is_told),
-        trial("commands::view::full_pictures_are_those_of_render", full_pictures_are_those_of_render),
-        trial("commands::view::no_view_is_an_error_of_the_server", no_view_is_an_error_of_the_server),
-        trial("commands::view::the_scheme_can_be_chosen_for_the_scene", the_scheme_can_be_chosen_for_the_scene),
-        trial("commands::view::the_newest_request_wins", the_newest_request_wins),
-        trial("commands::view::a_video_has_the_pictures_of_its_path", a_video_has_the_pictures_of_its_path),
-        trial("commands::view::one_video_at_a_time_for_who_waits", one_video_at_a_time_for_who_waits),
-        trial("commands::view::a_video_is_mp4_where_ffmpeg_is", a_video_is_mp4_where_ffmpeg_is),
-        trial("commands::view::ctrl_c_ends_it_and_nothing_is_written", ctrl_c_ends_it_and_nothing_is_written),
-        trial("commands::view::a_taken_port_is_an_error", a_taken_port_is_an_error),
-        trial("commands::view::learned_fields_are_shown", learned_fields_are_shown),
-        trial("commands::view::gaussians_are_shown", gaussians_are_shown),
-    ]
+viewfuse_tests::trials![
+    other_hosts_and_addresses_get_nothing,
+    how_much_was_photographed_is_told,
+    full_pictures_are_those_of_render,
+    no_view_is_an_error_of_the_server,
+    the_scheme_can_be_chosen_for_the_scene,
+    the_newest_request_wins,
+    a_video_has_the_pictures_of_its_path,
+    one_video_at_a_time_for_who_waits,
+    a_video_is_mp4_where_ffmpeg_is,
+    ctrl_c_ends_it_and_nothing_is_written,
+    a_taken_port_is_an_error,
+    learned_fields_are_shown,
+    gaussians_are_shown;
+    lacking(has_vulkan(), "no Vulkan device"), "VIEWFUSE_REQUIRE_VULKAN" => a_vulkan_device_shows_the_same,
+];
+
+fn has_vulkan() -> bool {
+    vulkan_devices().is_ok_and(|(_, adapters)| adapters.iter().any(|adapter| adapter.missing.is_empty()))
 }
 
 fn other_hosts_and_addresses_get_nothing() {
     let program = start(&repository(), &format!("{} --size 24x24", data("toy").display()));
-    let own = ("Host", program.host.as_str());
+    let header = ("Host", program.host.as_str());
     let status = |method: &str, path: &str, headers: &[(&str, &str)], body: &[u8]| {
         program.connect().ask(method, path, headers, body).status
     };
@@ -58,16 +56,16 @@ fn other_hosts_and_addresses_get_nothing() {
         assert_eq!(status("GET", &program.path, &[("Host", host)], b""), 403, "{host}");
     }
     assert_eq!(status("GET", &program.path, &[], b""), 403, "no host");
-    assert_eq!(status("GET", &program.path, &[own, own], b""), 403, "two hosts");
-    assert_eq!(status("GET", &program.path, &[own, ("Origin", "http://evil.example")], b""), 403);
+    assert_eq!(status("GET", &program.path, &[header, header], b""), 403, "two hosts");
+    assert_eq!(status("GET", &program.path, &[header, ("Origin", "http://evil.example")], b""), 403);
     for path in ["/", "/scene", "/0123456789abcdef0123456789abcdef/", &program.path[..20]] {
-        assert_eq!(status("GET", path, &[own], b""), 403, "{path}");
+        assert_eq!(status("GET", path, &[header], b""), 403, "{path}");
     }
     for (rest, expected) in [("scene", 405), ("picture", 400), ("nothing", 404), ("../Cargo.toml", 404)] {
-        assert_eq!(status("POST", &format!("{}{rest}", program.path), &[own], b"{}"), expected, "{rest}");
+        assert_eq!(status("POST", &format!("{}{rest}", program.path), &[header], b"{}"), expected, "{rest}");
     }
     let long = vec![b' '; 5000];
-    assert_eq!(status("POST", &format!("{}picture", program.path), &[own], &long), 413);
+    assert_eq!(status("POST", &format!("{}picture", program.path), &[header], &long), 413);
     let start = &program.scene()["start"];
     for (key, value) in [("scheme", "attention:Cargo.toml"), ("scheme", "median"), ("layer", "everything")] {
         let mut wrong = request("a", start, true);
@@ -94,7 +92,7 @@ fn filming(programs: &Path) -> Program {
 fn path(start: &Value, frames: usize) -> Value {
     let pose = |frame: usize| {
         let mut pose = start.clone();
-        pose[0][3] = (pose[0][3].as_f64().expect("a number") + 0.01 * frame as f64).into();
+        pose[0][3] = (number_of(&pose[0][3]) + 0.01 * frame as f64).into();
         pose
     };
     json!({"poses": (0..frames).map(pose).collect::<Vec<_>>(), "scheme": "mean"})
@@ -122,14 +120,14 @@ fn a_video_has_the_pictures_of_its_path() {
     let decoder = WebPDecoder::new(Cursor::new(answer.body)).expect("a WebP");
     let frames = decoder.into_frames().collect_frames().expect("frames");
     assert_eq!(frames.len(), 3);
-    for (frame, pose) in frames.iter().zip(film["poses"].as_array().expect("poses")) {
+    for (frame, pose) in frames.iter().zip(list_of(&film["poses"])) {
         let mut request = request("a", pose, false);
         request["scheme"] = "mean".into();
         let (_, picture) = program.connect().picture(&request).unpacked();
         assert!(DynamicImage::from(frame.buffer().clone()).into_rgb8() == picture, "without loss");
         // Rounded to whole milliseconds.
-        let (milliseconds, of) = frame.delay().numer_denom_ms();
-        assert!((41..=42).contains(&(milliseconds / of)), "{milliseconds} / {of}");
+        let (milliseconds, divisor) = frame.delay().numer_denom_ms();
+        assert!((41..=42).contains(&(milliseconds / divisor)), "{milliseconds} / {divisor}");
     }
     for (wrong, part) in [
         (path(&scene["start"], 1), "from 2 to 240 frames, not 1"),
@@ -200,20 +198,20 @@ fn a_video_is_mp4_where_ffmpeg_is() {
 fn how_much_was_photographed_is_told() {
     let program = start(&repository(), &format!("{} --size 24x18", data("room").display()));
     let scene = program.scene();
-    let ring = scene["ring"].as_array().expect("places");
-    let seen: Vec<f64> = ring.iter().map(|place| place["seen"].as_f64().expect("a share")).collect();
+    let ring = list_of(&scene["ring"]);
+    let seen: Vec<f64> = ring.iter().map(|place| number_of(&place["seen"])).collect();
     assert_eq!(seen.len(), 36);
     let count = |is: &dyn Fn(f64) -> bool| seen.iter().filter(|share| is(**share)).count();
     assert!(count(&|share| share > 0.9) >= 3 && count(&|share| share < 0.1) >= 15, "{seen:?}");
     let share = |pose: &Value, is_moving: bool| {
         let (answer, _) = program.connect().picture(&request("a", pose, is_moving)).unpacked();
-        answer["seen"].as_f64().expect("a share")
+        number_of(&answer["seen"])
     };
     // Looking back, over its own shoulder: the first two columns are turned around.
     let (there, mut away) = (scene["start"].clone(), scene["start"].clone());
     for row in 0..3 {
         for column in [0, 2] {
-            away[row][column] = (-away[row][column].as_f64().expect("a number")).into();
+            away[row][column] = (-number_of(&away[row][column])).into();
         }
     }
     for is_moving in [true, false] {
@@ -232,7 +230,7 @@ fn full_pictures_are_those_of_render() {
     }
     let program = start(folder.path(), &format!("{} {options} --weights error:alpha=1", scene.display()));
     let found = program.scene();
-    let others = found["others"].as_array().expect("other views");
+    let others = list_of(&found["others"]);
     let pose = &others.iter().find(|view| view["name"] == "005").expect("view 005")["pose"];
     let mut connection = program.connect();
     let mut pictures = Vec::new();
@@ -297,11 +295,11 @@ fn the_scheme_can_be_chosen_for_the_scene() {
         program.connect().picture(&request).unpacked().1
     };
     let shown = [&chosen, &json!("mean"), &chosen].map(picture);
-    for (scheme, own) in ["auto", "mean"].into_iter().zip(&shown) {
+    for (scheme, row) in ["auto", "mean"].into_iter().zip(&shown) {
         let arguments = format!("render toy --targets 000020 --weights {scheme} {options} --device cpu -o {scheme}");
         done_with_warnings(folder.path(), &arguments);
         let path = folder.path().join(scheme).join("000020.png");
-        assert!(image::open(path).expect("a picture").to_rgb8() == *own, "{scheme}: another picture");
+        assert!(image::open(path).expect("a picture").to_rgb8() == *row, "{scheme}: another picture");
     }
     assert!(shown[0] != shown[1] && shown[0] == shown[2]);
 }
@@ -399,7 +397,7 @@ fn gaussians_are_shown() {
     let expected = image::open(folder.path().join("out/000020.png")).expect("a picture").to_rgb8();
     let program = start(folder.path(), "toy --gaussians toy.ply --sources 0..19 --size 64x64");
     let found = program.scene();
-    let others = found["others"].as_array().expect("other views");
+    let others = list_of(&found["others"]);
     let pose = &others.iter().find(|view| view["name"] == "000020").expect("view 20")["pose"];
     let mut connection = program.connect();
     let (full, picture) = connection.picture(&request("a", pose, false)).unpacked();

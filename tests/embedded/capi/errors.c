@@ -64,7 +64,6 @@ static viewfuse_status weigh(uint32_t formula, uint32_t choice, float parameter)
 }
 
 static void schemes(void) {
-    EXPECT(FORMULA, weigh(7, 0, 0.0f));
     EXPECT(FORMULA, weigh(UINT32_MAX, 0, 0.0f));
     EXPECT(FORMULA, weigh(VIEWFUSE_FORMULA_DISTANCE, 0, 0.0f));
     EXPECT(FORMULA, weigh(VIEWFUSE_FORMULA_DISTANCE, 4, 0.0f));

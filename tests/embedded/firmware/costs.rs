@@ -73,8 +73,8 @@ fn numbers(call: &Call) -> [Option<u64>; 3] {
 
 /// Several at once, for an emulator takes one core: in the order of `runs`, each a board, a profile and a program.
 fn all_measured(runs: &[(&Firmware, &'static str, &str)]) -> Result<Vec<Vec<Call>>, Failed> {
-    let of = |(firmware, profile, program): &(&Firmware, &'static str, &str)| measured(firmware, profile, program);
-    runs.par_iter().map(of).collect::<Vec<_>>().into_iter().collect()
+    let cost = |(firmware, profile, program): &(&Firmware, &'static str, &str)| measured(firmware, profile, program);
+    runs.par_iter().map(cost).collect::<Vec<_>>().into_iter().collect()
 }
 
 /// What the first board's calls take, and the rows of a table: of every board the first so many numbers of each call.

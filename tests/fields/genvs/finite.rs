@@ -6,22 +6,14 @@ use viewfuse::field::finite::NotFinite;
 use viewfuse::field::genvs::{Architecture, Genvs, test_networks};
 use viewfuse::scene::photographs::SourceImages;
 use viewfuse_core::weights::Weights;
-use viewfuse_tests::checkpoints::changed;
-
-/// Times this, every weight is finite still; what becomes of numbers that meet several of them is not.
-const LARGE: f32 = 1.9e38;
+use viewfuse_tests::checkpoints::{LARGE, multiplied};
 
 /// The small network with all weights of a module, or of a layer, multiplied.
-fn multiplied(module: &str, factor: f32) -> Genvs {
+fn with_module(module: &str, factor: f32) -> Genvs {
     let made = test_networks::deterministic(&Architecture::small());
     let belongs =
         |name: &str| name.strip_prefix(module).is_some_and(|rest| rest.starts_with('.') && rest.ends_with(".weight"));
-    let checkpoint = changed(&made, |tensors| {
-        let own: Vec<_> = tensors.iter_mut().filter(|(tensor, _)| belongs(&tensor.name)).collect();
-        assert!(!own.is_empty(), "{module}");
-        own.into_iter().flat_map(|(_, values)| values).for_each(|value| *value *= factor);
-    });
-    Genvs::new(checkpoint, exact()).expect("a made network")
+    Genvs::new(multiplied(&made, belongs, factor), exact()).expect("a made network")
 }
 
 #[track_caller]
@@ -58,7 +50,7 @@ fn in_the_encoder() {
         "volume_head.reshape_conv",
     ] {
         println!("{name}");
-        let field = multiplied(&format!("pixel_nerf_net.encoder.{name}"), LARGE);
+        let field = with_module(&format!("pixel_nerf_net.encoder.{name}"), LARGE);
         let error = not_finite(&field, &sources(2));
         assert_eq!((error.stage.as_str(), error.tensor.as_str()), ("encoding source 0", VOLUME), "{name}");
     }
@@ -67,7 +59,7 @@ fn in_the_encoder() {
 #[test]
 fn in_the_network_at_points() {
     for layer in 0..3 {
-        let error = not_finite(&multiplied(&format!("pixel_nerf_net.mlp.layers.{layer}"), LARGE), &sources(2));
+        let error = not_finite(&with_module(&format!("pixel_nerf_net.mlp.layers.{layer}"), LARGE), &sources(2));
         assert_eq!(error.stage, "rendering the target's features", "{layer}");
         assert_eq!(error.tensor, "feature image");
     }
@@ -87,7 +79,7 @@ fn in_the_denoiser() {
         "dec.64x64_aux_norm",
         "dec.64x64_aux_conv",
     ] {
-        let error = not_finite(&multiplied(&format!("denoiser.model.{name}"), LARGE), &sources(2));
+        let error = not_finite(&with_module(&format!("denoiser.model.{name}"), LARGE), &sources(2));
         assert_eq!(
             (error.stage.as_str(), error.tensor.as_str()),
             ("denoising at level 80", "denoised picture"),
@@ -101,7 +93,7 @@ fn in_a_photograph() {
     for bad in [f32::NAN, f32::INFINITY] {
         let mut sources = sources(2);
         sources.images[1].texels[5][1] = bad;
-        let field = multiplied("denoiser.model.map_layer0", 1.0);
+        let field = with_module("denoiser.model.map_layer0", 1.0);
         let error = not_finite(&field, &sources);
         assert_eq!((error.stage.as_str(), error.index), ("encoding source 1", 5 * 3 + 1));
         assert_eq!(error.tensor, "image [row][column][3]");

@@ -1,21 +1,18 @@
-//! Each thing that can be left out, alone: what it saves and what it costs, against the exact picture.
+//! Each thing that can be omitted, alone: what it saves and what it costs, against the exact picture.
 
 use super::{
-    assert_sound, exact, largest_difference, leaving_out, made, picture_with, recorded, sources, target, weights,
-    without_denoiser,
+    assert_sound, exact, largest_difference, made, omitting, picture_with, recorded, sources, target, without_denoiser,
 };
-use std::sync::Arc;
 use viewfuse::device::cpu::Cpu;
+use viewfuse::field::LeftOut;
 use viewfuse::field::genvs::reference::Reference;
 use viewfuse::field::genvs::sampling::{Plan, Steps};
 use viewfuse::field::genvs::{GenvsOptions, Omissions};
-use viewfuse::field::render::{RenderOptions, Stage};
-use viewfuse::field::{LeftOut, On};
 use viewfuse::job::progress::Silent;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::weights::Weights;
-use viewfuse_tests::fields::line;
+use viewfuse_tests::fields::{line, on_sources, weights};
 
 fn in_18_calls() -> Plan {
     let steps = Steps::Fixed { sampler: Sampler::Ipndm, level_count: 18 };
@@ -23,7 +20,7 @@ fn in_18_calls() -> Plan {
 }
 
 #[test]
-fn nothing_is_left_out_where_nothing_may() {
+fn nothing_is_omitted_where_nothing_may() {
     let (_, record) = recorded(&made(exact()), &sources(3), &Weights::mean(3), &target(16));
     assert_eq!(record.left_out.len(), 4);
     for line in &record.left_out {
@@ -38,7 +35,7 @@ fn nothing_is_left_out_where_nothing_may() {
 fn views_that_no_target_uses_are_not_encoded() {
     let (sources, target, weights) = (sources(4), target(16), weights([0.0, 0.25, 0.0, 0.75], 4));
     let reference = picture_with(&made(exact()), &sources, &weights, &target);
-    let field = made(leaving_out(Omissions { unused_views: true, ..Omissions::NONE }));
+    let field = made(omitting(Omissions { unused_views: true, ..Omissions::NONE }));
     let (picture, record) = recorded(&field, &sources, &weights, &target);
     assert_eq!(picture, reference, "zeros are added exactly");
     let LeftOut { left_out, of, switch, .. } = line(&record, "encoded views");
@@ -55,24 +52,21 @@ fn rows_that_no_ray_reaches_are_not_computed() {
         Camera { pinhole, ..camera }
     };
     let targets = [part(16.0, 8), part(-12.0, 4), part(16.0, 32)];
-    let quiet = Silent;
     let with = |omissions| {
-        let field = without_denoiser(leaving_out(omissions));
-        let renderer = On { device: &Cpu, field: &field };
-        let options = RenderOptions::default();
-        let mut stage =
-            Stage::of_sources(Arc::new(sources.clone()), &renderer, &options, &quiet).expect("sources on the device");
-        let render = |target: &Camera| {
-            let picture = stage.picture(target, &Weights::mean(3), 0.0, &quiet);
-            (picture.expect("a picture"), line(&stage.record(), "volume rows").left_out)
-        };
-        targets.iter().map(render).collect::<Vec<_>>()
+        let field = without_denoiser(omitting(omissions));
+        on_sources(&sources, &field, &Silent, |stage| {
+            let render = |target: &Camera| {
+                let picture = stage.picture(target, &Weights::mean(3), 0.0, &Silent);
+                (picture.expect("a picture"), line(&stage.record(), "volume rows").left_out)
+            };
+            targets.iter().map(render).collect::<Vec<_>>()
+        })
     };
     let exact = with(Omissions::NONE);
     let few = with(Omissions { unseen_rows: true, ..Omissions::NONE });
-    for ((exact, none), (few, left_out)) in exact.iter().zip(&few) {
+    for ((exact, none), (few, omitted)) in exact.iter().zip(&few) {
         assert_eq!(few, exact, "rows that nobody sees");
-        println!("{left_out} of {} rows left out", 3 * 32);
+        println!("{omitted} of {} rows omitted", 3 * 32);
         assert_eq!(*none, 0);
     }
     assert!(few[0].1 > 20 && few[1].1 < few[0].1 && few[2].1 <= few[1].1, "what was there is not computed again");
@@ -88,20 +82,16 @@ fn an_earlier_frame_saves_calls() {
             ..viewfuse_tests::lorry::orbit(16).camera(2.02, 0.35).expect("a camera")
         },
     ];
-    let quiet = Silent;
     let frames = |reuse| {
         let options = GenvsOptions { omissions: Omissions { reuse, ..Omissions::NONE }, ..exact() };
         let field = made(GenvsOptions { plan: Plan { early_termination: None, ..in_18_calls() }, ..options });
-        let renderer = On { device: &Cpu, field: &field };
-        let options = RenderOptions::default();
-        let mut stage =
-            Stage::of_sources(Arc::new(sources.clone()), &renderer, &options, &quiet).expect("sources on the device");
-        let mut render = |camera| stage.picture(camera, &Weights::mean(2), 0.0, &quiet);
-        let frames = cameras.each_ref().map(|camera| render(camera).expect("a picture"));
-        // A frame of another size begins anew.
-        let smaller = render(&target(8)).expect("a picture");
-        assert_sound(&smaller);
-        (frames, line(&stage.record(), "denoiser calls"))
+        on_sources(&sources, &field, &Silent, |stage| {
+            let mut render = |camera| stage.picture(camera, &Weights::mean(2), 0.0, &Silent).expect("a picture");
+            let frames = cameras.each_ref().map(&mut render);
+            // A frame of another size begins anew.
+            assert_sound(&render(&target(8)));
+            (frames, line(&stage.record(), "denoiser calls"))
+        })
     };
     let (whole, all) = frames(None);
     assert_eq!((all.left_out, all.of, all.switch), (0, 3 * 18, false));
@@ -110,7 +100,7 @@ fn an_earlier_frame_saves_calls() {
     assert_eq!(with[0], whole[0], "the first frame has none before it");
     assert!(with[1] != whole[1], "the second one started elsewhere");
     assert_sound(&with[1]);
-    // Above the largest level nothing is left out.
+    // Above the largest level nothing is omitted.
     let (_, none) = frames(Some(1.0e6));
     assert_eq!(none.left_out, 0);
 }
@@ -125,7 +115,7 @@ fn a_picture_that_no_longer_changes_ends_early() {
     };
     let ((whole, _), (early, calls)) = (with(None), with(Plan::fast(0).early_termination));
     let difference = largest_difference(&whole.colours, &early.colours);
-    println!("{} of {} calls left out, largest difference {difference:.1e}", calls.left_out, calls.of);
+    println!("{} of {} calls omitted, largest difference {difference:.1e}", calls.left_out, calls.of);
     assert!(calls.left_out > 0 && calls.of == 18);
     assert!(difference <= 0.5 / 255.0 + 1.0e-6, "half a level: {difference}");
 }

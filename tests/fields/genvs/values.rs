@@ -18,9 +18,9 @@ fn file() -> PathBuf {
 fn said_of(member: Option<&str>, change: impl FnOnce(&mut HashMap<String, Tensor>)) -> Result<Vec<String>, String> {
     let bytes = std::fs::read(file()).expect("the file");
     let given = SafeTensors::deserialize(&bytes).expect("tensors");
-    let own =
+    let named =
         |(name, view): (String, TensorView<'_>)| (name, (view.dtype(), view.shape().to_vec(), view.data().to_vec()));
-    let mut tensors: HashMap<String, Tensor> = given.tensors().into_iter().map(own).collect();
+    let mut tensors: HashMap<String, Tensor> = given.tensors().into_iter().map(named).collect();
     change(&mut tensors);
     let views = tensors.iter().map(|(name, (dtype, shape, data))| {
         (name.clone(), TensorView::new(*dtype, shape.clone(), data).expect("a tensor"))

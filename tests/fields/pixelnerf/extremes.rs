@@ -1,13 +1,13 @@
 //! Input that nobody would give on purpose: results stay finite and in range.
 
-use super::{assert_sound, body, leaving_out, mist, picture, sources, target};
+use super::{assert_sound, body, mist, omitting, picture, sources, target};
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::FieldError;
 use viewfuse::field::pixelnerf::{Architecture, Omissions, PixelNerf, PixelNerfOptions, test_networks};
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::photographs::SourceImages;
 use viewfuse_core::weights::Weights;
-use viewfuse_tests::checkpoints::changed;
+use viewfuse_tests::checkpoints::{LARGE, multiplied};
 use viewfuse_tests::fields;
 
 #[test]
@@ -24,7 +24,7 @@ fn one_source_looks_as_far_as_several() {
 fn rays_of_no_length_and_of_any_length() {
     for near_far in [[1.0, 1.0], [0.0, 1.0e-6], [0.0, 1.0e6], [1.0e6, 2.0e6]] {
         for omissions in [Omissions::NONE, Omissions::default()] {
-            let mut options = leaving_out(omissions);
+            let mut options = omitting(omissions);
             options.sampling.near_far = Some(near_far);
             assert_sound(&picture(&mist(options), &sources(2), &target(8)));
             assert_sound(&picture(&body(options), &sources(2), &target(8)));
@@ -37,7 +37,7 @@ fn few_samples_and_many() {
     for (coarse_count, importance_count, depth_count) in [(1, 0, 0), (1, 1, 1), (2, 0, 5), (3, 40, 0), (200, 100, 100)]
     {
         for omissions in [Omissions::NONE, Omissions::default()] {
-            let mut options = leaving_out(omissions);
+            let mut options = omitting(omissions);
             options.sampling.coarse_count = coarse_count;
             options.sampling.importance_count = importance_count;
             options.sampling.depth_count = depth_count;
@@ -57,27 +57,16 @@ fn a_background_of_another_colour_shows_where_nothing_is() {
     assert!((0.8..1.3).contains(&middle), "the body is before the middle of the scene: {middle}");
 }
 
-/// Times this, every weight is finite still; what becomes of numbers that meet several of them is not.
-const LARGE: f32 = 1.9e38;
-
-/// The body's network with all weights of layers of this name multiplied.
-fn multiplied(layer: &str, options: PixelNerfOptions) -> PixelNerf {
-    let checkpoint = changed(&test_networks::body(&Architecture::small(16)), |tensors| {
-        let own: Vec<_> = tensors.iter_mut().filter(|(tensor, _)| tensor.name.ends_with(layer)).collect();
-        assert!(!own.is_empty(), "{layer}");
-        own.into_iter().flat_map(|(_, values)| values).for_each(|value| *value *= LARGE);
-    });
-    PixelNerf::new(&checkpoint, options).expect("a made network")
-}
-
 #[test]
 fn networks_that_overflow_are_errors_and_no_white_pictures() {
     let sources = sources(2);
     let weights = Weights::mean(2);
     let between_nodes = Omissions { nodes: 16, ..Omissions::default() };
     for layer in ["lin_in.weight", "fc_1.weight"] {
+        let made = test_networks::body(&Architecture::small(16));
+        let checkpoint = multiplied(&made, |name| name.ends_with(layer), LARGE);
         for omissions in [Omissions::NONE, Omissions::default(), between_nodes] {
-            let field = multiplied(layer, leaving_out(omissions));
+            let field = PixelNerf::new(&checkpoint, omitting(omissions)).expect("a made network");
             let made = fields::picture(&Cpu, &field, &sources, &weights, &target(8), 0.0, &Silent);
             let error = made.err().unwrap_or_else(|| panic!("{layer}: a picture"));
             let said = error.to_string();

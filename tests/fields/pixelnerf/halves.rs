@@ -1,6 +1,6 @@
 //! Latents in half precision (f16): what they cost and what they save.
 
-use super::{Omissions, body, largest_difference, leaving_out, mist, recorded, sources, target};
+use super::{Omissions, body, largest_difference, mist, omitting, recorded, sources, target};
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::pixelnerf::PixelNerf;
 use viewfuse_core::weights::Weights;
@@ -21,7 +21,7 @@ fn pictures_hardly_change() {
     for latent_layers in [true, false] {
         for field in [mist as fn(_) -> _, body] {
             let [whole, halves] = both(latent_layers)
-                .map(|omissions| recorded(&field(leaving_out(omissions)), &sources, &Weights::mean(3), &target, 0.0).0);
+                .map(|omissions| recorded(&field(omitting(omissions)), &sources, &Weights::mean(3), &target, 0.0).0);
             let difference = largest_difference(&whole.colours, &halves.colours);
             // A fine sample may fall into the next part where two sums round apart.
             assert!(difference > 0.0 && difference < 1.0e-2, "{difference}");
@@ -33,7 +33,7 @@ fn pictures_hardly_change() {
 fn half_the_memory() {
     let sources = sources(3);
     for latent_layers in [true, false] {
-        let [whole, halves] = both(latent_layers).map(|omissions| mist(leaving_out(omissions)));
+        let [whole, halves] = both(latent_layers).map(|omissions| mist(omitting(omissions)));
         let bytes = |field: &PixelNerf| {
             let (_, record) = recorded(field, &sources, &Weights::mean(3), &target(8), 0.0);
             line(&record, "latent bytes")

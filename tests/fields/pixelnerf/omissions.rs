@@ -1,6 +1,6 @@
-//! Each thing that can be left out, alone: what it saves and what it costs, against the exact picture.
+//! Each thing that can be omitted, alone: what it saves and what it costs, against the exact picture.
 
-use super::{body, exact, largest_difference, leaving_out, mist, picture, picture_with, recorded, sources, target};
+use super::{body, exact, largest_difference, mist, omitting, picture, picture_with, recorded, sources, target};
 use viewfuse::field::pixelnerf::{Omissions, PixelNerfOptions};
 use viewfuse::field::{LeftOut, Rendered};
 use viewfuse::weighting::sources::MAX_SOURCES;
@@ -11,22 +11,22 @@ use viewfuse_tests::fields::{line, rms};
 /// Transmittance at which rays end.
 const EARLY_TERMINATION: f32 = 1.0 / 256.0;
 
-/// Difference from the exact picture of the body, and the share of the samples of a pass that was left out.
+/// Difference from the exact picture of the body, and the share of the samples of a pass that was omitted.
 fn cost_and_gain(omissions: Omissions, what: &str) -> (f32, f64) {
     let (sources, target) = (sources(3), target(32));
     let reference = picture(&body(exact()), &sources, &target);
-    let field = body(leaving_out(omissions));
+    let field = body(omitting(omissions));
     let (picture, record) = recorded(&field, &sources, &Weights::mean(3), &target, EARLY_TERMINATION);
     let difference = largest_difference(&picture.colours, &reference.colours);
     let LeftOut { left_out, of, switch, .. } = line(&record, what);
     assert!(switch && of > 0);
     let share = left_out as f64 / of as f64;
-    println!("{what}: {share:.3} left out, largest difference {difference:.1e}");
+    println!("{what}: {share:.3} omitted, largest difference {difference:.1e}");
     (difference, share)
 }
 
 #[test]
-fn nothing_is_left_out_where_nothing_may() {
+fn nothing_is_omitted_where_nothing_may() {
     let (_, record) = recorded(&body(exact()), &sources(3), &Weights::mean(3), &target(16), EARLY_TERMINATION);
     assert_eq!(record.left_out.len(), 6);
     for line in &record.left_out {
@@ -41,7 +41,7 @@ fn views_that_no_target_uses_are_not_encoded() {
     (scores[1], scores[3]) = (0.25, 0.75);
     let weights = Weights::from_scores(&scores, 4);
     let reference = picture_with(&body(exact()), &sources, &weights, &target, 0.0);
-    let field = body(leaving_out(Omissions { unused_views: true, ..Omissions::NONE }));
+    let field = body(omitting(Omissions { unused_views: true, ..Omissions::NONE }));
     let (picture, record) = recorded(&field, &sources, &weights, &target, 0.0);
     assert_eq!(picture, reference, "zeros are added exactly");
     let LeftOut { left_out, of, .. } = line(&record, "encoded views");
@@ -53,7 +53,7 @@ fn latent_layers_on_the_grid_are_only_rounding() {
     // Mist, so that every sample counts.
     let (sources, target) = (sources(3), target(24));
     let reference = picture(&mist(exact()), &sources, &target);
-    let field = mist(leaving_out(Omissions { latent_layers: true, ..Omissions::NONE }));
+    let field = mist(omitting(Omissions { latent_layers: true, ..Omissions::NONE }));
     let (picture, record) = recorded(&field, &sources, &Weights::mean(3), &target, EARLY_TERMINATION);
     let difference = largest_difference(&picture.colours, &reference.colours);
     println!("latent layers on the grid: {difference:.1e}");
@@ -85,7 +85,7 @@ fn probes_stand_at_the_last_row_and_column_too() {
     assert!(reference.colours[31 * 31 - 1][3] > 0.9 && opaque(&reference) > 60, "cut by the border");
     // From 16 pixels on, only the probe in the last corner can meet it.
     for (step, share) in [(4, 1.0), (16, 0.5), (64, 0.5)] {
-        let field = body(leaving_out(Omissions { empty_space: step, ..Omissions::NONE }));
+        let field = body(omitting(Omissions { empty_space: step, ..Omissions::NONE }));
         let seen = opaque(&picture(&field, &sources, &camera));
         assert!(seen as f64 >= share * opaque(&reference) as f64, "step {step}: {seen} of {}", opaque(&reference));
     }
@@ -96,13 +96,13 @@ fn samples_between_nodes_converge_to_the_exact_picture() {
     let (sources, target) = (sources(3), target(32));
     for (name, field) in [("body", body as fn(PixelNerfOptions) -> _), ("mist", mist)] {
         let reference = picture(&field(exact()), &sources, &target);
-        let of = |nodes: u32| {
-            let field = field(leaving_out(Omissions { nodes, ..Omissions::NONE }));
+        let costs = |nodes: u32| {
+            let field = field(omitting(Omissions { nodes, ..Omissions::NONE }));
             let (picture, record) = recorded(&field, &sources, &Weights::mean(3), &target, EARLY_TERMINATION);
             let LeftOut { left_out, of, .. } = line(&record, "second-pass samples");
             (rms(&picture.colours, &reference.colours), left_out as f64 / of as f64)
         };
-        let found = [8, 16, 32, 64, 128].map(of);
+        let found = [8, 16, 32, 64, 128].map(costs);
         // The mist has a network of its own for the first pass, which places the exact picture's samples.
         assert!(found[1].0 < found[0].0 && found[4].0 < 0.6 * found[1].0, "{name}");
         assert!(found[4].0 < 0.012, "{name}");
@@ -152,7 +152,7 @@ fn a_higher_limit_of_early_termination_saves_more_and_costs_more() {
     let reference = picture(&body(exact()), &sources, &target);
     let weights = Weights::mean(3);
     let with = |early_termination| {
-        let field = body(leaving_out(Omissions { hidden_samples: true, ..Omissions::NONE }));
+        let field = body(omitting(Omissions { hidden_samples: true, ..Omissions::NONE }));
         let (picture, record) = recorded(&field, &sources, &weights, &target, early_termination);
         (largest_difference(&picture.colours, &reference.colours), line(&record, "second-pass samples").left_out)
     };

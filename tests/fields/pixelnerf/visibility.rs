@@ -1,27 +1,20 @@
 //! Views at points behind their cameras: of weight 0, and neither looked up nor computed.
 
 use super::{
-    Omissions, assert_sound, exact, is_not_finite, leaving_out, mist, orbit, picture_with, recorded, sources, target,
+    Omissions, assert_sound, exact, is_not_finite, mist, omitting, orbit, picture_with, recorded, sources, target,
 };
 use viewfuse::field::pixelnerf::{PixelNerfOptions, Sampling};
 use viewfuse::scene::photographs::SourceImages;
-use viewfuse::weighting::sources::{MAX_SOURCES, SourceWeights};
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::depths::stratified_depth;
 use viewfuse_core::pose::Pose;
 use viewfuse_core::rays::{CastBlock, cast_ray};
 use viewfuse_core::weights::Weights;
-use viewfuse_tests::fields::line;
+use viewfuse_tests::fields::{line, weights};
 
 const SIDE: u32 = 12;
 const WEIGHTS: [f32; 3] = [0.5, 0.3, 0.2];
-
-fn weights(scores: [f32; 3]) -> SourceWeights {
-    let mut all = [0.0; MAX_SOURCES];
-    all[..3].copy_from_slice(&scores);
-    Weights::from_scores(&all, 3)
-}
 
 fn centre(camera: &Camera) -> Vec3 {
     camera.block(0).centre_world()
@@ -59,19 +52,17 @@ fn nothing_of_a_view_behind_which_all_points_lie_reaches_the_picture() {
     for omissions in ways() {
         let field = |unseen_points| mist(with_near(0.1, Omissions { unseen_points, ..omissions }));
         let render = |sources: &SourceImages, unseen_points| {
-            picture_with(&field(unseen_points), sources, &weights(WEIGHTS), &target, 0.0)
+            picture_with(&field(unseen_points), sources, &weights(WEIGHTS, 3), &target, 0.0)
         };
         let picture = render(&spoiled, true);
         assert_eq!(picture, render(&sound, true), "the view is read: {omissions:?}");
         assert_eq!(picture, render(&sound, false), "not the same bits: {omissions:?}");
         assert_sound(&picture);
         // Without the omission its latents are multiplied by 0.
-        assert!(is_not_finite(&field(false), &spoiled, &weights(WEIGHTS), &target, 0.0), "{omissions:?}");
+        assert!(is_not_finite(&field(false), &spoiled, &weights(WEIGHTS, 3), &target, 0.0), "{omissions:?}");
         // The weights of the others are renormalised: the picture is theirs alone, up to the rounding of that.
-        let mut scores = [0.0; MAX_SOURCES];
-        (scores[0], scores[1]) = (WEIGHTS[0], WEIGHTS[2]);
         let field = mist(with_near(0.1, omissions));
-        let alone = picture_with(&field, &others, &Weights::from_scores(&scores, 2), &target, 0.0);
+        let alone = picture_with(&field, &others, &weights([WEIGHTS[0], WEIGHTS[2]], 2), &target, 0.0);
         assert!(super::largest_difference(&picture.colours, &alone.colours) < 2.0e-3, "{omissions:?}");
     }
 }
@@ -83,7 +74,7 @@ fn rays_through_the_plane_of_a_camera_keep_their_bits() {
     for omissions in ways() {
         let render = |unseen_points| {
             let field = mist(with_near(0.1, Omissions { unseen_points, ..omissions }));
-            recorded(&field, &sources, &weights(WEIGHTS), &target, 0.0)
+            recorded(&field, &sources, &weights(WEIGHTS, 3), &target, 0.0)
         };
         let ((picture, record), (computed, all)) = (render(true), render(false));
         assert_eq!(picture, computed, "{omissions:?}");
@@ -97,7 +88,7 @@ fn rays_through_the_plane_of_a_camera_keep_their_bits() {
 }
 
 #[test]
-fn as_many_are_left_out_as_lie_behind_cameras() {
+fn as_many_are_omitted_as_lie_behind_cameras() {
     let sources = sources(3);
     let target = looking_out(&sources, 0.6);
     let (near, far, count) = (0.1, 1.8, 10);
@@ -111,7 +102,7 @@ fn as_many_are_left_out_as_lie_behind_cameras() {
     };
     let omissions = Omissions { unseen_points: true, ..Omissions::NONE };
     let field = mist(PixelNerfOptions { sampling, omissions });
-    let (_, record) = recorded(&field, &sources, &weights(WEIGHTS), &target, 0.0);
+    let (_, record) = recorded(&field, &sources, &weights(WEIGHTS, 3), &target, 0.0);
 
     // All cameras look at the middle of the scene.
     let cast = CastBlock { camera: target.block(0), near, far, pixel_centre: 0.0, along_axis: 0 };
@@ -137,8 +128,8 @@ fn as_many_are_left_out_as_lie_behind_cameras() {
 #[test]
 fn a_view_of_weight_0_is_not_read_where_all_views_are_encoded() {
     let (sound, spoiled) = (sources(3), spoiled(1));
-    let weights = weights([0.75, 0.0, 0.25]);
-    let field = |unseen_points| mist(leaving_out(Omissions { unseen_points, ..Omissions::NONE }));
+    let weights = weights([0.75, 0.0, 0.25], 3);
+    let field = |unseen_points| mist(omitting(Omissions { unseen_points, ..Omissions::NONE }));
     let picture = picture_with(&field(true), &spoiled, &weights, &target(SIDE), 0.0);
     assert_eq!(picture, picture_with(&mist(exact()), &sound, &weights, &target(SIDE), 0.0));
     assert!(is_not_finite(&field(false), &spoiled, &weights, &target(SIDE), 0.0));

@@ -117,7 +117,7 @@ fn frame(leave_out: f32) -> (Frame, image::RgbImage) {
 }
 
 #[test]
-fn views_left_out_are_reported_and_none_are_unless_asked() {
+fn dropped_sources_are_reported_and_none_are_unless_asked() {
     let (whole, plain) = frame(0.0);
     assert_eq!((whole.omission.omitted_count, whole.omission.omitted_weight), (0, 0.0));
     assert_eq!(whole.omission.weights, whole.weights);
@@ -125,7 +125,7 @@ fn views_left_out_are_reported_and_none_are_unless_asked() {
 
     let (less, _) = frame(0.3);
     let omission = &less.omission;
-    println!("left out: {} views of weight {}", omission.omitted_count, omission.omitted_weight);
+    println!("dropped: {} views of weight {}", omission.omitted_count, omission.omitted_weight);
     assert!(omission.omitted_count > 0 && omission.omitted_weight > 0.0 && omission.omitted_weight <= 0.3);
     let left = omission.weights.values().iter().filter(|weight| **weight > 0.0).count() as u32;
     assert_eq!(left + omission.omitted_count, 7, "views used and views left out");

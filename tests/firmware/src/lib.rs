@@ -38,8 +38,8 @@ impl Output {
             *digit = if nibble < 10 { b'0' + nibble } else { b'a' + nibble - 10 };
         }
         let mut length = 9;
-        for (letter, own) in line[9..LONGEST - 1].iter_mut().zip(name.as_bytes()) {
-            *letter = *own;
+        for (letter, byte) in line[9..LONGEST - 1].iter_mut().zip(name.as_bytes()) {
+            *letter = *byte;
             length += 1;
         }
         line[length.min(LONGEST - 1)] = b'\n';

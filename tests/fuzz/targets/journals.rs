@@ -32,13 +32,13 @@ fn line(target: &str, file: &str) -> String {
 impl Target for Journals {
     fn seeds(&self) -> Vec<Vec<u8>> {
         let head = format!("{{\"run\":\"{RUN}\"}}\n");
-        let (own, other) = (line("20", "20.png"), line("21", "21.png"));
-        let cut = &own[..own.len() / 2];
+        let (first, other) = (line("20", "20.png"), line("21", "21.png"));
+        let cut = &first[..first.len() / 2];
         let texts = [
             head.clone(),
-            format!("{head}{own}"),
-            format!("{head}{own}{other}{cut}"),
-            format!("{{\"run\":\"another\"}}\n{own}"),
+            format!("{head}{first}"),
+            format!("{head}{first}{other}{cut}"),
+            format!("{{\"run\":\"another\"}}\n{first}"),
             "{\"run\":\"01".to_owned(),
         ];
         texts.into_iter().map(String::into_bytes).collect()

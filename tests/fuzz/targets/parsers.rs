@@ -106,15 +106,15 @@ impl Target for Specs {
 }
 
 /// Lists of views of the sample scene.
-pub(crate) struct Views(Scene);
+pub(crate) struct ViewLists(Scene);
 
-impl Views {
-    pub(crate) fn new() -> Views {
-        Views(Scene::open(data("toy")).expect("the sample scene"))
+impl ViewLists {
+    pub(crate) fn new() -> ViewLists {
+        ViewLists(Scene::open(data("toy")).expect("the sample scene"))
     }
 }
 
-impl Target for Views {
+impl Target for ViewLists {
     fn seeds(&self) -> Vec<Vec<u8>> {
         ["20", "1,4,7", "3..9", "all/3", "000001..000007/2", "all", "train"]
             .iter()

@@ -68,7 +68,8 @@ fn list(names: &[&str]) {
         let (name, path) = line.split_once('\t').expect("a binary");
         Binary { name: name.to_owned(), path: PathBuf::from(path) }
     };
-    let binaries: Vec<Binary> = text.lines().map(binary).filter(|own| names.contains(&own.name.as_str())).collect();
+    let binaries: Vec<Binary> =
+        text.lines().map(binary).filter(|binary| names.contains(&binary.name.as_str())).collect();
     fs::write(file("tests"), runs::list(&binaries)).expect("a list of tests");
 }
 

@@ -27,9 +27,9 @@ pub struct Place {
 pub fn float_constants(file: &syn::File) -> BTreeSet<String> {
     struct Names(BTreeSet<String>);
     impl<'a> Visit<'a> for Names {
-        fn visit_item_const(&mut self, own: &'a syn::ItemConst) {
-            if matches!(&*own.ty, syn::Type::Path(path) if path.path.is_ident("f32")) {
-                self.0.insert(own.ident.to_string());
+        fn visit_item_const(&mut self, item: &'a syn::ItemConst) {
+            if matches!(&*item.ty, syn::Type::Path(path) if path.path.is_ident("f32")) {
+                self.0.insert(item.ident.to_string());
             }
         }
     }
@@ -106,38 +106,38 @@ impl Search<'_> {
 }
 
 impl<'a> Visit<'a> for Search<'_> {
-    fn visit_item_fn(&mut self, own: &'a syn::ItemFn) {
-        self.function(&own.sig, |search| search.visit_block(&own.block));
+    fn visit_item_fn(&mut self, item: &'a syn::ItemFn) {
+        self.function(&item.sig, |search| search.visit_block(&item.block));
     }
 
-    fn visit_impl_item_fn(&mut self, own: &'a syn::ImplItemFn) {
-        self.function(&own.sig, |search| search.visit_block(&own.block));
+    fn visit_impl_item_fn(&mut self, item: &'a syn::ImplItemFn) {
+        self.function(&item.sig, |search| search.visit_block(&item.block));
     }
 
-    fn visit_item_impl(&mut self, own: &'a syn::ItemImpl) {
-        let name = match &*own.self_ty {
+    fn visit_item_impl(&mut self, item: &'a syn::ItemImpl) {
+        let name = match &*item.self_ty {
             syn::Type::Path(path) => path.path.segments.last().map(|segment| segment.ident.to_string()),
             _ => None,
         };
         self.path.push(name.unwrap_or_else(|| "impl".to_owned()));
-        visit::visit_item_impl(self, own);
+        visit::visit_item_impl(self, item);
         self.path.pop();
     }
 
-    fn visit_expr(&mut self, own: &'a Expr) {
+    fn visit_expr(&mut self, expression: &'a Expr) {
         if !self.in_body {
             return;
         }
-        match own {
-            Expr::Lit(literal) if matches!(literal.lit, Lit::Float(_)) => self.add(Kind::Constant, own, ""),
+        match expression {
+            Expr::Lit(literal) if matches!(literal.lit, Lit::Float(_)) => self.add(Kind::Constant, expression, ""),
             Expr::Path(path)
                 if path.path.get_ident().is_some_and(|name| self.constants.contains(&name.to_string())) =>
             {
-                self.add(Kind::Constant, own, "");
+                self.add(Kind::Constant, expression, "");
             }
             Expr::Binary(binary) => match binary.op {
                 BinOp::Add(_) | BinOp::Sub(_) | BinOp::Mul(_) | BinOp::Div(_) | BinOp::Rem(_) => {
-                    self.add(Kind::Operator, own, "");
+                    self.add(Kind::Operator, expression, "");
                 }
                 // What is added. A whole number is a step of a loop, which would not end.
                 BinOp::AddAssign(_) | BinOp::SubAssign(_) | BinOp::MulAssign(_) | BinOp::DivAssign(_)
@@ -156,7 +156,7 @@ impl<'a> Visit<'a> for Search<'_> {
             Expr::Repeat(repeat) => return self.visit_expr(&repeat.expr),
             _ => {}
         }
-        visit::visit_expr(self, own);
+        visit::visit_expr(self, expression);
     }
 
     // Not expressions of a body.

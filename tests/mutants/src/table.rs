@@ -39,14 +39,16 @@ pub fn table(name: &str) -> String {
         let groups = [&[0][..], &[1], &[2], &[3], &[0, 2, 3], &[0, 1, 2]];
         let counts: Vec<usize> = groups.iter().map(|groups| count(changes, groups)).collect();
         let row = [&[changes.len()][..], &counts].concat();
-        row.iter().zip(&mut sums).for_each(|(own, sum)| *sum += own);
+        row.iter().zip(&mut sums).for_each(|(count, sum)| *sum += count);
         let cells: Vec<String> = row.iter().map(usize::to_string).collect();
         writeln!(text, "| `{body}` | {} |", cells.join(" | ")).expect("a text");
         if row[6] == 0 {
             lost.push(body.as_str());
         }
-        for (change, answers) in changes.iter().filter(|(_, answers)| !answers[..3].iter().any(|own| is_noticed(own))) {
-            let reach = match answers[..3].iter().all(|own| own == "not reached") {
+        for (change, answers) in
+            changes.iter().filter(|(_, answers)| !answers[..3].iter().any(|answer| is_noticed(answer)))
+        {
+            let reach = match answers[..3].iter().all(|answer| answer == "not reached") {
                 true => "reached by none",
                 false => "noticed by none",
             };

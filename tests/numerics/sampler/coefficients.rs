@@ -11,11 +11,11 @@ use viewfuse_core::schedule::NoiseSchedule;
 
 /// `integral over [0, 1] of weight(t) p(t)` for the polynomial through 1 at `places[own]` and 0 at the others, by
 /// Simpson's rule.
-fn integral(places: &[f64], own: usize, weight: impl Fn(f64) -> f64) -> f64 {
+fn integral(places: &[f64], chosen: usize, weight: impl Fn(f64) -> f64) -> f64 {
     const PIECES: usize = 4000;
     let value = |t: f64| {
-        let others = places.iter().enumerate().filter(|(index, _)| *index != own);
-        weight(t) * others.map(|(_, place)| (t - place) / (places[own] - place)).product::<f64>()
+        let others = places.iter().enumerate().filter(|(index, _)| *index != chosen);
+        weight(t) * others.map(|(_, place)| (t - place) / (places[chosen] - place)).product::<f64>()
     };
     let sum = (0..=PIECES).map(|index| {
         let factor = if index == 0 || index == PIECES { 1.0 } else { 2.0 + 2.0 * (index % 2) as f64 };
@@ -227,7 +227,7 @@ fn embedded_differences_are_between_orders() {
     assert_eq!(difference(&[3.0, 2.0]), Mix { state: 0.0, results: [-0.5, 0.5, 0.0, 0.0] });
     let third = difference(&[4.0, 3.0, 2.0]);
     let expected = [-5.0, 10.0, -5.0, 0.0].map(|twelfths| twelfths / 12.0);
-    let off = third.results.iter().zip(expected).map(|(own, expected)| (own - expected).abs());
+    let off = third.results.iter().zip(expected).map(|(result, expected)| (result - expected).abs());
     assert!(third.state == 0.0 && off.fold(0.0, f32::max) < 1.0e-6, "{third:?}");
     for sampler in Sampler::ALL {
         // A single result, and a level that is not lower, tell nothing.

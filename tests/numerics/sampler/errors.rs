@@ -79,10 +79,10 @@ fn what_the_plans_make() {
     let calls = sampler.call_count(level_count);
     for (name, mixture) in &problems()[..2] {
         let truth = truth(mixture, &start(80.0));
-        let [own, published] = [error(sampler, calls, mixture, &truth), error(Sampler::Heun, 49, mixture, &truth)];
-        println!("{name}: {} {own:.1e} at {calls} calls, heun {published:.1e} at 49", sampler.name());
+        let [ours, published] = [error(sampler, calls, mixture, &truth), error(Sampler::Heun, 49, mixture, &truth)];
+        println!("{name}: {} {ours:.1e} at {calls} calls, heun {published:.1e} at 49", sampler.name());
         let ten = error(Sampler::Heun, 11, mixture, &truth);
-        assert!(calls == 10 && own <= 0.04 && own <= 8.0 * published && own <= 0.1 * ten, "{name}");
+        assert!(calls == 10 && ours <= 0.04 && ours <= 8.0 * published && ours <= 0.1 * ten, "{name}");
         for (plan, most) in [(Plan::fast(5), 0.05), (Plan::careful(5), 0.012)] {
             let (picture, sampled) = on_cpu(&plan, mixture);
             let whole = on_cpu(&Plan { early_termination: None, ..plan }, mixture);

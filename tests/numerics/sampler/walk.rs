@@ -2,7 +2,7 @@
 //! here.
 
 use viewfuse_core::random::normal;
-use viewfuse_core::sampler::{History, Mix, Sampler};
+use viewfuse_core::sampler::{Corrected, History, Mix, Sampler};
 use viewfuse_core::schedule::NoiseSchedule;
 use viewfuse_tests::mixture::{DIMENSIONS, Mixture};
 
@@ -53,11 +53,11 @@ pub(crate) fn walk(sampler: Sampler, levels: &[f32], start: &[f64], mixture: &Mi
         let all: Vec<&[f64]> = results.iter().map(Vec::as_slice).collect();
         let reached = mixed(&sampler.step(&history, *next), &state, &all);
         let before = std::mem::replace(&mut state, reached);
-        if sampler == Sampler::Heun && *next > 0.0 {
+        if sampler.corrected() == Corrected::ByAnotherCall && *next > 0.0 {
             let there = said(&state, *next);
             state = mixed(&sampler.correction(&history, *next), &state, &[&there, &results[0]]);
         }
-        if sampler == Sampler::UniPc {
+        if sampler.corrected() == Corrected::ByTheNextCall {
             begun = Some(before);
         }
     }

@@ -39,13 +39,13 @@ impl Case for CensusCost {
         let CensusCost { block, first_row, pairs, grey, evidence, costs, .. } = self;
         let row_len = (block.camera.width * block.group_count) as usize;
         let first = *first_row as usize * row_len;
-        let own = map(self.element_count(), 8, |element| {
+        let rows = map(self.element_count(), 8, |element| {
             let element = (first + element) as u32;
             let (pixel, group) = (element / block.group_count, element % block.group_count);
             sweep_oracle::census_cost(block, pairs, grey, evidence, pixel, group)
         });
         let above = if let Output::Continued = costs { 0 } else { 2 * PLANES * block.first_row as usize * row_len };
         let before = vec![Bounded::ZERO; above];
-        decided(before.into_iter().chain(own.iter().flat_map(|costs| costs.as_flattened()).copied()), 0)
+        decided(before.into_iter().chain(rows.iter().flat_map(|costs| costs.as_flattened()).copied()), 0)
     }
 }

@@ -54,8 +54,8 @@ impl Case for Composite {
     fn expected(&self) -> Vec<Option<Bounded>> {
         let count = self.block.sample_count as usize;
         let pixels = map(self.ray_count as usize, 16, |ray| {
-            let own = ray * count..(ray + 1) * count;
-            composite(&self.samples[own.clone()], &self.sample_depths[own], &self.block)
+            let samples = ray * count..(ray + 1) * count;
+            composite(&self.samples[samples.clone()], &self.sample_depths[samples], &self.block)
         });
         let colours = pixels.iter().flat_map(|[red, green, blue, opacity, _]| [*red, *green, *blue, *opacity]);
         colours.chain(pixels.iter().map(|pixel| pixel[4])).collect()

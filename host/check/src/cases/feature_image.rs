@@ -108,7 +108,7 @@ impl Case for SumFeatures {
     fn expected(&self) -> Vec<Option<Bounded>> {
         let SumFeatures { block, weights, fused, raw, .. } = self;
         let [samples, features] = [block.sample_count, block.feature_count].map(|count| count as usize);
-        let own = |index: usize| {
+        let bounded = |index: usize| {
             let (ray, feature) = (index / features, index % features);
             // The ray's rows of so many numbers a sample.
             let part = |row: usize| ray * samples * row..(ray + 1) * samples * row;
@@ -116,7 +116,7 @@ impl Case for SumFeatures {
             volume_oracle::summed_feature(weights, fused, &raw[part(features + 1)], block, feature)
         };
         let before = vec![Bounded::ZERO; block.first_ray as usize * features];
-        decided(before.into_iter().chain(map(self.element_count(), 16, own)), 1)
+        decided(before.into_iter().chain(map(self.element_count(), 16, bounded)), 1)
     }
 }
 

@@ -15,10 +15,10 @@ impl Case for FuseViews {
     fn inputs(seed: u64, size: u32) -> Vec<FuseViews> {
         let random = &mut random(3, seed, size);
         // Views, channels of a point, whether points have their own weights and how far these are apart beyond need.
-        let dispatch = |(view_count, channel_count, own): (usize, u32, Option<usize>)| {
+        let dispatch = |(view_count, channel_count, exact): (usize, u32, Option<usize>)| {
             let stride = size + random.below(3) as u32;
             let point_count = size.div_ceil(channel_count.max(1)) as usize;
-            let weight_stride = own.map_or(0, |beyond| view_count + beyond);
+            let weight_stride = exact.map_or(0, |beyond| view_count + beyond);
             let mut weights = numbers(view_count.max(point_count * weight_stride), || random.unit());
             for weights in weights.chunks_mut(weight_stride.max(view_count)) {
                 let sum: f32 = weights[..view_count].iter().sum();
@@ -38,8 +38,8 @@ impl Case for FuseViews {
             }
         };
         let shared = [1, 2, 3, 8, 15, 32].map(|view_count| (view_count, 0, None));
-        let own = [(1, 1, Some(0)), (3, 64, Some(0)), (2, 7, Some(3)), (32, 5, Some(0)), (4, 512, None)];
-        shared.into_iter().chain(own).map(dispatch).collect()
+        let more = [(1, 1, Some(0)), (3, 64, Some(0)), (2, 7, Some(3)), (32, 5, Some(0)), (4, 512, None)];
+        shared.into_iter().chain(more).map(dispatch).collect()
     }
 
     fn expected(&self) -> Vec<Option<Bounded>> {

@@ -63,11 +63,11 @@ impl Case for GatherLatents {
         };
         let mut gathered = map(points.len(), 1, row).concat();
         if let Some(residual) = residual {
-            let own = &residual[view * gathered.len()..];
+            let residuals = &residual[view * gathered.len()..];
             let with = |(value, residual): (&mut Option<Bounded>, &f32)| {
                 *value = value.map(|value| value + Bounded::from(*residual));
             };
-            gathered.iter_mut().zip(own).for_each(with);
+            gathered.iter_mut().zip(residuals).for_each(with);
         }
         gathered
     }

@@ -242,8 +242,8 @@ impl Case for ProjectGradients {
     fn expected(&self) -> Vec<Option<Bounded>> {
         let ProjectGradients { block, gaussians, splats, use_starts, uses, sums, .. } = self;
         let gradient = |index: usize| {
-            let own = &uses[use_starts[index] as usize..use_starts[index + 1] as usize];
-            let parts: Vec<SplatGradient> = own.iter().map(|entry| sums[*entry as usize]).collect();
+            let entries = &uses[use_starts[index] as usize..use_starts[index + 1] as usize];
+            let parts: Vec<SplatGradient> = entries.iter().map(|entry| sums[*entry as usize]).collect();
             let sums = gaussian_oracle::sums_of(&parts);
             let gradient = gaussian_oracle::project_gradient(&gaussians[index], &block.camera, &splats[index], &sums);
             gradient.map_or([None; 16], |gradient| gradient.map(Some))

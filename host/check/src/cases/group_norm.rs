@@ -134,8 +134,8 @@ impl Case for GroupNormStatistics {
             for _ in 0..part_count {
                 for [mean, deviation] in &groups {
                     let count = f64::from(64 * group_channels);
-                    let own = mean + deviation * random.normal() / 8.0;
-                    partials.push([own as f32, (deviation * count * random.range(0.5, 1.5)) as f32]);
+                    let part = mean + deviation * random.normal() / 8.0;
+                    partials.push([part as f32, (deviation * count * random.range(0.5, 1.5)) as f32]);
                 }
             }
             GroupNormStatistics { block, partials, statistics: Output::Zeros(group_count as usize + 1) }
@@ -146,8 +146,8 @@ impl Case for GroupNormStatistics {
     }
 
     fn expected(&self) -> Vec<Option<Bounded>> {
-        let own = |group| group_norm_oracle::group_norm_statistics(&self.partials, &self.block, group);
-        decided((0..self.element_count()).flat_map(own), 2)
+        let statistics = |group| group_norm_oracle::group_norm_statistics(&self.partials, &self.block, group);
+        decided((0..self.element_count()).flat_map(statistics), 2)
     }
 }
 

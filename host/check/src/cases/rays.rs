@@ -57,11 +57,11 @@ impl Case for PlacePoints {
             for ray in &rays {
                 let (near, far) = (f64::from(ray.near), f64::from(ray.far));
                 // Two passes may have the same depth.
-                let mut own: Vec<f32> = (0..sample_count)
+                let mut sorted: Vec<f32> = (0..sample_count)
                     .map(|_| if random.below(8) == 0 { ray.far } else { random.range(near, far) as f32 })
                     .collect();
-                own.sort_by(f32::total_cmp);
-                depths.extend(own);
+                sorted.sort_by(f32::total_cmp);
+                depths.extend(sorted);
             }
             let samples: Vec<u32> = (0..size).map(|_| random.below(depths.len()) as u32).collect();
             let first = (size / 3).min(size - 1);

@@ -219,8 +219,8 @@ pub fn march_ray(
         Some(false) => {
             let mean = first.unwrap_or(Bounded::ZERO) + behind_first / opacity;
             // The sum of weights times whole depths rounds once for each of them.
-            let own = (layers.len() + 2) as f64 * ROUNDING * mean.value + 2.0 * lost * mean.value;
-            Some(Bounded { error: mean.error + own, ..mean })
+            let rounding = (layers.len() + 2) as f64 * ROUNDING * mean.value + 2.0 * lost * mean.value;
+            Some(Bounded { error: mean.error + rounding, ..mean })
         }
         None => None,
     };

@@ -36,7 +36,7 @@ pub fn match_cost(
     if in_front || (Bounded::from(SWEPT_BEHIND_ENTRY) * object_radius).below(behind_entry)? {
         return Some(OUT);
     }
-    let own = scene.texels[texel].map(Bounded::from);
+    let here = scene.texels[texel].map(Bounded::from);
     let at = [(pixel % camera.width) as f32 + 0.5, (pixel / camera.width) as f32 + 0.5];
     let place = along(centre(camera), towards(camera, at), depth);
     let mut containing = 1;
@@ -66,7 +66,7 @@ pub fn match_cost(
         let behind = (seen.depth - entry).greater(Bounded::ZERO) / reach;
         let weight = Bounded::from(pair_weights[sweep.view as usize * scene.views.len() + other]);
         let share = weight * super::bell(behind);
-        let differences = [0, 1, 2].map(|c| (colour[c] / colour[3] - own[c] / own[3]).magnitude());
+        let differences = [0, 1, 2].map(|c| (colour[c] / colour[3] - here[c] / here[3]).magnitude());
         let difference = (differences[0] + differences[1] + differences[2]) / Bounded::from(3.0);
         votes.push((share, difference.lesser(MAX_DIFFERENCE.into())));
     }

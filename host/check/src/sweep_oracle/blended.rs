@@ -23,7 +23,7 @@ pub struct Pixel {
 /// The costs of all planes at an image coordinate of the target.
 fn costs_at(block: &BlendBlock, costs: &[Planes], at: [f32; 2]) -> Vec<Bounded> {
     let (width, height) = (block.volume_width, block.volume_height);
-    let scaled = |at: f32, size: u32, of: u32| Bounded::from(at) * (Bounded::from(size) / Bounded::from(of));
+    let scaled = |at: f32, size: u32, whole: u32| Bounded::from(at) * (Bounded::from(size) / Bounded::from(whole));
     let columns = tents(scaled(at[0], width, block.target.width), width);
     let rows = tents(scaled(at[1], height, block.target.height), height);
     let groups = block.group_count as usize;
@@ -41,7 +41,7 @@ fn visibility(view: &SweptView, disparities: &[[f32; 2]], seen: &PlaneProjection
     if !(view.disparity_step > 0.0) {
         return Bounded::ONE;
     }
-    let scaled = |at: Bounded, map: u32, of: u32| at * (Bounded::from(map) / Bounded::from(of));
+    let scaled = |at: Bounded, map: u32, whole: u32| at * (Bounded::from(map) / Bounded::from(whole));
     let columns = tents(scaled(seen.x, view.map_width, view.camera.width), view.map_width);
     let rows = tents(scaled(seen.y, view.map_height, view.camera.height), view.map_height);
     let node = |row: usize, column: usize| {
@@ -77,11 +77,11 @@ fn plane_colour(
         let seen = project_plane(&block.target, &view.camera, at, disparity);
         let in_image = seen.in_image?;
         let texel = look_up(&view.camera, texels, seen.x, seen.y);
-        let own = Bounded::from(view.weight);
-        let mut part = own * Bounded::from(HIDDEN_SHARE);
+        let share = Bounded::from(view.weight);
+        let mut part = share * Bounded::from(HIDDEN_SHARE);
         if in_image {
-            part = part + own * visibility(view, disparities, &seen, disparity / seen.depth_ratio);
-            in_images = in_images + own;
+            part = part + share * visibility(view, disparities, &seen, disparity / seen.depth_ratio);
+            in_images = in_images + share;
         }
         if block.has_silhouettes != 0 {
             hull = if in_image { hull * texel[3] } else { Bounded::ZERO };

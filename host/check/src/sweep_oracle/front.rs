@@ -70,7 +70,7 @@ pub fn front_cost(block: &FrontBlock, opacities: &[Planes], costs: &[Planes], pi
         values.fold(Bounded::ZERO, |sum, value| sum + value) / Bounded::from(window.len() as u32)
     };
     let opacity: Vec<Bounded> = (0..groups * PLANES).map(opacity).collect();
-    let own = costs[pixel as usize * groups..][..groups].as_flattened();
+    let costs = costs[pixel as usize * groups..][..groups].as_flattened();
     let (nothing, most) = (Bounded::from(HIDES_NOTHING), Bounded::from(HIDES_MOST));
     (0..groups * PLANES)
         .map(|plane| {
@@ -78,7 +78,7 @@ pub fn front_cost(block: &FrontBlock, opacities: &[Planes], costs: &[Planes], pi
             let before = opacity.iter().skip(plane + GUARD).map(hides);
             let hidden = before.fold(Bounded::ZERO, |most, hides| most.greater(hides)) * MAX_HIDDEN.into();
             let seen = (Bounded::ONE - hidden) * opacity[plane];
-            Bounded::from(own[plane]) + Bounded::from(block.front_share) * (Bounded::ONE - seen)
+            Bounded::from(costs[plane]) + Bounded::from(block.front_share) * (Bounded::ONE - seen)
         })
         .collect()
 }

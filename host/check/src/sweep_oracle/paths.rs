@@ -32,17 +32,17 @@ pub fn follow_path(block: &CostBlock, means: &[Planes], direction: u32, number: 
     for pixel in pixels(block, direction, number) {
         let least = before.iter().copied().fold(f64::MAX, f64::min);
         let cost = |plane: usize| {
-            let own = means[pixel as usize * block.group_count as usize + plane / PLANES][plane % PLANES];
+            let cost = means[pixel as usize * block.group_count as usize + plane / PLANES][plane % PLANES];
             let beside = [plane.wrapping_sub(1), plane + 1].into_iter().filter_map(|plane| before.get(plane));
             let stepped = beside.fold(f64::MAX, |least, cost| (cost + step_cost).min(least));
-            f64::from(own) + before[plane].min(stepped).min(least + jump_cost) - least
+            f64::from(cost) + before[plane].min(stepped).min(least + jump_cost) - least
         };
         let joined: Vec<f64> = (0..plane_count).map(cost).collect();
         let largest = before.iter().chain(&joined).fold(0.0_f64, |largest, cost| cost.abs().max(largest));
         // A step to a plane, the difference to the least cost, the sum.
-        let own = 3.0 * ROUNDING * (largest + jump_cost);
-        all.extend(joined.iter().map(|cost| Bounded { value: *cost, error: spread + own }));
-        spread += 2.0 * own;
+        let rounding = 3.0 * ROUNDING * (largest + jump_cost);
+        all.extend(joined.iter().map(|cost| Bounded { value: *cost, error: spread + rounding }));
+        spread += 2.0 * rounding;
         before = joined;
     }
     all

@@ -46,18 +46,18 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         notes,
     };
     // The kernels of a device take most of the time.
-    let (progress, of) = (Terminal::new("checking"), 1 + 10 * devices.len());
-    let picture = Picture::new(arguments.scene.as_deref(), &Part::begin(&progress, "picture", 0..1, of))?;
+    let (progress, parts) = (Terminal::new("checking"), 1 + 10 * devices.len());
+    let picture = Picture::new(arguments.scene.as_deref(), &Part::begin(&progress, "picture", 0..1, parts))?;
     for (index, device) in devices.into_iter().enumerate() {
         let (name, first) = (device.name(), 1 + 10 * index);
-        let part = Part::begin(&progress, name.clone(), first..first + 9, of);
+        let part = Part::begin(&progress, name.clone(), first..first + 9, parts);
         let checked = match &device {
             AnyDevice::Cpu(cpu) => check_device(cpu, Role::Reference, arguments.seeds, &part),
             AnyDevice::Vulkan(vulkan) => check_device(vulkan.as_ref(), Role::Other, arguments.seeds, &part),
         };
         let role = if matches!(device, AnyDevice::Cpu(_)) { Role::Reference } else { Role::Other };
         let checked = checked.and_then(|kernels| {
-            let part = Part::begin(&progress, format!("{name}: picture"), first + 9..first + 10, of);
+            let part = Part::begin(&progress, format!("{name}: picture"), first + 9..first + 10, parts);
             let picture = picture.check(AnyField::default().on(&device).as_ref(), role, &part)?;
             Ok(DeviceReport { picture: Some(picture), ..kernels })
         });

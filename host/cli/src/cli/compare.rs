@@ -91,8 +91,8 @@ impl Background {
 fn opened(pair: &Pair, background: &Background) -> anyhow::Result<([RgbImage; 2], bool)> {
     let prediction = read_over(&pair.prediction, None, background.colour)?;
     let size: [u32; 2] = prediction.dimensions().into();
-    let own = picture_size(&pair.truth)?;
-    let is_larger = own != size && is_shape_of(size, own) && own[0] >= size[0] && own[1] >= size[1];
+    let full = picture_size(&pair.truth)?;
+    let is_larger = full != size && is_shape_of(size, full) && full[0] >= size[0] && full[1] >= size[1];
     let truth = read_over(&pair.truth, is_larger.then_some(size), background.colour)?;
     Ok(([prediction, truth], is_larger))
 }
@@ -166,14 +166,14 @@ fn print_scores(pairs: &[Pair], scores: &[Vec<Scored>]) -> anyhow::Result<()> {
     }
     let mut rows = table(["metric", "mean", "worst", "of"].map(str::to_owned));
     for name in names {
-        let own = pairs
+        let scored = pairs
             .iter()
             .zip(scores)
             .filter_map(|(pair, scores)| scores.iter().find(|score| score.name == name).map(|score| (pair, score)));
-        let own: Vec<(&Pair, &Scored)> = own.collect();
-        let mean = own.iter().map(|(_, score)| score.value).sum::<f64>() / own.len() as f64;
+        let scored: Vec<(&Pair, &Scored)> = scored.collect();
+        let mean = scored.iter().map(|(_, score)| score.value).sum::<f64>() / scored.len() as f64;
         let badness = |score: &Scored| if score.more_is_better { -score.value } else { score.value };
-        let worst = own.iter().max_by(|(_, a), (_, b)| badness(a).total_cmp(&badness(b)));
+        let worst = scored.iter().max_by(|(_, a), (_, b)| badness(a).total_cmp(&badness(b)));
         let (place, worst) = worst.map_or((String::new(), f64::NAN), |(pair, score)| (pair.name.clone(), score.value));
         rows.add_row([name.to_owned(), format!("{mean:.4}"), format!("{worst:.4}"), place]);
     }

@@ -78,10 +78,10 @@ fn write_pages(mut command: Command, folder: Option<&Path>) -> anyhow::Result<()
         Ok(page)
     };
     let Some(folder) = folder else { return Ok(put(&page(&command)?)?) };
-    let commands = command.get_subcommands().filter(|own| own.get_name() != "help");
-    for own in [&command].into_iter().chain(commands) {
-        let path = folder.join(format!("{}.1", own.get_display_name().unwrap_or(own.get_name())));
-        write_whole(&path, &page(own)?)?;
+    let commands = command.get_subcommands().filter(|within| within.get_name() != "help");
+    for page_of in [&command].into_iter().chain(commands) {
+        let path = folder.join(format!("{}.1", page_of.get_display_name().unwrap_or(page_of.get_name())));
+        write_whole(&path, &page(page_of)?)?;
         say(path.display())?;
     }
     Ok(())

@@ -33,7 +33,7 @@ pub(crate) fn device_options(gpu: GpuOptions) -> DeviceOptions {
 /// this name that the system finds.
 pub(crate) fn openmvg() -> PathBuf {
     let name = format!("viewfuse-openmvg{}", env::consts::EXE_SUFFIX);
-    let beside = || env::current_exe().ok().map(|own| own.with_file_name(&name)).filter(|path| path.is_file());
+    let beside = || env::current_exe().ok().map(|program| program.with_file_name(&name)).filter(|path| path.is_file());
     env::var_os("VIEWFUSE_OPENMVG").map(PathBuf::from).or_else(beside).unwrap_or_else(|| name.into())
 }
 

@@ -40,7 +40,7 @@ const HINTED: [fn(&(dyn Error + 'static)) -> Option<Hint>; 11] = [
 ];
 
 fn hinted(cause: &(dyn Error + 'static)) -> Option<Hint> {
-    HINTED.iter().find_map(|of| of(cause))
+    HINTED.iter().find_map(|hint| hint(cause))
 }
 
 fn of<E: Hinted + 'static>(cause: &(dyn Error + 'static)) -> Option<Hint> {

@@ -106,7 +106,7 @@ fn print_views(views: &[ListedView], as_json: bool) -> anyhow::Result<ExitCode> 
     }
     let mut rows = table(["index", "name", "size", "nearest views"].map(str::to_owned));
     for view in views {
-        let near = |own: &Neighbour| format!("{} ({:.1}\u{b0})", views[own.index].name, own.degrees);
+        let near = |neighbour: &Neighbour| format!("{} ({:.1}\u{b0})", views[neighbour.index].name, neighbour.degrees);
         let neighbours: Vec<String> = view.neighbours.iter().map(near).collect();
         let [width, height] = view.size;
         let size = format!("{width}x{height}{}", if view.has_photograph { "" } else { ", no photograph" });

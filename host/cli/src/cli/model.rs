@@ -54,7 +54,7 @@ fn omissions() -> Vec<PossibleValue> {
     let value = |title: &str, Omission { name, what, part, typical_error }: &Omission| {
         PossibleValue::new(name).help(format!("{title}: {what} {part}; typical error: {typical_error}"))
     };
-    let of_rows = ROWS.iter().flat_map(|row| row.omissions.iter().map(|own| value(row.title, own)));
+    let of_rows = ROWS.iter().flat_map(|row| row.omissions.iter().map(|omission| value(row.title, omission)));
     [value("all", &VIEWS)].into_iter().chain(of_rows).collect()
 }
 

@@ -96,8 +96,9 @@ fn count_help() -> String {
 /// Seconds, or minutes with an `m`.
 fn parse_time(text: &str) -> Result<Duration, String> {
     let (number, unit) =
-        text.strip_suffix('m').map_or((text.strip_suffix('s').unwrap_or(text), 1.0), |own| (own, 60.0));
-    let seconds = number.trim().parse::<f64>().ok().map(|own| own * unit).filter(|own| (1.0..=1.0e6).contains(own));
+        text.strip_suffix('m').map_or((text.strip_suffix('s').unwrap_or(text), 1.0), |minutes| (minutes, 60.0));
+    let seconds =
+        number.trim().parse::<f64>().ok().map(|number| number * unit).filter(|seconds| (1.0..=1.0e6).contains(seconds));
     let seconds = seconds.ok_or_else(|| format!("{text} is no time of at least a second: 90, 90s or 10m"))?;
     Ok(Duration::from_secs_f64(seconds))
 }
@@ -134,7 +135,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let Chosen { device, reason } = arguments.device.open()?;
     let progress = Terminal::new("optimising");
     // For --resume, if the program is killed.
-    let is_resumable = output.extension().is_some_and(|own| own.eq_ignore_ascii_case("ply"));
+    let is_resumable = output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ply"));
     let keep = |so_far: &GaussianScene| if is_resumable { so_far.write(output, &scene.frame) } else { Ok(()) };
     let ended = on_threads(arguments.picture.threads, || optimisation.run(&device, &progress, keep))??;
     drop(progress);

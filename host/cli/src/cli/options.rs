@@ -18,7 +18,7 @@ use viewfuse_scene::photographs::BackgroundChoice;
 use viewfuse_scene::{MaskChoice, Scene, SceneError};
 use viewfuse_vulkan::{GpuOptions, VulkanError};
 
-/// Heading of the options that say what is left out.
+/// Heading of the options that say what is omitted.
 pub(crate) const EFFORTS: &str = "Efforts: what is left out, for which time and error";
 
 /// How a scene is opened, for every command that reads its photographs.
@@ -62,7 +62,7 @@ pub(crate) struct PictureOptions {
 }
 
 impl PictureOptions {
-    /// With `exact`, nothing is left out. Options that the field does not have are rejected.
+    /// With `exact`, nothing is omitted. Options that the field does not have are rejected.
     pub(crate) fn to_render_options(&self, exact: bool, field: &About) -> anyhow::Result<RenderOptions> {
         if self.early_termination.is_some() && !field.ends_rays {
             let title = rows::named(field.name).map_or(field.name, |row| row.title);
@@ -78,7 +78,7 @@ impl PictureOptions {
     }
 }
 
-/// Options that a bound replaces, beside efforts of the fields' rows: it chooses what is left out.
+/// Options that a bound replaces, beside efforts of the fields' rows: it chooses what is omitted.
 const CHOSEN_BY_A_BOUND: [&str; 2] = ["exact", "compute"];
 
 /// A bound on the error or the time of each picture.

@@ -140,7 +140,8 @@ mod tests {
     #[test]
     fn every_path_is_read_or_written() {
         let command = crate::cli::Arguments::command();
-        let arguments = command.get_subcommands().flat_map(|own| own.get_arguments().map(move |one| (own, one)));
+        let arguments =
+            command.get_subcommands().flat_map(|within| within.get_arguments().map(move |one| (within, one)));
         let is_path = |argument: &clap::Arg| argument.get_value_parser().type_id() == TypeId::of::<PathBuf>();
         let mut count = 0;
         for (command, argument) in arguments.filter(|(_, argument)| is_path(argument)) {

@@ -161,7 +161,7 @@ fn found(
     let Some(folder) = Kept::folder_beside(to.1) else { return written(photographs, &from, options, to, matches) };
     Kept::check(&folder).with_context(|| folder.display().to_string())?;
     let kept: Vec<Kept<'_>> = from.iter().map(|solver| Kept::new(*solver, &folder)).collect();
-    let from: Vec<&dyn Solver> = kept.iter().map(|own| own as &dyn Solver).collect();
+    let from: Vec<&dyn Solver> = kept.iter().map(|solver| solver as &dyn Solver).collect();
     let found = written(photographs, &from, options, to, matches);
     let is_stopped = |error: &anyhow::Error| error.chain().any(|cause| cause.is::<Interrupted>());
     // Before the first question there is nothing of this run; what is there is of one that was stopped.
@@ -276,15 +276,15 @@ fn print(found: &Found, verdict: &Verdict, record: &Record<'_>) -> std::io::Resu
     let (solver, points, error) = (&tried.solver, tried.points, record.reprojection_error);
     let features = tried.features;
     say(format_args!("points     {points} by {solver} ({features}), reprojection error {error:.2} pixels"))?;
-    for own in record.accepted {
-        let scores = &own.held_out;
+    for image in record.accepted {
+        let scores = &image.held_out;
         say(format_args!(
             "left-out   {} rendered from the others {:.1} dB; copies {:.1} dB, two degrees beside {:.1} dB; attempts differ by {:.2} degrees",
             scores.photograph,
             scores.score,
             scores.copy.max(scores.warp),
             scores.disturbed,
-            own.rotation_difference
+            image.rotation_difference
         ))?;
     }
     let neighbours = &record.neighbours;

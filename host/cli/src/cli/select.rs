@@ -68,10 +68,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let text = if arguments.json {
         format!("{}\n", serde_json::to_string_pretty(&selected)?)
     } else if arguments.lines {
-        if let Some(own) = job.targets.iter().find(|own| own.name.contains(['\n', '\r'])) {
+        if let Some(target) = job.targets.iter().find(|target| target.name.contains(['\n', '\r'])) {
             return Err(wrong(format_args!(
                 "--lines: the name {:?} has a line break in it; --json holds it",
-                own.name
+                target.name
             )));
         }
         selected.lines()
@@ -97,8 +97,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
 fn readable(selected: &SelectedSources) -> String {
     let mut rows = table(["target", "share", "sources and their weights"].map(str::to_owned));
     for target in selected.targets.iter().take(PRINTED) {
-        let of = |(name, weight): (&String, &f32)| format!("{name} {weight:.3}");
-        let sources: Vec<String> = target.sources.iter().zip(&target.weights).map(of).collect();
+        let named = |(name, weight): (&String, &f32)| format!("{name} {weight:.3}");
+        let sources: Vec<String> = target.sources.iter().zip(&target.weights).map(named).collect();
         rows.add_row([target.target.clone(), format!("{:.3}", target.share), sources.join(", ")]);
     }
     let more = selected.targets.len().saturating_sub(PRINTED);

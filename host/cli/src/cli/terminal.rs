@@ -66,8 +66,8 @@ impl Terminal {
     /// Without progress; `label` is the stage until the work names one.
     pub fn new(label: &str) -> Terminal {
         let display = Arc::new(ProgressDisplay::new(label, has_terminal(), time_between_lines()));
-        let own = Arc::clone(&display);
-        let clock = Clock::start(move || own.show());
+        let shared = Arc::clone(&display);
+        let clock = Clock::start(move || shared.show());
         Terminal { display, clock: Some(clock), told: Mutex::default() }
     }
 
@@ -83,8 +83,8 @@ impl Terminal {
 }
 
 impl Progress for Terminal {
-    fn stage(&self, name: &str, place: Range<usize>, of: usize) {
-        self.display.change(|course, now| course.begin(name, place, of, now));
+    fn stage(&self, name: &str, place: Range<usize>, count: usize) {
+        self.display.change(|course, now| course.begin(name, place, count, now));
     }
 
     fn expect(&self, pieces: usize) {

@@ -118,8 +118,8 @@ fn print_table(
         let distance = source.camera.pose.distance(&pose);
         let angle = source.camera.pose.axis_angle(&pose).to_degrees();
         let lead = [source.name.clone(), format!("{distance:.3}"), format!("{angle:.1}\u{b0}")];
-        let of = |scheme| format!("{:.4}", weights.weights(scheme, index)[row]);
-        rows.add_row(lead.into_iter().chain((0..weights.schemes.len()).map(of)));
+        let weight = |scheme| format!("{:.4}", weights.weights(scheme, index)[row]);
+        rows.add_row(lead.into_iter().chain((0..weights.schemes.len()).map(weight)));
     }
     say(format_args!("{}: target {}, {} sources", scene.path.display(), target.name, job.sources.len()))?;
     say(format_args!("{rows}"))

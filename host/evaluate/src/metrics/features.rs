@@ -3,7 +3,7 @@
 //! As pytorch-fid does it (mseitzer/pytorch-fid): a picture, levels in `[0, 1]`, is resized to 299x299 (bilinear
 //! between the four nearest pixels at any size, without a blur before downscaling), stretched to `[-1, 1]`, and the
 //! 2048 channels at the end are averaged over pixels. The size of a file's last layer determines which of the two
-//! Inceptions it holds ([`InceptionKind`]); with torchvision's, `transform_input` is left out, as pytorch-fid does.
+//! Inceptions it holds ([`InceptionKind`]); with torchvision's, `transform_input` is omitted, as pytorch-fid does.
 
 use super::trunk::{InceptionKind, Trunk, inception};
 use super::{MetricError, seen};

@@ -60,9 +60,9 @@ fn distance(a: &Mat<f64>, b: &Mat<f64>) -> f64 {
     };
     let within = |x: &Mat<f64>| {
         let kernels = kernels(x, x);
-        let own: f64 = kernels.diagonal().column_vector().iter().sum();
+        let trace: f64 = kernels.diagonal().column_vector().iter().sum();
         let count = x.nrows() as f64;
-        (kernels.sum() - own) / (count * (count - 1.0))
+        (kernels.sum() - trace) / (count * (count - 1.0))
     };
     within(a) + within(b) - 2.0 * kernels(a, b).sum() / (a.nrows() * b.nrows()) as f64
 }

@@ -38,7 +38,7 @@ const RING: i32 = 8;
 type Failure = Box<dyn Error>;
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// Draws the points of all devices. Points whose time or difference is NaN are left out. Settings that are chosen by a
+/// Draws the points of all devices. Points whose time or difference is NaN are dropped. Settings that are chosen by a
 /// bound ([`BOUNDED`]) are a line of their own.
 ///
 /// # Errors

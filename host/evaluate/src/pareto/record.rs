@@ -255,10 +255,10 @@ mod tests {
 
     #[test]
     fn another_programs_row_has_all_columns() {
-        let mut own = DeviceRecord::beside("CPU", 1.0, 2.0);
+        let mut record = DeviceRecord::beside("CPU", 1.0, 2.0);
         let left_out = LeftOut { what: "volume rows", switch: true, left_out: 3, of: 4, typical_error: "nothing" };
-        own.points[0].left_out = vec![left_out];
-        own.points[0].denoising = Some(Denoising {
+        record.points[0].left_out = vec![left_out];
+        record.points[0].denoising = Some(Denoising {
             sampler: "heun",
             levels: Some(25),
             tolerance: None,
@@ -280,7 +280,7 @@ mod tests {
             sources: Vec::new(),
             targets: Vec::new(),
             round_count: 1,
-            devices: vec![own, DeviceRecord::beside("PyTorch", 4.0, 2.0)],
+            devices: vec![record, DeviceRecord::beside("PyTorch", 4.0, 2.0)],
             failures: Vec::new(),
         };
         let table = csv_of(&record).expect("a table");

@@ -167,11 +167,11 @@ fn by_character(scene: &Scene) -> Vec<usize> {
 /// Every eighth view as a target, and of the others this many that are evenly spaced.
 fn evenly(views: &[usize], source_count: usize) -> Result<Chosen, String> {
     let is_target = |place: usize| place.is_multiple_of(EVERY);
-    let of = |wanted: bool| {
+    let views_where = |wanted: bool| {
         let places = views.iter().enumerate().filter(move |(place, _)| is_target(*place) == wanted);
         places.map(|(_, view)| *view).collect::<Vec<usize>>()
     };
-    let (targets, others) = (of(true), of(false));
+    let (targets, others) = (views_where(true), views_where(false));
     if others.len() < source_count {
         return Err(format!(
             "{} photographs, of which every {EVERY}th is a target, leave {} sources; {source_count} are needed",

@@ -53,8 +53,8 @@ pub(super) fn close(
     let (fitting, others): (Vec<usize>, Vec<usize>) = views.iter().copied().partition(fits);
     for target in draw.order(fitting.iter().copied()).into_iter().take(target_count) {
         let (near, far) = neighbours(target);
-        let own = draw.of_view(target);
-        let (near, far) = (own.order(near), own.order(far));
+        let order = draw.of_view(target);
+        let (near, far) = (order.order(near), order.order(far));
         let sources: Vec<usize> = near.into_iter().take(1).chain(far.into_iter().take(source_count - 1)).collect();
         add(ascending(&sources), vec![target]);
     }

@@ -116,7 +116,7 @@ impl FromStr for Protocol {
         let unknown = || ProtocolError::Unknown { text: text.to_owned() };
         let (name, rest) = text.split_once(':').unwrap_or((text, ""));
         if name == "fixed" {
-            let named = |name: &str| PUBLISHED.iter().find(|(own, ..)| *own == name);
+            let named = |name: &str| PUBLISHED.iter().find(|(row, ..)| *row == name);
             let (sources, targets) = match (rest.split_once(':'), named(if rest.is_empty() { "cars" } else { rest })) {
                 (Some((sources, targets)), _) if !sources.is_empty() && !targets.is_empty() => (sources, targets),
                 (None, Some((_, sources, targets))) => (*sources, *targets),

@@ -89,8 +89,8 @@ impl Published {
             Benchmark::Dtu => &DTU,
             Benchmark::Blender => &BLENDER,
         };
-        let figure = |(method, needs, own): &Method| {
-            let psnr = own.iter().find(|(count, _)| count == sources).map(|(_, psnr)| *psnr)?;
+        let figure = |(method, needs, figures): &Method| {
+            let psnr = figures.iter().find(|(count, _)| count == sources).map(|(_, psnr)| *psnr)?;
             Some(Figure { method, needs, psnr })
         };
         let mut figures: Vec<Figure> = methods.iter().filter_map(figure).collect();

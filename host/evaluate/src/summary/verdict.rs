@@ -80,8 +80,8 @@ impl Table {
     pub fn details(&self) -> Vec<String> {
         let Some(metric) = self.metrics.get(self.headline) else { return Vec::new() };
         let of_row = |row: &Row| {
-            let own = self.comparisons_of(&row.scheme).filter(|comparison| comparison.standing != Standing::Above);
-            let parts: Vec<String> = own.map(|comparison| words(comparison, metric)).collect();
+            let compared = self.comparisons_of(&row.scheme).filter(|comparison| comparison.standing != Standing::Above);
+            let parts: Vec<String> = compared.map(|comparison| words(comparison, metric)).collect();
             format!("{}: {}", row.scheme, parts.join("; "))
         };
         self.schemes_in_doubt().map(of_row).collect()
@@ -100,13 +100,13 @@ impl Table {
 
     /// How a scheme stands to the baselines, as short as it has to be.
     fn line(&self, scheme: &str) -> String {
-        let of = |standings: &[Standing]| -> Vec<&str> {
-            let own = self.comparisons_of(scheme).filter(|comparison| standings.contains(&comparison.standing));
-            own.map(|comparison| comparison.baseline.as_str()).collect()
+        let baselines = |standings: &[Standing]| -> Vec<&str> {
+            let compared = self.comparisons_of(scheme).filter(|comparison| standings.contains(&comparison.standing));
+            compared.map(|comparison| comparison.baseline.as_str()).collect()
         };
         let groups = [
-            ("below", of(&[Standing::Below])),
-            ("not shown to differ from", of(&[Standing::NotBelow, Standing::PerhapsBelow])),
+            ("below", baselines(&[Standing::Below])),
+            ("not shown to differ from", baselines(&[Standing::NotBelow, Standing::PerhapsBelow])),
         ];
         let join = |told: &dyn Fn(&[&str]) -> String| -> String {
             let parts = groups.iter().filter(|(_, names)| !names.is_empty());

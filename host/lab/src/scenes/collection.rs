@@ -110,7 +110,7 @@ impl Settings {
 }
 
 /// A scene to make.
-struct Job {
+struct Planned {
     folder: PathBuf,
     index: u32,
     on_spiral: bool,
@@ -128,7 +128,7 @@ pub fn make(out: &Path, settings: &Settings, counts: ObjectCounts, progress: &dy
     let folders: Vec<PathBuf> = sets.iter().map(|(set, ..)| out.join(format!("{KIND}_{set}"))).collect();
     claim(&out.join(format!("{KIND}.json")), settings, &folders)?;
 
-    let mut jobs = Vec::new();
+    let mut missing = Vec::new();
     let mut made = Made::default();
     for (set, (folder, (_, count, on_spiral))) in folders.iter().zip(sets).enumerate() {
         for object in 0..count {
@@ -136,26 +136,26 @@ pub fn make(out: &Path, settings: &Settings, counts: ObjectCounts, progress: &dy
             if folder.is_dir() {
                 made.kept_count += 1;
             } else {
-                jobs.push(Job { folder, index: set as u32 * MAX_OBJECT_COUNT + object, on_spiral });
+                missing.push(Planned { folder, index: set as u32 * MAX_OBJECT_COUNT + object, on_spiral });
             }
         }
     }
-    let cameras_of = |job: &Job| if job.on_spiral { spiral.len() } else { settings.views as usize };
-    progress.expect(jobs.iter().map(cameras_of).sum());
-    jobs.par_iter().try_for_each(|job| {
+    let cameras_of = |scene: &Planned| if scene.on_spiral { spiral.len() } else { settings.views as usize };
+    progress.expect(missing.iter().map(cameras_of).sum());
+    missing.par_iter().try_for_each(|scene| {
         progress.check()?;
-        let object = car(settings.seed, job.index);
+        let object = car(settings.seed, scene.index);
         let random: Vec<Camera>;
-        let cameras = if job.on_spiral {
+        let cameras = if scene.on_spiral {
             &spiral
         } else {
-            random = random_views(&sphere, settings.seed, job.index, settings.views)?;
+            random = random_views(&sphere, settings.seed, scene.index, settings.views)?;
             &random
         };
-        write_views(&job.folder, &object, cameras, RAYS_PER_SIDE, progress)?;
+        write_views(&scene.folder, &object, cameras, RAYS_PER_SIDE, progress)?;
         Ok::<(), MakeError>(())
     })?;
-    made.new_count = jobs.len();
+    made.new_count = missing.len();
     Ok(made)
 }
 

@@ -40,16 +40,16 @@ impl Average {
         parameters: &Parameters,
         work: impl FnOnce() -> std::result::Result<R, E>,
     ) -> std::result::Result<R, E> {
-        let mut own: Vec<(&Var, Tensor)> = Vec::new();
+        let mut kept: Vec<(&Var, Tensor)> = Vec::new();
         for (name, variable) in parameters.iter() {
             if let Some(average) = self.values.get(name) {
-                own.push((variable, variable.copy()?));
+                kept.push((variable, variable.copy()?));
                 variable.set(average)?;
             }
         }
         let result = work();
-        for (variable, own) in own {
-            variable.set(&own)?;
+        for (variable, kept) in kept {
+            variable.set(&kept)?;
         }
         result
     }

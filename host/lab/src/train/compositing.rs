@@ -52,11 +52,11 @@ pub(crate) fn merged(first: &[Vec<f32>], second: &[Vec<f32>], ray_count: usize) 
     let mut merge = |(object, (first, second)): (usize, (&Vec<f32>, &Vec<f32>))| {
         let mut depths = Vec::with_capacity(first.len() + second.len());
         for ray in 0..ray_count {
-            let own = |depths: &[f32], count: usize, start: usize| -> Vec<(f32, u32)> {
+            let numbered = |depths: &[f32], count: usize, start: usize| -> Vec<(f32, u32)> {
                 let number = start + (object * ray_count + ray) * count;
                 depths[ray * count..][..count].iter().copied().zip(number as u32..).collect()
             };
-            let mut samples = [own(first, before, 0), own(second, behind, first_count)].concat();
+            let mut samples = [numbered(first, before, 0), numbered(second, behind, first_count)].concat();
             samples.sort_by(|a, b| a.0.total_cmp(&b.0));
             order.extend(samples.iter().map(|(_, number)| *number));
             depths.extend(samples.iter().map(|(depth, _)| *depth));

@@ -8,7 +8,7 @@ mod layers;
 mod tests;
 mod views;
 
-pub(crate) use views::{ViewCounts, Views};
+pub(crate) use views::{ObjectViews, ViewCounts};
 
 use super::TrainError;
 use super::images::enlarge;
@@ -67,9 +67,9 @@ impl Genvs {
         if architecture.denoiser.is_none() {
             return refuse("it has no denoiser".to_owned());
         }
-        let own = architecture.image_side;
-        if own != side as usize {
-            return refuse(format!("it is for pictures of {own}x{own} pixels, not of {side}x{side}"));
+        let expected = architecture.image_side;
+        if expected != side as usize {
+            return refuse(format!("it is for pictures of {expected}x{expected} pixels, not of {side}x{side}"));
         }
         let parameters = Parameters::of(checkpoint, &used(&architecture), dtype)?;
         Ok(Genvs { architecture, parameters, is_frozen: true })
@@ -102,7 +102,7 @@ impl Genvs {
         &self,
         volumes: &Tensor,
         weights: &Tensor,
-        views: &Views,
+        views: &ObjectViews,
         samples: &CoarseBlock,
     ) -> Result<Tensor> {
         let side = self.architecture.image_side;

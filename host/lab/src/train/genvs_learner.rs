@@ -11,7 +11,7 @@ use super::TrainError;
 use super::augmentation::Augmentation;
 use super::batch::{SourceDraw, Targets};
 use super::draw::{Draw, Purpose};
-use super::genvs::{Genvs, ViewCounts, Views, colours, each};
+use super::genvs::{Genvs, ObjectViews, ViewCounts, colours, each};
 use super::parameters::{Contents, Parameters};
 use super::pixelnerf_learner::decibels;
 use super::run::{self, Learner, Outcome, Plan, Task, Validated, count, number, share, side};
@@ -166,7 +166,7 @@ fn levels(draw: &Draw, count: usize, share_of_largest: f32) -> Vec<f32> {
 /// The loss of some views, with noise by `draw`, for this share of the pictures of the largest level.
 pub(super) fn loss(
     network: &Genvs,
-    views: &Views,
+    views: &ObjectViews,
     weights: &Tensor,
     samples: &CoarseBlock,
     share_of_largest: f32,
@@ -187,7 +187,7 @@ pub(super) fn scores(
     scenes: &[TrainingScene],
     views: ViewCounts,
     sample_count: u32,
-    weigh: &dyn Fn(&Views) -> Result<Tensor>,
+    weigh: &dyn Fn(&ObjectViews) -> Result<Tensor>,
 ) -> Result<[f64; 2]> {
     let count = VALIDATION_OBJECTS.min(scenes.len());
     let samples = CoarseBlock { seed: [0, 0], sample_count, jitter: 0.0 };
@@ -195,7 +195,7 @@ pub(super) fn scores(
     let [mut score, mut colour_score] = [0.0, 0.0];
     for (index, object) in scenes[..count].iter().enumerate() {
         let draw = Draw { seed: 0, step: u32::MAX - index as u32 };
-        let views = Views::of(&[object], &draw, views, network.parameters.dtype())?;
+        let views = ObjectViews::of(&[object], &draw, views, network.parameters.dtype())?;
         let volumes = network.volumes(&views.pictures)?.detach();
         let features = network.features(&volumes, &weigh(&views)?, &views, &samples)?;
         let noise = Noisy::new(&views.truth.zeros_like()?, &[largest], &draw)?;
@@ -221,14 +221,14 @@ impl Learner for GenvsLearner {
         let (sources, scheme) = augmentation.drawn(draw);
         let targets = if Targets::of(scheme) == Targets::One { 1 } else { targets };
         let views = ViewCounts { sources, targets };
-        let views = Views::draw(&self.data.training, draw, objects, views, self.network.parameters.dtype())?;
+        let views = ObjectViews::draw(&self.data.training, draw, objects, views, self.network.parameters.dtype())?;
         let samples = CoarseBlock { seed: [draw.seed as u32, draw.step], sample_count: samples, jitter: 1.0 };
         loss(&self.network, &views, &views.weights(scheme)?, &samples, share_of_largest, draw)
     }
 
     fn validate(&self) -> Result<Validated> {
         let views = ViewCounts { sources: SourceDraw::whole(VALIDATION_SOURCES), targets: 1 };
-        let weigh = |views: &Views| views.weights(self.settings.augmentation.schemes[0]);
+        let weigh = |views: &ObjectViews| views.weights(self.settings.augmentation.schemes[0]);
         let [score, colour_score] = scores(&self.network, &self.data.validation, views, self.settings.samples, &weigh)?;
         Ok(Validated { score, remark: format!("features {colour_score:.3} dB") })
     }

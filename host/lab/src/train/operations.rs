@@ -89,8 +89,8 @@ fn forward<const N: usize, O: Operation<N>>(
         inputs: [(&CpuStorage, &Layout); N],
     ) -> Result<CpuStorage> {
         let mut slices: [&[T]; N] = [&[]; N];
-        for (own, (storage, layout)) in slices.iter_mut().zip(inputs) {
-            *own = slice(storage, layout)?;
+        for (input, (storage, layout)) in slices.iter_mut().zip(inputs) {
+            *input = slice(storage, layout)?;
         }
         Ok(T::to_cpu_storage_owned(operation.forward(slices)))
     }
@@ -117,8 +117,8 @@ fn backward<const N: usize, O: Operation<N>>(
         let (output_guard, output_layout) = output.storage_and_layout();
         let (gradient_guard, gradient_layout) = gradient.storage_and_layout();
         let mut slices: [&[T]; N] = [&[]; N];
-        for (own, (guard, layout)) in slices.iter_mut().zip(&guards) {
-            *own = slice(on_cpu(guard, O::NAME)?, layout)?;
+        for (input, (guard, layout)) in slices.iter_mut().zip(&guards) {
+            *input = slice(on_cpu(guard, O::NAME)?, layout)?;
         }
         let output = slice(on_cpu(&output_guard, O::NAME)?, output_layout)?;
         let gradient = slice(on_cpu(&gradient_guard, O::NAME)?, gradient_layout)?;

@@ -185,8 +185,8 @@ impl PixelNerf {
         let mut added = None;
         for level in &levels {
             let [_, rows, columns, channels] = dims4(level)?;
-            let own = weights.narrow(1, first_channel, channels)?.t()?.contiguous()?;
-            let mapped = level.contiguous()?.reshape((count * rows * columns, channels))?.matmul(&own)?;
+            let part = weights.narrow(1, first_channel, channels)?.t()?.contiguous()?;
+            let mapped = level.contiguous()?.reshape((count * rows * columns, channels))?.matmul(&part)?;
             added = Some(match added {
                 None => mapped.broadcast_add(&layers("bias")?)?.reshape((count, height, width, ()))?,
                 Some(added) => add_enlarged(&added, &mapped.reshape((count, rows, columns, ()))?)?,

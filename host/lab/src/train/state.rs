@@ -78,8 +78,8 @@ impl Learned<'_> {
         for (name, variable) in self.parameters.iter() {
             let [mean, square] = &self.adam.moments[name];
             let average = &self.average.values[name];
-            let own = [("parameter", variable), ("mean", mean), ("square", square), ("average", average)];
-            all.extend(own.map(|(prefix, own)| (format!("{prefix}.{name}"), own)));
+            let tensors = [("parameter", variable), ("mean", mean), ("square", square), ("average", average)];
+            all.extend(tensors.map(|(prefix, tensor)| (format!("{prefix}.{name}"), tensor)));
         }
         all
     }
@@ -127,7 +127,7 @@ pub(crate) fn read(path: &Path, settings: &Value, learned: &Learned<'_>) -> Resu
         && before < now
     {
         progressed.extended.push((progressed.steps, u32::try_from(before).unwrap_or(u32::MAX)));
-        earlier.pointer_mut(STEPS).into_iter().for_each(|own| *own = now.into());
+        earlier.pointer_mut(STEPS).into_iter().for_each(|steps| *steps = now.into());
     }
     if let Some(difference) = difference(&earlier, settings) {
         return Err(TrainError::OtherRun { path: path.to_path_buf(), difference });

@@ -132,8 +132,8 @@ impl Learner for WeightingLearner {
 
     fn validate(&self) -> Result<Validated> {
         let score = |weights| self.network.score(&self.data.validation, VALIDATION_SOURCES, weights);
-        let (own, mean) = (score(ViewWeights::Learned(&self.attention))?, score(ViewWeights::Equal)?);
-        Ok(Validated { score: own, remark: format!("{:+.3} dB against equal weights", own - mean) })
+        let (learned, mean) = (score(ViewWeights::Learned(&self.attention))?, score(ViewWeights::Equal)?);
+        Ok(Validated { score: learned, remark: format!("{:+.3} dB against equal weights", learned - mean) })
     }
 
     fn checkpoint(&self) -> Result<Contents> {

@@ -71,12 +71,12 @@ fn learned(inputs: Inputs, emit: Emit) {
 #[inline(never)]
 fn by_self_attention(inputs: Inputs, emit: Emit) {
     let Rig { sources, target } = Rig::around(inputs, 2.0);
-    let own = PoseSelfAttention {
+    let network = PoseSelfAttention {
         query: layer(inputs, 8),
         key: layer(inputs, 9),
         value: layer(inputs, 10),
         output: layer(inputs, 11),
         logit: layer(inputs, 12),
     };
-    emit_all("self attention", pose_self_attention(&own, &sources, &target).values(), emit);
+    emit_all("self attention", pose_self_attention(&network, &sources, &target).values(), emit);
 }

@@ -27,7 +27,7 @@ pub fn camera(inputs: Inputs) -> CameraBlock {
 pub fn scene<const N: usize>(inputs: Inputs) -> [GaussianBlock; N] {
     let mut gaussians = [GaussianBlock::default(); N];
     for (index, gaussian) in gaussians.iter_mut().enumerate() {
-        let number = |own: u32| wave(inputs, 16 * index as u32 + own);
+        let number = |offset: u32| wave(inputs, 16 * index as u32 + offset);
         let f_rest =
             [number(0), number(1), number(2), number(3), number(4), number(5), number(6), number(7), number(8)];
         let position = [number(9), number(10), number(11)];
@@ -50,8 +50,8 @@ pub fn projected<const N: usize>(
     projected: &mut [ProjectedGaussian; N],
     order: &mut [u32; N],
 ) {
-    for (gaussian, own) in gaussians.iter().zip(projected.iter_mut()) {
-        *own = project(gaussian, camera, NEAR);
+    for (gaussian, splat) in gaussians.iter().zip(projected.iter_mut()) {
+        *splat = project(gaussian, camera, NEAR);
     }
     nearest_first(projected, order);
 }
@@ -68,14 +68,14 @@ pub fn splatting(inputs: Inputs, emit: Emit) {
     let gaussians = scene::<COUNT>(inputs);
     let (mut seen, mut order) = ([ProjectedGaussian::default(); COUNT], [0; COUNT]);
     projected(&gaussians, &camera(inputs), &mut seen, &mut order);
-    for own in &seen {
-        emit_all("conic", &own.conic, emit);
-        emit_all("place", &own.mean, emit);
-        emit_all("extent", &own.extent, emit);
-        emit_all("colour", &own.colour, emit);
+    for splat in &seen {
+        emit_all("conic", &splat.conic, emit);
+        emit_all("place", &splat.mean, emit);
+        emit_all("extent", &splat.extent, emit);
+        emit_all("colour", &splat.colour, emit);
     }
-    for own in [20, 33] {
-        for pixel in row(&seen, &order, own) {
+    for y in [20, 33] {
+        for pixel in row(&seen, &order, y) {
             emit_all("pixel", &pixel.channels, emit);
         }
     }

@@ -42,8 +42,8 @@ fn main() -> ! {
     let gaussians = scene::<COUNT>(inputs);
     let (mut projected, mut order) = ([ProjectedGaussian::default(); COUNT], [0; COUNT]);
     black_box(measured_project(&gaussians[0], &camera));
-    for (gaussian, own) in gaussians.iter().zip(projected.iter_mut()) {
-        *own = project(gaussian, &camera, NEAR);
+    for (gaussian, splat) in gaussians.iter().zip(projected.iter_mut()) {
+        *splat = project(gaussian, &camera, NEAR);
     }
     measured_sort(&projected, &mut order);
     black_box(measured_row(&projected, &order, SIDE as u32 / 2));

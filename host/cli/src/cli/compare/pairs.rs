@@ -25,8 +25,8 @@ pub(super) fn pairs(prediction: &Path, truth: &Path) -> anyhow::Result<Vec<Pair>
     let all = pictures(prediction)?;
     let is_beside = |path: &Path| {
         let stem = stem(path);
-        let of = SUFFIXES.iter().filter(|suffix| !suffix.is_empty()).find_map(|suffix| stem.strip_suffix(suffix));
-        of.is_some_and(|own| all.iter().any(|other| self::stem(other) == own))
+        let base = SUFFIXES.iter().filter(|suffix| !suffix.is_empty()).find_map(|suffix| stem.strip_suffix(suffix));
+        base.is_some_and(|stem| all.iter().any(|other| self::stem(other) == stem))
     };
     let predictions: Vec<&PathBuf> = all.iter().filter(|path| !is_beside(path)).collect();
     if predictions.is_empty() {
@@ -37,7 +37,7 @@ pub(super) fn pairs(prediction: &Path, truth: &Path) -> anyhow::Result<Vec<Pair>
         let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         // The very name, before one that differs in its extension.
         let same = truth.join(&name);
-        let alike = || truths.iter().find(|own| stem(own) == stem(path)).cloned();
+        let alike = || truths.iter().find(|truth| stem(truth) == stem(path)).cloned();
         let found = if same.is_file() { Some(same.clone()) } else { alike() };
         let truth =
             found.with_context(|| format!("{}: is missing, to compare {} with", same.display(), path.display()))?;

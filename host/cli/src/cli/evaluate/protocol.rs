@@ -212,8 +212,8 @@ fn options_of(
 /// Width and height of the pictures at a scene's first view.
 fn size_of(scene: &Scene, options: &RenderOptions, longest: u32) -> Result<[u32; 2], RenderError> {
     let side = working_side(scene, options, longest)?;
-    let own = || scene.views.first().map_or([0, 0], |view| reduced_size(&view.camera, side).into());
-    Ok(options.size.unwrap_or_else(own))
+    let first = || scene.views.first().map_or([0, 0], |view| reduced_size(&view.camera, side).into());
+    Ok(options.size.unwrap_or_else(first))
 }
 
 /// Every score as CSV in the folder.

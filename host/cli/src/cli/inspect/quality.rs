@@ -1,4 +1,4 @@
-//! The quality to expect, from photographs that are left out, one at a time, and rendered from the others.
+//! The quality to expect, from photographs that are held out, one at a time, and rendered from the others.
 
 use crate::cli::printing::say;
 use crate::cli::verdict::{in_words, of_two};
@@ -17,7 +17,7 @@ use viewfuse_scene::photographs::{Album, BackgroundChoice};
 /// What was measured of the training-free field on a scene.
 #[derive(Debug, Serialize)]
 pub(super) struct Quality {
-    /// The photographs that were left out; none if there are too few.
+    /// The photographs that were held out; none if there are too few.
     left_out: Vec<HeldOutSource>,
     /// The score to expect between two neighbouring photographs.
     expected: Option<Expected>,
@@ -64,12 +64,12 @@ impl Quality {
         say(format_args!(
             "left out   {count} photographs, rendered from the others: PSNR {:.1} dB, from {:.1} ({}) to {:.1} ({}); a copy of \
              the nearest photograph {:.1} dB",
-            mean(&|own| own.psnr),
+            mean(&|source| source.psnr),
             least.psnr,
             least.source,
             most.psnr,
             most.source,
-            mean(&|own| own.copy_psnr)
+            mean(&|source| source.copy_psnr)
         ))?;
         let Expected { psnr, interval: [low, high], .. } = expected;
         say(format_args!(

@@ -11,8 +11,8 @@ pub(super) const NETWORK: &str = "Options of networks";
 
 /// The rows that have a flag, each with its form of it.
 fn stated(name: &str) -> Vec<(&'static Row, &'static Flag)> {
-    let of = |row: &'static Row| row.flags.iter().find(|flag| flag.name == name).map(|flag| (row, flag));
-    ROWS.into_iter().filter_map(of).collect()
+    let flag_of = |row: &'static Row| row.flags.iter().find(|flag| flag.name == name).map(|flag| (row, flag));
+    ROWS.into_iter().filter_map(flag_of).collect()
 }
 
 /// The names of all flags about something.

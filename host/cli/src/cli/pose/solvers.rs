@@ -18,17 +18,17 @@ pub(super) enum From {
 /// The solvers, each once.
 pub(super) fn solvers(from: &[From]) -> Vec<Box<dyn Solver>> {
     let mut named: Vec<From> = Vec::new();
-    for own in from {
-        if !named.contains(own) {
-            named.push(*own);
+    for solver in from {
+        if !named.contains(solver) {
+            named.push(*solver);
         }
     }
-    let of = |own: From| -> Box<dyn Solver> {
-        match own {
+    let opened = |solver: From| -> Box<dyn Solver> {
+        match solver {
             From::Openmvg => Box::new(OpenMvg { program: openmvg() }),
             From::Colmap => Box::new(Colmap { program: colmap() }),
             From::Pycolmap => Box::new(PyColmap { python: python() }),
         }
     };
-    named.into_iter().map(of).collect()
+    named.into_iter().map(opened).collect()
 }

@@ -56,14 +56,15 @@ fn choice(chosen: &ChosenRecord, weighting: &str) -> String {
         let two = pair.as_ref().map_or_else(String::new, |pair| format!("; {}", of_two(pair)));
         return format!("chosen: {weighting}, the default: too few sources to leave one out{two}");
     }
-    let of = |candidate: &Candidate| candidate.weighting == weighting && candidate.options.settings() == settings;
+    let is_chosen =
+        |candidate: &Candidate| candidate.weighting == weighting && candidate.options.settings() == settings;
     // A mixture is tried last.
-    let own = match mixture {
+    let candidate = match mixture {
         Some(_) => candidates.last(),
-        None => candidates.iter().find(|candidate| of(candidate)),
+        None => candidates.iter().find(|candidate| is_chosen(candidate)),
     };
-    let own = own.and_then(|candidate| candidate.psnr).unwrap_or(0.0);
-    let gain = own - candidates.first().and_then(|first| first.psnr).unwrap_or(own);
+    let psnr = candidate.and_then(|candidate| candidate.psnr).unwrap_or(0.0);
+    let gain = psnr - candidates.first().and_then(|first| first.psnr).unwrap_or(psnr);
     let with = match mixture {
         Some(mixture) if mixture.parts.len() == 1 => ", one picture under other settings".to_owned(),
         Some(mixture) => format!(", {} pictures under different settings mixed by region", mixture.parts.len()),
@@ -73,7 +74,7 @@ fn choice(chosen: &ChosenRecord, weighting: &str) -> String {
     let more = if gain > 0.0 { format!(", {gain:.2} dB more than by default") } else { String::new() };
     let count = left_out.len();
     format!(
-        "chosen: {weighting}{with}: {count} photographs that were left out have {own:.1} dB{more} (what was tried: {RECORD})"
+        "chosen: {weighting}{with}: {count} photographs that were left out have {psnr:.1} dB{more} (what was tried: {RECORD})"
     )
 }
 

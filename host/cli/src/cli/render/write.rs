@@ -55,15 +55,15 @@ fn written(
     let renderer = prepared.field.on(&prepared.device.device);
     // A frame of a video takes a part of the time that it took to render.
     let frames = 10 * prepared.job.targets.len().max(1);
-    let of = frames + prepared.job.targets.len() * formats.len();
-    let part = Part::begin(progress, "", 0..frames, of);
+    let parts = frames + prepared.job.targets.len() * formats.len();
+    let part = Part::begin(progress, "", 0..frames, parts);
     let write = |sources: &SourceImages, frame: Frame, chosen: Option<&Chosen>| {
         chosen.into_iter().for_each(|chosen| writer.set_chosen(chosen));
         anyhow::Ok(writer.write(sources, &frame)?)
     };
     let run = prepared.run(renderer.as_ref(), &part);
     let (finished, _) = auto::render(&run, prepared.weighting.as_ref(), write)?;
-    let videos = videos(&writer, formats, prepared.rate, &Part::begin(progress, "", frames..of, of))?;
+    let videos = videos(&writer, formats, prepared.rate, &Part::begin(progress, "", frames..parts, parts))?;
     let circumstances = Circumstances {
         program: env!("CARGO_PKG_VERSION"),
         device_reason: prepared.device.reason.clone(),

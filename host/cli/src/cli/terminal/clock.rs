@@ -18,9 +18,9 @@ impl Clock {
     /// Without a thread to spare, nothing is done.
     pub(super) fn start(work: impl Fn() + Send + 'static) -> Clock {
         let end = Arc::new((Mutex::new(false), Condvar::new()));
-        let own = Arc::clone(&end);
+        let shared = Arc::clone(&end);
         let beat = move || {
-            let (ended, told) = &*own;
+            let (ended, told) = &*shared;
             let mut is_over = ended.lock().unwrap_or_else(PoisonError::into_inner);
             while !*is_over {
                 is_over = told.wait_timeout(is_over, BEAT).unwrap_or_else(PoisonError::into_inner).0;

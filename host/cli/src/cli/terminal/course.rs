@@ -67,10 +67,10 @@ impl Course {
     }
 
     /// As of `Progress::stage`.
-    pub(super) fn begin(&mut self, stage: &str, place: Range<usize>, of: usize, now: Instant) {
+    pub(super) fn begin(&mut self, stage: &str, place: Range<usize>, count: usize, now: Instant) {
         stage.clone_into(&mut self.stage);
         stage.clone_into(&mut self.said);
-        let share = |part: usize| if of == 0 { 0.0 } else { (part as f64 / of as f64).min(1.0) };
+        let share = |part: usize| if count == 0 { 0.0 } else { (part as f64 / count as f64).min(1.0) };
         (self.place, self.pieces) = (share(place.start)..share(place.end), (0, 0));
         // What the stage before did until its end is of its rate.
         self.rise(now);
@@ -100,8 +100,8 @@ impl Course {
     }
 
     fn rise(&mut self, now: Instant) {
-        let (done, of) = self.pieces;
-        let within = if of == 0 { 0.0 } else { (done as f64 / of as f64).min(1.0) };
+        let (done, expected) = self.pieces;
+        let within = if expected == 0 { 0.0 } else { (done as f64 / expected as f64).min(1.0) };
         let Range { start, end } = self.place;
         let share = start + within * (end - start).max(0.0);
         if share > self.share {
@@ -127,11 +127,11 @@ impl Course {
         let Some(median_rate) = median(&self.rates) else { return };
         let mean_rate = self.share / now.duration_since(self.start).as_secs_f64();
         let all = if mean_rate > 0.0 { median_rate.min(mean_rate) } else { median_rate };
-        let own = median(&self.rates[self.earlier..]).unwrap_or(all);
+        let rate = median(&self.rates[self.earlier..]).unwrap_or(all);
         let stage_end = self.place.end.max(self.share);
-        let left = (stage_end - self.share) / own + (1.0 - stage_end).max(0.0) / all;
+        let left = (stage_end - self.share) / rate + (1.0 - stage_end).max(0.0) / all;
         self.left = Duration::try_from_secs_f64(left).ok().map(|left| (left, now));
-        self.next = Duration::try_from_secs_f64(left - gain / own).unwrap_or_default();
+        self.next = Duration::try_from_secs_f64(left - gain / rate).unwrap_or_default();
     }
 
     /// The stage, and the time that is left if it is not more than was told.
@@ -225,8 +225,8 @@ mod tests {
             let words = self.course.words(self.now);
             let number = |text: &str| text.split(' ').next().and_then(|word| word.parse().ok());
             let time = words.split_once(", about ").map(|(_, time)| {
-                let own: u64 = number(time).expect("a number");
-                if time.contains(" min") { 60 * own } else { own }
+                let count: u64 = number(time).expect("a number");
+                if time.contains(" min") { 60 * count } else { count }
             });
             self.told.push(time);
         }
@@ -241,8 +241,8 @@ mod tests {
         }
 
         /// A stage of so many pieces, each of which takes the time that is given for its number.
-        fn stage(&mut self, place: usize, of: usize, pieces: usize, seconds: impl Fn(usize) -> f64) {
-            self.course.begin("stage", place..place + 1, of, self.now);
+        fn stage(&mut self, place: usize, count: usize, pieces: usize, seconds: impl Fn(usize) -> f64) {
+            self.course.begin("stage", place..place + 1, count, self.now);
             self.course.expect(pieces);
             for piece in 0..pieces {
                 self.pass(seconds(piece));

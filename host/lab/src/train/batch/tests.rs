@@ -33,8 +33,8 @@ fn a_part_of_a_picture_has_its_camera() {
         assert_eq!(part.depth, whole.depth);
     }
     // Not resampled, the pixels are the picture's own.
-    let (_, own) = scene.source(1, Cut { left: 5, top: 3, size: 16, side: 16 }).expect("a source");
-    assert!(own.enumerate_pixels().all(|(x, y, pixel)| pixel == scene.pictures[1].get_pixel(x + 5, y + 3)));
+    let (_, part) = scene.source(1, Cut { left: 5, top: 3, size: 16, side: 16 }).expect("a source");
+    assert!(part.enumerate_pixels().all(|(x, y, pixel)| pixel == scene.pictures[1].get_pixel(x + 5, y + 3)));
     let (same, whole) = scene.source(1, Cut { left: 0, top: 0, size: 32, side: 32 }).expect("a source");
     assert_eq!((same, &whole), (scene.cameras[1], &scene.pictures[1]));
 }
@@ -76,10 +76,10 @@ fn weights_are_those_of_the_scheme_for_the_target() {
     let rows = |scheme| batch.weights(scheme).and_then(|weights| weights.to_vec2::<f32>()).expect("weights");
     assert_eq!(rows(Scheme::MEAN), vec![vec![1.0 / 3.0; 3]; 2]);
     let scheme = Weighting::from(Scheme::ERROR);
-    for ((own, sources), target) in rows(Scheme::ERROR).iter().zip(&batch.sources).zip(&batch.targets) {
+    for ((row, sources), target) in rows(Scheme::ERROR).iter().zip(&batch.sources).zip(&batch.targets) {
         let poses: Vec<Pose> = sources.iter().map(|camera| camera.pose).collect();
         let poses = SourcePoses::new(&poses).expect("sources");
-        assert_eq!(own, &scheme.weigh(&poses, &target.pose).values()[..3]);
-        assert!(own.iter().any(|weight| (weight - 1.0 / 3.0).abs() > 0.01), "{own:?}");
+        assert_eq!(row, &scheme.weigh(&poses, &target.pose).values()[..3]);
+        assert!(row.iter().any(|weight| (weight - 1.0 / 3.0).abs() > 0.01), "{row:?}");
     }
 }

@@ -41,12 +41,12 @@ pub(super) fn run(layers: Layers<'_>, sizes: &Denoiser, inputs: &Tensor, levels:
         }
         kept.push(x.clone());
     }
-    for own in sizes.up() {
-        if own.joined_channels > 0 {
-            let Some(joined) = kept.pop() else { candle_core::bail!("{} has nothing to join", own.name) };
+    for level in sizes.up() {
+        if level.joined_channels > 0 {
+            let Some(joined) = kept.pop() else { candle_core::bail!("{} has nothing to join", level.name) };
             x = Tensor::cat(&[x, joined], 3)?;
         }
-        x = block(layers, &own, &x, &embedded)?;
+        x = block(layers, &level, &x, &embedded)?;
     }
     let (norm, convolution) = sizes.exit();
     layers.convolved(&convolution.name, &layers.normalised(&norm, &x, true)?, Window::same(3), false)

@@ -10,7 +10,7 @@ use super::super::operations::{
     Apply, Convolution, MarchSizes, MarchVolumes, Normalise, Operation, SampledRays, Window,
 };
 use super::super::parameters::Parameters;
-use super::{Genvs, Views, colours, each};
+use super::{Genvs, ObjectViews, colours, each};
 use candle_core::{DType, Result, Tensor, Var};
 use std::sync::Arc;
 use viewfuse_core::camera::{Camera, CameraBlock};
@@ -36,7 +36,7 @@ fn target(side: u32, angle: f32) -> CameraBlock {
 }
 
 /// Photographs as both objects, and a target of each, as a step's views.
-fn views(sources: &SourceImages, targets: &[CameraBlock], object_count: usize) -> Views {
+fn views(sources: &SourceImages, targets: &[CameraBlock], object_count: usize) -> ObjectViews {
     let side = targets[0].height as usize;
     let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
     let shown = |image: &SourceImage| -> Vec<f32> {
@@ -45,7 +45,7 @@ fn views(sources: &SourceImages, targets: &[CameraBlock], object_count: usize) -
     };
     let pictures: Vec<f32> = (0..object_count).flat_map(|_| sources.images.iter().flat_map(shown)).collect();
     let truth = shown(&sources.images[0]).repeat(object_count * targets.len());
-    Views {
+    ObjectViews {
         pictures: tensor(pictures, &[object_count * cameras.len(), side, side, 3], DType::F64),
         cameras: vec![cameras.iter().map(|camera| camera.block(0)).collect(); object_count],
         near_far: vec![default_near_far(&cameras); object_count],
@@ -106,8 +106,10 @@ fn assert_graph_is_the_renderers(estimate: Estimate) {
 fn convolutions_and_norms_have_their_gradients() {
     let input = [2, 3, 4, 8];
     let images = variable(&input, 10);
-    let (filters, shared, own) = (variable(&[5, 9, 8], 9), variable(&[5], 11), variable(&[2, 5], 12));
-    for (biases, has_own_biases, rectifies) in [(&shared, false, true), (&own, true, true), (&own, true, false)] {
+    let (filters, shared, separate) = (variable(&[5, 9, 8], 9), variable(&[5], 11), variable(&[2, 5], 12));
+    for (biases, has_own_biases, rectifies) in
+        [(&shared, false, true), (&separate, true, true), (&separate, true, false)]
+    {
         let operation = || {
             let (window, out_channels) = (Window::same(3), 5);
             Apply(Convolution { input, out_channels, window, has_own_biases, rectifies, differentiates_input: true })
@@ -218,9 +220,9 @@ fn levels_scale_each_image_by_its_own() {
         (tensor.narrow(0, index, 1).expect("an image") * factor).and_then(|one| one.flatten_all()).expect("an image")
     };
     for (index, factor) in [(0, 2.0), (1, -1.0)] {
-        let [own, expected] = [(&scaled, 1.0), (&images, factor)]
+        let [found, expected] = [(&scaled, 1.0), (&images, factor)]
             .map(|(tensor, factor)| halves(tensor, factor, index).to_vec1::<f64>().expect("numbers"));
-        assert_eq!(own, expected);
+        assert_eq!(found, expected);
     }
 }
 
@@ -236,7 +238,7 @@ fn an_average_stands_in_for_the_parameters_and_goes_again() {
     // A tenth of the first values is left by the first step.
     let expected = [0.1 + 0.9 * last[0], 0.2 + 0.9 * last[1]];
     let during = average.during(&parameters, || Ok::<_, candle_core::Error>(value())).expect("work");
-    assert!(during.iter().zip(expected).all(|(own, expected)| (own - expected).abs() < 1.0e-12), "{during:?}");
+    assert!(during.iter().zip(expected).all(|(rate, expected)| (rate - expected).abs() < 1.0e-12), "{during:?}");
     assert_eq!(value(), last);
 }
 

@@ -21,7 +21,7 @@ pub(crate) struct ViewCounts {
 }
 
 /// Sources and targets of some objects.
-pub(crate) struct Views {
+pub(crate) struct ObjectViews {
     /// Of the sources, `[object][view]`, in the unit of weightings.
     pub(crate) sources: Vec<Vec<Camera>>,
     /// The same in world units, as kernels take them.
@@ -38,7 +38,7 @@ pub(crate) struct Views {
     pub(crate) near_far: Vec<[f32; 2]>,
 }
 
-impl Views {
+impl ObjectViews {
     /// Draws objects at random, and views of each.
     pub(crate) fn draw(
         scenes: &[TrainingScene],
@@ -46,21 +46,21 @@ impl Views {
         object_count: usize,
         counts: ViewCounts,
         dtype: DType,
-    ) -> Result<Views> {
+    ) -> Result<ObjectViews> {
         let objects: Vec<&TrainingScene> =
             (0..object_count).map(|index| &scenes[draw.below(Purpose::Objects, index, scenes.len())]).collect();
-        Views::of(&objects, draw, counts, dtype)
+        ObjectViews::of(&objects, draw, counts, dtype)
     }
 
-    /// As [`Views::draw`], of these objects.
-    pub(crate) fn of(objects: &[&TrainingScene], draw: &Draw, counts: ViewCounts, dtype: DType) -> Result<Views> {
+    /// As [`ObjectViews::draw`], of these objects.
+    pub(crate) fn of(objects: &[&TrainingScene], draw: &Draw, counts: ViewCounts, dtype: DType) -> Result<ObjectViews> {
         let ViewCounts { sources, targets } = counts;
         let (mut pictures, mut truth) = (Vec::new(), Vec::new());
         let mut lists = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for (index, scene) in objects.iter().enumerate() {
             let order = draw.choose(Purpose::Sources, index, scene.cameras.len(), sources.count + targets);
-            let (own, others) = order.split_at(sources.count);
-            let cameras = sources.sources(scene, draw, index, own, &mut pictures)?;
+            let (chosen, others) = order.split_at(sources.count);
+            let cameras = sources.sources(scene, draw, index, chosen, &mut pictures)?;
             others.iter().for_each(|view| truth.extend(inputs(&scene.pictures[*view])));
             lists.0.push(default_near_far(&cameras));
             lists.2.push(cameras.iter().map(|camera| camera.block(0)).collect());
@@ -73,7 +73,7 @@ impl Views {
             Tensor::from_vec(values, (objects.len() * count, side, side, 3), &Device::Cpu)?.to_dtype(dtype)
         };
         let (near_far, sources_of, cameras, targets_of, target_cameras) = lists;
-        Ok(Views {
+        Ok(ObjectViews {
             sources: sources_of,
             cameras,
             pictures: images(pictures, sources.count)?,

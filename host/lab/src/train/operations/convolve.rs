@@ -98,10 +98,10 @@ impl Convolution {
         }
         scratch.clear();
         scratch.resize(strip.len() * out_width * row_len, T::zero());
-        for (pixel, own) in scratch.chunks_exact_mut(row_len).enumerate() {
+        for (pixel, inputs) in scratch.chunks_exact_mut(row_len).enumerate() {
             let (row, column) = (strip.start + pixel / out_width, pixel % out_width);
             self.window.visit([height, width], row, column, |from, place| {
-                own[place * channels..][..channels].copy_from_slice(&image[from * channels..][..channels]);
+                inputs[place * channels..][..channels].copy_from_slice(&image[from * channels..][..channels]);
             });
         }
         scratch
@@ -111,10 +111,10 @@ impl Convolution {
     fn fold<T: Real>(&self, rows: &[T], strip: &Range<usize>, image: &mut [T]) {
         let [_, height, width, channels] = self.input;
         let [_, out_width] = self.out_size();
-        for (pixel, own) in rows.chunks_exact(self.row_len()).enumerate() {
+        for (pixel, inputs) in rows.chunks_exact(self.row_len()).enumerate() {
             let (row, column) = (strip.start + pixel / out_width, pixel % out_width);
             self.window.visit([height, width], row, column, |to, place| {
-                let from = &own[place * channels..][..channels];
+                let from = &inputs[place * channels..][..channels];
                 image[to * channels..][..channels].iter_mut().zip(from).for_each(|(to, from)| *to += *from);
             });
         }
@@ -141,13 +141,15 @@ impl Operation<3> for Convolution {
             let mut scratch = Vec::new();
             for strip in self.strips() {
                 let rows = self.unfold(image, &strip, &mut scratch);
-                let own = &mut output[strip.start * out_width * outs..strip.end * out_width * outs];
-                own.chunks_exact_mut(outs).for_each(|pixel| pixel.copy_from_slice(biases));
+                let strip_output = &mut output[strip.start * out_width * outs..strip.end * out_width * outs];
+                strip_output.chunks_exact_mut(outs).for_each(|pixel| pixel.copy_from_slice(biases));
                 let count = strip.len() * out_width;
-                add_product(matrix(rows, count, row_len), weights.t(), matrix_mut(own, count, outs));
+                add_product(matrix(rows, count, row_len), weights.t(), matrix_mut(strip_output, count, outs));
                 if self.rectifies {
                     // NaN stays NaN, so that the loss shows it.
-                    own.iter_mut().for_each(|value| *value = if *value < T::zero() { T::zero() } else { *value });
+                    strip_output
+                        .iter_mut()
+                        .for_each(|value| *value = if *value < T::zero() { T::zero() } else { *value });
                 }
             }
         });
@@ -169,8 +171,8 @@ impl Operation<3> for Convolution {
             let (mut scratch, mut of_rows, mut passed) = (Vec::new(), Vec::new(), Vec::new());
             for strip in self.strips() {
                 let count = strip.len() * out_width;
-                let own = (index * pixels + strip.start * out_width) * outs;
-                let (mut gradient, output) = (&gradient[own..][..count * outs], &output[own..][..count * outs]);
+                let first = (index * pixels + strip.start * out_width) * outs;
+                let (mut gradient, output) = (&gradient[first..][..count * outs], &output[first..][..count * outs]);
                 if self.rectifies {
                     passed.clear();
                     let pass = |(gradient, output): (&T, &T)| if *output > T::zero() { *gradient } else { T::zero() };
@@ -178,7 +180,7 @@ impl Operation<3> for Convolution {
                     gradient = &passed;
                 }
                 for row in gradient.chunks_exact(outs) {
-                    of_biases.iter_mut().zip(row).for_each(|(to, own)| *to += *own);
+                    of_biases.iter_mut().zip(row).for_each(|(to, value)| *to += *value);
                 }
                 let gradient = matrix(gradient, count, outs);
                 let rows = matrix(self.unfold(image, &strip, &mut scratch), count, row_len);
@@ -225,10 +227,10 @@ impl Operation<2> for DepthwiseConvolution {
         let out_len = self.window.count(height) * out_width * channels;
         let each = images.par_chunks_exact(height * width * channels).zip(output.par_chunks_exact_mut(out_len));
         each.for_each(|(image, output)| {
-            for (pixel, own) in output.chunks_exact_mut(channels).enumerate() {
+            for (pixel, sums) in output.chunks_exact_mut(channels).enumerate() {
                 self.window.visit([height, width], pixel / out_width, pixel % out_width, |from, place| {
                     let (from, by) = (&image[from * channels..][..channels], &weights[place * channels..][..channels]);
-                    own.iter_mut().zip(from.iter().zip(by)).for_each(|(own, (from, by))| *own += *from * *by);
+                    sums.iter_mut().zip(from.iter().zip(by)).for_each(|(sum, (from, by))| *sum += *from * *by);
                 });
             }
         });
@@ -243,12 +245,12 @@ impl Operation<2> for DepthwiseConvolution {
         let each = of_images.par_chunks_exact_mut(image_len).zip(images.par_chunks_exact(image_len));
         let one = |((of_image, image), gradient): ((&mut [T], &[T]), &[T])| {
             let mut of_weights = vec![T::zero(); weights.len()];
-            for (pixel, own) in gradient.chunks_exact(channels).enumerate() {
+            for (pixel, values) in gradient.chunks_exact(channels).enumerate() {
                 self.window.visit([height, width], pixel / out_width, pixel % out_width, |at, place| {
                     let (at, place) = (at * channels, place * channels);
                     for channel in 0..channels {
-                        of_image[at + channel] += own[channel] * weights[place + channel];
-                        of_weights[place + channel] += own[channel] * image[at + channel];
+                        of_image[at + channel] += values[channel] * weights[place + channel];
+                        of_weights[place + channel] += values[channel] * image[at + channel];
                     }
                 });
             }
@@ -264,7 +266,7 @@ pub(super) fn sum<T: Real>(lists: Vec<Vec<T>>) -> Vec<T> {
     let mut lists = lists.into_iter();
     let mut all = lists.next().unwrap_or_default();
     for list in lists {
-        all.iter_mut().zip(&list).for_each(|(all, own)| *all += *own);
+        all.iter_mut().zip(&list).for_each(|(all, part)| *all += *part);
     }
     all
 }

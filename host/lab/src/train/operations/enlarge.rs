@@ -53,10 +53,10 @@ impl Operation<2> for AddEnlarged {
                 row.iter_mut()
                     .zip(above.iter().zip(below))
                     .for_each(|(row, (a, b))| *row = *a * *of_above + *b * *of_below);
-                for (own, ([left, right], [of_left, of_right])) in output.chunks_exact_mut(channels).zip(&columns) {
+                for (pixel, ([left, right], [of_left, of_right])) in output.chunks_exact_mut(channels).zip(&columns) {
                     let [left, right] = [left, right].map(|column| &row[column * channels..][..channels]);
                     let both = left.iter().zip(right);
-                    own.iter_mut().zip(both).for_each(|(own, (a, b))| *own += *a * *of_left + *b * *of_right);
+                    pixel.iter_mut().zip(both).for_each(|(value, (a, b))| *value += *a * *of_left + *b * *of_right);
                 }
             }
         });
@@ -74,15 +74,15 @@ impl Operation<2> for AddEnlarged {
             let mut row = vec![T::zero(); row_len];
             for (gradient, (neighbours, shares)) in gradient.chunks_exact(width * channels).zip(&rows) {
                 row.fill(T::zero());
-                for (own, (neighbours, shares)) in gradient.chunks_exact(channels).zip(&columns) {
+                for (pixel, (neighbours, shares)) in gradient.chunks_exact(channels).zip(&columns) {
                     for (column, share) in neighbours.iter().zip(shares) {
                         let to = &mut row[column * channels..][..channels];
-                        to.iter_mut().zip(own).for_each(|(to, own)| *to += *own * *share);
+                        to.iter_mut().zip(pixel).for_each(|(to, value)| *to += *value * *share);
                     }
                 }
                 for (place, share) in neighbours.iter().zip(shares) {
                     let to = &mut of_small[place * row_len..][..row_len];
-                    to.iter_mut().zip(&row).for_each(|(to, own)| *to += *own * *share);
+                    to.iter_mut().zip(&row).for_each(|(to, value)| *to += *value * *share);
                 }
             }
         });

@@ -28,12 +28,12 @@ pub(super) fn linear_back<T: Real>(
     if let Some(of_layer) = of_layer {
         layer_gradient(&rectified(before), gradient, inner, outer, of_layer);
     }
-    let mut own = vec![T::zero(); before.len()];
+    let mut added = vec![T::zero(); before.len()];
     let weights = matrix(&layer[..inner * outer], outer, inner);
-    product(matrix(gradient, count, outer), weights, matrix_mut(&mut own, count, inner));
-    for ((to, own), before) in of_before.iter_mut().zip(own).zip(before) {
+    product(matrix(gradient, count, outer), weights, matrix_mut(&mut added, count, inner));
+    for ((to, added), before) in of_before.iter_mut().zip(added).zip(before) {
         // Without a branch, so that it takes several numbers at once.
-        *to += if *before > T::zero() { own } else { T::zero() };
+        *to += if *before > T::zero() { added } else { T::zero() };
     }
 }
 
@@ -44,7 +44,7 @@ pub(super) fn layer_gradient<T: Real>(rows: &[T], gradient: &[T], inner: usize, 
     let gradient = matrix(gradient, count, outer);
     add_product(gradient.t(), matrix(rows, count, inner), matrix_mut(of_weights, outer, inner));
     for row in gradient.rows() {
-        of_biases.iter_mut().zip(row).for_each(|(to, own)| *to += *own);
+        of_biases.iter_mut().zip(row).for_each(|(to, value)| *to += *value);
     }
 }
 

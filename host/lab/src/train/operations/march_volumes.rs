@@ -139,9 +139,9 @@ impl MarchVolumes {
         for (view, camera) in object_rays.cameras.iter().enumerate() {
             let volume = &volumes[(object * self.views() + view) * self.sizes.volume_len()..];
             let weight = weights[object * self.views() + view];
-            let own = &mut looked_up[view * points.len() * features..][..points.len() * features];
-            let rows = own.chunks_exact_mut(features).zip(fused.chunks_exact_mut(features));
-            for (point, (own, fused)) in points.iter().zip(rows) {
+            let rows_here = &mut looked_up[view * points.len() * features..][..points.len() * features];
+            let rows = rows_here.chunks_exact_mut(features).zip(fused.chunks_exact_mut(features));
+            for (point, (values, fused)) in points.iter().zip(rows) {
                 let place = VolumePlace::of(camera, point, &block);
                 for corner in 0..CORNERS {
                     let (node, share) = match place.is_outside() {
@@ -152,10 +152,10 @@ impl MarchVolumes {
                     if node != u32::MAX {
                         let from = &volume[node as usize * features..][..features];
                         let share = T::of(share);
-                        own.iter_mut().zip(from).for_each(|(own, from)| *own += *from * share);
+                        values.iter_mut().zip(from).for_each(|(value, from)| *value += *from * share);
                     }
                 }
-                fused.iter_mut().zip(own).for_each(|(fused, own)| *fused += *own * weight);
+                fused.iter_mut().zip(values).for_each(|(fused, value)| *fused += *value * weight);
             }
         }
         let layer = |index| &parameters[self.sizes.layer(index)];
@@ -192,8 +192,8 @@ impl MarchVolumes {
     }
 
     /// A sample's compositing weight, and its derivative by the sample's own optical depth.
-    fn share<T: Real>(&self, own: T, reaching: T) -> (T, T) {
-        let passes = (T::zero() - own).exponential();
+    fn share<T: Real>(&self, depth: T, reaching: T) -> (T, T) {
+        let passes = (T::zero() - depth).exponential();
         match self.inclusive {
             true => (reaching * (passes - passes * passes), reaching * (passes * passes + passes * passes - passes)),
             false => (reaching * (T::one() - passes), reaching * passes),
@@ -206,8 +206,8 @@ impl MarchVolumes {
         for (index, fused) in way.fused.chunks_exact(features).enumerate() {
             let (share, _) = self.share(way.own[index], way.reaching[index]);
             let raw = &way.raw[index * (1 + features) + 1..][..features];
-            let own = &mut seen[index / self.samples() * features..][..features];
-            own.iter_mut().zip(fused.iter().zip(raw)).for_each(|(own, (fused, raw))| *own += share * (*fused + *raw));
+            let sums = &mut seen[index / self.samples() * features..][..features];
+            sums.iter_mut().zip(fused.iter().zip(raw)).for_each(|(sum, (fused, raw))| *sum += share * (*fused + *raw));
         }
     }
 
@@ -251,11 +251,11 @@ impl MarchVolumes {
         let layer = |index| &parameters[self.sizes.layer(index)];
         let trains = !self.is_frozen;
         let mut of_second = vec![T::zero(); way.hidden[1].len()];
-        let own = trains.then(|| &mut of_parameters[self.sizes.layer(2)]);
-        linear_back(&way.hidden[1], layer(2), &of_raw, inner, 1 + features, &mut of_second, own);
+        let of_layer = trains.then(|| &mut of_parameters[self.sizes.layer(2)]);
+        linear_back(&way.hidden[1], layer(2), &of_raw, inner, 1 + features, &mut of_second, of_layer);
         let mut of_first = vec![T::zero(); way.hidden[0].len()];
-        let own = trains.then(|| &mut of_parameters[self.sizes.layer(1)]);
-        linear_back(&way.hidden[0], layer(1), &of_second, inner, inner, &mut of_first, own);
+        let of_layer = trains.then(|| &mut of_parameters[self.sizes.layer(1)]);
+        linear_back(&way.hidden[0], layer(1), &of_second, inner, inner, &mut of_first, of_layer);
         input_gradient(layer(0), &of_first, features, inner, &mut of_fused);
         if trains {
             layer_gradient(&way.fused, &of_first, features, inner, &mut of_parameters[self.sizes.layer(0)]);
@@ -316,9 +316,9 @@ impl Operation<3> for MarchVolumes {
             let mut of_parameters = kept(self.sizes.parameter_count());
             let gradient = &gradient[object * object_len..][..object_len];
             for chunk in self.chunks() {
-                let own = &gradient[chunk.start * self.sizes.features..chunk.end * self.sizes.features];
+                let values = &gradient[chunk.start * self.sizes.features..chunk.end * self.sizes.features];
                 let gradients = [&mut of_volumes[..], &mut of_weights[..], &mut of_parameters[..]];
-                self.back(inputs, own, object, &chunk, gradients);
+                self.back(inputs, values, object, &chunk, gradients);
             }
             (of_volumes, of_weights, of_parameters)
         };

@@ -26,8 +26,8 @@ impl Normalise {
         let channels = self.input[3];
         let mut sums = vec![T::zero(); channels];
         for pixel in image.chunks_exact(channels) {
-            for (channel, (sum, own)) in sums.iter_mut().zip(pixel).enumerate() {
-                *sum += value(channel, *own);
+            for (channel, (sum, entry)) in sums.iter_mut().zip(pixel).enumerate() {
+                *sum += value(channel, *entry);
             }
         }
         self.shared(&sums)
@@ -39,7 +39,7 @@ impl Normalise {
         let count = T::from_f64((self.input[1] * self.input[2] * size) as f64);
         let mut shared = Vec::with_capacity(sums.len());
         for group in sums.chunks_exact(size) {
-            let mean = group.iter().fold(T::zero(), |all, own| all + *own) / count;
+            let mean = group.iter().fold(T::zero(), |all, value| all + *value) / count;
             shared.extend((0..size).map(|_| mean));
         }
         shared
@@ -47,8 +47,8 @@ impl Normalise {
 
     /// Mean of each channel's group, and the factor of its deviations.
     fn moments<T: Real>(&self, image: &[T]) -> [Vec<T>; 2] {
-        let means = self.means(image, |_, own| own);
-        let spreads = self.means(image, |channel, own| (own - means[channel]) * (own - means[channel]));
+        let means = self.means(image, |_, value| value);
+        let spreads = self.means(image, |channel, value| (value - means[channel]) * (value - means[channel]));
         let factors =
             spreads.iter().map(|spread| T::from_f64(1.0 / (spread.to_f64() + self.variance_floor).sqrt())).collect();
         [means, factors]
@@ -68,11 +68,11 @@ impl Operation<3> for Normalise {
         let each = images.par_chunks_exact(self.image_len()).zip(output.par_chunks_exact_mut(self.image_len()));
         each.for_each(|(image, output)| {
             let [means, factors] = self.moments(image);
-            for (pixel, own) in image.chunks_exact(channels).zip(output.chunks_exact_mut(channels)) {
+            for (pixel, values) in image.chunks_exact(channels).zip(output.chunks_exact_mut(channels)) {
                 for channel in 0..channels {
                     let value = (pixel[channel] - means[channel]) * (factors[channel] * weights[channel]);
                     let value = value + biases[channel];
-                    own[channel] = if self.silu { value * logistic(value) } else { value };
+                    values[channel] = if self.silu { value * logistic(value) } else { value };
                 }
             }
         });
@@ -90,7 +90,7 @@ impl Operation<3> for Normalise {
             let (mut of_weights, mut of_biases) = (vec![T::zero(); channels], vec![T::zero(); channels]);
             // First the gradient of the normalised number, in place of the result's.
             let pixels = image.chunks_exact(channels).zip(gradient.chunks_exact(channels));
-            for ((pixel, gradient), own) in pixels.zip(of_image.chunks_exact_mut(channels)) {
+            for ((pixel, gradient), values) in pixels.zip(of_image.chunks_exact_mut(channels)) {
                 for channel in 0..channels {
                     let normal = (pixel[channel] - means[channel]) * factors[channel];
                     let mut slope = gradient[channel];
@@ -101,17 +101,19 @@ impl Operation<3> for Normalise {
                     }
                     of_weights[channel] += slope * normal;
                     of_biases[channel] += slope;
-                    own[channel] = slope;
+                    values[channel] = slope;
                 }
             }
-            let sums = |of: &[T]| -> Vec<T> { of.iter().zip(weights).map(|(of, weight)| *of * *weight).collect() };
+            let sums = |values: &[T]| -> Vec<T> {
+                values.iter().zip(weights).map(|(value, weight)| *value * *weight).collect()
+            };
             let mean_slope = self.shared(&sums(&of_biases));
             let mean_product = self.shared(&sums(&of_weights));
-            for (pixel, own) in image.chunks_exact(channels).zip(of_image.chunks_exact_mut(channels)) {
+            for (pixel, values) in image.chunks_exact(channels).zip(of_image.chunks_exact_mut(channels)) {
                 for channel in 0..channels {
                     let normal = (pixel[channel] - means[channel]) * factors[channel];
-                    let slope = own[channel] * weights[channel];
-                    own[channel] = (slope - mean_slope[channel] - normal * mean_product[channel]) * factors[channel];
+                    let slope = values[channel] * weights[channel];
+                    values[channel] = (slope - mean_slope[channel] - normal * mean_product[channel]) * factors[channel];
                 }
             }
             (of_weights, of_biases)

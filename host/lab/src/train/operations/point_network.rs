@@ -16,8 +16,8 @@ use viewfuse_kernels::pixelnerf::{EmbedBlock, GatherBlock, GridPlace, in_view_ax
 
 /// Points of a chunk.
 const CHUNK: usize = 64;
-/// A point is left out of the backward pass if its gradient is less than this share of the points' mean (sums of
-/// magnitudes). All that is left out together is then at most this share of the whole.
+/// A point is omitted from the backward pass if its gradient is less than this share of the points' mean (sums of
+/// magnitudes). All that is omitted together is then at most this share of the whole.
 const NEGLIGIBLE: f64 = 1.0e-4;
 
 /// Sizes of the network.
@@ -168,14 +168,14 @@ impl PointNetwork {
     fn shares<T: Real>(&self, weights: &[T], object: usize, point: usize) -> (Vec<T>, T) {
         let points = &*self.points;
         let views = points.view_count;
-        let own = &weights[object * views..][..views];
+        let shares = &weights[object * views..][..views];
         let sees = |view: usize| points.places[(object * views + view) * points.point_count + point].is_visible;
         let seen = (0..views).filter(|&view| sees(view)).count();
-        let all = (0..views).filter(|&view| sees(view)).fold(T::zero(), |all, view| all + own[view]);
+        let all = (0..views).filter(|&view| sees(view)).fold(T::zero(), |all, view| all + shares[view]);
         if seen == views || !(all > T::zero()) {
-            return (own.to_vec(), T::one());
+            return (shares.to_vec(), T::one());
         }
-        ((0..views).map(|view| if sees(view) { own[view] / all } else { T::zero() }).collect(), all)
+        ((0..views).map(|view| if sees(view) { shares[view] / all } else { T::zero() }).collect(), all)
     }
 
     fn run<T: Real>(&self, [grids, weights, parameters]: [&[T]; 3], object: usize, chunk: &[usize]) -> Way<T> {
@@ -193,13 +193,13 @@ impl PointNetwork {
         let mut of_views = Vec::new();
         for block in 0..block_count {
             if block < injected_count {
-                for (row, own) in points.rows(object, chunk).zip(flow.chunks_exact_mut(width)) {
+                for (row, values) in points.rows(object, chunk).zip(flow.chunks_exact_mut(width)) {
                     let place = &points.places[row];
                     let grid = &grids[row / points.point_count * self.node_count * self.node_len()..];
                     for (node, share) in place.nodes.iter().zip(place.shares) {
                         let share = T::of(share);
                         let from = &grid[*node as usize * self.node_len() + block * width..][..width];
-                        own.iter_mut().zip(from).for_each(|(own, from)| *own += *from * share);
+                        values.iter_mut().zip(from).for_each(|(value, from)| *value += *from * share);
                     }
                 }
             } else if block == injected_count {
@@ -223,10 +223,10 @@ impl PointNetwork {
     fn fuse<T: Real>(&self, of_views: &[T], weights: &[T], object: usize, chunk: &[usize]) -> Vec<T> {
         let width = self.sizes.width;
         let mut fused = vec![T::zero(); chunk.len() * width];
-        for (index, (&point, own)) in chunk.iter().zip(fused.chunks_exact_mut(width)).enumerate() {
+        for (index, (&point, values)) in chunk.iter().zip(fused.chunks_exact_mut(width)).enumerate() {
             for (view, share) in self.shares(weights, object, point).0.into_iter().enumerate() {
                 let from = &of_views[(view * chunk.len() + index) * width..][..width];
-                own.iter_mut().zip(from).for_each(|(own, from)| *own += *from * share);
+                values.iter_mut().zip(from).for_each(|(value, from)| *value += *from * share);
             }
         }
         fused
@@ -258,19 +258,19 @@ impl PointNetwork {
             }
             let mut inside = vec![T::zero(); flow.len()];
             let (first, second) = (Part::Block(block, 0), Part::Block(block, 1));
-            let own = trains.then(|| &mut of_parameters[self.sizes.layer(second)]);
-            linear_back(&way.insides[block], layer(second), &flow, width, width, &mut inside, own);
-            let own = trains.then(|| &mut of_parameters[self.sizes.layer(first)]);
-            linear_back(&way.flows[block], layer(first), &inside, width, width, &mut flow, own);
+            let of_layer = trains.then(|| &mut of_parameters[self.sizes.layer(second)]);
+            linear_back(&way.insides[block], layer(second), &flow, width, width, &mut inside, of_layer);
+            let of_layer = trains.then(|| &mut of_parameters[self.sizes.layer(first)]);
+            linear_back(&way.flows[block], layer(first), &inside, width, width, &mut flow, of_layer);
             if block < injected_count {
-                for (row, own) in points.rows(object, chunk).zip(flow.chunks_exact(width)) {
+                for (row, values) in points.rows(object, chunk).zip(flow.chunks_exact(width)) {
                     let place = &points.places[row];
                     let view = row / points.point_count % points.view_count;
                     let grid = &mut of_grids[view * self.node_count * self.node_len()..];
                     for (node, share) in place.nodes.iter().zip(place.shares) {
                         let share = T::of(share);
                         let to = &mut grid[*node as usize * self.node_len() + block * width..][..width];
-                        to.iter_mut().zip(own).for_each(|(to, own)| *to += *own * share);
+                        to.iter_mut().zip(values).for_each(|(to, value)| *to += *value * share);
                     }
                 }
             }
@@ -291,14 +291,14 @@ impl PointNetwork {
     ) -> Vec<T> {
         let width = self.sizes.width;
         let mut flow = vec![T::zero(); of_views.len()];
-        for (index, (&point, own)) in chunk.iter().zip(fused.chunks_exact(width)).enumerate() {
+        for (index, (&point, values)) in chunk.iter().zip(fused.chunks_exact(width)).enumerate() {
             let (shares, all) = self.shares(weights, object, point);
             let mut dots = Vec::with_capacity(shares.len());
             for (view, share) in shares.iter().enumerate() {
                 let at = (view * chunk.len() + index) * width;
                 let (to, from) = (&mut flow[at..][..width], &of_views[at..][..width]);
-                to.iter_mut().zip(own).for_each(|(to, own)| *to = *own * *share);
-                dots.push(own.iter().zip(from).fold(T::zero(), |dot, (own, from)| dot + *own * *from));
+                to.iter_mut().zip(values).for_each(|(to, value)| *to = *value * *share);
+                dots.push(values.iter().zip(from).fold(T::zero(), |dot, (value, from)| dot + *value * *from));
             }
             let is_renormalised = shares.iter().zip(weights[object * shares.len()..].iter()).any(|(a, b)| a != b);
             let mean = shares.iter().zip(&dots).fold(T::zero(), |mean, (share, dot)| mean + *share * *dot);
@@ -318,13 +318,13 @@ impl PointNetwork {
     /// The points of each object whose gradient, of `[object and point][4]`, is not negligible.
     pub(crate) fn with_gradient<T: Real>(&self, gradient: &[T]) -> Vec<Vec<usize>> {
         let points = &*self.points;
-        let own = |row: &[T]| row.iter().map(|value| value.to_f64().abs()).sum::<f64>();
-        let all: f64 = gradient.chunks_exact(4).map(own).sum();
+        let magnitude = |row: &[T]| row.iter().map(|value| value.to_f64().abs()).sum::<f64>();
+        let all: f64 = gradient.chunks_exact(4).map(magnitude).sum();
         let least = NEGLIGIBLE * all / (points.object_count * points.point_count) as f64;
         // NaN is no less than anything: it stays and shows itself.
-        let is_kept = |point: &usize, rows: &[T]| !(own(&rows[4 * point..][..4]) <= least);
-        let of = |rows: &[T]| (0..points.point_count).filter(|point| is_kept(point, rows)).collect();
-        gradient.chunks_exact(4 * points.point_count).map(of).collect()
+        let is_kept = |point: &usize, rows: &[T]| !(magnitude(&rows[4 * point..][..4]) <= least);
+        let kept = |rows: &[T]| (0..points.point_count).filter(|point| is_kept(point, rows)).collect();
+        gradient.chunks_exact(4 * points.point_count).map(kept).collect()
     }
 }
 
@@ -354,9 +354,9 @@ impl Operation<3> for PointNetwork {
             let mut of_parameters = vec![T::zero(); if self.is_frozen { 0 } else { inputs[2].len() }];
             for chunk in kept.chunks(CHUNK) {
                 let row = |point: &usize| &gradient[4 * (object * points.point_count + point)..][..4];
-                let own: Vec<T> = chunk.iter().flat_map(row).copied().collect();
+                let numbers: Vec<T> = chunk.iter().flat_map(row).copied().collect();
                 let gradients = [&mut of_grids[..], &mut of_weights[..], &mut of_parameters[..]];
-                self.back(inputs, &own, object, chunk, gradients);
+                self.back(inputs, &numbers, object, chunk, gradients);
             }
             (of_grids, of_weights, of_parameters)
         };

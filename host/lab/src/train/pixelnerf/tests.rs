@@ -175,8 +175,8 @@ fn a_density_at_zero_can_only_rise() {
     assert_eq!(rectified.to_vec1::<f64>().expect("numbers"), [2.0, 0.0, 0.0, 3.0]);
     let by = tensor(vec![1.0, 1.0, -1.0, -1.0], &[4], DType::F64);
     let gradients = (rectified * by).and_then(|all| all.sum_all()?.backward()).expect("gradients");
-    let own = gradients.get(&densities).expect("a gradient").to_vec1::<f64>().expect("numbers");
-    assert_eq!(own, [1.0, 0.0, -0.1, -1.0]);
+    let found = gradients.get(&densities).expect("a gradient").to_vec1::<f64>().expect("numbers");
+    assert_eq!(found, [1.0, 0.0, -0.1, -1.0]);
 }
 
 #[test]
@@ -218,7 +218,7 @@ fn samples_of_two_passes_are_numbered_over_objects_and_rays() {
 }
 
 #[test]
-fn points_without_a_gradient_are_left_out_of_the_backward_pass() {
+fn points_without_a_gradient_are_omitted_from_the_backward_pass() {
     let network = point_network(false);
     let count = 2 * network.points.point_count;
     let mut gradient = vec![0.0_f64; 4 * count];

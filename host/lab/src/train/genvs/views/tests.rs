@@ -1,13 +1,13 @@
 //! Sources of a GeNVS show what their cameras say.
 
 use super::super::super::gradient_check::scene;
-use super::{Draw, SourceDraw, ViewCounts, Views};
+use super::{Draw, ObjectViews, SourceDraw, ViewCounts};
 use candle_core::{DType, Tensor};
 
 /// Three sources and a target of each of two objects of 32 pixels.
-fn views(least_crop: f32) -> Views {
+fn views(least_crop: f32) -> ObjectViews {
     let counts = ViewCounts { sources: SourceDraw { least_crop, ..SourceDraw::whole(3) }, targets: 1 };
-    Views::of(&[&scene(32, 6), &scene(32, 7)], &Draw { seed: 5, step: 1 }, counts, DType::F32).expect("views")
+    ObjectViews::of(&[&scene(32, 6), &scene(32, 7)], &Draw { seed: 5, step: 1 }, counts, DType::F32).expect("views")
 }
 
 fn numbers(tensor: &Tensor) -> Vec<f32> {
@@ -25,7 +25,7 @@ fn cropped_sources_keep_their_side_and_change_their_cameras_only() {
         // A part at the whole's size is seen through a longer lens.
         assert!(cropped.pinhole.focal()[0] >= whole.pinhole.focal()[0]);
     }
-    let blocks = |views: &Views| views.sources.iter().flatten().map(|camera| camera.block(0)).collect::<Vec<_>>();
+    let blocks = |views: &ObjectViews| views.sources.iter().flatten().map(|camera| camera.block(0)).collect::<Vec<_>>();
     assert_eq!(cropped.cameras.concat(), blocks(&cropped));
     assert_ne!(blocks(&cropped), blocks(&whole));
 }
