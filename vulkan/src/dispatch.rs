@@ -47,6 +47,35 @@ impl Gpu {
         elements: Range<u32>,
         arrays: &[Bound<'_>],
     ) -> Result<(), VulkanError> {
+        self.dispatch_in(kernel, None, parameters, elements, arrays)
+    }
+
+    /// As [`Gpu::dispatch`], with a form of rounded factors ([`Form::ROUNDED`]) where this device is trusted with it
+    /// ([`Gpu::trusts`]): other numbers, within that form's bound; otherwise as `dispatch`.
+    ///
+    /// # Errors
+    /// Those of [`Gpu::dispatch`].
+    pub fn dispatch_rounded(
+        &self,
+        kernel: Kernel,
+        form: Form,
+        parameters: &[u8],
+        elements: Range<u32>,
+        arrays: &[Bound<'_>],
+    ) -> Result<(), VulkanError> {
+        let is_used = form.needs_matrices() && self.trusts(kernel, form)?;
+        self.dispatch_in(kernel, is_used.then_some(form), parameters, elements, arrays)
+    }
+
+    /// Dispatches a tiled kernel in a form, or in the one that is chosen for it.
+    pub(crate) fn dispatch_in(
+        &self,
+        kernel: Kernel,
+        form: Option<Form>,
+        parameters: &[u8],
+        elements: Range<u32>,
+        arrays: &[Bound<'_>],
+    ) -> Result<(), VulkanError> {
         if elements.is_empty() {
             return Ok(());
         }
@@ -62,7 +91,10 @@ impl Gpu {
         self.with_state(|gpu, state| {
             let (form, of_form) = match kernel.shape(parameters) {
                 Some(shape) => {
-                    let form = gpu.form(state, &job, &Class::new(kernel, shape))?;
+                    let form = match form {
+                        Some(form) => form,
+                        None => gpu.form(state, &job, &Class::new(kernel, shape))?,
+                    };
                     (form, 0..form.elements(shape.row_count, shape.column_count))
                 }
                 None => {

@@ -31,6 +31,7 @@ mod gpu;
 mod handle;
 mod instance;
 pub mod kernel;
+mod matrices;
 mod measure;
 mod messages;
 mod pieces;
