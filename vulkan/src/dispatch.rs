@@ -50,23 +50,6 @@ impl Gpu {
         self.dispatch_in(kernel, None, parameters, elements, arrays)
     }
 
-    /// As [`Gpu::dispatch`], with a form of rounded factors ([`Form::ROUNDED`]) where this device is trusted with it
-    /// ([`Gpu::trusts`]): other numbers, within that form's bound; otherwise as `dispatch`.
-    ///
-    /// # Errors
-    /// Those of [`Gpu::dispatch`].
-    pub fn dispatch_rounded(
-        &self,
-        kernel: Kernel,
-        form: Form,
-        parameters: &[u8],
-        elements: Range<u32>,
-        arrays: &[Bound<'_>],
-    ) -> Result<(), VulkanError> {
-        let is_used = form.needs_matrices() && self.trusts(kernel, form)?;
-        self.dispatch_in(kernel, is_used.then_some(form), parameters, elements, arrays)
-    }
-
     /// Dispatches a tiled kernel in a form, or in the one that is chosen for it.
     pub(crate) fn dispatch_in(
         &self,

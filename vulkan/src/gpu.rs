@@ -31,11 +31,11 @@ pub struct GpuOptions {
     pub closing: Duration,
     /// Limits that apply where they are lower than the device's own, so that tests can split work on any device.
     pub limits: Limits,
-    /// The form of all tiled kernels; `None` for the fastest, which is measured. The results of [`Form::ALL`] are the same
-    /// bits. A form of [`Form::ROUNDED`] is that of the kernels that have it.
+    /// The form of all tiled kernels; `None` for the fastest, which is measured. The results of [`Form::ALL`] are the
+    /// same bits. A form of [`Form::ROUNDED`] is that of the kernels that have it.
     pub form: Option<Form>,
-    /// A module whose entry points take the place of those for matrix units, so that tests see the same places, barriers
-    /// and roundings on any device; `None` for the device's own units.
+    /// A module whose entry points take the place of those for matrix units, so that tests see the same places,
+    /// barriers and roundings on any device; `None` for the device's own units.
     pub stand_ins: Option<&'static [u8]>,
     /// The longest time that a piece of a dispatch may be expected to take; `None` for the device's default:
     /// [`GpuOptions::longest_piece_on`]. The results are the same bits.

@@ -1,7 +1,7 @@
 //! Replaces each phi of an array or struct by phis of its members: what a device keeps in registers.
 //!
-//! An array of sums that a loop carries joins as a whole in what rust-gpu writes. Drivers keep matrices in registers only
-//! if they join one by one.
+//! An array of sums that a loop carries joins as a whole in what rust-gpu writes. Drivers keep matrices in registers
+//! only if they join one by one.
 
 use crate::refine::{RefineError, read};
 use rspirv::binary::Assemble;

@@ -17,8 +17,8 @@ pub const fn tile_elements(row_count: u32, column_count: u32) -> u32 {
     Form::Single.elements(row_count, column_count)
 }
 
-/// How a workgroup computes a tile of a matrix product. The sums of an output run along the inner index in every form of
-/// [`Form::ALL`]: the results are the same bits. Those of [`Form::ROUNDED`] are other numbers.
+/// How a workgroup computes a tile of a matrix product. The sums of an output run along the inner index in every form
+/// of [`Form::ALL`]: the results are the same bits. Those of [`Form::ROUNDED`] are other numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[repr(u32)]
 pub enum Form {
@@ -35,9 +35,9 @@ pub enum Form {
     /// Rows pass between the invocations of a subgroup instead of through the workgroup's memory. There are no
     /// barriers. Only for devices with [subgroups that fit](Form::needs_subgroups).
     Subgroup,
-    /// By a device's matrix units: the factors are rounded to f16, the sums are f32. Each factor is off by at most 2^-11
-    /// of itself, or by 2^-14 if that is more. A factor beyond 65,504 makes its outputs NaN. Only for devices with such
-    /// [units](Form::needs_matrices).
+    /// By a device's matrix units: the factors are rounded to f16, the sums are f32. Each factor is off by at most
+    /// 2^-11 of itself, or by 2^-14 if that is more. A factor beyond 65,504 makes its outputs NaN. Only for devices
+    /// with such [units](Form::needs_matrices).
     Half,
     /// The same with factors in two parts, an f16 and what is missing: each is off by at most 2^-22 of itself, or by
     /// 2^-25 if that is more, and the product of the two missing parts, at most 2^-22 of the product, is left out.
@@ -87,8 +87,8 @@ impl Form {
         matches!(self, Form::Subgroup)
     }
 
-    /// Whether it multiplies by the matrix units of a device, in f16 with sums in f32. Its entry points are in a module of
-    /// their own. A subgroup is full and has 32 invocations.
+    /// Whether it multiplies by the matrix units of a device, in f16 with sums in f32. Its entry points are in a
+    /// module of their own. A subgroup is full and has 32 invocations.
     pub const fn needs_matrices(self) -> bool {
         matches!(self, Form::Half | Form::TwoHalves)
     }

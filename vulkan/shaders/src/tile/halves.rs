@@ -1,10 +1,10 @@
 //! Products by the matrix units of a device: factors in f16, sums in f32
 //! ([`Form::Half`](viewfuse_kernels::rows::Form::Half), [`Form::TwoHalves`](viewfuse_kernels::rows::Form::TwoHalves)).
 //!
-//! A workgroup has four subgroups of 32 invocations, two times two, each of which has a quarter of the tile: matrices of
-//! 16 times 16 sums. For each step along the inner index the workgroup rounds its rows of the left matrix and its
-//! columns of the right one into its memory, while the next step's numbers are on their way. Beyond the inner index both
-//! are 0; beyond rows and columns the last one is read and nothing is stored.
+//! A workgroup has four subgroups of 32 invocations, two times two, each of which has a quarter of the tile: matrices
+//! of 16 times 16 sums. For each step along the inner index the workgroup rounds its rows of the left matrix and its
+//! columns of the right one into its memory, while the next step's numbers are on their way. Beyond the inner index
+//! both are 0; beyond rows and columns the last one is read and nothing is stored.
 //!
 //! A factor is rounded by its bits, so that no driver takes what is missing for 0. In two parts a factor is
 //! `high + low / 2048`: `high` is the nearest f16, or 0 below 2^-14, and `low` the nearest f16 of 2048 times what is
