@@ -6,6 +6,7 @@
 
 mod bodies;
 mod forms;
+mod halves;
 
 use bodies::Bodies;
 use libtest_mimic::{Arguments, Failed, Trial};
@@ -51,6 +52,7 @@ fn main() -> ExitCode {
         Ok((instance, adapters)) => {
             for adapter in adapters {
                 trials.extend(forms::trials(&instance, &adapter));
+                trials.extend(halves::trials(&instance, &adapter));
                 let (instance, name) = (instance.clone(), adapter.name.clone());
                 trials.extend(trials_of(&Candidate {
                     open: move || {

@@ -74,8 +74,7 @@ fn tests_by_value(module: &Module) -> Vec<&Instruction> {
 
 #[test]
 fn no_compiled_kernel_tests_by_value() {
-    let Modules { kernels, subgroups } = Modules::read(&repository()).expect("the compiled kernels");
-    for bytes in [&kernels, &subgroups] {
+    for (_, bytes) in Modules::read(&repository()).expect("the compiled kernels").named() {
         let mut module = read(bytes).expect("SPIR-V");
         let mut found = BTreeMap::new();
         tests_by_value(&module)

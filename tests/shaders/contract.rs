@@ -21,6 +21,11 @@ fn subgroups() -> Module {
     SUBGROUPS.clone()
 }
 
+fn matrices() -> Module {
+    static MATRICES: LazyLock<Module> = LazyLock::new(|| read(&COMPILED.matrices).expect("SPIR-V"));
+    MATRICES.clone()
+}
+
 /// Breaches of the compiled kernels with one change.
 fn breaches_with(change: impl FnOnce(&mut Module)) -> Vec<String> {
     let mut module = kernels();
@@ -39,11 +44,14 @@ fn entry(module: &Module, kernel: Kernel) -> u32 {
 fn the_kernels_are_what_the_list_says() {
     assert_eq!(breaches(Part::Kernels, &kernels()), Vec::<String>::new());
     assert_eq!(breaches(Part::Subgroups, &subgroups()), Vec::<String>::new());
+    assert_eq!(breaches(Part::Matrices, &matrices()), Vec::<String>::new());
+    let stand_ins = read(&COMPILED.stand_ins).expect("SPIR-V");
+    assert_eq!(breaches(Part::StandIns, &stand_ins), Vec::<String>::new());
 }
 
 #[test]
 fn reading_and_writing_changes_nothing() {
-    for bytes in [&COMPILED.kernels, &COMPILED.subgroups] {
+    for (_, bytes) in COMPILED.named() {
         assert!(refine(bytes).expect("SPIR-V") == *bytes);
     }
 }
@@ -51,9 +59,13 @@ fn reading_and_writing_changes_nothing() {
 #[test]
 fn a_module_that_is_split_goes_to_one_side() {
     let nothing = |module: &[u8]| read(module).expect("SPIR-V").functions.is_empty();
-    let Modules { kernels, subgroups } = split(&COMPILED.kernels).expect("SPIR-V");
-    assert!(kernels == COMPILED.kernels && nothing(&subgroups));
-    let Modules { kernels, subgroups } = split(&COMPILED.subgroups).expect("SPIR-V");
+    let Modules { kernels, subgroups, matrices, stand_ins } = split(&COMPILED.kernels).expect("SPIR-V");
+    assert!(kernels == COMPILED.kernels && [subgroups, matrices, stand_ins].iter().all(|other| nothing(other)));
+    let Modules { kernels, matrices, stand_ins, .. } = split(&COMPILED.matrices).expect("SPIR-V");
+    assert!(matrices == COMPILED.matrices && nothing(&kernels) && nothing(&stand_ins));
+    let Modules { kernels, stand_ins, .. } = split(&COMPILED.stand_ins).expect("SPIR-V");
+    assert!(stand_ins == COMPILED.stand_ins && nothing(&kernels));
+    let Modules { kernels, subgroups, .. } = split(&COMPILED.subgroups).expect("SPIR-V");
     assert!(subgroups == COMPILED.subgroups && nothing(&kernels));
     let capabilities = |bytes: &[u8]| read(bytes).expect("SPIR-V").capabilities.len();
     assert_eq!([capabilities(&kernels), capabilities(&subgroups)], [2, 5]);
@@ -228,6 +240,18 @@ const OF_KERNELS: [(Change, &str); 17] = [
     ),
 ];
 
+const OF_MATRICES: [(Change, &str); 3] = [
+    (
+        |module| {
+            let is_mark = |operand: &Operand| matches!(operand, Operand::MemoryAccess(_));
+            for_each(module, Op::CooperativeMatrixLoadKHR, |access| access.operands.retain(|own| !is_mark(own)));
+        },
+        "accesses to shared memory are private",
+    ),
+    (|module| without(module, Op::CooperativeMatrixMulAddKHR), ": 0 matrix products"),
+    (|module| _ = module.capabilities.pop(), "capabilities"),
+];
+
 const OF_SUBGROUPS: [(Change, &str); 2] = [
     (|module| without_annotations(module, Decoration::SpecId), "does not use the specialisation constant"),
     (
@@ -246,7 +270,8 @@ const OF_SUBGROUPS: [(Change, &str); 2] = [
 fn every_breach_is_seen_and_no_other_is_said() {
     let of_kernels = OF_KERNELS.map(|(change, what)| (Part::Kernels, kernels(), change, what));
     let of_subgroups = OF_SUBGROUPS.map(|(change, what)| (Part::Subgroups, subgroups(), change, what));
-    for (part, mut module, change, what) in of_kernels.into_iter().chain(of_subgroups) {
+    let of_matrices = OF_MATRICES.map(|(change, what)| (Part::Matrices, matrices(), change, what));
+    for (part, mut module, change, what) in of_kernels.into_iter().chain(of_subgroups).chain(of_matrices) {
         change(&mut module);
         let said = breaches(part, &module);
         assert!(!said.is_empty() && said.iter().all(|said| said.contains(what)), "{what}: {said:?}");

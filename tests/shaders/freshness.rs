@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use viewfuse_shader_compiler::split::Modules;
 use viewfuse_shader_compiler::stamp::{
-    CORE, Inputs, LIBRARIES, MANIFESTS, MODULE, SOURCES, STAMP, SUBGROUPS, Stamp, StampError,
+    CORE, Inputs, LIBRARIES, MANIFESTS, MATRICES, MODULE, SOURCES, STAMP, STAND_INS, SUBGROUPS, Stamp, StampError,
 };
 use viewfuse_shader_compiler::tokens::{names_in, tokens, without_modules};
 use viewfuse_tests::places::repository;
@@ -18,7 +18,9 @@ fn stale(root: &Path) -> Vec<String> {
 /// A copy of everything that a stamp speaks of.
 fn copy() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
-    for path in SOURCES.into_iter().chain(MANIFESTS).chain([CORE, MODULE, SUBGROUPS, STAMP, "Cargo.lock"]) {
+    for path in
+        SOURCES.into_iter().chain(MANIFESTS).chain([CORE, MODULE, SUBGROUPS, MATRICES, STAND_INS, STAMP, "Cargo.lock"])
+    {
         copy_all(&repository().join(path), &folder.path().join(path));
     }
     folder
@@ -162,7 +164,7 @@ fn a_changed_lock_is_noticed() {
 
 #[test]
 fn another_module_is_noticed() {
-    for name in [MODULE, SUBGROUPS] {
+    for name in [MODULE, SUBGROUPS, MATRICES, STAND_INS] {
         let folder = copy();
         let mut module = fs::read(folder.path().join(name)).expect("the module");
         module[100] ^= 1;

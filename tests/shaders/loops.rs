@@ -55,9 +55,9 @@ const INDEXED_BY_A_COUNTER: [&str; 23] = [
     "window_cost",
 ];
 
-fn compiled() -> [Module; 2] {
-    let Modules { kernels, subgroups } = Modules::read(&repository()).expect("the compiled kernels");
-    [kernels, subgroups].map(|bytes| read(&bytes).expect("SPIR-V"))
+fn compiled() -> [Module; 4] {
+    let modules = Modules::read(&repository()).expect("the compiled kernels");
+    modules.named().map(|(_, bytes)| read(bytes).expect("SPIR-V"))
 }
 
 #[test]

@@ -11,6 +11,8 @@ use viewfuse_vulkan::kernel::{Access, Array, Form, Kernel, Layout};
 
 /// `Sqrt` of `GLSL.std.450`: the only function that is the device's.
 const SQUARE_ROOT: u32 = 31;
+/// `PackHalf2x16`, of numbers that are rounded already: with matrix units, which have f16 themselves.
+const PACK_HALVES: u32 = 58;
 
 /// What a barrier has to say: what was written is there, and is seen.
 const SHARING: MemorySemantics = MemorySemantics::ACQUIRE_RELEASE
@@ -25,13 +27,24 @@ pub enum Part {
     Kernels,
     /// The forms that need operations of subgroups.
     Subgroups,
+    /// The forms that need matrix units.
+    Matrices,
+    /// What stands in for these in tests.
+    StandIns,
 }
 
 impl Part {
     /// What a device must have for it.
     fn capabilities(self) -> &'static [Capability] {
         match self {
-            Part::Kernels => &[Capability::Shader, Capability::VulkanMemoryModel],
+            Part::Kernels | Part::StandIns => &[Capability::Shader, Capability::VulkanMemoryModel],
+            Part::Matrices => &[
+                Capability::Shader,
+                Capability::VulkanMemoryModel,
+                Capability::Float16,
+                Capability::GroupNonUniform,
+                Capability::CooperativeMatrixKHR,
+            ],
             Part::Subgroups => &[
                 Capability::Shader,
                 Capability::VulkanMemoryModel,
@@ -45,9 +58,19 @@ impl Part {
     /// The number of its specialisation constant: a page's length, or the size of a subgroup.
     fn constant(self) -> u32 {
         match self {
-            Part::Kernels => 0,
             Part::Subgroups => 1,
+            _ => 0,
         }
+    }
+
+    /// Whether its entry points compute by matrix units, or by what stands in for them.
+    fn is_rounded(self) -> bool {
+        matches!(self, Part::Matrices | Part::StandIns)
+    }
+
+    /// The functions of the device that it may call.
+    fn functions(self) -> &'static [u32] {
+        if self.is_rounded() { &[SQUARE_ROOT, PACK_HALVES] } else { &[SQUARE_ROOT] }
     }
 }
 
@@ -66,8 +89,8 @@ pub fn breaches(part: Part, module: &Module) -> Vec<String> {
         breaches.unless(double.is_none(), || format!("{name}: two entry points"));
     }
     for (kernel, form, name) in entry_points(part) {
-        match entries.get(name) {
-            Some(entry) => breaches.look_at_kernel(module, (kernel, form), name, *entry),
+        match entries.get(&name) {
+            Some(entry) => breaches.look_at_kernel(module, (kernel, form), &name, *entry),
             None => breaches.said.push(format!("{name}: no entry point")),
         }
     }
@@ -76,9 +99,12 @@ pub fn breaches(part: Part, module: &Module) -> Vec<String> {
 }
 
 /// Every entry point that should be in a module: one for each kernel and form.
-pub fn entry_points(part: Part) -> impl Iterator<Item = (Kernel, Form, &'static str)> {
-    let of_kernel = |kernel: Kernel| kernel.forms().iter().map(move |form| (kernel, *form, kernel.entry_point(*form)));
-    let is_here = move |(_, form, _): &(Kernel, Form, &str)| form.needs_subgroups() == (part == Part::Subgroups);
+pub fn entry_points(part: Part) -> impl Iterator<Item = (Kernel, Form, String)> {
+    let forms = move |kernel: Kernel| if part.is_rounded() { kernel.rounded_forms() } else { kernel.forms() };
+    let end = if part == Part::StandIns { "_stand_in" } else { "" };
+    let name = move |kernel: Kernel, form: Form| kernel.entry_point(form).to_owned() + end;
+    let of_kernel = move |kernel: Kernel| forms(kernel).iter().map(move |form| (kernel, *form, name(kernel, *form)));
+    let is_here = move |(_, form, _): &(Kernel, Form, String)| form.needs_subgroups() == (part == Part::Subgroups);
     Kernel::ALL.into_iter().flat_map(of_kernel).filter(is_here)
 }
 
@@ -111,7 +137,8 @@ impl Breaches<'_> {
         self.unless(capabilities == allowed, || format!("capabilities {capabilities:?}, not {allowed:?}"));
         for extension in &module.extensions {
             let name = extension.operands[0].unwrap_literal_string();
-            self.unless(name == "SPV_KHR_vulkan_memory_model", || format!("extension {name}"));
+            let is_of_matrices = self.part == Part::Matrices && name == "SPV_KHR_cooperative_matrix";
+            self.unless(name == "SPV_KHR_vulkan_memory_model" || is_of_matrices, || format!("extension {name}"));
         }
         let model = module.memory_model.as_ref().map(|model| model.operands.clone());
         let logical = Operand::AddressingModel(AddressingModel::Logical);
@@ -180,6 +207,7 @@ impl Breaches<'_> {
         let most = if kernel.has_barriers(form) { form.shared_bytes() } else { 0 };
         self.look_at_sharing(most, name, &shared, &functions);
         self.look_at_subgroups(name, &functions);
+        self.look_at_matrices(name, &functions);
     }
 
     fn look_at_buffers(&mut self, kernel: Kernel, name: &str, buffers: &[Word]) {
@@ -237,6 +265,13 @@ impl Breaches<'_> {
         }
     }
 
+    /// Matrices are multiplied in their own module alone, and all of it by them.
+    fn look_at_matrices(&mut self, name: &str, functions: &[&Function]) {
+        let all = functions.iter().flat_map(|function| instructions(function));
+        let products = all.filter(|instruction| instruction.class.opcode == Op::CooperativeMatrixMulAddKHR).count();
+        self.unless((products > 0) == (self.part == Part::Matrices), || format!("{name}: {products} matrix products"));
+    }
+
     /// Numbers pass between invocations only within a subgroup, and only in the module for devices that can do that.
     fn look_at_subgroups(&mut self, name: &str, functions: &[&Function]) {
         let mut passed = 0;
@@ -263,7 +298,7 @@ impl Breaches<'_> {
         let (mut private, mut barriers) = (0, 0);
         for instruction in functions.iter().flat_map(|function| instructions(function)) {
             match instruction.class.opcode {
-                Op::Load | Op::Store => {
+                Op::Load | Op::Store | Op::CooperativeMatrixLoadKHR | Op::CooperativeMatrixStoreKHR => {
                     let is_shared = self.declarations.is_pointer_to(id_of(instruction, 0), StorageClass::Workgroup);
                     let marked = |operand: &Operand| {
                         matches!(operand, Operand::MemoryAccess(access)
@@ -296,7 +331,8 @@ impl Breaches<'_> {
             }
             if operation == Op::ExtInst {
                 let function = &instruction.operands[1];
-                self.unless(*function == Operand::LiteralExtInstInteger(SQUARE_ROOT), || {
+                let known = self.part.functions().iter().copied().map(Operand::LiteralExtInstInteger);
+                self.unless(known.into_iter().any(|known| known == *function), || {
                     format!("the device's function {function:?}, where core has its own")
                 });
             }

@@ -3,6 +3,7 @@
 use crate::error::{Missing, VulkanError, failed};
 use crate::instance::Instance;
 use crate::kernel::{Form, Kernel, WORKGROUP};
+use crate::matrices;
 use crate::subgroups::fitting_size;
 use ash::{ext, khr, vk};
 use std::ffi::{CStr, FromBytesUntilNulError};
@@ -87,6 +88,9 @@ pub struct Adapter {
     /// Invocations of a subgroup in [`Form::Subgroup`](crate::kernel::Form::Subgroup); `None` if the device cannot run
     /// that form.
     pub subgroup_size: Option<u32>,
+    /// Whether it has matrix units for [`Form::ROUNDED`](crate::kernel::Form::ROUNDED): f16 matrices of 16x16x16 with
+    /// f32 sums (`VK_KHR_cooperative_matrix`) in subgroups of 32 invocations.
+    pub has_matrices: bool,
     /// Missing requirements; if there are any, it cannot be opened.
     pub missing: Vec<Missing>,
     /// Most invocations of a workgroup, and bytes of the memory that they share.
@@ -152,6 +156,10 @@ impl Adapter {
             true if properties.api_version >= vk::API_VERSION_1_1 => fitting_size(instance, raw),
             _ => None,
         };
+        let has_matrices = subgroup_size.is_some()
+            && properties.api_version >= vk::API_VERSION_1_2
+            && has(khr::cooperative_matrix::NAME)
+            && matrices::fit(instance, raw);
         let heaps = memory_types.memory_heaps_as_slice().iter();
         let memory = heaps
             .filter(|heap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL))
@@ -187,6 +195,7 @@ impl Adapter {
                 memory,
             },
             subgroup_size,
+            has_matrices,
             missing: missing(&properties, has_model, family.is_some()),
             queue_family: family.unwrap_or(0),
             timestamp_bits: family.map_or(0, |family| families[family as usize].timestamp_valid_bits),
@@ -195,6 +204,7 @@ impl Adapter {
             extensions: extensions(
                 properties.api_version,
                 subgroup_size.is_some(),
+                has_matrices,
                 has(khr::pipeline_executable_properties::NAME) && reports_pipelines(instance, raw),
                 has,
             ),
@@ -212,6 +222,7 @@ impl Adapter {
     pub fn runs(&self, form: Form) -> bool {
         let [invocations, shared_bytes] = self.workgroup;
         (!form.needs_subgroups() || self.subgroup_size.is_some())
+            && (!form.needs_matrices() || self.has_matrices)
             && invocations >= form.invocations()
             && shared_bytes as usize >= form.shared_bytes()
     }
@@ -272,6 +283,7 @@ fn best_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
 fn extensions(
     api_version: u32,
     has_subgroups: bool,
+    has_matrices: bool,
     has_reports: bool,
     has: impl Fn(&CStr) -> bool,
 ) -> Vec<&'static CStr> {
@@ -280,6 +292,7 @@ fn extensions(
         (khr::vulkan_memory_model::NAME, api_version < vk::API_VERSION_1_2),
         (ext::memory_budget::NAME, true),
         (ext::subgroup_size_control::NAME, has_subgroups),
+        (khr::cooperative_matrix::NAME, has_matrices),
         (khr::pipeline_executable_properties::NAME, has_subgroups && has_reports),
     ];
     wanted.into_iter().filter(|(name, is_used)| *is_used && has(name)).map(|(name, _)| name).collect()

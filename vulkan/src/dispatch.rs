@@ -47,6 +47,18 @@ impl Gpu {
         elements: Range<u32>,
         arrays: &[Bound<'_>],
     ) -> Result<(), VulkanError> {
+        self.dispatch_in(kernel, None, parameters, elements, arrays)
+    }
+
+    /// Dispatches a tiled kernel in a form, or in the one that is chosen for it.
+    pub(crate) fn dispatch_in(
+        &self,
+        kernel: Kernel,
+        form: Option<Form>,
+        parameters: &[u8],
+        elements: Range<u32>,
+        arrays: &[Bound<'_>],
+    ) -> Result<(), VulkanError> {
         if elements.is_empty() {
             return Ok(());
         }
@@ -62,7 +74,10 @@ impl Gpu {
         self.with_state(|gpu, state| {
             let (form, of_form) = match kernel.shape(parameters) {
                 Some(shape) => {
-                    let form = gpu.form(state, &job, &Class::new(kernel, shape))?;
+                    let form = match form {
+                        Some(form) => form,
+                        None => gpu.form(state, &job, &Class::new(kernel, shape))?,
+                    };
                     (form, 0..form.elements(shape.row_count, shape.column_count))
                 }
                 None => {

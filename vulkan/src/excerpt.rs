@@ -17,6 +17,7 @@ const ENTRY_POINT: u32 = 15;
 const EXECUTION_MODE: u32 = 16;
 const FIRST_TYPE: u32 = 19;
 const LAST_TYPE: u32 = 39;
+const MATRIX_TYPE: u32 = 4456;
 const FUNCTION: u32 = 54;
 const FUNCTION_END: u32 = 56;
 const FUNCTION_CALL: u32 = 57;
@@ -51,7 +52,7 @@ pub(crate) fn excerpt(module: &[u32], entry_point: &str) -> Vec<u32> {
         match (code, words) {
             (ENTRY_POINT, [_, _, id, name @ ..]) if is_named(name) => (entry, interface) = (Some(*id), name),
             (VARIABLE, [_, _, id, ..]) if function.is_none() => drop(variables.insert(*id)),
-            (FIRST_TYPE..=LAST_TYPE, [_, id, ..]) => drop(types.insert(*id)),
+            (FIRST_TYPE..=LAST_TYPE | MATRIX_TYPE, [_, id, ..]) => drop(types.insert(*id)),
             (FUNCTION, [_, _, id, ..]) => function = Some(*id),
             _ => {}
         }
@@ -107,7 +108,7 @@ pub(crate) fn excerpt(module: &[u32], entry_point: &str) -> Vec<u32> {
 mod tests {
     use super::*;
     use crate::kernel::{Form, Kernel};
-    use crate::pipelines::{MODULE, SUBGROUPS};
+    use crate::pipelines::{MATRICES, MODULE, SUBGROUPS};
 
     const CAPABILITY: u32 = 17;
     /// A storage class.
@@ -116,6 +117,8 @@ mod tests {
     const OF_ALL: [u32; 2] = [1, 5345];
     /// `GroupNonUniform`, `GroupNonUniformBallot`, `GroupNonUniformShuffle`: asked for in `subgroups::fitting_size`.
     const OF_SUBGROUPS: [u32; 3] = [61, 64, 65];
+    /// `Float16`, `GroupNonUniform`, `CooperativeMatrixKHR`: asked for in `matrices::fit`.
+    const OF_MATRICES: [u32; 3] = [9, 61, 6022];
 
     fn words(module: &[u8]) -> Vec<u32> {
         module.chunks_exact(4).map(bytemuck::pod_read_unaligned).collect()
@@ -123,17 +126,20 @@ mod tests {
 
     #[test]
     fn an_excerpt_relies_on_nothing_that_was_not_asked_for() {
-        let (kernels, subgroups) = (words(MODULE), words(SUBGROUPS));
+        let (kernels, subgroups, matrices) = (words(MODULE), words(SUBGROUPS), words(MATRICES));
         let mut seen = 0;
         for kernel in Kernel::ALL {
-            for form in Form::ALL.into_iter().filter(|form| *form == Form::Single || kernel.is_tiled()) {
-                let module =
-                    excerpt(if form.needs_subgroups() { &subgroups } else { &kernels }, kernel.entry_point(form));
+            for form in kernel.forms().iter().chain(kernel.rounded_forms()).copied() {
+                let (module, known) = match form {
+                    Form::Subgroup => (&subgroups, &OF_SUBGROUPS[..]),
+                    Form::Half | Form::TwoHalves => (&matrices, &OF_MATRICES[..]),
+                    Form::Single | Form::Large | Form::Small => (&kernels, &[][..]),
+                };
+                let module = excerpt(module, kernel.entry_point(form));
                 let coded = |wanted| instructions(&module).filter(move |(code, _)| *code == wanted);
                 assert_eq!(coded(ENTRY_POINT).count(), 1, "{} {}", kernel.name(), form.name());
                 for (_, capability) in coded(CAPABILITY) {
-                    let is_asked_for = OF_ALL.contains(&capability[1])
-                        || form.needs_subgroups() && OF_SUBGROUPS.contains(&capability[1]);
+                    let is_asked_for = OF_ALL.contains(&capability[1]) || known.contains(&capability[1]);
                     assert!(is_asked_for, "{} {}: capability {}", kernel.name(), form.name(), capability[1]);
                     seen += 1;
                 }

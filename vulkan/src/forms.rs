@@ -50,6 +50,7 @@ impl Class {
             Form::Large => !is_software && tiles(Form::Large) >= MIN_LARGE_TILES,
             Form::Small => !is_software && tiles(Form::Single) <= MAX_TILES_WITH_SMALL,
             Form::Subgroup => true,
+            Form::Half | Form::TwoHalves => false,
         };
         Form::ALL.into_iter().filter(fits).take(if work >= MIN_WORK { Form::ALL.len() } else { 1 })
     }

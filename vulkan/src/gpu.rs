@@ -11,6 +11,7 @@ use crate::pipelines::Pipelines;
 use crate::staging::Ring;
 use crate::submissions::{Done, Submission, Submissions};
 use ash::vk;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -31,8 +32,12 @@ pub struct GpuOptions {
     pub closing: Duration,
     /// Limits that apply where they are lower than the device's own, so that tests can split work on any device.
     pub limits: Limits,
-    /// The form of all tiled kernels; `None` for the fastest, which is measured. The results are the same bits.
+    /// The form of all tiled kernels; `None` for the fastest, which is measured. The results of [`Form::ALL`] are the
+    /// same bits. A form of [`Form::ROUNDED`] is that of the kernels that have it.
     pub form: Option<Form>,
+    /// A module whose entry points take the place of those for matrix units, so that tests see the same places,
+    /// barriers and roundings on any device; `None` for the device's own units.
+    pub stand_ins: Option<&'static [u8]>,
     /// The longest time that a piece of a dispatch may be expected to take; `None` for the device's default:
     /// [`GpuOptions::longest_piece_on`]. The results are the same bits.
     pub longest_piece: Option<Duration>,
@@ -68,6 +73,7 @@ impl Default for GpuOptions {
             closing: Duration::from_secs(10),
             limits,
             form: None,
+            stand_ins: None,
             longest_piece: None,
             faults: Faults::default(),
         }
@@ -116,6 +122,7 @@ pub struct Gpu {
     pub(crate) is_software: bool,
     pub(crate) longest_piece: Option<Duration>,
     pub(crate) faults: Faults,
+    has_stand_ins: bool,
 }
 
 pub(crate) struct State {
@@ -125,6 +132,8 @@ pub(crate) struct State {
     pub(crate) choices: Choices,
     /// Forms that are not used, because their results or their subgroups were others.
     pub(crate) refused: Vec<(Kernel, Form)>,
+    /// Whether forms of rounded factors are used, as far as it was asked.
+    pub(crate) trusted: BTreeMap<(Kernel, Form), bool>,
     /// How long elements took.
     pub(crate) rates: [Rate; Kernel::ALL.len()],
     pub(crate) upload: Option<Ring>,
@@ -155,10 +164,14 @@ impl Gpu {
             workgroup_count: limits.workgroup_count.min(lower.workgroup_count).max(1),
             memory: limits.memory.min(lower.memory),
         };
-        if let Some(form) = options.form.filter(|form| !adapter.runs(*form)) {
-            let missing = vec![Missing::Feature(match form.needs_subgroups() {
-                true => "subgroups of 8 to 64 invocations",
-                false => "workgroups of 256 invocations that share 32 KiB",
+        if let Some(form) = options.form.filter(|form| {
+            let stands_in = form.needs_matrices() && options.stand_ins.is_some();
+            !stands_in && !adapter.runs(*form)
+        }) {
+            let missing = vec![Missing::Feature(match form {
+                Form::Subgroup => "subgroups of 8 to 64 invocations",
+                Form::Half | Form::TwoHalves => "matrix units of 16x16x16 f16 with f32 sums",
+                Form::Single | Form::Large | Form::Small => "workgroups of 256 invocations that share 32 KiB",
             })];
             return Err(VulkanError::Missing(adapter.name.clone(), missing));
         }
@@ -166,7 +179,7 @@ impl Gpu {
         let timestamps = (adapter.timestamp_bits > 0).then_some((adapter.timestamp_period, adapter.timestamp_bits));
         let time_limit = options.time_limit_on(adapter.kind);
         let submissions = Submissions::new(&handle, adapter.queue_family, timestamps, time_limit, options.closing)?;
-        let pipelines = Pipelines::new(&handle, options.faults.reported_subgroup_size)?;
+        let pipelines = Pipelines::new(&handle, options.faults.reported_subgroup_size, options.stand_ins)?;
         // The longest page that is within the limits in every array, but long enough to start at allowed offsets.
         let page_len =
             (limits.buffer_range.min(limits.allocation) / WIDEST_PAGED).max(adapter.offset_alignment).max(64);
@@ -175,6 +188,7 @@ impl Gpu {
             pipelines,
             choices: Choices::default(),
             refused: Vec::new(),
+            trusted: BTreeMap::new(),
             rates: [Rate::default(); Kernel::ALL.len()],
             upload: None,
             download: None,
@@ -191,12 +205,18 @@ impl Gpu {
             is_software: adapter.kind == AdapterKind::Software,
             longest_piece: options.longest_piece_on(adapter.kind),
             faults: options.faults,
+            has_stand_ins: options.stand_ins.is_some(),
         })
     }
 
     /// The driver's name for it.
     pub fn name(&self) -> &str {
         &self.handle.name
+    }
+
+    /// Whether it has what a form of tiled kernels needs, or what stands in for it.
+    pub(crate) fn runs(&self, form: Form) -> bool {
+        self.handle.runs(form) || form.needs_matrices() && self.has_stand_ins
     }
 
     /// The limits by which work is split.

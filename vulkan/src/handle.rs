@@ -50,6 +50,11 @@ impl Handle {
         if adapter.subgroup_size.is_some() {
             info = info.push_next(&mut subgroups);
         }
+        let mut matrices = vk::PhysicalDeviceCooperativeMatrixFeaturesKHR::default().cooperative_matrix(true);
+        let mut floats = vk::PhysicalDeviceShaderFloat16Int8Features::default().shader_float16(true);
+        if adapter.has_matrices {
+            info = info.push_next(&mut matrices).push_next(&mut floats);
+        }
         let mut executable =
             vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
         let reports = adapter.extensions.contains(&khr::pipeline_executable_properties::NAME);

@@ -22,7 +22,7 @@ pub struct InstanceOptions {
 
 /// Vulkan itself, loaded at run time, so that everything else works on a machine without it.
 pub struct Instance {
-    _entry: ash::Entry,
+    pub(crate) entry: ash::Entry,
     pub(crate) raw: ash::Instance,
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     messages: Messages,
@@ -56,15 +56,10 @@ impl Instance {
         }
         let messages = Messages::default();
         let raw = create(&entry, options, &messages)?;
-        let mut instance = Instance {
-            raw,
-            messenger: None,
-            messages,
-            number: INSTANCES.fetch_add(1, Ordering::Relaxed),
-            _entry: entry,
-        };
+        let mut instance =
+            Instance { raw, messenger: None, messages, number: INSTANCES.fetch_add(1, Ordering::Relaxed), entry };
         if options.validation {
-            let functions = ext::debug_utils::Instance::new(&instance._entry, &instance.raw);
+            let functions = ext::debug_utils::Instance::new(&instance.entry, &instance.raw);
             // SAFETY: the extension is enabled; the messages outlive the messenger.
             let messenger = unsafe { functions.create_debug_utils_messenger(&instance.messages.create_info(), None) }
                 .map_err(failed("vkCreateDebugUtilsMessengerEXT"))?;

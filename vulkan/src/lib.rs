@@ -7,7 +7,7 @@
 //! error                          the errors, with numbers
 //! kernel                         the list of kernels: names, arrays, parameters
 //! messages, instance             the loader and its drivers
-//! subgroups, adapter             devices, what they can do, and missing requirements
+//! subgroups, matrices, adapter   devices, what they can do, and missing requirements
 //! handle, buffer                 an opened device, memory in it
 //! forms                          forms of tiles: what is measured, what is chosen
 //! excerpt, pipelines             the part of a module that a kernel needs, pipelines of kernels
@@ -18,6 +18,7 @@
 //! dispatch, pieces               dispatches, split to fit the device and its watchdog
 //! measure                        forms compared and timed
 //! transfers                      arrays between host and device
+//! trust                          products by matrix units, tried before they are used
 //! ```
 //!
 //! Unsafe code is only in calls of Vulkan; each has a comment why it is sound.
@@ -32,6 +33,7 @@ mod gpu;
 mod handle;
 mod instance;
 pub mod kernel;
+mod matrices;
 mod measure;
 mod messages;
 mod pieces;
@@ -41,6 +43,7 @@ mod staging;
 mod subgroups;
 mod submissions;
 mod transfers;
+mod trust;
 
 pub use adapter::{Adapter, AdapterKind, Limits};
 pub use buffer::{Bound, Buffer};

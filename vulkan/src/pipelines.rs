@@ -4,6 +4,7 @@ use crate::error::VulkanError;
 use crate::excerpt::excerpt;
 use crate::handle::Handle;
 use crate::kernel::{Form, Kernel};
+use crate::matrices;
 use ash::vk;
 use std::collections::HashMap;
 use std::ffi::CString;
@@ -13,6 +14,9 @@ use std::sync::Arc;
 pub(crate) const MODULE: &[u8] = include_bytes!("kernels.spv");
 /// Those that need operations of subgroups.
 pub(crate) const SUBGROUPS: &[u8] = include_bytes!("subgroups.spv");
+
+/// Those that need matrix units.
+pub(crate) const MATRICES: &[u8] = include_bytes!("matrices.spv");
 
 /// The pipeline of a kernel.
 #[derive(Clone, Copy)]
@@ -33,12 +37,19 @@ pub(crate) struct Pipelines {
     reported: HashMap<(Kernel, Form, u32), u32>,
     /// What takes the place of the driver's reports.
     pretended: Option<u32>,
+    /// What takes the place of the module for matrix units.
+    stand_ins: Option<&'static [u8]>,
     handle: Arc<Handle>,
 }
 
 impl Pipelines {
-    /// `pretended` is a size of subgroups that takes the place of the driver's reports.
-    pub(crate) fn new(handle: &Arc<Handle>, pretended: Option<u32>) -> Result<Pipelines, VulkanError> {
+    /// `pretended` is a size of subgroups that takes the place of the driver's reports, `stand_ins` a module that takes
+    /// the place of that for matrix units.
+    pub(crate) fn new(
+        handle: &Arc<Handle>,
+        pretended: Option<u32>,
+        stand_ins: Option<&'static [u8]>,
+    ) -> Result<Pipelines, VulkanError> {
         let mut pipelines = Pipelines {
             cache: vk::PipelineCache::null(),
             layouts: HashMap::new(),
@@ -46,6 +57,7 @@ impl Pipelines {
             pipelines: HashMap::new(),
             reported: HashMap::new(),
             pretended,
+            stand_ins,
             handle: handle.clone(),
         };
         // SAFETY: an empty cache needs nothing.
@@ -200,7 +212,10 @@ impl Pipelines {
         layout: vk::PipelineLayout,
         page_shift: u32,
     ) -> Result<vk::Pipeline, VulkanError> {
-        let subgroup_size = self.handle.subgroup_size().unwrap_or_default();
+        let subgroup_size = match form.needs_matrices() {
+            true => matrices::SUBGROUP,
+            false => self.handle.subgroup_size().unwrap_or_default(),
+        };
         let data: [u32; 2] = [page_shift, subgroup_size];
         let entry = |constant_id: u32| vk::SpecializationMapEntry {
             constant_id,
@@ -212,8 +227,14 @@ impl Pipelines {
         let specialization = vk::SpecializationInfo::default().map_entries(used).data(bytemuck::bytes_of(&data));
         let mut required =
             vk::PipelineShaderStageRequiredSubgroupSizeCreateInfoEXT::default().required_subgroup_size(subgroup_size);
-        let entry_point = kernel.entry_point(form);
-        let module = self.module(if form.needs_subgroups() { SUBGROUPS } else { MODULE }, entry_point)?;
+        let stand_ins = self.stand_ins.filter(|_| form.needs_matrices());
+        let entry_point = kernel.entry_point(form).to_owned() + if stand_ins.is_some() { "_stand_in" } else { "" };
+        let bytes = match form {
+            Form::Subgroup => SUBGROUPS,
+            Form::Half | Form::TwoHalves => stand_ins.unwrap_or(MATRICES),
+            Form::Single | Form::Large | Form::Small => MODULE,
+        };
+        let module = self.module(bytes, &entry_point)?;
         // No kernel's name has a zero in it.
         let name = CString::new(entry_point).unwrap_or_default();
         let mut stage = vk::PipelineShaderStageCreateInfo::default()
@@ -223,7 +244,7 @@ impl Pipelines {
         if kernel.has_pages() || form.needs_subgroups() {
             stage = stage.specialization_info(&specialization);
         }
-        if form.needs_subgroups() {
+        if form.needs_subgroups() || form.needs_matrices() && stand_ins.is_none() {
             let full = vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS_EXT;
             stage = stage.flags(full).push_next(&mut required);
         }

@@ -14,7 +14,7 @@
 use crate::adapter::Identity;
 use crate::forms::Choices;
 use crate::gpu::Gpu;
-use crate::pipelines::{MODULE, SUBGROUPS};
+use crate::pipelines::{MATRICES, MODULE, SUBGROUPS};
 
 const MAGIC: &[u8; 16] = b"viewfuse device\x02";
 /// Bytes of the head, of the lengths and of a checksum.
@@ -31,6 +31,7 @@ impl Identity {
         let mut modules = crc32fast::Hasher::new();
         modules.update(MODULE);
         modules.update(SUBGROUPS);
+        modules.update(MATRICES);
         head.extend(modules.finalize().to_le_bytes());
         for number in [self.vendor, self.device, self.driver] {
             head.extend(number.to_le_bytes());

@@ -5,8 +5,10 @@
 //! registers, dead code) stay.
 
 use crate::backend::{Backend, Toolchain};
+use crate::phis::split_phis;
 use crate::refine::{RefineError, refine};
-use crate::split::{CAPABILITIES, Modules, split};
+use crate::split::{CAPABILITIES, MATRIX_EXTENSION, Modules, split};
+use rspirv::spirv::Capability;
 use spirv_builder::{SpirvBuilder, SpirvBuilderError};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -40,6 +42,7 @@ pub fn compile(backend: &Backend, root: &Path, target: &Path) -> Result<Modules,
     builder.rustc_codegen_spirv_location = Some(backend.code_generator.clone());
     builder.target_dir_path = Some(target.to_path_buf());
     builder.capabilities = CAPABILITIES.to_vec();
+    builder.extensions = vec![MATRIX_EXTENSION.to_owned()];
     builder.extra_args = vec!["--no-spirv-opt".to_owned()];
     // This is not a build script: no instructions to cargo.
     builder.build_script.defaults = false;
@@ -49,26 +52,62 @@ pub fn compile(backend: &Backend, root: &Path, target: &Path) -> Result<Modules,
     let compiled = builder.build()?;
     let path = compiled.module.unwrap_single();
     let bytes = std::fs::read(path).map_err(|cause| CompileError::Read(path.to_path_buf(), cause))?;
-    let Modules { kernels, subgroups } = split(&bytes)?;
-    Ok(Modules { kernels: refine(&kernels)?, subgroups: refine(&subgroups)? })
+    let Modules { kernels, subgroups, matrices, stand_ins } = split(&bytes)?;
+    let of_matrices = |bytes: &[u8]| refine(&split_phis(bytes)?);
+    Ok(Modules {
+        kernels: refine(&kernels)?,
+        subgroups: refine(&subgroups)?,
+        matrices: of_matrices(&matrices)?,
+        stand_ins: of_matrices(&stand_ins)?,
+    })
 }
 
-/// Validates a module by `spirv-val`, for the versions of Vulkan that it is meant for. Returns whether the program
-/// is installed.
+/// The environment variable that names the validator in the place of `spirv-val`.
+pub const VALIDATOR_VARIABLE: &str = "SPIRV_VAL";
+
+/// What a validator said of a module that it did not reject.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Validation {
+    /// It is valid.
+    Accepted,
+    /// There is no validator.
+    NotInstalled,
+    /// The validator is older than matrix units are in SPIR-V.
+    TooOld,
+}
+
+impl std::fmt::Display for Validation {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Validation::Accepted => "accepted by spirv-val",
+            Validation::NotInstalled => "not validated: spirv-val is not installed",
+            Validation::TooOld => {
+                "not validated: this spirv-val does not know matrix units; SPIRV_VAL may name a newer one"
+            }
+        })
+    }
+}
+
+/// Validates a module by `spirv-val`, or the program that [`VALIDATOR_VARIABLE`] names, for the versions of Vulkan that
+/// it is meant for.
 ///
 /// # Errors
 /// [`CompileError::Invalid`], or [`CompileError::Read`] for a file that could not be written.
-pub fn validate(module: &[u8], target: &Path) -> Result<bool, CompileError> {
+pub fn validate(module: &[u8], target: &Path) -> Result<Validation, CompileError> {
+    let program = std::env::var_os(VALIDATOR_VARIABLE).unwrap_or_else(|| "spirv-val".into());
     let path = target.join("refined.spv");
     std::fs::write(&path, module).map_err(|cause| CompileError::Read(path.clone(), cause))?;
     for environment in ["vulkan1.1", "vulkan1.2", "vulkan1.3"] {
-        let Ok(output) = Command::new("spirv-val").args(["--target-env", environment]).arg(&path).output() else {
-            return Ok(false);
+        let Ok(output) = Command::new(&program).args(["--target-env", environment]).arg(&path).output() else {
+            return Ok(Validation::NotInstalled);
         };
         if !output.status.success() {
             let said = String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
-            return Err(CompileError::Invalid(environment, said));
+            // The number of the capability, in a parser that has no name for it.
+            let is_unknown =
+                said.contains(&format!("Invalid capability operand: {}", Capability::CooperativeMatrixKHR as u32));
+            return if is_unknown { Ok(Validation::TooOld) } else { Err(CompileError::Invalid(environment, said)) };
         }
     }
-    Ok(true)
+    Ok(Validation::Accepted)
 }

@@ -1,4 +1,4 @@
-//! `cargo shaders`: writes `kernels.spv`, `subgroups.spv` and `kernels.toml`, or checks that they are up to date.
+//! `cargo shaders`: writes the modules of the kernels and `kernels.toml`, or checks that they are up to date.
 
 use std::env;
 use std::error::Error;
@@ -11,10 +11,10 @@ use viewfuse_shader_compiler::compile::{compile, validate};
 use viewfuse_shader_compiler::loops::{Joined, joined};
 use viewfuse_shader_compiler::refine::read;
 use viewfuse_shader_compiler::split::Modules;
-use viewfuse_shader_compiler::stamp::{Inputs, MODULE, STAMP, SUBGROUPS, Stamp};
+use viewfuse_shader_compiler::stamp::{Inputs, STAMP, Stamp};
 
 const USAGE: &str = "usage: cargo shaders [--check]
-Makes vulkan/src/kernels.spv, subgroups.spv and kernels.toml from the sources.
+Makes vulkan/src/kernels.spv, subgroups.spv, matrices.spv, stand_ins.spv and kernels.toml from the sources.
   --check    writes nothing; compiles and compares, exit code 1 if anything differs
 Exit code 3 if there is no shader compiler.";
 
@@ -64,17 +64,19 @@ fn run(check: bool) -> Result<ExitCode, Box<dyn Error>> {
     let target =
         program.parent().and_then(Path::parent).ok_or("the program is not in a target folder")?.join("shaders");
     let modules = compile(&backend, &root, &target)?;
-    let validated = validate(&modules.kernels, &target)? && validate(&modules.subgroups, &target)?;
+    let mut validations = Vec::new();
+    for (_, bytes) in modules.named() {
+        validations.push(validate(bytes, &target)?);
+    }
     let stamp = Stamp::new(backend.version()?, &modules, inputs);
     if check {
         return compare(&root, &modules, &stamp);
     }
-    for (name, bytes) in named(&modules) {
+    for (name, bytes) in modules.named() {
         fs::write(root.join(name), bytes).map_err(|error| format!("{name}: {error}"))?;
     }
     fs::write(root.join(STAMP), stamp.text()).map_err(|error| format!("{STAMP}: {error}"))?;
-    let validated = if validated { "accepted by spirv-val" } else { "not validated: spirv-val is not installed" };
-    for (name, bytes) in named(&modules) {
+    for ((name, bytes), validated) in modules.named().into_iter().zip(validations) {
         println!("{name}: {} bytes by {}; {validated}", bytes.len(), stamp.compiler);
         for Joined { function, kept } in joined(&read(bytes)?) {
             let why = kept.map_or_else(|| "for no reason".to_owned(), |reason| reason.to_string());
@@ -84,16 +86,12 @@ fn run(check: bool) -> Result<ExitCode, Box<dyn Error>> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn named(modules: &Modules) -> [(&'static str, &[u8]); 2] {
-    [(MODULE, &modules.kernels), (SUBGROUPS, &modules.subgroups)]
-}
-
 /// Compares the fresh compilation with the checked-in modules.
 fn compare(root: &Path, modules: &Modules, compiled: &Stamp) -> Result<ExitCode, Box<dyn Error>> {
     let stored = Modules::read(root)?;
     let stamp = Stamp::read(root)?;
     let mut stale = stamp.stale(&compiled.inputs, &stored);
-    for ((name, stored), (_, module)) in named(&stored).into_iter().zip(named(modules)) {
+    for ((name, stored), (_, module)) in stored.named().into_iter().zip(modules.named()) {
         if stored != module {
             stale.push(format!(
                 "{name} is stale: it has {} bytes, compiled by {}; compiled now: {} bytes by {}",
@@ -105,11 +103,11 @@ fn compare(root: &Path, modules: &Modules, compiled: &Stamp) -> Result<ExitCode,
         }
     }
     if stale.is_empty() {
-        println!("{MODULE} and {SUBGROUPS} are up to date");
+        println!("the modules are up to date");
         return Ok(ExitCode::SUCCESS);
     }
     stale.iter().for_each(|difference| eprintln!("{difference}"));
-    eprintln!("stale: run `cargo shaders` and commit {MODULE}, {SUBGROUPS} and {STAMP}");
+    eprintln!("stale: run `cargo shaders` and commit the modules and {STAMP}");
     Ok(ExitCode::FAILURE)
 }
 

@@ -27,6 +27,8 @@ pub fn share(module: &mut Module) {
         let operands = match instruction.class.opcode {
             Op::Load => 1,
             Op::Store => 2,
+            Op::CooperativeMatrixLoadKHR => 3,
+            Op::CooperativeMatrixStoreKHR => 4,
             _ => continue,
         };
         let pointer = instruction.operands.first().and_then(Operand::id_ref_any);

@@ -1,7 +1,7 @@
-//! Takes the entry points that need operations of subgroups out of a module, into one of their own.
+//! Takes the entry points apart into modules by what a device must have for them.
 //!
-//! A device must have every capability of a module, whichever entry points it runs. Not every device has these
-//! operations.
+//! A device must have every capability of a module, whichever entry points it runs. Not every device has operations of
+//! subgroups, and few have matrix units.
 
 use crate::refine::{RefineError, read};
 use rspirv::binary::Assemble;
@@ -10,11 +10,20 @@ use rspirv::spirv::{Capability, Op};
 use spirv_builder::Capability as Enabled;
 use std::collections::HashSet;
 
-/// How the names of entry points end that need operations of subgroups.
-pub const SUFFIX: &str = "::subgroup";
-/// What the sources are compiled with for their sake.
-pub const CAPABILITIES: [Enabled; 3] =
-    [Enabled::GroupNonUniform, Enabled::GroupNonUniformBallot, Enabled::GroupNonUniformShuffle];
+/// What the sources are compiled with for the sake of some entry points.
+pub const CAPABILITIES: [Enabled; 5] = [
+    Enabled::GroupNonUniform,
+    Enabled::GroupNonUniformBallot,
+    Enabled::GroupNonUniformShuffle,
+    Enabled::Float16,
+    Enabled::CooperativeMatrixKHR,
+];
+/// The extension of SPIR-V for matrix units.
+pub const MATRIX_EXTENSION: &str = "SPV_KHR_cooperative_matrix";
+
+/// The kernels whose products matrix units compute: what networks take most of their time for. Others' entry points for
+/// them are left out.
+pub const WITH_MATRICES: [&str; 2] = ["linear", "convolve"];
 
 /// The compiled kernels, as bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -23,6 +32,43 @@ pub struct Modules {
     pub kernels: Vec<u8>,
     /// Those for devices with the operations of subgroups.
     pub subgroups: Vec<u8>,
+    /// Those for devices with matrix units.
+    pub matrices: Vec<u8>,
+    /// The same with plain arithmetic in the place of matrix units, by which these are tested on every device.
+    pub stand_ins: Vec<u8>,
+}
+
+/// The modules, in the order of [`Modules`].
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Part {
+    Kernels,
+    Subgroups,
+    Matrices,
+    StandIns,
+}
+
+impl Part {
+    /// That of an entry point; `None` for one that is left out.
+    fn of(name: &str) -> Option<Part> {
+        let (kernel, form) = name.split_once("::").unwrap_or((name, ""));
+        let of_matrices = |part| WITH_MATRICES.contains(&kernel).then_some(part);
+        match form {
+            "subgroup" => Some(Part::Subgroups),
+            "half" | "two_halves" => of_matrices(Part::Matrices),
+            "half_stand_in" | "two_halves_stand_in" => of_matrices(Part::StandIns),
+            _ => Some(Part::Kernels),
+        }
+    }
+
+    /// Whether it keeps a capability that [`CAPABILITIES`] has.
+    fn keeps(self, capability: Capability) -> bool {
+        match capability {
+            Capability::GroupNonUniform => matches!(self, Part::Subgroups | Part::Matrices),
+            Capability::GroupNonUniformBallot | Capability::GroupNonUniformShuffle => self == Part::Subgroups,
+            Capability::Float16 | Capability::CooperativeMatrixKHR => self == Part::Matrices,
+            _ => true,
+        }
+    }
 }
 
 /// Splits a module. Types and constants that a part does not need are left for [`refine`](crate::refine::refine) to
@@ -32,21 +78,23 @@ pub struct Modules {
 /// If the bytes are not SPIR-V.
 pub fn split(bytes: &[u8]) -> Result<Modules, RefineError> {
     let whole = read(bytes)?;
-    let mut kernels = whole.clone();
-    retain(&mut kernels, |name| !name.ends_with(SUFFIX));
-    let is_of_subgroups = |capability: &Instruction| {
-        matches!(
-            capability.operands.first(),
-            Some(Operand::Capability(
-                Capability::GroupNonUniform | Capability::GroupNonUniformBallot | Capability::GroupNonUniformShuffle
-            ))
-        )
+    let take = |part: Part| -> Vec<u8> {
+        let mut module = whole.clone();
+        retain(&mut module, |name| Part::of(name) == Some(part));
+        module.capabilities.retain(|capability| match capability.operands.first() {
+            Some(Operand::Capability(capability)) => part.keeps(*capability),
+            _ => true,
+        });
+        let is_of_matrices = |extension: &Instruction| matches!(extension.operands.first(), Some(Operand::LiteralString(name)) if name == MATRIX_EXTENSION);
+        module.extensions.retain(|extension| part == Part::Matrices || !is_of_matrices(extension));
+        module.assemble().iter().flat_map(|word| word.to_le_bytes()).collect()
     };
-    kernels.capabilities.retain(|capability| !is_of_subgroups(capability));
-    let mut subgroups = whole;
-    retain(&mut subgroups, |name| name.ends_with(SUFFIX));
-    let bytes = |module: &Module| module.assemble().iter().flat_map(|word| word.to_le_bytes()).collect();
-    Ok(Modules { kernels: bytes(&kernels), subgroups: bytes(&subgroups) })
+    Ok(Modules {
+        kernels: take(Part::Kernels),
+        subgroups: take(Part::Subgroups),
+        matrices: take(Part::Matrices),
+        stand_ins: take(Part::StandIns),
+    })
 }
 
 /// Retains some entry points and the functions that they call.

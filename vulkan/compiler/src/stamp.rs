@@ -19,6 +19,10 @@ use std::path::{Path, PathBuf};
 pub const MODULE: &str = "vulkan/src/kernels.spv";
 /// The module for devices with the operations of subgroups.
 pub const SUBGROUPS: &str = "vulkan/src/subgroups.spv";
+/// The module for devices with matrix units.
+pub const MATRICES: &str = "vulkan/src/matrices.spv";
+/// The module that stands in for it on other devices, for tests.
+pub const STAND_INS: &str = "vulkan/src/stand_ins.spv";
 /// Their stamp.
 pub const STAMP: &str = "vulkan/src/kernels.toml";
 /// The manifests of what becomes part of the modules: their dependencies, features and kinds of library count.
@@ -26,11 +30,12 @@ pub const MANIFESTS: [&str; 3] = ["core/Cargo.toml", "core/kernels/Cargo.toml", 
 /// The folder of `viewfuse-core`, of which only the modules count that kernels reach.
 pub const CORE: &str = "core/src";
 /// Source files, and folders with all their Rust files.
-pub const SOURCES: [&str; 8] = [
+pub const SOURCES: [&str; 9] = [
     "core/kernels/src",
     "vulkan/compiler/src/compile.rs",
     "vulkan/compiler/src/legalise.rs",
     "vulkan/compiler/src/loops.rs",
+    "vulkan/compiler/src/phis.rs",
     "vulkan/compiler/src/refine.rs",
     "vulkan/compiler/src/share.rs",
     "vulkan/compiler/src/split.rs",
@@ -74,6 +79,10 @@ pub struct Stamp {
     pub module: String,
     /// sha256 of the module for devices with the operations of subgroups.
     pub subgroups: String,
+    /// sha256 of the module for devices with matrix units.
+    pub matrices: String,
+    /// sha256 of the module that stands in for it.
+    pub stand_ins: String,
     /// What they were made from.
     #[serde(flatten)]
     pub inputs: Inputs,
@@ -102,7 +111,18 @@ impl Modules {
             let path = root.join(name);
             fs::read(&path).map_err(|cause| StampError::File(path, cause))
         };
-        Ok(Modules { kernels: bytes(MODULE)?, subgroups: bytes(SUBGROUPS)? })
+        Ok(Modules {
+            kernels: bytes(MODULE)?,
+            subgroups: bytes(SUBGROUPS)?,
+            matrices: bytes(MATRICES)?,
+            stand_ins: bytes(STAND_INS)?,
+        })
+    }
+
+    /// Each with its file, relative to the repository.
+    pub fn named(&self) -> [(&'static str, &[u8]); 4] {
+        let Modules { kernels, subgroups, matrices, stand_ins } = self;
+        [(MODULE, kernels), (SUBGROUPS, subgroups), (MATRICES, matrices), (STAND_INS, stand_ins)]
     }
 }
 
@@ -154,9 +174,9 @@ impl Stamp {
     /// The file's text.
     pub fn text(&self) -> String {
         let mut text = format!(
-            "# What kernels.spv and subgroups.spv were made from; written by `cargo shaders`.\n\
-             compiler = {:?}\nmodule = {:?}\nsubgroups = {:?}\n",
-            self.compiler, self.module, self.subgroups
+            "# What kernels.spv, subgroups.spv, matrices.spv and stand_ins.spv were made from; written by `cargo shaders`.\n\
+             compiler = {:?}\nmodule = {:?}\nsubgroups = {:?}\nmatrices = {:?}\nstand_ins = {:?}\n",
+            self.compiler, self.module, self.subgroups, self.matrices, self.stand_ins
         );
         for (name, table) in [("libraries", &self.inputs.libraries), ("sources", &self.inputs.sources)] {
             text += &format!("\n[{name}]\n");
@@ -169,7 +189,8 @@ impl Stamp {
 
     /// Of modules that were made from these inputs.
     pub fn new(compiler: String, modules: &Modules, inputs: Inputs) -> Stamp {
-        Stamp { compiler, module: sha256(&modules.kernels), subgroups: sha256(&modules.subgroups), inputs }
+        let [module, subgroups, matrices, stand_ins] = modules.named().map(|(_, bytes)| sha256(bytes));
+        Stamp { compiler, module, subgroups, matrices, stand_ins, inputs }
     }
 
     /// Whether modules were made from these inputs: every difference as a sentence that names it, none if they are
@@ -177,8 +198,9 @@ impl Stamp {
     pub fn stale(&self, inputs: &Inputs, modules: &Modules) -> Vec<String> {
         let mut stale = differences("library", &self.inputs.libraries, &inputs.libraries);
         stale.extend(differences("source", &self.inputs.sources, &inputs.sources));
-        let found = [(MODULE, &modules.kernels, &self.module), (SUBGROUPS, &modules.subgroups, &self.subgroups)];
-        for (name, _, _) in found.into_iter().filter(|(_, bytes, described)| sha256(bytes) != **described) {
+        let described = [&self.module, &self.subgroups, &self.matrices, &self.stand_ins];
+        let found = modules.named().into_iter().zip(described);
+        for ((name, _), _) in found.filter(|((_, bytes), described)| sha256(bytes) != **described) {
             stale.push(format!("{name} is not the module that {STAMP} describes"));
         }
         stale

@@ -254,6 +254,74 @@ macro_rules! entry {
                 let tiles = Subgroup { size, subgroup, lane };
                 bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
             }
+
+            /// By matrix units, in f16.
+            #[spirv(compute(threads(128)))]
+            #[allow(clippy::too_many_arguments)]
+            #[cfg(target_arch = "spirv")]
+            pub fn half(
+                #[spirv(global_invocation_id)] id: UVec3,
+                #[spirv(subgroup_id)] subgroup: u32,
+                #[spirv(subgroup_local_invocation_id)] lane: u32,
+                #[spirv(push_constant)] push: &Push<$Block>,
+                $($parameters)*
+                #[spirv(workgroup)] shared: &mut SharedOfHalf,
+            ) {
+                let $block = &push.parameters;
+                let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
+                let tiles = Half { units: PhantomData::<Matrices>, shared, subgroup, lane };
+                bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
+            }
+
+            /// By matrix units, in f16 in two parts.
+            #[spirv(compute(threads(128)))]
+            #[allow(clippy::too_many_arguments)]
+            #[cfg(target_arch = "spirv")]
+            pub fn two_halves(
+                #[spirv(global_invocation_id)] id: UVec3,
+                #[spirv(subgroup_id)] subgroup: u32,
+                #[spirv(subgroup_local_invocation_id)] lane: u32,
+                #[spirv(push_constant)] push: &Push<$Block>,
+                $($parameters)*
+                #[spirv(workgroup)] shared: &mut SharedOfTwoHalves,
+            ) {
+                let $block = &push.parameters;
+                let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
+                let tiles = TwoHalves { units: PhantomData::<Matrices>, shared, subgroup, lane };
+                bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
+            }
+
+            /// As `half`, by plain arithmetic.
+            #[spirv(compute(threads(128)))]
+            #[allow(clippy::too_many_arguments)]
+            pub fn half_stand_in(
+                #[spirv(global_invocation_id)] id: UVec3,
+                #[spirv(push_constant)] push: &Push<$Block>,
+                $($parameters)*
+                #[spirv(workgroup)] shared: &mut SharedOfHalf,
+            ) {
+                let $block = &push.parameters;
+                let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
+                let (subgroup, lane) = (id.x % 128 / 32, id.x % 32);
+                let tiles = Half { units: PhantomData::<StandIns>, shared, subgroup, lane };
+                bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
+            }
+
+            /// As `two_halves`, by plain arithmetic.
+            #[spirv(compute(threads(128)))]
+            #[allow(clippy::too_many_arguments)]
+            pub fn two_halves_stand_in(
+                #[spirv(global_invocation_id)] id: UVec3,
+                #[spirv(push_constant)] push: &Push<$Block>,
+                $($parameters)*
+                #[spirv(workgroup)] shared: &mut SharedOfTwoHalves,
+            ) {
+                let $block = &push.parameters;
+                let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
+                let (subgroup, lane) = (id.x % 128 / 32, id.x % 32);
+                let tiles = TwoHalves { units: PhantomData::<StandIns>, shared, subgroup, lane };
+                bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
+            }
         }
     };
 }

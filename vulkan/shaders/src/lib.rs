@@ -5,11 +5,11 @@
 //! ([`viewfuse_kernels::bodies`]). Arrays that may be longer than a device can bind at once come as four pages; arrays
 //! `as vectors` are loaded and stored as vectors (`loads`). A tiled kernel has an entry point for each form of a tile:
 //! the first of the kernel's name, the other in a module of that name. What devices do otherwise than the CPU is here:
-//! matrix products are summed in workgroup memory or by subgroups (`tile`), and a workgroup computes an element
-//! `together`, both without a panic (`unchecked`).
+//! matrix products are summed in workgroup memory, by subgroups or by matrix units (`tile`), and a workgroup computes
+//! an element `together`, both without a panic (`unchecked`).
 //!
 //! On the host the same entry points are plain functions, which are compiled and not called.
-#![cfg_attr(target_arch = "spirv", no_std)]
+#![cfg_attr(target_arch = "spirv", no_std, feature(f16, asm_experimental_arch))]
 
 #[macro_use]
 mod entry;
@@ -23,6 +23,9 @@ use core::marker::PhantomData;
 use loads::{InVectors, Vectors, VectorsMut};
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
+#[cfg(target_arch = "spirv")]
+use tile::Matrices;
+use tile::{Half, SharedOfHalf, SharedOfTwoHalves, StandIns, TwoHalves};
 use tile::{Large, SharedOfLarge, SharedOfSingle, SharedOfSmall, Single, Small, Staged, Subgroup};
 use unchecked::{Endless, Together, Unchecked};
 use viewfuse_kernels::bodies;

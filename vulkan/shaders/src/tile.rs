@@ -10,8 +10,12 @@
 //! This code must not panic, see [`crate::unchecked`]. Closures capture by value: a module with logical addressing
 //! cannot hold references to references.
 
+mod halves;
 mod subgroup;
 
+#[cfg(target_arch = "spirv")]
+pub(crate) use halves::Matrices;
+pub(crate) use halves::{Half, SharedOfHalf, SharedOfTwoHalves, StandIns, TwoHalves};
 pub(crate) use subgroup::Subgroup;
 
 use core::marker::PhantomData;

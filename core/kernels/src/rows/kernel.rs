@@ -17,8 +17,8 @@ pub const fn tile_elements(row_count: u32, column_count: u32) -> u32 {
     Form::Single.elements(row_count, column_count)
 }
 
-/// How a workgroup computes a tile of a matrix product. The sums of an output run along the inner index in every form:
-/// the results are the same bits.
+/// How a workgroup computes a tile of a matrix product. The sums of an output run along the inner index in every form
+/// of [`Form::ALL`]: the results are the same bits. Those of [`Form::ROUNDED`] are other numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[repr(u32)]
 pub enum Form {
@@ -35,17 +35,26 @@ pub enum Form {
     /// Rows pass between the invocations of a subgroup instead of through the workgroup's memory. There are no
     /// barriers. Only for devices with [subgroups that fit](Form::needs_subgroups).
     Subgroup,
+    /// By a device's matrix units: the factors are rounded to f16, the sums are f32. Each factor is off by at most
+    /// 2^-11 of itself, or by 2^-14 if that is more. A factor beyond 65,504 makes its outputs NaN. Only for devices
+    /// with such [units](Form::needs_matrices).
+    Half,
+    /// The same with factors in two parts, an f16 and what is missing: each is off by at most 2^-22 of itself, or by
+    /// 2^-25 if that is more, and the product of the two missing parts, at most 2^-22 of the product, is left out.
+    TwoHalves,
 }
 
 impl Form {
-    /// Every form.
+    /// The forms of two roundings that are summed in the same order, which give the same bits.
     pub const ALL: [Form; 4] = [Form::Single, Form::Large, Form::Small, Form::Subgroup];
+    /// The forms of rounded factors, for devices with matrix units.
+    pub const ROUNDED: [Form; 2] = [Form::Half, Form::TwoHalves];
 
     /// Rows and columns of its tiles.
     pub const fn side(self) -> u32 {
         match self {
-            Form::Single | Form::Subgroup => TILE,
-            Form::Large => 128,
+            Form::Single | Form::Subgroup | Form::TwoHalves => TILE,
+            Form::Large | Form::Half => 128,
             Form::Small => 32,
         }
     }
@@ -54,6 +63,7 @@ impl Form {
     pub const fn invocations(self) -> u32 {
         match self {
             Form::Large => 256,
+            Form::Half | Form::TwoHalves => 128,
             _ => WORKGROUP,
         }
     }
@@ -61,7 +71,7 @@ impl Form {
     /// Most bytes of memory that a workgroup shares.
     pub const fn shared_bytes(self) -> usize {
         match self {
-            Form::Large => 2 * SHARED_BYTES,
+            Form::Large | Form::Half | Form::TwoHalves => 2 * SHARED_BYTES,
             _ => SHARED_BYTES,
         }
     }
@@ -77,6 +87,12 @@ impl Form {
         matches!(self, Form::Subgroup)
     }
 
+    /// Whether it multiplies by the matrix units of a device, in f16 with sums in f32. Its entry points are in a
+    /// module of their own. A subgroup is full and has 32 invocations.
+    pub const fn needs_matrices(self) -> bool {
+        matches!(self, Form::Half | Form::TwoHalves)
+    }
+
     /// Its name in records.
     pub const fn name(self) -> &'static str {
         match self {
@@ -84,6 +100,8 @@ impl Form {
             Form::Large => "large",
             Form::Small => "small",
             Form::Subgroup => "subgroup",
+            Form::Half => "half",
+            Form::TwoHalves => "two_halves",
         }
     }
 }
@@ -242,6 +260,12 @@ macro_rules! list {
                     Form::Subgroup => match self {
                         $(Kernel::$Kernel => concat!(stringify!($method), "::subgroup"),)+
                     },
+                    Form::Half => match self {
+                        $(Kernel::$Kernel => concat!(stringify!($method), "::half"),)+
+                    },
+                    Form::TwoHalves => match self {
+                        $(Kernel::$Kernel => concat!(stringify!($method), "::two_halves"),)+
+                    },
                 }
             }
 
@@ -295,9 +319,17 @@ macro_rules! list {
 crate::for_each_kernel!(list);
 
 impl Kernel {
-    /// The forms that its entry points have.
+    /// The forms that give the same bits.
     pub const fn forms(self) -> &'static [Form] {
         if self.is_tiled() { &Form::ALL } else { &[Form::Single] }
+    }
+
+    /// The forms of rounded factors that it has.
+    pub const fn rounded_forms(self) -> &'static [Form] {
+        match self {
+            Kernel::Linear | Kernel::Convolve => &Form::ROUNDED,
+            _ => &[],
+        }
     }
 
     /// Whether invocations of a form of it wait for one another at barriers, and share memory.
