@@ -99,14 +99,14 @@ impl Residuals {
 /// The residual of a source over the background; 0 where its lens saw nothing.
 fn residual(colours: &[[f32; 4]], image: &SourceImage, images: &SourceImages, gain: [f32; 3]) -> Vec<[f32; 3]> {
     let behind = images.background;
-    let of = |(colour, texel): (&[f32; 4], &[f32; 4])| {
+    let left = |(colour, texel): (&[f32; 4], &[f32; 4])| {
         [0, 1, 2].map(|channel| match images.has_silhouettes {
             true => texel[channel] + (1.0 - texel[3]) * behind[channel] - gain[channel] * colour[channel],
             false if texel[3] < 0.999 => 0.0,
             false => texel[channel] - gain[channel] * colour[channel],
         })
     };
-    colours.iter().zip(&image.texels).map(of).collect()
+    colours.iter().zip(&image.texels).map(left).collect()
 }
 
 /// What is added at a point; the sum is in the order of the views. Nothing where no view sees it.

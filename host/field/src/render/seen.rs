@@ -6,12 +6,14 @@ use viewfuse_core::camera::Camera;
 
 /// Points of a picture that are looked at, along its longer side.
 const POINTS: u32 = 64;
+/// A photograph that is taken from as near as this, as a share of a point's depth, shows the point whatever its depth.
+const SAME_PLACE: f32 = 1.0e-3;
 /// Shares of a picture's surfaces, in `[0, 1]`, by the depths that the field found: an estimate, as good as these.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Seen {
     /// That no photograph of a used source shows: they are filled from what lies beside them.
     pub by_none: f32,
-    /// That a single one shows, so that nothing confirms their depth.
+    /// That a single one shows, from another place, so that nothing confirms their depth.
     pub by_one: f32,
 }
 
@@ -29,7 +31,9 @@ pub(super) fn seen(camera: &Camera, [width, height]: [u32; 2], depths: &[f32], m
             let depth = depths[(row * width + column) as usize];
             if depth > 0.0 {
                 let point = camera.centre_world() + camera.towards(column as f32 + 0.5, row as f32 + 0.5) * depth;
-                match maps.iter().filter(|map| map.shows(point)).take(2).count() {
+                let away = |map: &DepthMap| (map.camera.centre_world() - camera.centre_world()).length();
+                let confirms = |map: &DepthMap| if away(map) <= SAME_PLACE * depth { 2 } else { 1 };
+                match maps.iter().filter(|map| map.shows(point)).take(2).map(confirms).sum::<u32>() {
                     0 => none += 1,
                     1 => one += 1,
                     _ => {}
@@ -60,7 +64,7 @@ mod tests {
     }
 
     fn of(depth: f32, maps: &[DepthMap]) -> [f32; 2] {
-        let seen = seen(&camera(0.0), [16, 16], &[depth; 256], maps).expect("surfaces");
+        let seen = seen(&camera(0.01), [16, 16], &[depth; 256], maps).expect("surfaces");
         [seen.by_none, seen.by_one]
     }
 
@@ -72,6 +76,14 @@ mod tests {
         assert_eq!(of(2.0, &[far_away.clone(), far_away]), [1.0, 0.0]);
         // Beside it by half a picture: a half is not in it.
         assert_eq!(of(2.0, &[map(1.0, 2.0, 1.0)]), [0.5, 0.5]);
+    }
+
+    #[test]
+    fn a_photograph_from_the_same_place_needs_no_other() {
+        let far_away = map(100.0, 2.0, 1.0);
+        for (x, by_one) in [(0.01, 0.0), (0.011, 0.0), (0.02, 1.0)] {
+            assert_eq!(of(2.0, &[far_away.clone(), map(x, 2.0, 1.0)]), [0.0, by_one], "{x}");
+        }
     }
 
     #[test]

@@ -13,8 +13,6 @@ use viewfuse_output::run::RECORD;
 const MIN_FEW: f32 = 0.2;
 /// From which share on of what no photograph shows: that is invented.
 const MIN_UNSEEN: f32 = 0.05;
-/// The weight of a source, before views are left out, from which on a picture is this photograph again: no other one needs to show it.
-const SAME_PLACE: f32 = 0.99;
 /// Decibels of exposure from which a picture's line says what it has without.
 const MIN_EXPOSURE: f64 = 0.5;
 
@@ -115,10 +113,7 @@ fn summary(frame: &FrameRecord, sources: &[String], folder: &Path) -> String {
 fn few_photographs(frame: &FrameRecord, sources: &[String]) -> Option<String> {
     let Seen { by_none, by_one } = frame.seen_by?;
     let percent = |share: f32| (100.0 * share).round();
-    let mut order: Vec<usize> = (0..sources.len().min(frame.weights.len())).collect();
-    order.sort_by(|a, b| frame.weights[*b].total_cmp(&frame.weights[*a]));
-    let [first, second, ..] = order[..] else { return None };
-    let lacks = if by_none + by_one >= MIN_FEW && frame.weights_before[first] < SAME_PLACE {
+    let lacks = if by_none + by_one >= MIN_FEW {
         format!(
             "{} % of it seen by fewer than two photographs, {} % by none",
             percent(by_none + by_one),
@@ -129,6 +124,9 @@ fn few_photographs(frame: &FrameRecord, sources: &[String]) -> Option<String> {
     } else {
         return None;
     };
+    let mut order: Vec<usize> = (0..sources.len().min(frame.weights.len())).collect();
+    order.sort_by(|a, b| frame.weights[*b].total_cmp(&frame.weights[*a]));
+    let [first, second, ..] = order[..] else { return None };
     Some(format!("  {lacks}: photograph from between {} and {}", sources[first], sources[second]))
 }
 
