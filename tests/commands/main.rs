@@ -40,7 +40,6 @@ mod trained;
 mod verify;
 mod view;
 
-use libtest_mimic::{Arguments, run};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -87,8 +86,7 @@ fn main() -> ExitCode {
     if std::env::args_os().next().is_some_and(|name| Path::new(&name).file_stem() == Some("viewfuse-lab".as_ref())) {
         return viewfuse_lab::main();
     }
-    let arguments = Arguments::from_args();
-    run(&arguments, trials()).exit_code()
+    viewfuse_tests::trials::run(trials())
 }
 
 /// Runs a command in a folder; it must succeed and say nothing on standard error.

@@ -69,19 +69,29 @@ fn ours(line: &str) -> Option<(&'static str, &str)> {
     }
 }
 
-/// The same arguments for one target, or a path of three pictures.
+/// The same arguments for one target, or a path of three pictures, of half the size, and a fifth of the steps of training.
 pub(super) fn with_few_pictures(words: impl Iterator<Item = String>) -> Vec<String> {
     let mut option = String::new();
     let few = |word: String| {
         let few = match option.as_str() {
             "--orbit" | "--frames" => "3".to_owned(),
             "--targets" => word.split([',', '.']).next().unwrap_or_default().to_owned(),
+            "--size" if word.contains('x') => halved(&word),
+            "--steps" | "--validate-every" => {
+                word.parse::<u32>().expect("a number of steps").div_ceil(5).max(2).to_string()
+            }
             _ => word.clone(),
         };
         option = word;
         few
     };
     words.map(few).collect()
+}
+
+/// Half of `WIDTHxHEIGHT`.
+fn halved(size: &str) -> String {
+    let half = |side: &str| (side.parse::<u32>().expect("pixels") / 2).to_string();
+    size.split('x').map(half).collect::<Vec<_>>().join("x")
 }
 
 fn run(binary: &str, arguments: &[String]) -> String {

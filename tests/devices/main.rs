@@ -21,13 +21,13 @@ mod transfers;
 mod validation;
 
 use candidate::{Candidate, Test};
-use libtest_mimic::{Arguments, Failed, Trial};
+use libtest_mimic::Failed;
 use std::collections::BTreeSet;
 use std::env;
 use std::process::ExitCode;
 use std::sync::Arc;
 use viewfuse_tests::devices::vulkan_devices;
-use viewfuse_tests::trials::{is_required, needing};
+use viewfuse_tests::trials::{is_required, needing, run, timed};
 
 const REQUIRED: &str = "VIEWFUSE_REQUIRE_VULKAN";
 
@@ -37,7 +37,6 @@ fn main() -> ExitCode {
     if let Some(code) = child::run() {
         return code;
     }
-    let arguments = Arguments::from_args();
     let (candidates, problem) = match vulkan_devices() {
         Ok((instance, adapters)) => {
             (adapters.into_iter().map(|adapter| Arc::new(Candidate::new(&instance, adapter))).collect(), None)
@@ -45,8 +44,8 @@ fn main() -> ExitCode {
         Err(error) => (Vec::new(), Some(error.to_string())),
     };
     let drivers: BTreeSet<String> = candidates.iter().map(|candidate| candidate.adapter.driver.clone()).collect();
-    let mut trials = vec![Trial::test("so_many_drivers_as_required", move || enough_drivers(&drivers))];
-    trials.extend(loader::TESTS.iter().map(|(name, test)| Trial::test(*name, test)));
+    let mut trials = vec![timed("so_many_drivers_as_required", move || enough_drivers(&drivers))];
+    trials.extend(loader::TESTS.iter().map(|(name, test)| timed(*name, test)));
     let tests: Vec<Test> = [
         arguments::TESTS,
         transfers::TESTS,
@@ -60,27 +59,27 @@ fn main() -> ExitCode {
         forms::TESTS,
         gaussians::TESTS,
     ]
-    .concat()
-    .into_iter()
-    .chain(validation::tests())
-    .collect();
-    for candidate in &candidates {
-        for test in &tests {
+    .concat();
+    for (index, candidate) in candidates.iter().enumerate() {
+        // The layers see what is asked of a driver, and that is the same of each.
+        let validated = if index == 0 { validation::tests() } else { Vec::new() };
+        for test in tests.iter().chain(&validated) {
             let (work, candidate) = (test.work, candidate.clone());
             let name = format!("{}::{}", candidate.adapter.name, test.name);
             let missing = candidate.problem().or_else(|| test.missing.clone());
-            trials.push(needing(missing, is_required(REQUIRED), Trial::test(name, move || work(&candidate))));
+            trials.push(needing(missing, is_required(REQUIRED), timed(name, move || work(&candidate))));
         }
     }
     if let Some(problem) = problem {
-        let gone = tests.iter().map(|test| {
+        let all = [tests, validation::tests()].concat();
+        let gone = all.iter().map(|test| {
             let problem_here = problem.clone();
-            let trial = Trial::test(format!("vulkan::{}", test.name), move || Err(problem_here.into()));
+            let trial = timed(format!("vulkan::{}", test.name), move || Err(problem_here.into()));
             needing(Some(problem.clone()), is_required(REQUIRED), trial)
         });
         trials.extend(gone);
     }
-    libtest_mimic::run(&arguments, trials).exit_code()
+    run(trials)
 }
 
 fn enough_drivers(drivers: &BTreeSet<String>) -> Result<(), Failed> {

@@ -18,7 +18,7 @@ use viewfuse_tests::emulator::Emulator;
 use viewfuse_tests::emulator::board::{BOARDS, Board};
 use viewfuse_tests::emulator::list::{Line, compare, gathered, parsed};
 use viewfuse_tests::places::repository;
-use viewfuse_tests::trials::{is_required, needing};
+use viewfuse_tests::trials::{is_required, needing, timed};
 
 const REQUIRED: &str = "VIEWFUSE_REQUIRE_FIRMWARE";
 
@@ -75,23 +75,23 @@ pub(crate) fn trials() -> Vec<Trial> {
         let missing = boards.iter().find_map(|firmware| firmware.emulator.as_ref().err().cloned());
         needing(missing, is_required(REQUIRED), trial)
     };
-    let the_calls = Trial::test("what_the_calls_take", || costs::what_the_calls_take(&FIRMWARE[..]));
+    let the_calls = timed("what_the_calls_take", || costs::what_the_calls_take(&FIRMWARE[..]));
     let mut trials = vec![
         on_device(&FIRMWARE[..], the_calls),
-        Trial::test("every_kind_of_number_depends_on_the_inputs", every_kind_of_number_depends_on_the_inputs),
-        Trial::test("both_workspaces_lock_the_same_mathematics", both_workspaces_lock_the_same_mathematics),
+        timed("every_kind_of_number_depends_on_the_inputs", every_kind_of_number_depends_on_the_inputs),
+        timed("both_workspaces_lock_the_same_mathematics", both_workspaces_lock_the_same_mathematics),
     ];
     for firmware in FIRMWARE.iter() {
         let target = firmware.board.target;
         for profile in if firmware.board == BOARDS[0] { &PROFILES[..] } else { &PROFILES[..1] } {
             for program in PROGRAMS {
                 let name = format!("bits_equal_the_hosts::{target}::{program}::{profile}");
-                let trial = Trial::test(name, move || bits_equal_the_hosts(firmware, profile, program));
+                let trial = timed(name, move || bits_equal_the_hosts(firmware, profile, program));
                 trials.push(on_device(std::slice::from_ref(firmware), trial));
             }
         }
         let name = format!("a_program_that_panics_is_noticed::{target}");
-        let trial = Trial::test(name, move || a_program_that_panics_is_noticed(firmware));
+        let trial = timed(name, move || a_program_that_panics_is_noticed(firmware));
         trials.push(on_device(std::slice::from_ref(firmware), trial));
     }
     trials

@@ -5,11 +5,9 @@ mod defmt;
 mod firmware;
 mod miri;
 
-use libtest_mimic::{Arguments, run};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let arguments = Arguments::from_args();
     let trials = firmware::trials().into_iter().chain(capi::trials()).chain(defmt::trials()).chain(miri::trials());
-    run(&arguments, trials.collect()).exit_code()
+    viewfuse_tests::trials::run(trials.collect())
 }

@@ -5,20 +5,20 @@ use libtest_mimic::{Failed, Trial};
 use std::path::Path;
 use std::process::{Command, Output};
 use viewfuse_tests::places::repository;
-use viewfuse_tests::trials::{is_required, needing};
+use viewfuse_tests::trials::{is_required, needing, timed};
 
 const REQUIRED: &str = "VIEWFUSE_REQUIRE_MIRI";
 
 pub(crate) fn trials() -> Vec<Trial> {
     let miri = miri();
     let missing = miri.as_ref().err().cloned();
-    let under_miri = Trial::test("no_undefined_behaviour", move || {
+    let under_miri = timed("no_undefined_behaviour", move || {
         let [cargo, toolchain] = miri.map_err(Failed::from)?;
         printed(Command::new(cargo).arg(toolchain).args(["miri", "run"]))?;
         Ok(())
     });
     vec![
-        Trial::test("the_program_for_miri_runs", the_program_for_miri_runs),
+        timed("the_program_for_miri_runs", the_program_for_miri_runs),
         needing(missing, is_required(REQUIRED), under_miri),
     ]
 }

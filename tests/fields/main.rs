@@ -2,6 +2,7 @@
 
 mod auto;
 mod budget;
+mod counts;
 mod every;
 mod gaussians;
 mod genvs;

@@ -24,9 +24,10 @@ mod memory;
 mod targets;
 mod worker;
 
-use libtest_mimic::{Arguments, Trial, run};
+use libtest_mimic::Trial;
 use std::env;
 use std::process::ExitCode;
+use viewfuse_tests::trials::{run, timed};
 
 #[global_allocator]
 static MEMORY: memory::Counting = memory::Counting;
@@ -45,15 +46,15 @@ fn main() -> ExitCode {
     }
     let trial = |(name, _): &(&'static str, _)| {
         let name = *name;
-        Trial::test(name, move || {
+        timed(name, move || {
             drive::short(name, SHORT);
             Ok(())
         })
     };
     let mut trials: Vec<Trial> = targets::ALL.iter().map(trial).collect();
-    trials.push(Trial::test("what_falls_is_found", || {
+    trials.push(timed("what_falls_is_found", || {
         drive::what_falls_is_found();
         Ok(())
     }));
-    run(&Arguments::from_args(), trials).exit_code()
+    run(trials)
 }

@@ -11,7 +11,7 @@ use viewfuse::check::cases::visit;
 use viewfuse::device::vulkan::Vulkan;
 use viewfuse::device::{Device, Layer, LayerShape, Memory};
 use viewfuse_kernels::network::linear::LinearBlock;
-use viewfuse_tests::trials::{is_required, needing};
+use viewfuse_tests::trials::{is_required, needing, timed};
 use viewfuse_vulkan::kernel::{Form, Kernel};
 use viewfuse_vulkan::{Adapter, GpuOptions, Instance, Limits, Missing};
 
@@ -23,7 +23,7 @@ pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> 
     let of_form = |kernel: Kernel, form: Form| {
         let (instance, adapter) = (instance.clone(), adapter.clone());
         let name = format!("{}::{}::{}", adapter.name, kernel.name(), form.name());
-        ready(Trial::test(name, move || {
+        ready(timed(name, move || {
             let open =
                 |form| Vulkan::open(&instance, &adapter, &GpuOptions { form: Some(form), ..GpuOptions::default() });
             let device = open(form)?;
@@ -34,7 +34,7 @@ pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> 
     let in_pieces = |kernel: Kernel| {
         let (instance, adapter) = (instance.clone(), adapter.clone());
         let name = format!("{}::{}::in_pieces", adapter.name, kernel.name());
-        ready(Trial::test(name, move || pieces_have_the_same_bits(&instance, &adapter, kernel)))
+        ready(timed(name, move || pieces_have_the_same_bits(&instance, &adapter, kernel)))
     };
     let tiled = Kernel::ALL.into_iter().filter(|kernel| kernel.is_tiled());
     let has_subgroups = adapter.subgroup_size.is_some();
@@ -46,17 +46,17 @@ pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> 
     if has_subgroups {
         let name = format!("{}::a_form_is_measured_and_remembered", adapter.name);
         let measured = (instance.clone(), adapter.clone());
-        trials.push(ready(Trial::test(name, move || measured_and_remembered(&measured.0, &measured.1))));
+        trials.push(ready(timed(name, move || measured_and_remembered(&measured.0, &measured.1))));
         let name = format!("{}::two_at_a_time_remember_both", adapter.name);
         let both = (instance.clone(), adapter.clone());
-        trials.push(ready(Trial::test(name, move || two_at_a_time_remember_both(&both.0, &both.1))));
+        trials.push(ready(timed(name, move || two_at_a_time_remember_both(&both.0, &both.1))));
     }
     if has_subgroups && adapter.name.starts_with("llvmpipe") {
-        trials.push(ready(Trial::test(format!("{}::of_wider_subgroups", adapter.name), of_wider_subgroups)));
+        trials.push(ready(timed(format!("{}::of_wider_subgroups", adapter.name), of_wider_subgroups)));
     }
     if !has_subgroups {
         let name = format!("{}::a_form_that_the_device_lacks_is_refused", adapter.name);
-        trials.push(ready(Trial::test(name, move || refused(&instance, &adapter))));
+        trials.push(ready(timed(name, move || refused(&instance, &adapter))));
     }
     trials
 }

@@ -11,7 +11,7 @@ use viewfuse_kernels::network::convolve::{ConvolveBlock, patch_value};
 use viewfuse_kernels::network::linear::LinearBlock;
 use viewfuse_shader_compiler::stamp::STAND_INS;
 use viewfuse_tests::places::repository;
-use viewfuse_tests::trials::{is_required, needing};
+use viewfuse_tests::trials::{is_required, needing, timed};
 use viewfuse_vulkan::kernel::{Form, Kernel};
 use viewfuse_vulkan::{Adapter, Gpu, GpuOptions, Instance, Missing};
 
@@ -36,12 +36,12 @@ pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> 
             let options = GpuOptions { form: Some(form), stand_ins, ..GpuOptions::default() };
             let (instance, adapter) = (instance.clone(), adapter.clone());
             let name = format!("{}::{}::{what}", adapter.name, form.name());
-            trials.push(ready(Trial::test(name, move || is_within_its_bound(&instance, &adapter, &options, form))));
+            trials.push(ready(timed(name, move || is_within_its_bound(&instance, &adapter, &options, form))));
         }
     }
     let (instance, own) = (instance.clone(), adapter.clone());
     let name = format!("{}::rounded_forms_are_trusted_after_a_probe", adapter.name);
-    trials.push(ready(Trial::test(name, move || trusted_after_a_probe(&instance, &own))));
+    trials.push(ready(timed(name, move || trusted_after_a_probe(&instance, &own))));
     trials
 }
 

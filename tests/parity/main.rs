@@ -9,7 +9,7 @@ mod forms;
 mod halves;
 
 use bodies::Bodies;
-use libtest_mimic::{Arguments, Failed, Trial};
+use libtest_mimic::{Failed, Trial};
 use std::process::ExitCode;
 use viewfuse::check::agreement::{Disagreement, measure};
 use viewfuse::check::bounded::Bounded;
@@ -22,7 +22,7 @@ use viewfuse::device::cpu::Cpu;
 use viewfuse::device::vulkan::Vulkan;
 use viewfuse::job::progress::Silent;
 use viewfuse_tests::devices::vulkan_devices;
-use viewfuse_tests::trials::{is_required, needing};
+use viewfuse_tests::trials::{is_required, needing, run, timed};
 use viewfuse_vulkan::GpuOptions;
 use viewfuse_vulkan::kernel::{Access, Kernel};
 
@@ -37,7 +37,6 @@ struct Candidate<D, F: Fn() -> Result<D, String>> {
 }
 
 fn main() -> ExitCode {
-    let arguments = Arguments::from_args();
     let mut trials = Vec::new();
     // The CPU has no dispatches to count.
     let cpu = Candidate { name: "cpu".to_owned(), open: || Ok(Cpu), missing: None, dispatch_count: |_, _| None };
@@ -77,15 +76,15 @@ fn main() -> ExitCode {
     for kernel in [Kernel::CompareViews, Kernel::CensusCost, Kernel::WindowCost, Kernel::PlaneOpacity] {
         let name = format!("the_cpu_has_the_bits_of_the_body::{}", kernel.name());
         let same_bits = forms::SameBits { one: &Cpu, other: &Bodies::PLAIN, seeds: 1..=12 };
-        trials.push(Trial::test(name, move || visit(kernel, same_bits)));
+        trials.push(timed(name, move || visit(kernel, same_bits)));
     }
-    trials.push(Trial::test("every_input_has_a_control", every_input_has_a_control));
+    trials.push(timed("every_input_has_a_control", every_input_has_a_control));
     for kernel in Kernel::ALL {
         let name = format!("check_reports_a_faulty::{}", kernel.name());
-        trials.push(Trial::test(name, move || a_fault_is_reported(kernel)));
+        trials.push(timed(name, move || a_fault_is_reported(kernel)));
     }
-    trials.push(Trial::test("a_faulty_device_fails_the_check", a_faulty_device_fails_the_check));
-    libtest_mimic::run(&arguments, trials).exit_code()
+    trials.push(timed("a_faulty_device_fails_the_check", a_faulty_device_fails_the_check));
+    run(trials)
 }
 
 fn vulkan_dispatches(device: &Vulkan, kernel: Kernel) -> Option<u64> {
@@ -106,7 +105,7 @@ where
 {
     let Candidate { name, open, missing, dispatch_count } = candidate;
     let (open, dispatch_count) = (open.clone(), *dispatch_count);
-    let trial = Trial::test(format!("{name}::{}", kernel.name()), move || parity(&open()?, kernel, dispatch_count));
+    let trial = timed(format!("{name}::{}", kernel.name()), move || parity(&open()?, kernel, dispatch_count));
     needing(missing.clone(), is_required("VIEWFUSE_REQUIRE_VULKAN"), trial)
 }
 

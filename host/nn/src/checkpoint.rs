@@ -235,14 +235,15 @@ impl Checkpoint {
             what: format!("tensor '{}' takes {} bytes, which this machine does not have", shortened(name), 4 * count),
         })?;
         self.read(name, |element, bytes| {
-            for value in element.values(bytes) {
-                let number = value as f32;
-                if !number.is_finite() {
-                    return Err(self.not_finite(name, values.len() as u64, value));
+            let first = values.len();
+            element.push_numbers(bytes, &mut values);
+            match values[first..].iter().position(|number| !number.is_finite()) {
+                None => Ok(()),
+                Some(index) => {
+                    let value = element.values(bytes).nth(index).unwrap_or(f64::NAN);
+                    Err(self.not_finite(name, (first + index) as u64, value))
                 }
-                values.push(number);
             }
-            Ok(())
         })?;
         Ok(values)
     }

@@ -28,17 +28,11 @@ impl ConvolutionWeights {
         let [out_channels, in_channels, rows, columns] = shape;
         let size = rows.max(columns);
         let [above, left] = [rows, columns].map(|length| (size - length) / 2);
-        let place_len = in_channels * out_channels;
-        let mut values = vec![0.0; size * size * place_len];
-        for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
-            let place = (row + above) * size + column + left;
-            let place = &mut values[place * place_len..][..place_len];
-            for (in_channel, outputs) in place.chunks_exact_mut(out_channels.max(1)).enumerate() {
-                for (out_channel, value) in outputs.iter_mut().enumerate() {
-                    *value = weights[((out_channel * in_channels + in_channel) * rows + row) * columns + column];
-                }
-            }
-        }
+        let place = |inner: usize| {
+            let (row, column) = (inner / columns % rows + above, inner % columns + left);
+            (row * size + column) * in_channels + inner / (rows * columns)
+        };
+        let values = reordered(weights, out_channels, size * size * in_channels, place);
         ConvolutionWeights { size, in_channels, out_channels, values, bias }
     }
 
@@ -170,8 +164,28 @@ impl BatchNorm {
     }
 }
 
+/// Rows and columns of the squares in which [`reordered`] goes through a matrix: as many numbers as a line of a cache has.
+const SQUARE: usize = 16;
+
+/// `values[row][column]` of so many rows, as `[place(column)][row]`; what has no place in it is 0.
+fn reordered(values: &[f32], row_count: usize, place_count: usize, place: impl Fn(usize) -> usize) -> Vec<f32> {
+    let mut placed = vec![0.0; place_count * row_count];
+    let columns = values.len() / row_count.max(1);
+    for first_column in (0..columns).step_by(SQUARE) {
+        let end = columns.min(first_column + SQUARE);
+        let places: Vec<usize> = (first_column..end).map(|column| place(column) * row_count).collect();
+        for first_row in (0..row_count).step_by(SQUARE) {
+            for row in first_row..row_count.min(first_row + SQUARE) {
+                for (value, place) in values[row * columns + first_column..row * columns + end].iter().zip(&places) {
+                    placed[place + row] = *value;
+                }
+            }
+        }
+    }
+    placed
+}
+
 /// `values[row][column]` of so many rows, as `[column][row]`.
 pub(crate) fn transposed(values: &[f32], row_count: usize) -> Vec<f32> {
-    let columns = values.len() / row_count;
-    (0..values.len()).map(|index| values[index % row_count * columns + index / row_count]).collect()
+    reordered(values, row_count, values.len() / row_count.max(1), |column| column)
 }

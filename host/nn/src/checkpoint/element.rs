@@ -85,9 +85,20 @@ impl Element {
     }
 
     /// The elements of these bytes in `f64`, which is exact for all types but large 64-bit integers. An incomplete last
-    /// element is left out.
+    /// element is omitted.
     pub(super) fn values(self, bytes: &[u8]) -> impl Iterator<Item = f64> {
         bytes.chunks_exact(self.size()).map(move |element| self.value(element))
+    }
+
+    /// Adds the elements of these bytes to `numbers`, which rounds those of 64 bits. An incomplete last element is
+    /// omitted.
+    pub(super) fn push_numbers(self, bytes: &[u8], numbers: &mut Vec<f32>) {
+        // Nearly all elements of all checkpoints.
+        if self == Element::F32 {
+            numbers.extend(bytes.chunks_exact(4).map(|four| f32::from_le_bytes([four[0], four[1], four[2], four[3]])));
+        } else {
+            numbers.extend(self.values(bytes).map(|value| value as f32));
+        }
     }
 
     fn value(self, bytes: &[u8]) -> f64 {

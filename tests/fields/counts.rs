@@ -1,0 +1,103 @@
+//! What the published networks ask of a GPU, counted without one: dispatches, transfers, and how many workgroups each
+//! matrix product has. The same counts are in `host/results/vulkan.md`.
+
+mod device;
+
+use device::{Counted, Counting};
+use viewfuse::field::genvs::sampling::{Plan, Steps};
+use viewfuse::field::{Field, genvs, pixelnerf};
+use viewfuse::job::progress::Silent;
+use viewfuse_core::sampler::Sampler;
+use viewfuse_core::weights::Weights;
+use viewfuse_kernels::rows::{Form, Kernel};
+use viewfuse_tests::fields;
+use viewfuse_tests::lorry::{photographs, target};
+
+const SIDE: u32 = 128;
+const SOURCES: u32 = 3;
+/// Twice the units of the GPU with the most that this project was run on.
+const ENOUGH_WORKGROUPS: u32 = 264;
+
+/// A picture of 128x128 from three views, counted.
+fn counted(field: &(impl Field + Sync)) -> Counted {
+    let device = Counting::default();
+    let weights = Weights::mean(SOURCES);
+    fields::picture(&device, field, &photographs(SOURCES, SIDE), &weights, &target(SIDE), 0.0, &Silent)
+        .expect("a picture");
+    device.take()
+}
+
+/// The published PixelNeRF; nothing is omitted.
+fn pixelnerf() -> Counted {
+    let checkpoint = pixelnerf::test_networks::deterministic(&pixelnerf::Architecture::published());
+    let options = pixelnerf::PixelNerfOptions { omissions: pixelnerf::Omissions::NONE, ..Default::default() };
+    counted(&pixelnerf::PixelNerf::new(&checkpoint, options).expect("a network"))
+}
+
+/// The published GeNVS with so many calls of its denoiser; nothing is omitted.
+fn genvs(level_count: u32) -> Counted {
+    let checkpoint = genvs::test_networks::deterministic(&genvs::Architecture::published());
+    let steps = Steps::Fixed { sampler: Sampler::Ipndm, level_count };
+    let plan = Plan { steps, ..Plan::published(0) };
+    let options = genvs::GenvsOptions { plan, omissions: genvs::Omissions::NONE, ..Default::default() };
+    counted(&genvs::Genvs::new(checkpoint, options).expect("a network"))
+}
+
+/// Workgroups of a product in the form with the most: the smallest tile.
+fn workgroups(kernel: Kernel, rows: u32, columns: u32) -> u32 {
+    let of = |form: &Form| form.elements(rows, columns) / form.invocations();
+    kernel.forms().iter().map(of).max().unwrap_or_default()
+}
+
+/// The share of all multiply-adds in products that fill a GPU, and the others: a line each.
+fn filling(counted: &Counted) -> (f64, Vec<String>) {
+    let mut work = [0.0; 2];
+    let mut small = Vec::new();
+    for (kernel, shape, count) in &counted.products {
+        let products = f64::from(shape.row_count) * f64::from(shape.inner_count) * f64::from(shape.column_count);
+        let workgroups = workgroups(*kernel, shape.row_count, shape.column_count);
+        let fills = workgroups >= ENOUGH_WORKGROUPS;
+        work[usize::from(fills)] += products * *count as f64;
+        if !fills {
+            let [rows, inner, columns] = [shape.row_count, shape.inner_count, shape.column_count];
+            small.push(format!("{} {rows}x{inner}x{columns}, {count} times: {workgroups}", kernel.name()));
+        }
+    }
+    (work[1] / (work[0] + work[1]), small)
+}
+
+fn print(name: &str, counted: &Counted) {
+    println!("{name}: {} dispatches, {:?}", counted.all(), counted.transfers);
+    for (kernel, count) in Kernel::ALL.into_iter().zip(&counted.dispatches).filter(|(_, count)| **count > 0) {
+        println!("  {count} {}", kernel.name());
+    }
+    let (share, small) = filling(counted);
+    println!("  {:.1} % of the multiply-adds in products with {ENOUGH_WORKGROUPS} workgroups or more", 100.0 * share);
+    small.iter().for_each(|line| println!("  below: {line}"));
+}
+
+#[test]
+fn a_picture_of_pixelnerf_is_few_dispatches() {
+    let counted = pixelnerf();
+    print("PixelNeRF, 128x128, three views, exact", &counted);
+    assert!(counted.all() <= 2500, "{} dispatches", counted.all());
+    let (share, small) = filling(&counted);
+    assert!(share > 0.98, "{share}: {small:?}");
+}
+
+#[test]
+fn a_call_of_the_denoiser_is_few_dispatches() {
+    let [short, long] = [2, 3].map(genvs);
+    print("GeNVS, 128x128, three views, two calls", &short);
+    let call = long.all() - short.all();
+    println!("a call: {call} dispatches");
+    let more = long.dispatches.iter().zip(&short.dispatches).map(|(long, short)| long - short);
+    for (kernel, count) in Kernel::ALL.into_iter().zip(more).filter(|(_, count)| *count > 0) {
+        println!("  {count} {}", kernel.name());
+    }
+    // A group norm takes three of them, and 117 of its layers are group norms.
+    assert!(call <= 540, "{call} dispatches");
+    assert!(long.transfers.downloads - short.transfers.downloads <= 1, "a call waits more than once");
+    let (share, small) = filling(&long);
+    assert!(share > 0.5, "{share}: {small:?}");
+}
