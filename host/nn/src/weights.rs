@@ -172,13 +172,12 @@ fn reordered(values: &[f32], row_count: usize, place_count: usize, place: impl F
     let mut placed = vec![0.0; place_count * row_count];
     let columns = values.len() / row_count.max(1);
     for first_column in (0..columns).step_by(SQUARE) {
-        let end = columns.min(first_column + SQUARE);
-        let places: Vec<usize> = (first_column..end).map(|column| place(column) * row_count).collect();
+        let places: Vec<usize> = (first_column..columns.min(first_column + SQUARE)).map(&place).collect();
         for first_row in (0..row_count).step_by(SQUARE) {
-            for row in first_row..row_count.min(first_row + SQUARE) {
-                for (value, place) in values[row * columns + first_column..row * columns + end].iter().zip(&places) {
-                    placed[place + row] = *value;
-                }
+            let rows = first_row..row_count.min(first_row + SQUARE);
+            for (column, place) in (first_column..).zip(&places) {
+                let placed = &mut placed[place * row_count..][rows.clone()];
+                rows.clone().zip(placed).for_each(|(row, placed)| *placed = values[row * columns + column]);
             }
         }
     }
