@@ -49,9 +49,9 @@ impl Expected {
         self.efforts.iter().position(is_within).unwrap_or(self.efforts.len() - 1)
     }
 
-    /// The same of those that omit nothing.
-    pub(super) fn first_whole_within(&self, most: f64) -> usize {
-        let first = self.efforts.iter().position(|effort| effort.only_rounds).unwrap_or(self.efforts.len() - 1);
+    /// The same of those that are as exact as `f32` is.
+    pub(super) fn cheapest_as_f32(&self, most: f64) -> usize {
+        let first = self.efforts.iter().position(|effort| effort.rounds_as_f32).unwrap_or(self.efforts.len() - 1);
         self.cheapest_within(most).max(first)
     }
 
@@ -120,12 +120,12 @@ mod tests {
     }
 
     #[test]
-    fn tight_bounds_omit_nothing() {
+    fn tight_bounds_are_kept_as_f32_does() {
         let expected = efforts();
-        assert_eq!((expected.cheapest_within(0.05), expected.first_whole_within(0.05)), (0, 4));
+        assert_eq!((expected.cheapest_within(0.05), expected.cheapest_as_f32(0.05)), (0, 4));
         let mut rounding = efforts();
-        rounding.efforts.insert(4, Variant { only_rounds: true, ..Variant::new("", AnyOptions::new(()), 1e-4, 0.4) });
-        assert_eq!([0.05, 1e-3, 1e-5].map(|most| rounding.first_whole_within(most)), [4, 4, 5]);
+        rounding.efforts.insert(4, Variant { rounds_as_f32: true, ..Variant::new("", AnyOptions::new(()), 1e-4, 0.4) });
+        assert_eq!([0.05, 1e-3, 1e-5].map(|most| rounding.cheapest_as_f32(most)), [4, 4, 5]);
     }
 
     #[test]

@@ -46,8 +46,8 @@ const ROUNDINGS: [Rounding; 2] = [
     Rounding { precision: Precision::TwoHalves, typical_error: 3.6e-5, typical_share: 0.8 },
 ];
 /// What rounding changes in a picture over what it changes in an estimate at the largest level, both with colours from
-/// 0 to 1: what is off at one call is partly taken back by the next ones (`host/results/efforts.md`).
-const GROWTH: f32 = 1.0;
+/// 0 to 1 (`host/results/efforts.md`).
+const GROWTH: f32 = 3.0;
 
 /// The root mean square difference from the exact picture, colours from 0 to 1, of a denoiser whose estimate at the
 /// largest level changes by this, values from -1 to 1: an estimate.
