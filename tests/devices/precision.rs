@@ -6,6 +6,7 @@ use crate::candidate::{Candidate, tests};
 use libtest_mimic::Failed;
 use std::error::Error;
 use std::sync::{Arc, Mutex};
+use viewfuse::check::rates::measure_rates;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::vulkan::Vulkan;
 use viewfuse::device::{Device, Precision};
@@ -26,6 +27,7 @@ use viewfuse_tests::devices::{exchanged_stand_ins, stand_ins, takes_stand_ins};
 use viewfuse_tests::fields::{self, rms};
 use viewfuse_tests::lorry::{photographs, target};
 use viewfuse_vulkan::GpuOptions;
+use viewfuse_vulkan::kernel::Form;
 
 tests!(
     pixelnerfs_pictures_in_rounded_products,
@@ -34,6 +36,7 @@ tests!(
     efforts_round_where_a_device_does,
     bounds_choose_among_precisions,
     a_form_that_is_wrong_is_told_once,
+    rates_of_rounded_products,
 );
 
 /// Side of the pictures.
@@ -273,5 +276,20 @@ fn a_form_that_is_wrong_is_told_once(candidate: &Candidate) -> Result<(), Failed
     }
     let told: Vec<String> = heard.all().into_iter().filter(|warning| faults.contains(warning)).collect();
     assert_eq!((&told, &stage.record().notes), (&faults, &faults));
+    Ok(())
+}
+
+/// `bench` measures each form of a device beside its limits, and names none where there is none.
+fn rates_of_rounded_products(candidate: &Candidate) -> Result<(), Failed> {
+    let Some(device) = with_units(candidate)? else { return Ok(()) };
+    let rates = measure_rates(&device, 1, &Silent)?;
+    let forms = Form::ROUNDED.map(Form::name);
+    assert_eq!((&rates.rounded_forms[..], &rates.faults[..]), (&forms[..], &[][..]));
+    for (kernel, form) in ["linear", "convolve"].into_iter().flat_map(|kernel| forms.map(|form| (kernel, form))) {
+        let rate = rates.kernels.iter().find(|rate| rate.kernel == kernel && rate.form == Some(form));
+        let rate = rate.unwrap_or_else(|| panic!("no {kernel}, {form}"));
+        assert!(rate.share > 0.0 && rate.share.is_finite() && rate.giga_operations > Some(0.0), "{rate:?}");
+    }
+    assert!(rates.kernels.iter().any(|rate| rate.kernel == "linear" && rate.form.is_none()));
     Ok(())
 }

@@ -118,7 +118,7 @@ mod tests {
         assert_eq!(labels(&[]), [some("some", Precision::Exact, 4e-3, 0.1), exact.clone()]);
         let half = some("products in f16", Precision::Half, 3e-3, 0.25);
         let parts = some("products in two parts", Precision::TwoHalves, 1e-5, 0.5);
-        let first = some("some, products in f16", Precision::Half, 5e-3, 0.025);
+        let first = some("some, products in f16", Precision::Half, 4e-3_f32.hypot(3e-3), 0.025);
         assert_eq!(labels(&Precision::ROUNDED), [first, half, parts.clone(), exact.clone()]);
         // Where f16 is not trusted, the efforts take what is.
         let first = some("some, products in two parts", Precision::TwoHalves, 4e-3_f32.hypot(1e-5), 0.05);
