@@ -2,7 +2,7 @@
 """Single products in PyTorch, at the sizes of `viewfuse bench`: linear layers and 3x3 convolutions in f32, in tf32 and in f16.
 
     products.py --device cuda              # the median of five rounds
-    products.py --device cpu --rounds 1    # without tf32, and small sizes alone
+    products.py --device cpu --rounds 1    # f32 and small sizes alone
 
 Operands of f32 and tf32 are 32 bits in memory, those of f16 are 16. Errors are the largest difference from f64 over the
 largest value. Needs torch.
@@ -65,12 +65,10 @@ def main():
     for name, size, operations, function, inputs, weights, more in works:
         inputs, weights = inputs.to(options.device), weights.to(options.device)
         exact = function(inputs.double(), weights.double(), **more)
-        for label, kind, tensor_float in formats:
-            if tensor_float and not on_gpu:
-                continue
+        for label, kind, tensor_float in formats if on_gpu else formats[:1]:
             torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = tensor_float
             given, factors = inputs.to(kind), weights.to(kind)
-            if on_gpu and name == "convolution" and kind == torch.float16:
+            if name == "convolution" and kind == torch.float16:
                 given, factors = (tensor.to(memory_format=torch.channels_last) for tensor in (given, factors))
             times = [seconds(lambda: function(given, factors, **more), on_gpu) for _ in range(options.rounds)]
             error = ((function(given, factors, **more).double() - exact).abs().max() / exact.abs().max()).item()
