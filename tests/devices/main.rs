@@ -16,6 +16,7 @@ mod loader;
 mod memory;
 mod picture;
 mod pixelnerf;
+mod precision;
 mod time;
 mod transfers;
 mod validation;
@@ -54,6 +55,7 @@ fn main() -> ExitCode {
         picture::TESTS,
         pixelnerf::TESTS,
         genvs::TESTS,
+        precision::TESTS,
         limits::TESTS,
         expectations::TESTS,
         forms::TESTS,

@@ -49,7 +49,8 @@ fn picture<D: Device + Sync>(device: &D, omissions: Omissions, targets: &str) ->
     let options = RenderOptions { size: Some([SIDE, SIDE]), ..RenderOptions::default() };
     let sampling = Sampling { coarse_count: COARSE_COUNT, importance_count: 8, depth_count: 8, ..Sampling::default() };
     let body = test_networks::body(&Architecture::small(16));
-    let field = PixelNerf::new(&body, PixelNerfOptions { sampling, omissions }).expect("a made network");
+    let of_field = PixelNerfOptions { sampling, omissions, ..PixelNerfOptions::default() };
+    let field = PixelNerf::new(&body, of_field).expect("a made network");
     let mut colours = Vec::new();
     let keep = |_: &_, frame: Frame| -> Result<(), RenderError> {
         colours = frame.colours;

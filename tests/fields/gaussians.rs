@@ -40,7 +40,7 @@ fn hasty() -> AnyField {
 fn cheaper_efforts_are_farther_from_the_exact_picture() {
     let weighting = Weighting::open("distance:power=2").expect("a scheme");
     with_stage(AnyField::new(Gaussians::default()), "0..19/2", &RenderOptions::default(), |stage, job, _| {
-        let efforts = stage.efforts().to_vec();
+        let efforts = stage.efforts();
         assert_eq!(efforts.last().map(|effort| effort.typical_error), Some(0.0));
         assert!(efforts.len() > 2 && efforts.is_sorted_by(|a, b| a.typical_share < b.typical_share));
         assert!(efforts.is_sorted_by(|a, b| a.typical_error > b.typical_error));

@@ -35,13 +35,13 @@ fn sources(folders: &[&str]) -> Vec<Source> {
     paths.filter(|path| !is_test(path)).map(|path| Source::read(&path)).collect()
 }
 
-/// Whether code calls a method of what is called a device.
+/// Whether code calls a method of what is called a device, or that of a layer in a precision.
 fn calls(sources: &[Source], method: &str) -> bool {
-    let calls = [format!("device.{method}("), format!("device().{method}(")];
+    let calls = ["device", "device()"].map(|device| ["", "_in"].map(|form| format!("{device}.{method}{form}(")));
     sources.iter().any(|source| {
         let code = source.code.split("\n#[cfg(test)]\nmod tests {").next().unwrap_or_default();
         let code: String = code.split_whitespace().collect();
-        calls.iter().any(|call| code.contains(call))
+        calls.iter().flatten().any(|call| code.contains(call))
     })
 }
 

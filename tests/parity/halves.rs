@@ -3,33 +3,27 @@
 //! barriers and roundings.
 
 use libtest_mimic::{Failed, Trial};
-use std::fs;
-use std::sync::{Arc, LazyLock};
+use std::sync::Arc;
 use viewfuse::device::vulkan::Vulkan;
 use viewfuse::device::{Device, Layer, LayerShape, Memory};
 use viewfuse_kernels::network::convolve::{ConvolveBlock, patch_value};
 use viewfuse_kernels::network::linear::LinearBlock;
-use viewfuse_shader_compiler::stamp::STAND_INS;
-use viewfuse_tests::places::repository;
+use viewfuse_tests::devices::{exchanged_stand_ins, stand_ins, takes_stand_ins};
 use viewfuse_tests::trials::{is_required, needing, timed};
 use viewfuse_vulkan::kernel::{Form, Kernel};
 use viewfuse_vulkan::{Adapter, Gpu, GpuOptions, Instance, Missing};
-
-/// What stands in for matrix units.
-static MODULE: LazyLock<Vec<u8>> = LazyLock::new(|| fs::read(repository().join(STAND_INS)).expect("the module"));
 
 /// The trials of a device.
 pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> {
     let missing: Vec<String> = adapter.missing.iter().map(Missing::to_string).collect();
     let missing = (!missing.is_empty()).then(|| missing.join(", "));
     let ready = |trial: Trial| needing(missing.clone(), is_required("VIEWFUSE_REQUIRE_VULKAN"), trial);
-    // On SwiftShader the first of these pipelines had not finished after 200 s.
-    if !adapter.name.starts_with("llvmpipe") && !adapter.has_matrices {
+    if !takes_stand_ins(adapter) {
         return Vec::new();
     }
     let mut trials = Vec::new();
     for form in Form::ROUNDED {
-        for (what, stand_ins) in [("stands_in", Some(&MODULE[..])), ("units", None)] {
+        for (what, stand_ins) in [("stands_in", Some(stand_ins())), ("units", None)] {
             if stand_ins.is_none() && !adapter.has_matrices {
                 continue;
             }
@@ -169,7 +163,7 @@ fn is_within_its_bound(
 fn trusted_after_a_probe(instance: &Arc<Instance>, adapter: &Adapter) -> Result<(), Failed> {
     let open = |stand_ins| Gpu::open(instance, adapter, &GpuOptions { stand_ins, ..GpuOptions::default() });
     let kernels = [Kernel::Linear, Kernel::Convolve];
-    let right = open(Some(&MODULE[..]))?;
+    let right = open(Some(stand_ins()))?;
     for (kernel, form) in kernels.into_iter().flat_map(|kernel| Form::ROUNDED.map(|form| (kernel, form))) {
         assert!(right.trusts(kernel, form)?, "{} {}", kernel.name(), form.name());
     }
@@ -179,24 +173,8 @@ fn trusted_after_a_probe(instance: &Arc<Instance>, adapter: &Adapter) -> Result<
         let without = open(None)?;
         assert!(!without.trusts(Kernel::Linear, Form::Half)?, "a device without units");
     }
-    // Two parts as one: the names of the entry points exchanged.
-    static EXCHANGED: LazyLock<Vec<u8>> = LazyLock::new(exchanged);
-    let wrong = open(Some(&EXCHANGED[..]))?;
+    let wrong = open(Some(exchanged_stand_ins()))?;
     assert!(!wrong.trusts(Kernel::Linear, Form::TwoHalves)?, "another form in its place");
     assert_eq!(wrong.distrusted_forms(), [(Kernel::Linear, Form::TwoHalves)]);
     Ok(())
-}
-
-/// The module with `half` of the linear layers under the name of `two_halves`.
-fn exchanged() -> Vec<u8> {
-    let mut module = rspirv::dr::load_bytes(&MODULE[..]).expect("SPIR-V");
-    for entry in &mut module.entry_points {
-        let renamed = match entry.operands[2].unwrap_literal_string() {
-            "linear::half_stand_in" => "linear::two_halves_stand_in",
-            "linear::two_halves_stand_in" => "linear::half_stand_in",
-            other => other,
-        };
-        entry.operands[2] = rspirv::dr::Operand::LiteralString(renamed.to_owned());
-    }
-    rspirv::binary::Assemble::assemble(&module).iter().flat_map(|word| word.to_le_bytes()).collect()
 }

@@ -4,3 +4,4 @@ mod bits;
 mod contract;
 mod freshness;
 mod loops;
+mod phis;

@@ -169,9 +169,9 @@ fn product_bound(form: Form, left: f64, right: f64) -> f64 {
         _ => (2_f64.powi(-22), 2_f64.powi(-25)),
     };
     let [left_error, right_error] = [left, right].map(|factor| (factor.abs() * relative).max(absolute));
-    // Of two parts, the product of the low ones is left out.
-    let left_out = if form == Form::TwoHalves { (left * right).abs() * relative } else { 0.0 };
-    left_error * right.abs() + right_error * left.abs() + left_error * right_error + left_out
+    // Of two parts, the product of the low ones is omitted.
+    let omitted = if form == Form::TwoHalves { (left * right).abs() * relative } else { 0.0 };
+    left_error * right.abs() + right_error * left.abs() + left_error * right_error + omitted
 }
 
 /// The most that sums in f32 change whose magnitudes add up to `total`: units cut what rounding would round, and align

@@ -10,6 +10,10 @@
 //! compositing and the census the operations are counted by hand; an operation that no device may fuse with another
 //! takes the place of two. Where views are compared on planes it is look-ups. Other kernels are compared with the copy
 //! only.
+//!
+//! Where a device has matrix units, linear layers and convolutions are measured in their forms of rounded factors as
+//! well. Their limit is that of multiply-adds in registers, since no kernel here measures the units alone: a share
+//! above 1 is what the units gain over the best that exact products could reach.
 
 mod limits;
 mod networks;
@@ -19,9 +23,9 @@ use super::dispatch::Dispatch;
 use super::report::CheckError;
 use serde::Serialize;
 use std::time::{Duration, Instant};
-use viewfuse_device::{Device, DeviceError};
+use viewfuse_device::{Device, DeviceError, Precision};
 use viewfuse_job::progress::Progress;
-use viewfuse_vulkan::kernel::Kernel;
+use viewfuse_vulkan::kernel::{Form, Kernel};
 
 /// The default number of rounds.
 pub const DEFAULT_ROUNDS: u32 = 5;
@@ -49,6 +53,8 @@ pub enum Limit {
 pub struct KernelRate {
     /// Its name.
     pub kernel: &'static str,
+    /// The form of rounded factors that it was asked for; null for the exact one.
+    pub form: Option<&'static str>,
     /// What it worked on.
     pub size: String,
     /// Time of a dispatch, in milliseconds.
@@ -78,7 +84,11 @@ pub struct DeviceRates {
     pub multiply_add_giga_operations: f64,
     /// Billions of bilinear look-ups of four channels a second.
     pub giga_look_ups: f64,
-    /// The kernels, in the order of the data.
+    /// The forms of rounded factors that it has: products by matrix units, tried and found within their bounds.
+    pub rounded_forms: Vec<&'static str>,
+    /// What of it is not used because its results were wrong.
+    pub faults: Vec<String>,
+    /// The kernels, in the order of the data; those in forms of rounded factors last.
     pub kernels: Vec<KernelRate>,
 }
 
@@ -115,6 +125,7 @@ impl Operations {
 /// A dispatch that can be repeated.
 struct Work<'a> {
     kernel: Kernel,
+    form: Option<Form>,
     size: String,
     work: Operations,
     /// Bytes of all numbers that it reads and writes, once each.
@@ -135,7 +146,7 @@ impl<'a> Work<'a> {
     {
         let mut loaded = K::upload(device, std::slice::from_ref(&dispatch))?;
         let run = Box::new(move || dispatch.dispatch(device, &mut loaded, 0));
-        Ok(Work { kernel: K::KERNEL, size, work, bytes, run })
+        Ok(Work { kernel: K::KERNEL, form: None, size, work, bytes, run })
     }
 }
 
@@ -185,6 +196,7 @@ pub fn measure_rates<D: Device>(device: &D, rounds: u32, progress: &dyn Progress
         let time = median(times);
         KernelRate {
             kernel: work.kernel.name(),
+            form: work.form.map(Form::name),
             size: work.size.clone(),
             milliseconds: 1.0e3 * time,
             giga_operations: work.work.arithmetic().map(|operations| operations / time / 1.0e9),
@@ -200,6 +212,8 @@ pub fn measure_rates<D: Device>(device: &D, rounds: u32, progress: &dyn Progress
         copy_giga_bytes: of_limits(|limit| limit.bytes),
         multiply_add_giga_operations: of_limits(|limit| limit.operations),
         giga_look_ups: of_limits(|limit| limit.look_ups),
+        faults: device.faults(),
+        rounded_forms: device.precisions().into_iter().filter_map(Precision::form).map(Form::name).collect(),
         kernels: works.iter().zip(times).zip(shares).map(kernel).collect(),
     })
 }

@@ -1,7 +1,9 @@
 //! The choice of a device: the devices of this machine, the requested one, and the reason for the chosen one.
 
 use super::cpu::Cpu;
+use super::kernels::Device;
 use super::memory::Memory;
+use super::precision::Precision;
 use super::vulkan::Vulkan;
 use std::fmt;
 use std::path::PathBuf;
@@ -64,6 +66,14 @@ impl AnyDevice {
         match self {
             AnyDevice::Cpu(cpu) => cpu.name(),
             AnyDevice::Vulkan(vulkan) => vulkan.name(),
+        }
+    }
+
+    /// The precisions that it has besides the exact one, the coarsest first; see [`Device::rounds`].
+    pub fn precisions(&self) -> Vec<Precision> {
+        match self {
+            AnyDevice::Cpu(cpu) => cpu.precisions(),
+            AnyDevice::Vulkan(vulkan) => vulkan.precisions(),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::error::DeviceError;
 use super::memory::Memory;
+use super::precision::Precision;
 use viewfuse_kernels::for_each_kernel;
 use viewfuse_kernels::rows::*;
 
@@ -51,6 +52,62 @@ macro_rules! device {
             /// # Errors
             /// If the device has no memory left.
             fn weights(&self, shape: &LayerShape, weights: &[f32]) -> Result<Self::Weights, DeviceError>;
+
+            /// Whether it computes linear layers and convolutions in this precision: it has units for that, and a
+            /// product that was tried on them was within its bound. `false` means that [`Device::linear_in`] and
+            /// [`Device::convolve_in`] are exact. The first question of a precision takes the time of a trial.
+            fn rounds(&self, _precision: Precision) -> bool {
+                false
+            }
+
+            /// The precisions that it has besides the exact one, the coarsest first.
+            fn precisions(&self) -> Vec<Precision> {
+                Precision::ROUNDED.into_iter().filter(|precision| self.rounds(*precision)).collect()
+            }
+
+            /// What of the device is not used because its results were wrong, each in one sentence. Empty on a device
+            /// without faults.
+            fn faults(&self) -> Vec<String> {
+                Vec::new()
+            }
+
+            /// As [`Device::linear`], in another precision where the device [rounds](Device::rounds) so. A factor
+            /// beyond 65,504 then makes its outputs NaN.
+            ///
+            /// # Errors
+            /// If the device is lost.
+            #[allow(clippy::too_many_arguments)]
+            fn linear_in(
+                &self,
+                _precision: Precision,
+                block: &LinearBlock,
+                inputs: &Self::Buffer<f32>,
+                weights: &Self::Weights,
+                bias: &Self::Buffer<f32>,
+                residual: Option<&Self::Buffer<f32>>,
+                outputs: &mut Self::Buffer<f32>,
+            ) -> Result<(), DeviceError> {
+                self.linear(block, inputs, weights, bias, residual, outputs)
+            }
+
+            /// As [`Device::convolve`], in another precision where the device [rounds](Device::rounds) so. A factor
+            /// beyond 65,504 then makes its outputs NaN.
+            ///
+            /// # Errors
+            /// If the device is lost.
+            #[allow(clippy::too_many_arguments)]
+            fn convolve_in(
+                &self,
+                _precision: Precision,
+                block: &ConvolveBlock,
+                inputs: &Self::Buffer<f32>,
+                weights: &Self::Weights,
+                bias: &Self::Buffer<f32>,
+                residual: Option<&Self::Buffer<f32>>,
+                outputs: &mut Self::Buffer<f32>,
+            ) -> Result<(), DeviceError> {
+                self.convolve(block, inputs, weights, bias, residual, outputs)
+            }
 
             $(
                 $($doc)*

@@ -10,6 +10,7 @@
 //! error         the errors of any device                                DeviceError
 //! memory        buffers on a device                                     Memory, Element, KernelTime
 //! parallel      one parallel driver under all kernels of the CPU
+//! precision     how precisely a layer multiplies                        Precision
 //! kernels       a method for each kernel, made from the rows            Device, LayerShape
 //! bundles       arguments that belong together                          Layer, HullScene, Pixels, Rays
 //! cpu, vulkan   the devices                                             Cpu, Vulkan
@@ -24,12 +25,14 @@ pub mod error;
 pub mod kernels;
 pub mod memory;
 pub mod parallel;
+pub mod precision;
 pub mod vulkan;
 
 pub use bundles::{HullScene, Layer, Pixels, Rays};
 pub use error::DeviceError;
 pub use kernels::{Device, LayerShape};
 pub use memory::{Element, KernelTime, Memory, Transfers};
+pub use precision::Precision;
 
 /// The examples of the README, compiled and run.
 #[cfg(doctest)]

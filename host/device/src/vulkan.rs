@@ -3,6 +3,7 @@
 use super::error::DeviceError;
 use super::kernels::{Device, LayerShape};
 use super::memory::{Element, KernelTime, Memory, Transfers};
+use super::precision::Precision;
 use crate::argument;
 use bytemuck::bytes_of;
 use std::path::{Path, PathBuf};
@@ -23,6 +24,8 @@ pub struct Vulkan {
     memory: Option<PathBuf>,
 }
 
+/// The kernels that have forms of rounded factors.
+const ROUNDED_KERNELS: [Kernel; 2] = [Kernel::Linear, Kernel::Convolve];
 /// Elements of a kernel that keep a small GPU busy, and the largest.
 const BUSY_ELEMENTS: [u64; 2] = [1 << 16, 1 << 20];
 /// Bytes of a GPU's memory for each element that keeps it busy: one with much memory has many units. Buffers for so
@@ -77,6 +80,23 @@ impl Vulkan {
 
     fn counted(&self) -> MutexGuard<'_, Transfers> {
         self.transfers.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A layer in a form of rounded factors. `parameters` say whether there is a residual.
+    #[allow(clippy::too_many_arguments)]
+    fn layer(
+        &self,
+        kernel: Kernel,
+        form: Form,
+        parameters: &[u8],
+        elements: u32,
+        [inputs, weights, bias]: [&Buffer<f32>; 3],
+        residual: Option<&Buffer<f32>>,
+        outputs: &Buffer<f32>,
+    ) -> Result<(), DeviceError> {
+        let residual = residual.unwrap_or(bias);
+        let arrays = [inputs, weights, bias, residual, outputs].map(Buffer::bind);
+        Ok(self.gpu.dispatch_rounded(kernel, form, parameters, 0..elements, &arrays)?)
     }
 
     /// The dispatches of a kernel, up to the last download.
@@ -196,6 +216,64 @@ macro_rules! dispatches {
 
             fn weights(&self, shape: &LayerShape, weights: &[f32]) -> Result<Buffer<f32>, DeviceError> {
                 self.upload(&weights[..shape.inner_count * shape.column_count])
+            }
+
+            fn rounds(&self, precision: Precision) -> bool {
+                // A device that fails says so at its next kernel.
+                let is_trusted = |kernel, form| self.gpu.trusts(kernel, form).unwrap_or(false);
+                precision.form().is_some_and(|form| {
+                    ROUNDED_KERNELS.into_iter().fold(true, |all, kernel| is_trusted(kernel, form) && all)
+                })
+            }
+
+            fn faults(&self) -> Vec<String> {
+                let unused = |(kernel, form): (Kernel, Form), fault: &str| {
+                    let (device, kernel, form) = (self.gpu.name(), kernel.name(), form.name());
+                    format!("{device}: the form '{form}' of {kernel} is not used, because {fault}")
+                };
+                let beyond = "its results were beyond their bound, or the driver does not compile it";
+                let other = "it gave other results than 'single', or was compiled for subgroups of another size";
+                let distrusted = self.gpu.distrusted_forms().into_iter().map(|form| unused(form, beyond));
+                let refused = self.gpu.refused_forms().into_iter().map(|form| unused(form, other));
+                distrusted.chain(refused).collect()
+            }
+
+            fn linear_in(
+                &self,
+                precision: Precision,
+                block: &LinearBlock,
+                inputs: &Buffer<f32>,
+                weights: &Buffer<f32>,
+                bias: &Buffer<f32>,
+                residual: Option<&Buffer<f32>>,
+                outputs: &mut Buffer<f32>,
+            ) -> Result<(), DeviceError> {
+                let Some(form) = precision.form() else {
+                    return self.linear(block, inputs, weights, bias, residual, outputs);
+                };
+                let block = LinearBlock { has_residual: u32::from(residual.is_some()), ..*block };
+                let elements = tile_elements(block.row_count, block.column_count);
+                let given = [inputs, weights, bias];
+                self.layer(Kernel::Linear, form, bytes_of(&block), elements, given, residual, outputs)
+            }
+
+            fn convolve_in(
+                &self,
+                precision: Precision,
+                block: &ConvolveBlock,
+                inputs: &Buffer<f32>,
+                weights: &Buffer<f32>,
+                bias: &Buffer<f32>,
+                residual: Option<&Buffer<f32>>,
+                outputs: &mut Buffer<f32>,
+            ) -> Result<(), DeviceError> {
+                let Some(form) = precision.form() else {
+                    return self.convolve(block, inputs, weights, bias, residual, outputs);
+                };
+                let block = ConvolveBlock { has_residual: u32::from(residual.is_some()), ..*block };
+                let elements = tile_elements(block.pixel_count(), block.out_channels);
+                let given = [inputs, weights, bias];
+                self.layer(Kernel::Convolve, form, bytes_of(&block), elements, given, residual, outputs)
             }
 
             $(

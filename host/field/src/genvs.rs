@@ -31,6 +31,7 @@ pub(crate) use open::ROW;
 pub use options::{GenvsOptions, Omissions, Rays};
 
 use super::learned::{NoDepths, default_near_far};
+use super::rounding::Overflow;
 use super::{About, AnyOptions, Field, FieldError, Prepared, SourceSide};
 use encoder::SIDE_STEP;
 use parts::Parts;
@@ -110,6 +111,8 @@ impl Genvs {
             error: f32::INFINITY,
             features: None,
             counts: Counts::default(),
+            overflow: Overflow::default(),
+            rounding: Vec::new(),
         })
     }
 }

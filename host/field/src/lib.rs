@@ -4,6 +4,7 @@
 //! error             the errors of a field
 //! finite            NaN and infinity are found at the stage that produced them
 //! variant           a value of a field's options: efforts, candidates, pictures that are mixed
+//! rounding          efforts of a product: what rounded factors change in the lists of efforts
 //! record            what a field may leave out, and the record of its work
 //! field             the traits of a field: it prepares, encodes and renders
 //! renderer          a field on a device, with types erased
@@ -50,6 +51,7 @@ pub mod point_cloud;
 pub mod record;
 pub mod render;
 pub mod renderer;
+mod rounding;
 pub mod row;
 pub mod rows;
 pub mod scores;

@@ -27,6 +27,7 @@ pub(crate) use open::ROW;
 pub use options::{MIN_OPACITY, MIN_SHARE, Omissions, PixelNerfOptions, Sampling};
 
 use super::learned::{default_near_far, in_network_unit, over_white, warn_of_unit};
+use super::rounding::Overflow;
 use super::variant::erased;
 use super::{
     About, AnyOptions, Check, Encoding, Field, FieldError, LeftOut, Prepared, Record, Rendered, Request, SourceSide,
@@ -41,7 +42,7 @@ use pass::{Evaluated, Renderer};
 use std::sync::Arc;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::rays::CastBlock;
-use viewfuse_device::{Device, DeviceError};
+use viewfuse_device::{Device, DeviceError, Precision};
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
 use viewfuse_nn::image::{Image, Size};
@@ -74,6 +75,7 @@ struct Views<'a, D: Device> {
     background: [f32; 3],
     counts: Counts,
     options: PixelNerfOptions,
+    overflow: Overflow,
 }
 
 /// Counts of computed and omitted work so far.
@@ -144,6 +146,7 @@ impl PixelNerf {
             background: sources.background,
             counts: Counts::default(),
             options: self.options,
+            overflow: Overflow::default(),
         })
     }
 }
@@ -172,14 +175,15 @@ impl Field for PixelNerf {
 }
 
 impl<D: Device> Views<'_, D> {
-    /// A point network, for one of the passes.
-    fn network(&self, pass: Pass) -> Network<'_, D> {
+    /// A point network, for one of the passes, in this precision.
+    fn network(&self, pass: Pass, precision: Precision) -> Network<'_, D> {
         let index = if pass == Pass::Fine && self.field.architecture.has_fine { 1 } else { 0 };
         Network {
             device: self.device,
             architecture: &self.field.architecture,
             layers: &self.parameters.networks[index],
             grids: self.options.omissions.latent_layers.then_some(index),
+            precision,
         }
     }
 
@@ -221,11 +225,11 @@ impl<D: Device> Views<'_, D> {
         options: PixelNerfOptions,
         progress: &'r dyn Progress,
     ) -> Renderer<'r, D> {
-        let PixelNerfOptions { sampling, omissions } = options;
+        let PixelNerfOptions { sampling, omissions, precision } = options;
         Renderer {
             device: self.device,
-            coarse: self.network(Pass::Coarse),
-            fine: self.network(Pass::Fine),
+            coarse: self.network(Pass::Coarse, precision),
+            fine: self.network(Pass::Fine, precision),
             views,
             sampling,
             omissions,
@@ -242,30 +246,14 @@ impl<D: Device> Views<'_, D> {
         Workspace::new(self.device, architecture, request.views.len(), most_points, maps)
     }
 
-    fn encode_view(&mut self, view: usize) -> Result<(), DeviceError> {
-        let (architecture, omissions) = (&self.field.architecture, &self.options.omissions);
-        let encoded = encode(self.device, architecture, &self.parameters, &self.images[view], omissions)?;
-        for [kept, whole] in encoded.grids.iter().flatten().map(Grid::bytes) {
-            self.counts.kept_bytes += kept;
-            self.counts.latent_bytes += whole;
-        }
-        self.latents[view] = Some(encoded);
-        Ok(())
-    }
-}
-
-impl<D: Device> Prepared for Views<'_, D> {
-    fn encoding(&self) -> Encoding {
-        if self.options.omissions.unused_views { Encoding::Used } else { Encoding::All }
-    }
-
-    fn encode(&mut self, view: usize, _progress: &dyn Progress) -> Result<(), FieldError> {
-        Ok(self.encode_view(view)?)
-    }
-
-    fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
-        let options = self.options;
-        let PixelNerfOptions { sampling, omissions } = options;
+    /// Renders a target under these options, which differ from those that are set in their precision alone.
+    fn render_under(
+        &mut self,
+        options: PixelNerfOptions,
+        request: &Request<'_>,
+        progress: &dyn Progress,
+    ) -> Result<Rendered, FieldError> {
+        let PixelNerfOptions { sampling, omissions, .. } = options;
         let Request { camera, .. } = request;
         let most_points = (camera.pinhole.width() * camera.pinhole.height() * sampling.coarse_count) as usize;
         let views = self.used(request.views, &request.view_weights(), Some(&self.cast(request)))?;
@@ -297,6 +285,41 @@ impl<D: Device> Prepared for Views<'_, D> {
         Ok(rendered)
     }
 
+    fn encode_view(&mut self, view: usize) -> Result<(), DeviceError> {
+        let (architecture, omissions) = (&self.field.architecture, &self.options.omissions);
+        let encoded = encode(self.device, architecture, &self.parameters, &self.images[view], omissions)?;
+        for [kept, whole] in encoded.grids.iter().flatten().map(Grid::bytes) {
+            self.counts.kept_bytes += kept;
+            self.counts.latent_bytes += whole;
+        }
+        self.latents[view] = Some(encoded);
+        Ok(())
+    }
+}
+
+impl<D: Device> Prepared for Views<'_, D> {
+    fn encoding(&self) -> Encoding {
+        if self.options.omissions.unused_views { Encoding::Used } else { Encoding::All }
+    }
+
+    fn encode(&mut self, view: usize, _progress: &dyn Progress) -> Result<(), FieldError> {
+        Ok(self.encode_view(view)?)
+    }
+
+    fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
+        let precision = self.overflow.limit(self.options.precision);
+        let in_precision = |precision| PixelNerfOptions { precision, ..self.options };
+        let [options, exact] = [precision, Precision::Exact].map(in_precision);
+        let mut rendered = self.render_under(options, request, progress);
+        if Overflow::is_repeated(&rendered, precision) {
+            rendered = self.render_under(exact, request, progress);
+            if rendered.is_ok() {
+                self.overflow.tell(progress);
+            }
+        }
+        rendered
+    }
+
     fn set(&mut self, options: &AnyOptions) -> Result<(), FieldError> {
         if let Some(options) = options.of() {
             self.options = PixelNerfOptions::checked(*options);
@@ -305,7 +328,8 @@ impl<D: Device> Prepared for Views<'_, D> {
     }
 
     fn efforts(&self, options: &AnyOptions) -> Vec<Variant<AnyOptions>> {
-        erased(options.of().map_or_else(Vec::new, variants::efforts))
+        let efforts = |options| variants::efforts(options, &self.device.precisions());
+        erased(options.of().map_or_else(Vec::new, efforts))
     }
 
     fn check(&self) -> Check {
@@ -365,7 +389,7 @@ impl<D: Device> Prepared for Views<'_, D> {
         let sizes: Vec<[u32; 2]> = self.images.iter().map(|image| [image.size.width, image.size.height]).collect();
         let memory_estimate = Some(memory::estimate(self.device, &self.field.architecture, &self.options, &sizes));
         let near_far = Some(self.near_far().map(|depth| depth * self.unit.length()));
-        Record { left_out, memory_estimate, near_far, ..Record::default() }
+        Record { left_out, memory_estimate, near_far, notes: self.overflow.notes(), ..Record::default() }
     }
 }
 

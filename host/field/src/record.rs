@@ -14,6 +14,8 @@ pub struct Record {
     pub memory_estimate: Option<u64>,
     /// The near and far bounds of its rays, world units.
     pub near_far: Option<[f32; 2]>,
+    /// What else is to be known of the run, each in one sentence.
+    pub notes: Vec<String>,
 }
 
 /// An omission: a part of the work that an effort leaves out where a scene does not need it.

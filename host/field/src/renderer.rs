@@ -19,6 +19,9 @@ pub trait Renderer: Sync {
     /// The device's name in the run record.
     fn device_name(&self) -> String;
 
+    /// What of the device is not used because its results were wrong; see [`Device::faults`].
+    fn device_faults(&self) -> Vec<String>;
+
     /// Takes the photographs to the device.
     ///
     /// # Errors
@@ -62,6 +65,10 @@ impl<D: Device + Sync, F: Field + Sync> Renderer for On<'_, D, F> {
 
     fn device_name(&self) -> String {
         self.device.name()
+    }
+
+    fn device_faults(&self) -> Vec<String> {
+        self.device.faults()
     }
 
     fn prepare<'a>(

@@ -7,6 +7,7 @@ use super::options::{Flag, Given, OpenError};
 use super::record::{Omission, VIEWS};
 use super::render::{DEFAULT_EARLY_TERMINATION, DEFAULT_LEAVE_OUT, RenderOptions};
 use super::variant::Variant;
+use viewfuse_device::Precision;
 use viewfuse_nn::checkpoint::Checkpoint;
 
 /// A field's row.
@@ -25,8 +26,9 @@ pub struct Row {
     /// What may be left out of its work, besides [`VIEWS`].
     pub omissions: &'static [Omission],
     /// Variants to draw of a field of this row, the exact one first; empty if it is of another, or for the exact one
-    /// and the default alone. The options say what is omitted by default; the number is that of the targets.
-    pub drawn: fn(&AnyField, &RenderOptions, usize) -> Vec<Drawn>,
+    /// and the default alone. The options say what is omitted by default; the number is that of the targets, and the
+    /// precisions are those that the device has besides the exact one.
+    pub drawn: fn(&AnyField, &RenderOptions, usize, &[Precision]) -> Vec<Drawn>,
 }
 
 /// How a field is opened.

@@ -60,6 +60,7 @@ mod tests {
     use crate::row::ALL;
     use crate::variant::EXACT;
     use std::collections::BTreeMap;
+    use viewfuse_device::Precision;
 
     #[test]
     fn told_by_names() {
@@ -93,9 +94,15 @@ mod tests {
         for row in ROWS {
             let field = opened(row, &Given::default()).expect(row.name);
             assert_eq!((field.about().name, named(row.name).map(|row| row.title)), (row.name, Some(row.title)));
-            let drawn = (row.drawn)(&field, &RenderOptions::default(), 2);
+            let drawn = (row.drawn)(&field, &RenderOptions::default(), 2, &[]);
             let words: Vec<&str> = drawn.iter().map(|variant| variant.label.as_str()).collect();
             assert!(words.is_empty() || words[0] == EXACT && words.contains(&ALL), "{words:?}");
+            // What only some devices have.
+            let rounding = (row.drawn)(&field, &RenderOptions::default(), 2, &Precision::ROUNDED);
+            let new: Vec<&str> = rounding.iter().map(|variant| variant.label.as_str()).collect();
+            let new: Vec<&str> = new.into_iter().filter(|label| !words.contains(label)).collect();
+            let is_learned = row.prefix().is_some();
+            assert_eq!(new, if is_learned { Precision::ROUNDED.map(Precision::name).to_vec() } else { Vec::new() });
         }
     }
 

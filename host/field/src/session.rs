@@ -23,8 +23,6 @@ pub(crate) struct Session<'a> {
     relevance: Option<Vec<SourceWeights>>,
     /// The field's own options, or those in their place.
     options: AnyOptions,
-    /// Their efforts; none for a field with one way to render.
-    pub(crate) efforts: Vec<Variant<AnyOptions>>,
     effort: Option<usize>,
     /// For what pictures have less resolution, if they have.
     purpose: Option<Purpose>,
@@ -33,6 +31,8 @@ pub(crate) struct Session<'a> {
     mixture: Option<Mixture>,
     /// The mean share of each part in the last picture; empty without a mixture.
     pub(crate) shares: Vec<f32>,
+    /// What was told of the device's faults.
+    faults: Vec<String>,
 }
 
 impl<'a> Session<'a> {
@@ -49,7 +49,6 @@ impl<'a> Session<'a> {
             renderer,
             encoded,
             relevance: None,
-            efforts: prepared.efforts(&options),
             prepared,
             current: options.clone(),
             options,
@@ -57,7 +56,14 @@ impl<'a> Session<'a> {
             purpose: None,
             mixture: None,
             shares: Vec::new(),
+            faults: Vec::new(),
         })
+    }
+
+    /// The efforts of the options; none for a field with one way to render. The first question of all may try what the
+    /// device can do.
+    pub(crate) fn efforts(&self) -> Vec<Variant<AnyOptions>> {
+        self.prepared.efforts(&self.options)
     }
 
     /// Renders what follows under other options than the field's own, if there are some, and mixes pictures, if there
@@ -69,7 +75,6 @@ impl<'a> Session<'a> {
         progress: &dyn Progress,
     ) -> Result<(), FieldError> {
         self.options = options.cloned().unwrap_or_else(|| self.renderer.options());
-        self.efforts = self.prepared.efforts(&self.options);
         self.mixture = mixture.filter(|mixture| !mixture.parts.is_empty()).cloned();
         self.shares = Vec::new();
         let is_stale = self.apply(&self.options.clone())?;
@@ -161,6 +166,18 @@ impl<'a> Session<'a> {
         progress: &dyn Progress,
     ) -> Result<Rendered, FieldError> {
         self.encode(weights, progress)?;
+        let rendered = self.render_encoded(camera, weights, early_termination, progress)?;
+        self.tell_faults(progress);
+        Ok(rendered)
+    }
+
+    fn render_encoded(
+        &mut self,
+        camera: &Camera,
+        weights: &SourceWeights,
+        early_termination: f32,
+        progress: &dyn Progress,
+    ) -> Result<Rendered, FieldError> {
         let views = &self.views(weights);
         let request = Request { camera, weights, views, early_termination };
         self.shares.clear();
@@ -180,6 +197,13 @@ impl<'a> Session<'a> {
         Ok(between(self.prepared.render(&request, progress)?, mixed, share))
     }
 
+    /// Says once what of the device is not used.
+    fn tell_faults(&mut self, progress: &dyn Progress) {
+        let faults = self.renderer.device_faults();
+        faults.iter().filter(|fault| !self.faults.contains(fault)).for_each(|fault| progress.warn(fault));
+        self.faults = faults;
+    }
+
     /// Renders the same target under other options.
     fn go_on_with(
         &mut self,
@@ -194,7 +218,7 @@ impl<'a> Session<'a> {
 
     /// Renders what follows with one of the efforts. Views that this effort needs otherwise are encoded again.
     pub(crate) fn set_effort(&mut self, effort: usize, progress: &dyn Progress) -> Result<(), FieldError> {
-        if effort < self.efforts.len() {
+        if effort < self.efforts().len() {
             self.effort = Some(effort);
             let is_stale = self.apply(&self.options.clone())?;
             self.encode_again(is_stale, progress)?;
@@ -218,6 +242,7 @@ impl<'a> Session<'a> {
     /// The record of the work so far.
     pub(crate) fn record(&self) -> Record {
         let mut record = self.prepared.record();
+        record.notes.extend(self.faults.iter().cloned());
         let skips_unused = self.prepared.encoding() != Encoding::All;
         if !skips_unused && self.prepared.is_weighted() {
             return record;

@@ -22,6 +22,9 @@ pub struct Variant<O> {
     pub typical_error: f32,
     /// Its share of the exact one's time, likewise.
     pub typical_share: f32,
+    /// Whether it omits nothing, and rounds about as much as `f32` does in another order of its sums: the exact
+    /// pictures of two devices differ as much.
+    pub rounds_as_f32: bool,
 }
 
 /// Label of the variant that omits nothing.
@@ -30,12 +33,12 @@ pub const EXACT: &str = "exact";
 impl<O> Variant<O> {
     /// One that omits something.
     pub fn new(label: impl Into<String>, options: O, typical_error: f32, typical_share: f32) -> Variant<O> {
-        Variant { label: label.into(), options, typical_error, typical_share }
+        Variant { label: label.into(), options, typical_error, typical_share, rounds_as_f32: false }
     }
 
     /// The one that omits nothing.
     pub fn exact(options: O) -> Variant<O> {
-        Variant::new(EXACT, options, 0.0, 1.0)
+        Variant { rounds_as_f32: true, ..Variant::new(EXACT, options, 0.0, 1.0) }
     }
 
     /// One whose error and time are to be measured.
@@ -45,8 +48,8 @@ impl<O> Variant<O> {
 
     /// With other options.
     pub fn map<P>(self, to: impl FnOnce(O) -> P) -> Variant<P> {
-        let Variant { label, options, typical_error, typical_share } = self;
-        Variant { label, options: to(options), typical_error, typical_share }
+        let Variant { label, options, typical_error, typical_share, rounds_as_f32 } = self;
+        Variant { label, options: to(options), typical_error, typical_share, rounds_as_f32 }
     }
 }
 

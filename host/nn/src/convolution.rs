@@ -4,7 +4,7 @@ use super::image::{Image, Size};
 use super::scratch::Scratch;
 use super::window::Windows;
 use std::ops::Range;
-use viewfuse_device::{Device, DeviceError, Layer};
+use viewfuse_device::{Device, DeviceError, Layer, Precision};
 use viewfuse_kernels::network::convolve::ConvolveBlock;
 use viewfuse_kernels::network::depthwise::DepthwiseBlock;
 use viewfuse_kernels::network::transpose::TransposedBlock;
@@ -89,7 +89,7 @@ impl<D: Device> Convolution<D> {
         residual: Residual<'_, D>,
     ) -> Result<Image<D>, DeviceError> {
         let mut output = scratch.image(options.out_size(image.size, self.size, self.channels))?;
-        self.run_into(scratch.device(), options, image, residual, &mut output)?;
+        self.run_into(scratch, options, image, residual, &mut output)?;
         Ok(output)
     }
 
@@ -99,7 +99,7 @@ impl<D: Device> Convolution<D> {
     /// If the device is lost.
     pub fn run_into(
         &self,
-        device: &D,
+        scratch: &Scratch<'_, D>,
         options: ConvolutionOptions,
         image: &Image<D>,
         residual: Residual<'_, D>,
@@ -113,10 +113,10 @@ impl<D: Device> Convolution<D> {
             Residual::Channels(values, first) => (Some(values), 0, first),
         };
         let block = ConvolveBlock { residual_pitch, residual_first, ..block };
-        self.dispatch(device, &block, image, residual, output)
+        self.dispatch(scratch.device(), scratch.precision(), &block, image, residual, output)
     }
 
-    /// The same for some rows alone; its windows are single pixels.
+    /// The same for some rows alone, exact; its windows are single pixels.
     ///
     /// # Errors
     /// If the device is lost.
@@ -138,7 +138,7 @@ impl<D: Device> Convolution<D> {
             out_first: block.out_first + before * block.out_pitch,
             ..block
         };
-        self.dispatch(device, &block, image, None, output)
+        self.dispatch(device, Precision::Exact, &block, image, None, output)
     }
 
     /// The parameters for an input and an output, without residual.
@@ -169,13 +169,14 @@ impl<D: Device> Convolution<D> {
     fn dispatch(
         &self,
         device: &D,
+        precision: Precision,
         block: &ConvolveBlock,
         image: &Image<D>,
         residual: Option<&D::Buffer<f32>>,
         output: &mut Image<D>,
     ) -> Result<(), DeviceError> {
         let Layer { weights, bias } = &self.layer;
-        device.convolve(block, &image.values, weights, bias, residual, &mut output.values)
+        device.convolve_in(precision, block, &image.values, weights, bias, residual, &mut output.values)
     }
 }
 

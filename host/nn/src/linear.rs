@@ -1,6 +1,6 @@
 //! Linear layers.
 
-use viewfuse_device::{Device, DeviceError, Layer};
+use viewfuse_device::{Device, DeviceError, Layer, Precision};
 use viewfuse_kernels::network::linear::LinearBlock;
 
 /// A linear layer on a device: `outputs[row][output] = bias[output] + sum over inputs of inputs[row][input] *
@@ -13,18 +13,28 @@ pub struct Linear<D: Device> {
     pub out_count: u32,
 }
 
-/// Rectification at a linear layer.
+/// Options of a linear layer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinearOptions {
     /// Whether negative inputs count as 0.
     pub relu_inputs: bool,
     /// Whether negative outputs become 0.
     pub relu_outputs: bool,
+    /// The precision of its products, on devices that have another than the exact one.
+    pub precision: Precision,
 }
 
 impl LinearOptions {
-    /// Nothing is rectified.
-    pub const PLAIN: LinearOptions = LinearOptions { relu_inputs: false, relu_outputs: false };
+    /// Nothing is rectified, and products are exact.
+    pub const PLAIN: LinearOptions =
+        LinearOptions { relu_inputs: false, relu_outputs: false, precision: Precision::Exact };
+    /// Negative outputs become 0.
+    pub const RELU: LinearOptions = LinearOptions { relu_outputs: true, ..LinearOptions::PLAIN };
+
+    /// The same in another precision.
+    pub const fn in_precision(self, precision: Precision) -> LinearOptions {
+        LinearOptions { precision, ..self }
+    }
 }
 
 impl<D: Device> Linear<D> {
@@ -51,6 +61,6 @@ impl<D: Device> Linear<D> {
             ..LinearBlock::default()
         };
         let Layer { weights, bias } = &self.layer;
-        device.linear(&block, inputs, weights, bias, residual, outputs)
+        device.linear_in(options.precision, &block, inputs, weights, bias, residual, outputs)
     }
 }

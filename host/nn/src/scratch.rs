@@ -1,19 +1,31 @@
-//! Scratch buffers: memory for the images between layers, which is reused.
+//! What a network of images runs with: scratch buffers, memory for the images between layers, which is reused, and the
+//! precision of its convolutions.
 
 use super::image::{Image, Size};
-use viewfuse_device::{Device, DeviceError};
+use viewfuse_device::{Device, DeviceError, Precision};
 
 /// A device and its free buffers. Every kernel writes all of its output: earlier content of a buffer is never read.
 /// Dropping it frees them.
 pub struct Scratch<'a, D: Device> {
     device: &'a D,
+    precision: Precision,
     free: Vec<(usize, D::Buffer<f32>)>,
 }
 
 impl<'a, D: Device> Scratch<'a, D> {
-    /// Without any buffers.
+    /// Without any buffers. Convolutions are exact.
     pub fn new(device: &'a D) -> Scratch<'a, D> {
-        Scratch { device, free: Vec::new() }
+        Scratch { device, precision: Precision::Exact, free: Vec::new() }
+    }
+
+    /// Convolutions that run with it have this precision from now on, on devices that have another than the exact one.
+    pub fn set_precision(&mut self, precision: Precision) {
+        self.precision = precision;
+    }
+
+    /// The precision of convolutions that run with it.
+    pub fn precision(&self) -> Precision {
+        self.precision
     }
 
     /// The device.

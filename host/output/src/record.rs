@@ -52,7 +52,7 @@ pub struct RunRecord {
     pub leave_out: f32,
     /// Transmittance of early termination: no channel changes by more than this times its range.
     pub early_termination: f32,
-    /// Warnings about the scene and its photographs.
+    /// Warnings about the scene and its photographs, and notes of the field and the device.
     pub warnings: Vec<String>,
     /// Conventions of the scene's files that were applied.
     pub conventions: Vec<String>,

@@ -315,7 +315,7 @@ impl RunWriter {
             background: background_record(options, self.background),
             leave_out: options.leave_out,
             early_termination: options.early_termination,
-            warnings: self.given.into_iter().chain(self.warnings).collect(),
+            warnings: self.given.into_iter().chain(self.warnings).chain(record.notes).collect(),
             conventions: self.conventions,
             sources: self.source_names,
             memory_estimate: record.memory_estimate,

@@ -29,7 +29,7 @@ fn looking_out(sources: &SourceImages, share: f32) -> Camera {
 
 fn with_near(near: f32, omissions: Omissions) -> PixelNerfOptions {
     let sampling = Sampling { near_far: Some([near, 1.8]), ..Sampling::default() };
-    PixelNerfOptions { sampling, omissions }
+    PixelNerfOptions { sampling, omissions, ..PixelNerfOptions::default() }
 }
 
 /// Everything that asks the network: two passes, with and without probes, and nodes.
@@ -101,7 +101,7 @@ fn as_many_are_omitted_as_lie_behind_cameras() {
         ..Sampling::default()
     };
     let omissions = Omissions { unseen_points: true, ..Omissions::NONE };
-    let field = mist(PixelNerfOptions { sampling, omissions });
+    let field = mist(PixelNerfOptions { sampling, omissions, ..PixelNerfOptions::default() });
     let (_, record) = recorded(&field, &sources, &weights(WEIGHTS, 3), &target, 0.0);
 
     // All cameras look at the middle of the scene.

@@ -40,7 +40,7 @@ pub enum Form {
     /// with such [units](Form::needs_matrices).
     Half,
     /// The same with factors in two parts, an f16 and what is missing: each is off by at most 2^-22 of itself, or by
-    /// 2^-25 if that is more, and the product of the two missing parts, at most 2^-22 of the product, is left out.
+    /// 2^-25 if that is more, and the product of the two missing parts, at most 2^-22 of the product, is omitted.
     TwoHalves,
 }
 

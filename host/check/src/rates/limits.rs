@@ -62,6 +62,7 @@ fn copy<D: Device>(device: &D, times: u32) -> Result<Work<'_>, DeviceError> {
     let (numbers, mut copies) = (device.zeros::<[f32; 4]>(count)?, device.zeros::<[f32; 4]>(count)?);
     Ok(Work {
         kernel: Kernel::CopyNumbers,
+        form: None,
         size: format!("{} MiB", (count * 16) >> 20),
         work: Operations::Uncounted,
         bytes: 32.0 * count as f64,
@@ -76,6 +77,7 @@ fn chains<D: Device>(device: &D, times: u32) -> Result<Work<'_>, DeviceError> {
     let block = ChainBlock { factor: 0.9, summand: 0.1, round_count };
     Ok(Work {
         kernel: Kernel::MultiplyAdd,
+        form: None,
         size: format!("{ELEMENTS} x {} chains", CHAINS),
         work: Operations::Fused(2.0 * f64::from(ELEMENTS) * f64::from(CHAINS * round_count * ROUND_STEPS)),
         bytes: 8.0 * f64::from(ELEMENTS),
@@ -91,6 +93,7 @@ fn look_ups<D: Device>(device: &D, times: u32) -> Result<Work<'_>, DeviceError> 
     let block = LookUpBlock { width, height };
     Ok(Work {
         kernel: Kernel::LookUpTexels,
+        form: None,
         size: format!("{width}x{height}, {LOOK_UPS} look-ups"),
         work: Operations::LookUps(f64::from(count * LOOK_UPS)),
         bytes: 20.0 * f64::from(count),

@@ -7,7 +7,7 @@ use crate::poses::{numbers, random};
 use crate::ray_inputs::{camera, point};
 use viewfuse_core::composite::CompositeBlock;
 use viewfuse_core::fuse::FuseBlock;
-use viewfuse_device::{Device, DeviceError, LayerShape};
+use viewfuse_device::{Device, DeviceError, Layer, LayerShape, Precision};
 use viewfuse_kernels::network::attend::MatrixBlock;
 use viewfuse_kernels::network::convolve::ConvolveBlock;
 use viewfuse_kernels::network::linear::LinearBlock;
@@ -33,7 +33,52 @@ pub(super) fn works<D: Device>(device: &D) -> Result<Vec<Work<'_>>, DeviceError>
             works.push(convolve(device, side, channels)?);
         }
     }
+    // By matrix units, where there are some. What stands in for them on a processor would take seconds.
+    let count = if device.is_software() { [1, 1] } else { [LINEARS.len(), CONVOLUTIONS.len()] };
+    let (linears, convolutions) = (&LINEARS[..count[0]], &CONVOLUTIONS[..count[1]]);
+    for precision in device.precisions() {
+        for sizes in linears {
+            works.push(rounded_linear(device, *sizes, precision)?);
+        }
+        for [side, channels] in convolutions {
+            works.push(rounded_convolve(device, *side, *channels, precision)?);
+        }
+    }
     Ok(works)
+}
+
+/// Rows, inner indices and columns of linear layers in forms of rounded factors.
+const LINEARS: [[u32; 3]; 3] = [[16_384, 64, 64], [2046, 512, 512], [32_768, 512, 512]];
+/// Sides and channels of convolutions, likewise.
+const CONVOLUTIONS: [[u32; 2]; 4] = [[64, 64], [128, 128], [32, 256], [16, 512]];
+
+/// [`linear`] in another precision.
+fn rounded_linear<D: Device>(device: &D, sizes: [u32; 3], precision: Precision) -> Result<Work<'_>, DeviceError> {
+    let exact = linear(device, sizes)?;
+    let [row_count, inner_count, column_count] = sizes;
+    let [rows, inner, columns] = sizes.map(|size| size as usize);
+    let shape = LayerShape { inner_count: inner, column_count: columns, has_wide_images: false };
+    let layer = Layer::new(device, &shape, &values(1, inner * columns), &values(2, columns))?;
+    let block = LinearBlock { row_count, inner_count, column_count, relu_inputs: 1, ..LinearBlock::default() };
+    let (inputs, mut outputs) = (device.upload(&values(3, rows * inner))?, device.zeros(rows * columns)?);
+    let run = move || device.linear_in(precision, &block, &inputs, &layer.weights, &layer.bias, None, &mut outputs);
+    Ok(Work { form: precision.form(), run: Box::new(run), ..exact })
+}
+
+/// [`convolve`] in another precision.
+fn rounded_convolve<D: Device>(
+    device: &D,
+    side: u32,
+    channels: u32,
+    precision: Precision,
+) -> Result<Work<'_>, DeviceError> {
+    let (exact, block) = (convolve(device, side, channels)?, windows(side, channels));
+    let (inner, columns, image) = (block.patch_len() as usize, channels as usize, (side * side * channels) as usize);
+    let shape = LayerShape { inner_count: inner, column_count: columns, has_wide_images: false };
+    let layer = Layer::new(device, &shape, &values(4, inner * columns), &values(5, columns))?;
+    let (inputs, mut outputs) = (device.upload(&values(6, image))?, device.zeros(image)?);
+    let run = move || device.convolve_in(precision, &block, &inputs, &layer.weights, &layer.bias, None, &mut outputs);
+    Ok(Work { form: precision.form(), run: Box::new(run), ..exact })
 }
 
 fn values(seed: u64, count: usize) -> Vec<f32> {
@@ -58,8 +103,9 @@ fn linear<D: Device>(device: &D, sizes: [u32; 3]) -> Result<Work<'_>, DeviceErro
     Work::new(device, linear, size, Operations::Fused(2.0 * (rows * inner * columns) as f64), bytes)
 }
 
-fn convolve<D: Device>(device: &D, side: u32, channels: u32) -> Result<Work<'_>, DeviceError> {
-    let block = ConvolveBlock {
+/// A convolution of 3x3 that keeps size and channels.
+fn windows(side: u32, channels: u32) -> ConvolveBlock {
+    ConvolveBlock {
         in_height: side,
         in_width: side,
         in_channels: channels,
@@ -75,7 +121,11 @@ fn convolve<D: Device>(device: &D, side: u32, channels: u32) -> Result<Work<'_>,
         padding: 1,
         scale: 1.0,
         ..ConvolveBlock::default()
-    };
+    }
+}
+
+fn convolve<D: Device>(device: &D, side: u32, channels: u32) -> Result<Work<'_>, DeviceError> {
+    let block = windows(side, channels);
     let (inner, columns) = (block.patch_len() as usize, channels as usize);
     let image = (side * side * channels) as usize;
     let shape = LayerShape { inner_count: inner, column_count: columns, has_wide_images: side >= 32 };

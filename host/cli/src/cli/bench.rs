@@ -80,7 +80,12 @@ fn print_device(rates: &DeviceRates) -> std::io::Result<()> {
     for kernel in &rates.kernels {
         rows.add_row(row(kernel));
     }
-    say(format_args!("{rows}\n"))
+    say(rows)?;
+    rates.faults.iter().try_for_each(say)?;
+    match rates.rounded_forms.is_empty() {
+        true => say("linear and convolve by matrix units: none that fit, or none that is trusted\n"),
+        false => say(format_args!("linear and convolve by matrix units: {}\n", rates.rounded_forms.join(", "))),
+    }
 }
 
 fn row(kernel: &KernelRate) -> [String; 7] {
@@ -90,7 +95,7 @@ fn row(kernel: &KernelRate) -> [String; 7] {
         Limit::LookUp => "look-up",
     };
     [
-        kernel.kernel.to_owned(),
+        kernel.form.map_or_else(|| kernel.kernel.to_owned(), |form| format!("{}, {form}", kernel.kernel)),
         kernel.size.clone(),
         format!("{:.3}", kernel.milliseconds),
         kernel.giga_operations.map_or_else(String::new, |rate| format!("{rate:.1}")),

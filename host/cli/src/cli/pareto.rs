@@ -186,7 +186,7 @@ struct Sweep<'a> {
 
 impl Sweep<'_> {
     fn on(&self, device: &AnyDevice, field: &AnyField, progress: &dyn Progress) -> Result<Measured, Failure> {
-        let settings = settings::of(field, self.options, self.subject.job.targets.len());
+        let settings = settings::of(field, self.options, self.subject.job.targets.len(), &device.precisions());
         let begins = |setting: &Drawn, words: &String| setting.label.starts_with(words.as_str());
         if let Some(none) = self.only.iter().find(|words| !settings.iter().any(|setting| begins(setting, words))) {
             let all: Vec<&str> = settings.iter().map(|setting| setting.label.as_str()).collect();

@@ -1,6 +1,7 @@
 //! The settings tried for each field: the variants that its row draws, and bounds on the error. The first one omits
 //! nothing.
 
+use viewfuse_device::Precision;
 use viewfuse_field::AnyField;
 use viewfuse_field::budget::Bound;
 use viewfuse_field::render::RenderOptions;
@@ -14,11 +15,11 @@ pub const BOUNDED: &str = "at most ";
 const BOUNDS: [u32; 6] = [25, 30, 35, 40, 45, 50];
 
 /// The settings of a field for this many targets: its row's variants, and bounds on the error for which it chooses what
-/// to omit. `options` give what `all` omits, the size and the background. A field that draws none has two: nothing
-/// omitted, and `options` as they are.
-pub fn of(field: &AnyField, options: &RenderOptions, target_count: usize) -> Vec<Drawn> {
+/// to omit. `options` give what `all` omits, the size and the background; `precisions` are those that the device has
+/// besides the exact one. A field that draws none has two: nothing omitted, and `options` as they are.
+pub fn of(field: &AnyField, options: &RenderOptions, target_count: usize, precisions: &[Precision]) -> Vec<Drawn> {
     let row = rows::named(field.about().name);
-    let mut drawn = row.map_or_else(Vec::new, |row| (row.drawn)(field, options, target_count));
+    let mut drawn = row.map_or_else(Vec::new, |row| (row.drawn)(field, options, target_count, precisions));
     if drawn.is_empty() {
         let exact = RenderOptions { leave_out: 0.0, early_termination: 0.0, ..options.clone() };
         drawn.push(Variant::exact((field.clone(), exact)));

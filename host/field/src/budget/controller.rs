@@ -24,7 +24,7 @@ const OTHER_PICTURES: f64 = 1.3;
 /// for nothing, unless both render from the same encodings.
 const MAX_COMPARED: f32 = 0.7;
 /// The least error of a single pixel that checks must see. Where one that is off by less may have all of the error that
-/// is allowed, few exact pixels tell nothing, and the picture is exact (`host/results/bounds.md`).
+/// is allowed, few exact pixels tell nothing, and the picture is as exact as `f32` is (`host/results/bounds.md`).
 const MIN_SINGLE: f64 = 0.134;
 /// A picture whose error is below the bound by this factor lets the next one begin with less effort.
 const FAR_LESS: f64 = 1.6;
@@ -79,7 +79,7 @@ impl Controller {
             Check::Steps => embedded::SAFETY,
             Check::Comparison => OTHER_PICTURES * embedded::SAFETY,
         };
-        let expected = Expected::new(session.efforts.clone(), safety);
+        let expected = Expected::new(session.efforts(), safety);
         Controller { bound, expected, check, compared: None, last: None, pictures: 0 }
     }
 
@@ -136,7 +136,7 @@ impl Controller {
         let (width, height) = (search.view.camera.pinhole.width(), search.view.camera.pinhole.height());
         let single = most * (f64::from(width) * f64::from(height)).sqrt();
         let mut effort = match self.check == Check::Pixels && single < MIN_SINGLE {
-            true => self.expected.efforts.len() - 1,
+            true => self.expected.cheapest_as_f32(most),
             false => self.begin(most),
         };
         loop {

@@ -49,6 +49,12 @@ impl Expected {
         self.efforts.iter().position(is_within).unwrap_or(self.efforts.len() - 1)
     }
 
+    /// The same of those that are as exact as `f32` is.
+    pub(super) fn cheapest_as_f32(&self, most: f64) -> usize {
+        let first = self.efforts.iter().position(|effort| effort.rounds_as_f32).unwrap_or(self.efforts.len() - 1);
+        self.cheapest_within(most).max(first)
+    }
+
     /// Whether two efforts render from the same encodings: the second one then takes what the first one did not do.
     pub(super) fn encode_alike(&self, first: usize, second: usize) -> bool {
         self.efforts[first].options.encodes_alike(&self.efforts[second].options)
@@ -111,6 +117,15 @@ mod tests {
         expected.learn(0, found(0.4));
         assert_eq!((expected.cheapest_within(0.012), expected.is_exact(4)), (4, true));
         assert_eq!([0, 1, 2, 3].map(|effort| expected.after(effort, 0.012)), [2, 2, 4, 4]);
+    }
+
+    #[test]
+    fn tight_bounds_are_kept_as_f32_does() {
+        let expected = efforts();
+        assert_eq!((expected.cheapest_within(0.05), expected.cheapest_as_f32(0.05)), (0, 4));
+        let mut rounding = efforts();
+        rounding.efforts.insert(4, Variant { rounds_as_f32: true, ..Variant::new("", AnyOptions::new(()), 1e-4, 0.4) });
+        assert_eq!([0.05, 1e-3, 1e-5].map(|most| rounding.cheapest_as_f32(most)), [4, 4, 5]);
     }
 
     #[test]

@@ -129,7 +129,6 @@ impl<D: Device> Denoiser<D> {
         inputs: Image<D>,
         shifts: &D::Buffer<f32>,
     ) -> Result<Vec<Image<D>>, DeviceError> {
-        let device = scratch.device();
         // The last image is read first, behind the channels of the block before its reader.
         let mut in_front: Vec<u32> = self.decoder.iter().filter_map(|block| block.in_front).collect();
         let mut place = |scratch: &mut Scratch<'_, D>, size: Size| {
@@ -144,7 +143,7 @@ impl<D: Device> Denoiser<D> {
             let next = match step {
                 Step::First(layer) => {
                     let mut first = place(scratch, x.size.with_channels(layer.channels))?;
-                    layer.run_into(device, PLAIN, x, Residual::None, &mut first)?;
+                    layer.run_into(scratch, PLAIN, x, Residual::None, &mut first)?;
                     first
                 }
                 Step::Block(block) => {
@@ -158,7 +157,7 @@ impl<D: Device> Denoiser<D> {
                     let mut first = place(scratch, halved.size)?;
                     let options = ConvolutionOptions { stride: 2, padding: Some(1), scale: FRAC_1_SQRT_2, ..PLAIN };
                     let input = residual.map_or(&inputs, |index| &skips[index]);
-                    aux_residual.run_into(device, options, input, Residual::Image(&halved), &mut first)?;
+                    aux_residual.run_into(scratch, options, input, Residual::Image(&halved), &mut first)?;
                     scratch.recycle(halved);
                     residual = Some(skips.len());
                     first

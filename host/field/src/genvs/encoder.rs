@@ -171,7 +171,7 @@ impl<D: Device> Aspp<D> {
         let channels = self.plain.channels;
         let branch_count = self.dilated.len() as u32 + 2;
         let mut wide = scratch.channel_slice(image.size.with_channels(channels), channels * branch_count, 0)?;
-        self.plain.run_into(device, RELU, image, Residual::None, &mut wide)?;
+        self.plain.run_into(scratch, RELU, image, Residual::None, &mut wide)?;
         for (branch, (separable, dilation)) in (1..).zip(self.dilated.iter().zip(ASPP_RATES)) {
             wide = wide.channel_slice(branch * channels, channels);
             let options = ConvolutionOptions { dilation: dilation as u32, ..PLAIN };
@@ -220,7 +220,7 @@ impl<D: Device> SeparableConvolution<D> {
         output: &mut Image<D>,
     ) -> Result<(), DeviceError> {
         let inside = self.depthwise.run(scratch, options, image)?;
-        self.pointwise.run_into(scratch.device(), RELU, &inside, Residual::None, output)?;
+        self.pointwise.run_into(scratch, RELU, &inside, Residual::None, output)?;
         scratch.recycle(inside);
         Ok(())
     }

@@ -60,7 +60,7 @@ impl<D: Device> PointNetwork<D> {
         hidden: &mut [D::Buffer<f32>; 2],
         raw: &mut D::Buffer<f32>,
     ) -> Result<(), DeviceError> {
-        let rectified = LinearOptions { relu_inputs: false, relu_outputs: true };
+        let rectified = LinearOptions::RELU;
         let [first, second, third] = &self.layers;
         let [inside, next] = hidden;
         first.run(device, point_count, rectified, fused, None, inside)?;

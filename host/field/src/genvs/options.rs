@@ -4,6 +4,7 @@ use super::super::Denoising;
 use super::sampling::{Plan, Steps};
 use crate::variant::Options;
 use viewfuse_core::sampler::Sampler;
+use viewfuse_device::Precision;
 
 /// Samples on a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,17 +71,26 @@ pub struct GenvsOptions {
     pub omissions: Omissions,
     /// Rows and columns of pictures are divided by this, and the pictures enlarged; 1 for whole pictures.
     pub divisor: u32,
+    /// Precision of the denoiser's convolutions, on devices that have another than the exact one. Volumes and feature
+    /// images, which take little of the time, are exact.
+    pub precision: Precision,
 }
 
 impl Default for GenvsOptions {
     /// The fast run with seed 0.
     fn default() -> GenvsOptions {
-        GenvsOptions { rays: Rays::default(), plan: Plan::fast(0), omissions: Omissions::default(), divisor: 1 }
+        GenvsOptions {
+            rays: Rays::default(),
+            plan: Plan::fast(0),
+            omissions: Omissions::default(),
+            divisor: 1,
+            precision: Precision::Exact,
+        }
     }
 }
 
 impl Options for GenvsOptions {
-    /// Where both keep volumes in the same precision.
+    /// Where both keep volumes with as many bits; the denoiser's precision does not change them.
     fn encodes_alike(&self, other: &GenvsOptions) -> bool {
         self.omissions.half_volumes == other.omissions.half_volumes
     }

@@ -5,16 +5,15 @@ use super::denoiser::Denoiser;
 use super::encoder::Encoder;
 use super::feature_image::{PointNetwork, Views, render};
 use super::ray_sampling::RaySampling;
-use super::sampling::{Accuracy, Plan, Sampled, Start, sample};
+use super::sampling::{Accuracy, Plan, Sampled, Start, root_mean_square, sample};
 use super::volume::Volume;
 use crate::FieldError;
-use crate::finite::{check_finite, check_finite_on};
+use crate::finite::{check_finite, check_finite_on, download_finite};
 use std::ops::Range;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::sampler::Mix;
+use viewfuse_core::sampler::{Mix, NoiseBlock};
 use viewfuse_core::schedule::Preconditioning;
-use viewfuse_device::Device;
-use viewfuse_device::DeviceError;
+use viewfuse_device::{Device, DeviceError, Precision};
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::Checkpoint;
 use viewfuse_nn::convolution::leading_channels;
@@ -131,6 +130,34 @@ impl<D: Device> Parts<D> {
         sample(device, plan, count, start, progress, |noisy, level, denoised| {
             Ok(self.denoise(device, scratch, noisy, &condition, level, denoised)?)
         })
+    }
+
+    /// What a precision changes in the denoiser's estimate of a picture behind noise of the plan's largest level: the
+    /// root mean square over the values, from -1 to 1. There the estimate is the network's output alone, and errors
+    /// are largest. What it is compared with is in two parts, which is exact beside f16, or exact.
+    pub(super) fn rounding(
+        &self,
+        device: &D,
+        scratch: &mut Scratch<'_, D>,
+        features: &Image<D>,
+        plan: &Plan,
+        precision: Precision,
+    ) -> Result<f32, FieldError> {
+        let condition = self.condition(device, scratch, features)?;
+        let (level, count) = (plan.schedule.level(0, 2), features.size.pixel_count() as usize * COLOUR_CHANNELS);
+        let block = NoiseBlock { seed: [plan.seed as u32, (plan.seed >> 32) as u32], stream: 0, scale: level };
+        let mut noisy = device.zeros(count)?;
+        device.add_noise(&block, count as u32, &device.zeros(count)?, &mut noisy)?;
+        let finer = if precision == Precision::Half { Precision::TwoHalves } else { Precision::Exact };
+        let mut estimates = Vec::new();
+        for precision in [precision, finer] {
+            scratch.set_precision(precision);
+            let mut denoised = device.zeros(count)?;
+            self.denoise(device, scratch, &noisy, &condition, level, &mut denoised)?;
+            estimates.push(download_finite(device, &denoised, "trying a precision", "denoised picture")?);
+        }
+        let changes: Vec<f32> = estimates[0].iter().zip(&estimates[1]).map(|(a, b)| a - b).collect();
+        Ok(root_mean_square(&changes))
     }
 
     /// The denoiser's condition for a feature image.

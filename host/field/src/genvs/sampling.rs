@@ -15,6 +15,7 @@ pub use plan::{Plan, Steps};
 
 use super::super::FieldError;
 use run::Run;
+pub(super) use run::root_mean_square;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 

@@ -5,12 +5,14 @@ use super::sampling::{Accuracy, Plan, Steps};
 use super::{Estimate, Genvs, GenvsOptions, Omissions, Rays};
 use crate::AnyField;
 use crate::render::RenderOptions;
+use crate::rounding::{Rounding, rounded};
 use crate::row::{ALL, Drawn};
 use crate::variant::{EXACT, Variant};
 use std::ops::RangeInclusive;
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::sampler::control::HALF_A_LEVEL;
 use viewfuse_core::schedule::NoiseSchedule;
+use viewfuse_device::Precision;
 
 /// Calls of the denoiser, with the error that is typical of so many, from noise alone and from the colours of the
 /// feature image, and what the error is relative to what the run itself tells (`host/results/efforts.md`,
@@ -36,9 +38,35 @@ enum Relative {
     ToLastChange(f32),
 }
 
-/// The root mean square difference of an effort's picture from the exact one, colours from 0 to 1: an estimate.
-/// Infinite for other runs.
+/// What rounded products are typically worth. Errors: emulated on the network of the published size, with an encoder
+/// and feature images that are rounded too, 61.5 and 89 dB from the exact picture; times: what convolutions take of a
+/// picture, at the rates of prototypes on a GPU (`host/results/efforts.md`).
+const ROUNDINGS: [Rounding; 2] = [
+    Rounding { precision: Precision::Half, typical_error: 8.4e-4, typical_share: 0.7 },
+    Rounding { precision: Precision::TwoHalves, typical_error: 3.6e-5, typical_share: 0.8 },
+];
+/// What rounding changes in a picture over what it changes in an estimate at the largest level, both with colours from
+/// 0 to 1 (`host/results/efforts.md`).
+const GROWTH: f32 = 3.0;
+
+/// The root mean square difference from the exact picture, colours from 0 to 1, of a denoiser whose estimate at the
+/// largest level changes by this, values from -1 to 1: an estimate.
+pub(super) fn rounding_error(change: f32) -> f32 {
+    0.5 * GROWTH * change
+}
+
+/// The plan of the exact picture.
+fn exact_plan(plan: &Plan) -> Plan {
+    let steps = Plan::published(plan.seed).steps;
+    Plan { steps, early_termination: None, compares_orders: false, ..*plan }
+}
+
+/// The root mean square difference of an effort's picture from the exact one, colours from 0 to 1, without what
+/// rounding changes: an estimate. Infinite for other runs.
 pub(super) fn error_of(plan: &Plan, accuracy: Accuracy) -> f32 {
+    if *plan == exact_plan(plan) {
+        return 0.0;
+    }
     let is_own = |(calls, ..): &&(u32, [f32; 2], Relative)| {
         plan.compares_orders && plan.steps == Steps::Fixed { sampler: Sampler::Ipndm, level_count: *calls }
     };
@@ -79,11 +107,14 @@ const REUSED: [f32; 2] = [20.0, 2.0];
 /// The share of the exact run's work that no number of calls changes: encoding, and the feature image.
 const FIXED_WORK: f32 = 0.06;
 
-/// The efforts of these options, with a denoiser of this kind, the cheapest first.
-pub(super) fn efforts(options: &GenvsOptions, estimate: Estimate) -> Vec<Variant<GenvsOptions>> {
-    let plan = &options.plan;
-    let steps = Plan::published(plan.seed).steps;
-    let exact = Plan { steps, early_termination: None, compares_orders: false, ..*plan };
+/// The efforts of these options, with a denoiser of this kind, the cheapest first. On a device with other precisions
+/// than the exact one, all but the exact effort use them.
+pub(super) fn efforts(
+    options: &GenvsOptions,
+    estimate: Estimate,
+    precisions: &[Precision],
+) -> Vec<Variant<GenvsOptions>> {
+    let exact = exact_plan(&options.plan);
     let all_calls = match exact.steps {
         Steps::Fixed { sampler, level_count } => sampler.call_count(level_count),
         Steps::Chosen { most_calls, .. } => most_calls,
@@ -94,7 +125,9 @@ pub(super) fn efforts(options: &GenvsOptions, estimate: Estimate) -> Vec<Variant
         let plan = Plan { compares_orders: true, ..in_calls(&exact, estimate, calls) };
         Variant::new(format!("{calls} calls of the denoiser"), GenvsOptions { plan, ..*options }, error, work)
     });
-    few.into_iter().chain([Variant::exact(GenvsOptions { plan: exact, ..*options })]).collect()
+    let exact = GenvsOptions { plan: exact, precision: Precision::Exact, ..*options };
+    let all = few.into_iter().chain([Variant::exact(exact)]).collect();
+    rounded(all, precisions, &ROUNDINGS, |options, precision| GenvsOptions { precision, ..*options })
 }
 
 /// The plan with so many calls; few have their own levels, as far as these lie between the plan's.
@@ -116,7 +149,12 @@ pub(super) fn in_calls(plan: &Plan, estimate: Estimate, calls: u32) -> Plan {
 /// What `pareto` draws for this many targets. Calls of the denoiser take nearly all of the time: other omissions are
 /// compared with the default number of calls. `field` gives the rays, the first and last level and the seed; `options`
 /// give the weight that `all` leaves out, the size and the background. What the field itself omits is ignored.
-pub(super) fn drawn(field: &AnyField, options: &RenderOptions, target_count: usize) -> Vec<Drawn> {
+pub(super) fn drawn(
+    field: &AnyField,
+    options: &RenderOptions,
+    target_count: usize,
+    precisions: &[Precision],
+) -> Vec<Drawn> {
     let Some(field) = field.downcast_ref::<Genvs>() else { return Vec::new() };
     let GenvsOptions { rays, plan: Plan { schedule, seed, .. }, .. } = field.options();
     let exact = Plan { schedule, ..Plan::published(seed) };
@@ -125,11 +163,16 @@ pub(super) fn drawn(field: &AnyField, options: &RenderOptions, target_count: usi
         let field = AnyField::new(field.with_options(changed));
         Variant::to_measure(label, (field, RenderOptions { leave_out, early_termination: 0.0, ..options.clone() }))
     };
-    let alone = GenvsOptions { rays, plan: exact, omissions: Omissions::NONE, divisor: 1 };
+    let precision = Precision::Exact;
+    let alone = GenvsOptions { rays, plan: exact, omissions: Omissions::NONE, divisor: 1, precision };
     let planned = |label: String, plan| variant(&label, GenvsOptions { plan, ..alone }, 0.0);
     let omitting = |label: &str, omissions| variant(label, GenvsOptions { omissions, ..alone }, 0.0);
 
+    let in_precision =
+        |precision: &Precision| variant(precision.name(), GenvsOptions { precision: *precision, ..alone }, 0.0);
+
     let mut drawn = vec![variant(EXACT, alone, 0.0)];
+    drawn.extend(precisions.iter().map(in_precision));
     drawn.push(omitting("unseen rows", Omissions { unseen_rows: true, ..Omissions::NONE }));
     drawn.push(omitting("half volumes", Omissions { half_volumes: true, ..Omissions::NONE }));
     drawn.push(planned("early termination".to_owned(), Plan { early_termination: Some(HALF_A_LEVEL), ..exact }));
@@ -170,7 +213,7 @@ mod tests {
 
     fn plans(plan: Plan, estimate: Estimate) -> Vec<Plan> {
         let options = GenvsOptions { plan, ..GenvsOptions::default() };
-        efforts(&options, estimate).into_iter().map(|effort| effort.options.plan).collect()
+        efforts(&options, estimate, &[]).into_iter().map(|effort| effort.options.plan).collect()
     }
 
     #[test]

@@ -11,11 +11,12 @@ use super::volume::Volume;
 use super::{COLOUR_CHANNELS, Genvs, GenvsOptions, Omissions, Rays, variants};
 use crate::enlarged::enlarged;
 use crate::learned::{NoDepths, over_white};
+use crate::rounding::Overflow;
 use crate::variant::erased;
 use crate::{AnyOptions, Check, Encoding, FieldError, LeftOut, Prepared, Record, Rendered, Request, Variant};
 use std::ops::Range;
 use viewfuse_core::camera::{Camera, CameraBlock};
-use viewfuse_device::{Device, DeviceError};
+use viewfuse_device::{Device, DeviceError, Precision};
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::image::{Image, Size};
 use viewfuse_nn::scratch::Scratch;
@@ -41,6 +42,9 @@ pub(super) struct Views<'a, D: Device> {
     /// The last frame's feature image: another run of the denoiser for the same frame uses it again.
     pub(super) features: Option<(FeatureKey, Image<D>)>,
     pub(super) counts: Counts,
+    pub(super) overflow: Overflow,
+    /// What precisions of the denoiser change in a picture, as far as it was measured.
+    pub(super) rounding: Vec<(Precision, f32)>,
 }
 
 /// What a feature image depends on, for encoded views.
@@ -130,6 +134,30 @@ impl<D: Device> Views<'_, D> {
         })
     }
 
+    /// What the denoiser's precision changes in a picture, root mean square of colours from 0 to 1: an estimate, made
+    /// once. The run's own steps do not tell it.
+    fn rounding(
+        &mut self,
+        precision: Precision,
+        scratch: &mut Scratch<'_, D>,
+        features: &Image<D>,
+    ) -> Result<f32, FieldError> {
+        if !self.device.rounds(precision) {
+            return Ok(0.0);
+        }
+        if let Some((_, known)) = self.rounding.iter().find(|(of, _)| *of == precision) {
+            return Ok(*known);
+        }
+        let error = match self.parts.rounding(self.device, scratch, features, &self.options.plan, precision) {
+            Ok(change) => variants::rounding_error(change),
+            // The picture itself is finite; what cannot be told is not promised.
+            Err(FieldError::NotFinite(_)) => f32::INFINITY,
+            Err(error) => return Err(error),
+        };
+        self.rounding.push((precision, error));
+        Ok(error)
+    }
+
     /// Near and far bounds.
     fn near_far(&self) -> [f32; 2] {
         self.options.rays.near_far.unwrap_or(self.usual_near_far)
@@ -178,13 +206,24 @@ impl<D: Device> Prepared for Views<'_, D> {
                 self.parts.features(device, &mut scratch, &views, &camera, &ray_sampling, progress)?
             }
         };
-        let start = match (&self.earlier, omissions.reuse) {
+        let start = || match (&self.earlier, omissions.reuse) {
             (Some((of_size, picture)), Some(level)) if *of_size == size => Start::Picture { picture, level },
             _ => Start::Noise,
         };
-        let sampled = self.parts.picture(device, &mut scratch, &features, &plan, start, progress)?;
+        let mut precision = self.overflow.limit(self.options.precision);
+        scratch.set_precision(precision);
+        let mut sampled = self.parts.picture(device, &mut scratch, &features, &plan, start(), progress);
+        if Overflow::is_repeated(&sampled, precision) {
+            precision = Precision::Exact;
+            scratch.set_precision(precision);
+            sampled = self.parts.picture(device, &mut scratch, &features, &plan, start(), progress);
+            if sampled.is_ok() {
+                self.overflow.tell(progress);
+            }
+        }
+        let sampled = sampled?;
+        self.error = variants::error_of(&plan, sampled.accuracy) + self.rounding(precision, &mut scratch, &features)?;
         self.features = Some((key, features));
-        self.error = variants::error_of(&plan, sampled.accuracy);
         self.counts.calls += u64::from(sampled.call_count());
         self.counts.planned_calls += u64::from(sampled.call_count() + sampled.left_out);
         let values = device.download(&sampled.picture)?;
@@ -207,7 +246,7 @@ impl<D: Device> Prepared for Views<'_, D> {
         let Some((options, denoiser)) = options.of().zip(self.field.architecture.denoiser.as_ref()) else {
             return Vec::new();
         };
-        erased(variants::efforts(options, denoiser.estimate))
+        erased(variants::efforts(options, denoiser.estimate, &self.device.precisions()))
     }
 
     fn check(&self) -> Check {
@@ -239,7 +278,7 @@ impl<D: Device> Prepared for Views<'_, D> {
         let denoising = has_denoiser.then(|| self.options.denoising(calls, planned_calls.saturating_sub(calls)));
         let estimate = memory::estimate(self.device, architecture, &self.options, &self.source_sizes);
         let (memory_estimate, near_far) = (Some(estimate), Some(self.near_far()));
-        Record { left_out, denoising, memory_estimate, near_far }
+        Record { left_out, denoising, memory_estimate, near_far, notes: self.overflow.notes() }
     }
 }
 

@@ -10,8 +10,7 @@ use std::mem::swap;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::fuse::FuseBlock;
 use viewfuse_core::rays::RayPoint;
-use viewfuse_device::Device;
-use viewfuse_device::DeviceError;
+use viewfuse_device::{Device, DeviceError, Precision};
 use viewfuse_kernels::finite::{ALL_FINITE, FINITE_RUN};
 use viewfuse_kernels::pixelnerf::{EmbedBlock, GatherBlock};
 use viewfuse_nn::linear::{Linear, LinearOptions};
@@ -133,9 +132,16 @@ pub(super) struct Network<'a, D: Device> {
     pub(super) layers: &'a PointNetwork<Linear<D>>,
     /// Which list of a view's grids is this network's; `None` where the grid holds latents.
     pub(super) grids: Option<usize>,
+    /// That of its layers.
+    pub(super) precision: Precision,
 }
 
 impl<D: Device> Network<'_, D> {
+    /// A layer without rectification.
+    fn plain(&self) -> LinearOptions {
+        LinearOptions::PLAIN.in_precision(self.precision)
+    }
+
     /// Computes the four raw outputs of the first `point_count` points of a workspace.
     pub(super) fn evaluate(
         &self,
@@ -154,7 +160,7 @@ impl<D: Device> Network<'_, D> {
         };
         device.embed_points(&embed, view_count, &views.cameras, &workspace.points, &mut workspace.embedded)?;
         let Workspace { embedded, flow, .. } = workspace;
-        layers.lin_in.run(device, row_count, LinearOptions::PLAIN, embedded, None, flow)?;
+        layers.lin_in.run(device, row_count, self.plain(), embedded, None, flow)?;
         if self.grids.is_none() {
             self.gather_latents(workspace, views, point_count)?;
         }
@@ -171,7 +177,7 @@ impl<D: Device> Network<'_, D> {
         for block in architecture.injected_count..architecture.block_count {
             self.run_block(workspace, point_count, block)?;
         }
-        let options = LinearOptions { relu_inputs: true, relu_outputs: false };
+        let options = LinearOptions { relu_inputs: true, ..self.plain() };
         layers.lin_out.run(device, point_count, options, &workspace.flow, None, &mut workspace.raw)?;
         let value_count = 4 * point_count;
         let mut firsts = device.zeros(value_count.div_ceil(FINITE_RUN) as usize)?;
@@ -218,7 +224,7 @@ impl<D: Device> Network<'_, D> {
             None => {
                 let row_count = views.latents.len() as u32 * point_count;
                 let lin_z = &self.layers.lin_z[block];
-                lin_z.run(self.device, row_count, LinearOptions::PLAIN, latents, Some(flow), next)?;
+                lin_z.run(self.device, row_count, self.plain(), latents, Some(flow), next)?;
             }
         }
         swap(flow, next);
@@ -234,10 +240,10 @@ impl<D: Device> Network<'_, D> {
     /// A residual block: `flow + fc_1(relu(fc_0(relu(flow))))`.
     fn run_block(&self, workspace: &mut Workspace<D>, row_count: u32, block: usize) -> Result<(), DeviceError> {
         let [fc_0, fc_1] = &self.layers.blocks[block];
-        let rectified = LinearOptions { relu_inputs: true, relu_outputs: true };
+        let rectified = LinearOptions { relu_inputs: true, relu_outputs: true, ..self.plain() };
         let Workspace { flow, next, inside, .. } = workspace;
         fc_0.run(self.device, row_count, rectified, flow, None, inside)?;
-        fc_1.run(self.device, row_count, LinearOptions::PLAIN, inside, Some(flow), next)?;
+        fc_1.run(self.device, row_count, self.plain(), inside, Some(flow), next)?;
         swap(flow, next);
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! The options of a PixelNeRF: its samples, and its omissions.
 
 use crate::variant::Options;
+use viewfuse_device::Precision;
 
 /// Samples on a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -143,10 +144,14 @@ pub struct PixelNerfOptions {
     pub sampling: Sampling,
     /// Omissions.
     pub omissions: Omissions,
+    /// Precision of the point networks' layers, on devices that have another than the exact one. Views are encoded
+    /// exactly.
+    pub precision: Precision,
 }
 
 impl Options for PixelNerfOptions {
-    /// Where both keep the same grids.
+    /// Where both keep the same grids, whatever the precision: the exact pixels that a bound is checked with are
+    /// rendered from the same ones.
     fn encodes_alike(&self, other: &PixelNerfOptions) -> bool {
         let grids = |options: &PixelNerfOptions| (options.omissions.latent_layers, options.omissions.half_latents);
         grids(self) == grids(other)

@@ -8,7 +8,7 @@ use viewfuse_core::composite::CompositeBlock;
 use viewfuse_core::depths::FineBlock;
 use viewfuse_core::rays::{PlaceBlock, RayPoint, TargetRay};
 use viewfuse_device::DeviceError;
-use viewfuse_device::{Device, Pixels, Rays};
+use viewfuse_device::{Device, Pixels, Precision, Rays};
 use viewfuse_kernels::sample_mask::RaysBlock;
 use viewfuse_scene::photographs::SourceImages;
 
@@ -76,7 +76,7 @@ impl<'a, D: Device> Reference<'a, D> {
         let views = self.views.used(&all, weights, None)?;
         let maps = self.views.options.omissions.latent_layers;
         let mut workspace = Workspace::new(*device, &field.architecture, all.len(), points.len(), maps)?;
-        let network = self.views.network(pass);
+        let network = self.views.network(pass, Precision::Exact);
         let mut samples = device.zeros(points.len())?;
         for some in points.chunks(workspace.point_count as usize) {
             workspace.points = device.upload(some)?;

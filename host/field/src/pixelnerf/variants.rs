@@ -6,8 +6,10 @@ use super::node_picture::MAX_NODES;
 use super::options::{Omissions, PixelNerfOptions, Sampling};
 use crate::AnyField;
 use crate::render::RenderOptions;
+use crate::rounding::{Rounding, rounded};
 use crate::row::{ALL, Drawn};
 use crate::variant::{EXACT, Variant};
+use viewfuse_device::Precision;
 
 /// Nodes between which samples are interpolated, in 64ths of the samples of the first pass, with the largest difference
 /// between the rays around an interpolated pixel, the error that is typical of it and its typical work. Measured on the
@@ -23,6 +25,14 @@ const NODES: [(u32, f32, f32, f32); 9] = [
     (48, 0.1, 0.0054, 0.04),
     (64, 0.06, 0.0036, 0.09),
 ];
+/// What rounded products are typically worth. Errors: emulated on the network of the published size, 62.7 dB from the
+/// exact picture and more than 90; times: what products take of a picture, at the rates of prototypes on a GPU
+/// (`host/results/efforts.md`).
+const ROUNDINGS: [Rounding; 2] = [
+    Rounding { precision: Precision::Half, typical_error: 8e-4, typical_share: 0.4 },
+    Rounding { precision: Precision::TwoHalves, typical_error: 3e-5, typical_share: 0.55 },
+];
+
 /// Both passes, without nodes.
 const TWO_PASSES: [(&str, Omissions, f32, f32); 2] = [
     (
@@ -82,8 +92,8 @@ const SAMPLES: [[u32; 2]; 8] = [[6, 6], [4, 4], [3, 3], [2, 2], [1, 1], [8, 0], 
 
 /// The efforts of a network with these options, the cheapest first. Counts of samples are shares of the options'.
 /// Whether latent layers are applied on the grid, and in which precision grids are kept, does not change: views are
-/// encoded for it.
-pub(super) fn efforts(options: &PixelNerfOptions) -> Vec<Variant<PixelNerfOptions>> {
+/// encoded for it. On a device with other precisions than the exact one, all but the exact effort use them.
+pub(super) fn efforts(options: &PixelNerfOptions, precisions: &[Precision]) -> Vec<Variant<PixelNerfOptions>> {
     let with = |omissions: Omissions| PixelNerfOptions { omissions: options.omissions.kept_in(omissions), ..*options };
     let between_nodes = NODES.map(|(share, interpolation, error, work)| {
         let nodes = (options.sampling.coarse_count * share).div_ceil(64).clamp(1, MAX_NODES);
@@ -92,26 +102,40 @@ pub(super) fn efforts(options: &PixelNerfOptions) -> Vec<Variant<PixelNerfOption
     });
     let two_passes =
         TWO_PASSES.map(|(label, omissions, error, work)| Variant::new(label, with(omissions), error, work));
-    between_nodes.into_iter().chain(two_passes).chain([Variant::exact(exact(options))]).collect()
+    let all = between_nodes.into_iter().chain(two_passes).chain([Variant::exact(exact(options))]).collect();
+    rounded(all, precisions, &ROUNDINGS, |options, precision| PixelNerfOptions { precision, ..*options })
 }
 
-/// Nothing is omitted of a picture but what costs nothing or rounding.
+/// Nothing is omitted of a picture but what costs nothing or rounding, and products are exact.
 pub(super) fn exact(options: &PixelNerfOptions) -> PixelNerfOptions {
-    PixelNerfOptions { omissions: options.omissions.kept_in(Omissions::NONE), ..*options }
+    let omissions = options.omissions.kept_in(Omissions::NONE);
+    PixelNerfOptions { omissions, precision: Precision::Exact, ..*options }
 }
 
 /// What `pareto` draws. `field` gives the sampling; `options` give what `all` omits, the size and the background. What
 /// the field itself omits is ignored.
-pub(super) fn drawn(field: &AnyField, options: &RenderOptions, _target_count: usize) -> Vec<Drawn> {
+pub(super) fn drawn(
+    field: &AnyField,
+    options: &RenderOptions,
+    _target_count: usize,
+    precisions: &[Precision],
+) -> Vec<Drawn> {
     let Some(field) = field.downcast_ref::<PixelNerf>() else { return Vec::new() };
     let full = field.options().sampling;
     let variant = |label: &str, sampling, omissions, leave_out, early_termination| {
-        let field = AnyField::new(field.with_options(PixelNerfOptions { sampling, omissions }));
+        let with = PixelNerfOptions { sampling, omissions, precision: Precision::Exact };
+        let field = AnyField::new(field.with_options(with));
         Variant::to_measure(label, (field, RenderOptions { leave_out, early_termination, ..options.clone() }))
+    };
+    let in_precision = |precision: &Precision| {
+        let with = PixelNerfOptions { sampling: full, omissions: NONE, precision: *precision };
+        let options = RenderOptions { leave_out: 0.0, early_termination: 0.0, ..options.clone() };
+        Variant::to_measure(precision.name(), (AnyField::new(field.with_options(with)), options))
     };
     let all =
         |label: &str, sampling| variant(label, sampling, Omissions::ALL, options.leave_out, options.early_termination);
     let mut drawn = vec![variant(EXACT, full, NONE, 0.0, 0.0)];
+    drawn.extend(precisions.iter().map(in_precision));
     drawn.extend(ALONE.map(|(label, omissions, leave_out, early_termination)| {
         variant(label, full, omissions, leave_out, early_termination)
     }));

@@ -196,8 +196,8 @@ impl<'a> Stage<'a> {
     }
 
     /// The efforts of the field, the cheapest first, the exact one last; none for a field with one way to render.
-    pub fn efforts(&self) -> &[Variant<AnyOptions>] {
-        &self.session.efforts
+    pub fn efforts(&self) -> Vec<Variant<AnyOptions>> {
+        self.session.efforts()
     }
 
     /// Renders what follows with one of [`Stage::efforts`]; without effect where the options have a bound, which

@@ -84,7 +84,7 @@ pub(crate) const ROW: Row = Row {
     origin: Origin::TrainingFree { open },
     flags: FLAGS,
     omissions: &[],
-    drawn: |_, _, _| Vec::new(),
+    drawn: |_, _, _, _| Vec::new(),
 };
 
 flags! {

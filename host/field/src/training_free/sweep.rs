@@ -100,7 +100,7 @@ pub(crate) const ROW: Row = Row {
     origin: Origin::TrainingFree { open: |_| Ok(AnyField::new(Sweep::default())) },
     flags: &[],
     omissions: &[],
-    drawn: |_, _, _| Vec::new(),
+    drawn: |_, _, _, _| Vec::new(),
 };
 
 impl Field for Sweep {

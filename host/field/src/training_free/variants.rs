@@ -5,6 +5,7 @@ use crate::AnyField;
 use crate::render::RenderOptions;
 use crate::row::{ALL, Drawn};
 use crate::variant::{EXACT, Variant};
+use viewfuse_device::Precision;
 
 /// Words, `--leave-out`, `--early-termination`, alone.
 const EARLY: [(&str, f32, f32); 8] = [
@@ -22,7 +23,12 @@ const EARLY: [(&str, f32, f32); 8] = [
 const SOURCES: [(&str, f32); 3] = [("3/4", 0.75), ("1/2", 0.5), ("1/4", 0.25)];
 
 /// What `pareto` draws; `options` give what `all` omits, the size and the background.
-pub(super) fn drawn(field: &AnyField, options: &RenderOptions, _target_count: usize) -> Vec<Drawn> {
+pub(super) fn drawn(
+    field: &AnyField,
+    options: &RenderOptions,
+    _target_count: usize,
+    _precisions: &[Precision],
+) -> Vec<Drawn> {
     let Some(field) = field.downcast_ref::<TrainingFree>() else { return Vec::new() };
     let variant = |label: &str, source_share, leave_out, early_termination| {
         let field = AnyField::new(TrainingFree { source_share, ..field.clone() });

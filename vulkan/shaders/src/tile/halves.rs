@@ -21,7 +21,7 @@ mod stand_ins;
 pub(crate) use matrices::Matrices;
 pub(crate) use stand_ins::StandIns;
 
-use super::wait_for_all;
+use super::{fetch_columns, wait_for_all};
 use core::marker::PhantomData;
 use spirv_std::arch::IndexUnchecked;
 use spirv_std::float::vec2_to_f16x2;
@@ -189,13 +189,10 @@ fn fetch_row<L: Left>(left: L, row: u32, first: u32, shape: Shape) -> Eight {
 
 /// Eight numbers of an inner index from a column on, 0 beyond the matrix.
 #[inline(always)]
-fn fetch_columns(right: impl Fn(u32, u32) -> f32 + Copy, inner: u32, first: u32, shape: Shape) -> Eight {
-    let last = shape.column_count - 1;
-    let number = move |more: u32| {
-        let number = right(inner, (first + more).min(last));
-        if inner < shape.inner_count { number } else { 0.0 }
-    };
-    [Vec4::new(number(0), number(1), number(2), number(3)), Vec4::new(number(4), number(5), number(6), number(7))]
+fn fetch_eight(right: impl Fn(u32, u32) -> f32 + Copy, inner: u32, first: u32, shape: Shape) -> Eight {
+    let column = move |more: u32| (first + more).min(shape.column_count - 1);
+    let fours = [[column(0), column(1), column(2), column(3)], [column(4), column(5), column(6), column(7)]];
+    [fetch_columns(right, inner, fours[0], shape), fetch_columns(right, inner, fours[1], shape)]
 }
 
 /// Blocks once for each number, with the number as a constant: only so an array stays in registers.
@@ -252,7 +249,7 @@ macro_rules! form {
                     [$(fetch_row(left, first_row + row + $i * ROWS, start + row_inner * 8, shape)),*]
                 };
                 let fetch_columns = move |start: u32| {
-                    [$(fetch_columns(right, start + column_inner + $i * INNERS, first_column + column * 8, shape)),*]
+                    [$(fetch_eight(right, start + column_inner + $i * INNERS, first_column + column * 8, shape)),*]
                 };
                 let (rows, columns) = (fetch_rows(0), fetch_columns(0));
                 $(put::<$two, _>(shared, row_place + $i * ROWS * LEFT_STRIDE, LEFT, rows[$i]);)*

@@ -121,7 +121,7 @@ impl<D: Device> Block<D> {
         // The sum of two independent images is scaled to the variance of one.
         let options = ConvolutionOptions { scale: FRAC_1_SQRT_2, ..PLAIN };
         match &self.attention {
-            None => self.conv1.run_into(scratch.device(), options, &normalised, residual, output)?,
+            None => self.conv1.run_into(scratch, options, &normalised, residual, output)?,
             Some(attention) => {
                 let sum = self.conv1.run(scratch, options, &normalised, residual)?;
                 attention.run_into(scratch, &sum, output)?;
@@ -148,7 +148,7 @@ impl<D: Device> Attention<D> {
         let qkv = self.qkv.run(scratch, PLAIN, &normalised, Residual::None)?;
         let attended = self_attention(scratch, &qkv)?;
         let options = ConvolutionOptions { scale: FRAC_1_SQRT_2, ..PLAIN };
-        self.proj.run_into(scratch.device(), options, &attended, Residual::Image(image), output)?;
+        self.proj.run_into(scratch, options, &attended, Residual::Image(image), output)?;
         for image in [normalised, qkv, attended] {
             scratch.recycle(image);
         }

@@ -302,7 +302,7 @@ where
 }
 
 /// Root mean square in `f64`; infinite or NaN if a value is.
-fn root_mean_square(values: &[f32]) -> f32 {
+pub(in crate::genvs) fn root_mean_square(values: &[f32]) -> f32 {
     let sum: f64 = values.iter().map(|value| f64::from(*value) * f64::from(*value)).sum();
     (sum / values.len().max(1) as f64).sqrt() as f32
 }

@@ -1,0 +1,232 @@
+//! Phis of arrays and structs become phis of their members, and what is computed stays the same. A small module is
+//! executed before and after.
+
+use rspirv::binary::Assemble;
+use rspirv::dr::{Builder, Instruction, Module, Operand};
+use rspirv::spirv::{
+    AddressingModel, Capability, ExecutionModel, FunctionControl, LoopControl, MemoryModel, Op, StorageClass, Word,
+};
+use std::collections::HashMap;
+use viewfuse_shader_compiler::phis::split_phis;
+use viewfuse_shader_compiler::refine::read;
+use viewfuse_tests::module::id_of;
+
+/// Numbers of what the modules compute with.
+const LIMIT: Word = 1;
+const RESULT: Word = 2;
+
+/// What a loop carries.
+#[derive(Clone, Copy, PartialEq)]
+enum Carried {
+    /// `{ [a, b], sum }`.
+    Struct,
+    /// Three numbers by themselves.
+    Numbers,
+}
+
+/// `{ [a, b], sum } = { [0, 1], 0 }; i = 0; do { [a, b], sum = [b, a + b], sum + a; i += 1 } while i < limit;
+/// result = 100 sum + a`, in a loop of one block, which is its own predecessor.
+fn module(carried: Carried) -> Module {
+    let mut b = Builder::new();
+    // The limit and the result have the first numbers.
+    let [limit, result] = [b.id(), b.id()];
+    assert_eq!([limit, result], [LIMIT, RESULT]);
+    b.capability(Capability::Shader);
+    b.memory_model(AddressingModel::Logical, MemoryModel::GLSL450);
+    let (void, boolean, number) = (b.type_void(), b.type_bool(), b.type_int(32, 0));
+    let kind = b.type_function(void, []);
+    let pointer = b.type_pointer(None, StorageClass::Private, number);
+    b.variable(pointer, Some(limit), StorageClass::Private, None);
+    b.variable(pointer, Some(result), StorageClass::Private, None);
+    let [zero, one, two, hundred] = [0, 1, 2, 100].map(|value| b.constant_bit32(number, value));
+    let pair = b.type_array(number, two);
+    let state = b.type_struct([pair, number]);
+    let first_pair = b.constant_composite(pair, [zero, one]);
+    let first = b.constant_composite(state, [first_pair, zero]);
+    let function = b.begin_function(void, None, FunctionControl::NONE, kind).expect("a function");
+    b.entry_point(ExecutionModel::GLCompute, function, "fibonacci", [limit, result]);
+    let [start, again, out] = std::array::from_fn(|_| b.id());
+    let [more, next, next_a, next_b, next_sum] = std::array::from_fn(|_| b.id());
+    let block = |b: &mut Builder, label| _ = b.begin_block(Some(label)).expect("a block");
+    block(&mut b, start);
+    let bound = b.load(number, None, limit, None, []).expect("the limit");
+    b.branch(again).expect("a branch");
+    block(&mut b, again);
+    let (at_a, at_b, at_sum) = match carried {
+        Carried::Struct => {
+            let held = b.phi(state, None, [(first, start), (next, again)]).expect("a state");
+            let count = b.phi(number, None, [(zero, start), (more, again)]).expect("a counter");
+            b.i_add(number, Some(more), count, one).expect("a counter");
+            let both = b.composite_extract(pair, None, held, [0]).expect("a pair");
+            let at_a = b.composite_extract(number, None, both, [0]).expect("a number");
+            let at_b = b.composite_extract(number, None, held, [0, 1]).expect("a number");
+            (at_a, at_b, b.composite_extract(number, None, held, [1]).expect("a number"))
+        }
+        Carried::Numbers => {
+            let at_a = b.phi(number, None, [(zero, start), (next_a, again)]).expect("a number");
+            let at_b = b.phi(number, None, [(one, start), (next_b, again)]).expect("a number");
+            let at_sum = b.phi(number, None, [(zero, start), (next_sum, again)]).expect("a number");
+            let count = b.phi(number, None, [(zero, start), (more, again)]).expect("a counter");
+            b.i_add(number, Some(more), count, one).expect("a counter");
+            (at_a, at_b, at_sum)
+        }
+    };
+    b.i_add(number, Some(next_a), at_b, zero).expect("a sum");
+    b.i_add(number, Some(next_b), at_a, at_b).expect("a sum");
+    b.i_add(number, Some(next_sum), at_sum, at_a).expect("a sum");
+    if carried == Carried::Struct {
+        let both = b.composite_construct(pair, None, [next_a, next_b]).expect("a pair");
+        b.composite_construct(state, Some(next), [both, next_sum]).expect("a state");
+    }
+    let goes_on = b.u_less_than(boolean, None, more, bound).expect("a condition");
+    b.loop_merge(out, again, LoopControl::NONE, []).expect("a loop");
+    b.branch_conditional(goes_on, again, out, []).expect("a branch");
+    block(&mut b, out);
+    let [sum, last] = match carried {
+        Carried::Struct => {
+            // What leaves the loop joins once more.
+            let held = b.phi(state, None, [(next, again)]).expect("a state");
+            [&[1][..], &[0, 0]].map(|path| {
+                let path: Vec<u32> = path.to_vec();
+                b.composite_extract(number, None, held, path).expect("a number")
+            })
+        }
+        Carried::Numbers => [next_sum, next_a],
+    };
+    let larger = b.i_mul(number, None, sum, hundred).expect("a product");
+    let total = b.i_add(number, None, larger, last).expect("a sum");
+    b.store(result, total, None, []).expect("a store");
+    b.ret().expect("an end");
+    b.end_function().expect("an end");
+    b.module()
+}
+
+#[derive(Clone, Debug)]
+enum Value {
+    Number(u32),
+    Members(Vec<Value>),
+}
+
+impl Value {
+    fn number(&self) -> u32 {
+        match self {
+            Value::Number(number) => *number,
+            Value::Members(members) => panic!("{members:?} is no number"),
+        }
+    }
+
+    fn member(&self, path: &[Operand]) -> Value {
+        path.iter().fold(self.clone(), |value, index| match value {
+            Value::Members(members) => members[index.unwrap_literal_bit32() as usize].clone(),
+            Value::Number(_) => panic!("a number has no members"),
+        })
+    }
+}
+
+/// What a module of [`module`] stores for a limit.
+fn execute(module: &Module, limit: u32) -> u32 {
+    let mut values: HashMap<Word, Value> = HashMap::new();
+    let members = |instruction: &Instruction, values: &HashMap<Word, Value>| {
+        Value::Members(instruction.operands.iter().map(|id| values[&id.unwrap_id_ref()].clone()).collect())
+    };
+    for constant in &module.types_global_values {
+        let value = match constant.class.opcode {
+            Op::Constant => Value::Number(constant.operands[0].unwrap_literal_bit32()),
+            Op::ConstantComposite => members(constant, &values),
+            _ => continue,
+        };
+        values.insert(constant.result_id.expect("a result"), value);
+    }
+    values.insert(LIMIT, Value::Number(limit));
+    let blocks = &module.functions[0].blocks;
+    let (mut before, mut block) = (0, &blocks[0]);
+    for _ in 0..1000 {
+        let entered = values.clone();
+        let mut next = None;
+        for instruction in &block.instructions {
+            let operands = &instruction.operands;
+            let id = |index: usize| id_of(instruction, index);
+            let number = |index: usize| values[&id(index)].number();
+            let computed = match instruction.class.opcode {
+                Op::Phi => {
+                    let from = operands.chunks(2).find(|pair| pair[1] == Operand::IdRef(before));
+                    entered[&from.expect("a value from the block before")[0].unwrap_id_ref()].clone()
+                }
+                Op::Load => values[&id(0)].clone(),
+                Op::IAdd => Value::Number(number(0) + number(1)),
+                Op::IMul => Value::Number(number(0) * number(1)),
+                Op::ULessThan => Value::Number(u32::from(number(0) < number(1))),
+                Op::CompositeExtract => values[&id(0)].member(&operands[1..]),
+                Op::CompositeConstruct => members(instruction, &values),
+                Op::Store => {
+                    let stored = values[&id(1)].clone();
+                    values.insert(id(0), stored);
+                    continue;
+                }
+                Op::Branch => {
+                    next = Some(id(0));
+                    continue;
+                }
+                Op::BranchConditional => {
+                    next = Some(if number(0) == 1 { id(1) } else { id(2) });
+                    continue;
+                }
+                Op::LoopMerge => continue,
+                Op::Return => return values[&RESULT].number(),
+                other => panic!("{other:?} is not in these modules"),
+            };
+            values.insert(instruction.result_id.expect("a result"), computed);
+        }
+        before = block.label_id().expect("a label");
+        block = blocks.iter().find(|block| block.label_id() == next).expect("the next block");
+    }
+    panic!("the loop does not end")
+}
+
+fn bytes(module: &Module) -> Vec<u8> {
+    module.assemble().iter().flat_map(|word| word.to_le_bytes()).collect()
+}
+
+/// The types of a module's phis.
+fn phi_types(module: &Module) -> Vec<Op> {
+    let kinds: HashMap<Word, Op> =
+        module.types_global_values.iter().filter_map(|kind| Some((kind.result_id?, kind.class.opcode))).collect();
+    let instructions = module.functions[0].blocks.iter().flat_map(|block| &block.instructions);
+    let phis = instructions.filter(|instruction| instruction.class.opcode == Op::Phi);
+    phis.map(|phi| kinds[&phi.result_type.expect("a type")]).collect()
+}
+
+/// For limits that leave the loop after the first round, and later: sums of Fibonacci's numbers.
+const RESULTS: [(u32, u32); 4] = [(0, 1), (1, 1), (5, 705), (9, 5434)];
+
+#[test]
+fn phis_of_structs_and_arrays_become_those_of_their_numbers() {
+    let before = module(Carried::Struct);
+    assert_eq!(phi_types(&before), [Op::TypeStruct, Op::TypeInt, Op::TypeStruct]);
+    let after = read(&split_phis(&bytes(&before)).expect("SPIR-V")).expect("SPIR-V");
+    // Three numbers of the loop and its counter, and three behind it.
+    assert_eq!(phi_types(&after), [Op::TypeInt; 7]);
+    for (limit, expected) in RESULTS {
+        assert_eq!([&before, &after].map(|module| execute(module, limit)), [expected; 2], "{limit}");
+    }
+    // In each block they stand first, and every number is below the bound and given once.
+    let mut given: Vec<Word> = after.all_inst_iter().filter_map(|instruction| instruction.result_id).collect();
+    assert!(given.iter().all(|id| *id < after.header.as_ref().expect("a header").bound));
+    given.sort_unstable();
+    assert!(given.windows(2).all(|pair| pair[0] != pair[1]), "a number is given twice");
+    for block in &after.functions[0].blocks {
+        let is_phi = |instruction: &Instruction| instruction.class.opcode == Op::Phi;
+        let first_other = block.instructions.iter().position(|instruction| !is_phi(instruction));
+        assert!(block.instructions[first_other.expect("an end")..].iter().all(|instruction| !is_phi(instruction)));
+    }
+}
+
+#[test]
+fn a_module_of_numbers_stays_as_it_is() {
+    let before = module(Carried::Numbers);
+    assert!(split_phis(&bytes(&before)).expect("SPIR-V") == bytes(&before));
+    for (limit, expected) in RESULTS {
+        assert_eq!(execute(&before, limit), expected, "{limit}");
+    }
+    assert!(split_phis(&[1, 2, 3]).is_err());
+}
