@@ -26,6 +26,7 @@
 //! Source: "3D Gaussian Splatting for Real-Time Radiance Field Rendering" (Kerbl et al. 2023); the pyramid, the faint
 //! Gaussians at random and the penalty on opacity are for few views.
 
+mod course;
 mod covers;
 mod given;
 mod growth;
@@ -37,12 +38,14 @@ mod particles;
 mod picture;
 mod quality;
 mod recipe;
+mod resident;
 mod residuals;
 mod start;
 mod tiles;
 
+pub use course::Optimised;
 pub use given::{GivenGaussians, behind, scene_of};
-pub use optimise::{Optimisation, Optimised, optimisation, optimised};
+pub use optimise::{Optimisation, optimisation, optimisation_by_host, optimisation_on_device, optimised};
 pub use picture::{Splatted, Splatter};
 pub use quality::{Quality, RecipeOptions};
 pub use recipe::{MAX_COUNT, MAX_ITERATIONS, Recipe};

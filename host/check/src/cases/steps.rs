@@ -160,7 +160,7 @@ impl Case for GatherGradients {
         ("gaussians", |case| increase(case.gaussians.iter_mut().flat_map(|gaussian| &mut gaussian.log_scales))),
         ("splats", |case| increase(case.splats.iter_mut().flat_map(|splat| &mut splat.conic))),
         ("starts", |case| case.starts.fill(0)),
-        ("entries", |case| case.entries.fill(u32::MAX >> 8)),
+        ("entries", |case| case.entries.fill(0)),
         ("sums", |case| increase(case.sums.iter_mut().map(|sums| &mut sums.opacity))),
         ("parameters", |case| case.block.camera.intrinsics[0] *= 1.01),
     ];
