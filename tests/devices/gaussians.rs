@@ -25,6 +25,7 @@ tests!(
     iterations_of_a_device_are_the_hosts,
     a_devices_scene_depends_on_no_capacity_and_no_run,
     an_iteration_needs_no_transfer,
+    a_picture_has_the_same_bits_with_lists_of_the_device,
 );
 
 /// Most splats of a tile: fewer than those whose loops Mesa's llvmpipe ends (`viewfuse_field::gaussians::optimised`).
@@ -269,5 +270,24 @@ fn an_iteration_needs_no_transfer(candidate: &Candidate) -> Result<(), Failed> {
         let a_piece = (dispatches(&device) - dispatched) as f64 / 32.0;
         assert_eq!(a_piece, 15.0 + f64::from(degree), "dispatches an iteration");
     }
+    Ok(())
+}
+
+fn a_picture_has_the_same_bits_with_lists_of_the_device(candidate: &Candidate) -> Result<(), Failed> {
+    let device = candidate.vulkan(&GpuOptions::default())?;
+    let made = cpus_scene();
+    let uploaded = device.upload(&made.gaussians)?;
+    let splatter = Splatter { device: &device, near: made.near, background: made.background };
+    let before = device.transfers();
+    let [ours, hosts] = [true, false].map(|are_lists_on_device| {
+        let drawn = splatter.drawn(&uploaded, made.gaussians.len(), &camera(), are_lists_on_device);
+        let (colours, depths) = drawn.expect("a picture");
+        let transfers = device.transfers();
+        (device.download(&colours).expect("colours"), device.download(&depths).expect("depths"), transfers)
+    });
+    assert!(ours.0 == hosts.0 && ours.1 == hosts.1);
+    assert!(ours.0.iter().any(|colour| colour[3] > 0.5), "something is seen");
+    let downloaded = ours.2.downloaded_bytes - before.downloaded_bytes;
+    assert!(downloaded == 12 && ours.2.uploads == before.uploads, "{downloaded} bytes");
     Ok(())
 }

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! masks     which splats' boxes reach a bin of 8 by 8 tiles, a bit each      ListBlock::mask
-//! counts    how many of them a tile shows, in 16 parts of the splats         ListBlock::fold_entries
+//! counts    how many of them a tile shows, in 32 parts of the splats         ListBlock::fold_entries
 //! starts    sums of the counts before a tile                                 ListBlock::before
 //! keys      a tile's splats with their depths, by index                      ListBlock::fold_entries
 //! entries   the same by depth, and of one depth by index                     rank
@@ -28,9 +28,9 @@ const BIN: u32 = BIN_TILES * SPLAT_TILE as u32;
 /// Splats of a mask.
 pub const MASK_SPLATS: u32 = 32;
 /// Parts of the splats: those of a tile are counted and listed by so many invocations.
-pub const LIST_PARTS: u32 = 16;
+pub const LIST_PARTS: u32 = 32;
 /// Tiles whose counts are summed together.
-pub const TILE_RUN: u32 = 16;
+pub const TILE_RUN: u32 = 8;
 /// Numbers of a [`ListStatus`].
 pub const STATUS_NUMBERS: u32 = 3;
 

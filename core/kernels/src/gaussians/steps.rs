@@ -212,16 +212,13 @@ pub fn step_term(
     colour_rate: f32,
     corrections: [f32; 2],
 ) -> HarmonicTerm {
-    let mut stepped = *term;
-    let mut channel = 0;
-    while channel < 3 {
-        let (mut value, mut moments) = (stepped.value[channel], stepped.moments[channel]);
+    let step = |channel: usize| {
+        let (mut value, mut moments) = (term.value[channel], term.moments[channel]);
         adam_step(&mut value, &mut moments, by_colour[channel] * basis, RATE_SHARE * colour_rate, corrections);
-        stepped.value[channel] = value;
-        stepped.moments[channel] = moments;
-        channel += 1;
-    }
-    stepped
+        (value, moments)
+    };
+    let ((red, of_red), (green, of_green), (blue, of_blue)) = (step(0), step(1), step(2));
+    HarmonicTerm { value: [red, green, blue], moments: [of_red, of_green, of_blue], ..*term }
 }
 
 /// A parameter and its moments after a step; the same if the derivative is not finite.
@@ -252,32 +249,30 @@ pub fn step_particle(
     let solid = opacity(gaussian.opacity);
     let penalty = block.opacity_penalty * solid * (1.0 - solid);
     let by_colour = by_colour(gradient.colour, seen, block.degree);
-    let mut index = 0;
-    while index < 3 {
-        (next.position[index], after.moments[index]) =
-            stepped(next.position[index], after.moments[index], gradient.position[index], place, corrections);
-        (next.log_scales[index], after.moments[3 + index]) =
-            stepped(next.log_scales[index], after.moments[3 + index], gradient.log_scales[index], scale, corrections);
-        (next.colour[index], after.moments[11 + index]) =
-            stepped(next.colour[index], after.moments[11 + index], by_colour[index], colour, corrections);
-        index += 1;
-    }
-    let mut index = 0;
-    while index < 4 {
-        (next.rotation[index], after.moments[6 + index]) =
-            stepped(next.rotation[index], after.moments[6 + index], gradient.rotation[index], turn, corrections);
-        index += 1;
-    }
-    (next.opacity, after.moments[10]) =
-        stepped(next.opacity, after.moments[10], gradient.opacity + penalty, opaque, corrections);
+    let old = &state.moments;
+    let three = |first: usize, values: [f32; 3], by: [f32; 3], rate: f32| {
+        let (a, of_a) = stepped(values[0], old[first], by[0], rate, corrections);
+        let (b, of_b) = stepped(values[1], old[first + 1], by[1], rate, corrections);
+        let (c, of_c) = stepped(values[2], old[first + 2], by[2], rate, corrections);
+        ([a, b, c], [of_a, of_b, of_c])
+    };
+    let (position, [m0, m1, m2]) = three(0, gaussian.position, gradient.position, place);
+    let (log_scales, [m3, m4, m5]) = three(3, gaussian.log_scales, gradient.log_scales, scale);
+    let ([w, i, j, k], [by_w, by_i, by_j, by_k]) = (gaussian.rotation, gradient.rotation);
+    let (w, m6) = stepped(w, old[6], by_w, turn, corrections);
+    let ([i, j, k], [m7, m8, m9]) = three(7, [i, j, k], [by_i, by_j, by_k], turn);
+    let (logit, m10) = stepped(gaussian.opacity, old[10], gradient.opacity + penalty, opaque, corrections);
+    let (colour, [m11, m12, m13]) = three(11, gaussian.colour, by_colour, colour);
+    after.moments = [m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11, m12, m13];
+    (next.position, next.rotation, next.colour) = (position, [w, i, j, k], colour);
     let [x, y, z] = next.position;
     let depth = block.camera.pose.rotate_to_camera(Vec3::new(x, y, z) - block.camera.centre_world()).z;
     let most = ln(MAX_SCALE * block.footprint * max(depth / block.depth, 1.0));
-    let [a, b, c] = next.log_scales;
+    let [a, b, c] = log_scales;
     let [a, b, c] = [min(a, most), min(b, most), min(c, most)];
     let least = max(max(a, b), c) - MAX_ELONGATION;
     next.log_scales = [max(a, least), max(b, least), max(c, least)];
-    next.opacity = clamp(next.opacity, -MAX_LOGIT, MAX_LOGIT);
+    next.opacity = clamp(logit, -MAX_LOGIT, MAX_LOGIT);
     if block.degree > 0 && after.rest_count < REST_COUNTS[block.degree as usize] {
         after.rest_count = REST_COUNTS[block.degree as usize];
     }
@@ -294,17 +289,14 @@ pub fn step_particle(
 /// A gain after a step against its derivative.
 #[inline(always)]
 pub fn step_gain(gain: &GainBlock, by_gain: [f32; 3], rate: f32) -> GainBlock {
-    let mut next = *gain;
-    next.step_count += 1;
-    let corrections = corrections(next.step_count);
-    let mut channel = 0;
-    while channel < 3 {
-        let (mut value, mut moments) = (next.value[channel], next.moments[channel]);
+    let step_count = gain.step_count + 1;
+    let corrections = corrections(step_count);
+    let step = |channel: usize| {
+        let (mut value, mut moments) = (gain.value[channel], gain.moments[channel]);
         let pulled = by_gain[channel] + GAIN_PULL * (value - 1.0);
         adam_step(&mut value, &mut moments, pulled, rate, corrections);
-        next.value[channel] = value;
-        next.moments[channel] = moments;
-        channel += 1;
-    }
-    next
+        (value, moments)
+    };
+    let ((red, of_red), (green, of_green), (blue, of_blue)) = (step(0), step(1), step(2));
+    GainBlock { value: [red, green, blue], step_count, moments: [of_red, of_green, of_blue], ..*gain }
 }

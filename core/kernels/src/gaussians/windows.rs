@@ -12,8 +12,8 @@ use viewfuse_core::math::clamp;
 
 /// Radius of a window in pixels.
 pub const RADIUS: usize = 4;
-/// The window along an axis, from its centre on, before it is divided by its sum.
-pub const WINDOW: [f32; RADIUS + 1] = [1.0, 0.800_737_4, 0.411_112_3, 0.135_335_28, 0.028_565_5];
+/// The window along an axis, from its centre on: with its other half its sum is 1.
+pub const WINDOW: [f32; RADIUS + 1] = window();
 /// SSIM's constants for colours from 0 to 1.
 const CONSTANTS: [f32; 2] = [1.0e-4, 9.0e-4];
 /// Differences below this count by their square: the derivative is then continuous.
@@ -21,13 +21,12 @@ pub const SMALL: f32 = 0.01;
 /// Opacity below which a photograph shows nothing, where it has no silhouette.
 pub const MIN_SEEN: f32 = 0.999;
 /// Pixels whose shares in the derivative by a gain are summed together.
-pub const SHARE_RUN: u32 = 128;
+pub const SHARE_RUN: u32 = 256;
 
-/// The window along an axis, from its centre on: with its other half its sum is 1.
-#[inline(always)]
-pub fn window() -> [f32; RADIUS + 1] {
-    let sum = WINDOW[0] + 2.0 * (WINDOW[1] + WINDOW[2] + WINDOW[3] + WINDOW[4]);
-    [WINDOW[0] / sum, WINDOW[1] / sum, WINDOW[2] / sum, WINDOW[3] / sum, WINDOW[4] / sum]
+const fn window() -> [f32; RADIUS + 1] {
+    let [centre, a, b, c, d] = [1.0, 0.800_737_4, 0.411_112_3, 0.135_335_28, 0.028_565_5];
+    let sum: f32 = centre + 2.0 * (a + b + c + d);
+    [centre / sum, a / sum, b / sum, c / sum, d / sum]
 }
 
 /// A photograph and what it counts, as plain data.
@@ -114,19 +113,28 @@ fn scaled(values: [Channels; 3], weight: f32) -> [Channels; 3] {
     [part(0), part(1), part(2)]
 }
 
+/// The window's weight at an offset from 1 to [`RADIUS`]: by choices, as an array that a counter indexes is memory on a
+/// GPU.
+#[inline(always)]
+fn weight(offset: u32) -> f32 {
+    let (near, far) =
+        (if offset == 1 { WINDOW[1] } else { WINDOW[2] }, if offset == 3 { WINDOW[3] } else { WINDOW[4] });
+    if offset < 3 { near } else { far }
+}
+
 /// The mean over a part of a row around a column, of `at(pixel)`; 0 for a row outside of the picture.
 #[inline(always)]
 fn row_mean(block: &LossBlock, column: u32, row: u32, at: impl Fn(u32) -> [Channels; 3]) -> [Channels; 3] {
     if row >= block.height {
         return zero();
     }
-    let (window, first) = (window(), row * block.width);
-    let mut sums = scaled(at(first + column), window[0]);
+    let first = row * block.width;
+    let mut sums = scaled(at(first + column), WINDOW[0]);
     let mut offset = 1;
     while offset <= RADIUS as u32 {
         let before = if column >= offset { at(first + column - offset) } else { zero() };
         let after = if column + offset < block.width { at(first + column + offset) } else { zero() };
-        sums = added(sums, window[offset as usize], before, after);
+        sums = added(sums, weight(offset), before, after);
         offset += 1;
     }
     sums
@@ -136,14 +144,13 @@ fn row_mean(block: &LossBlock, column: u32, row: u32, at: impl Fn(u32) -> [Chann
 #[inline(always)]
 fn mean(block: &LossBlock, pixel: u32, at: impl Fn(u32) -> [Channels; 3] + Copy) -> [Channels; 3] {
     let (column, row) = (pixel % block.width, pixel / block.width);
-    let window = window();
-    let mut sums = scaled(row_mean(block, column, row, at), window[0]);
+    let mut sums = scaled(row_mean(block, column, row, at), WINDOW[0]);
     let mut offset = 1;
     while offset <= RADIUS as u32 {
         // Above the picture the number wraps around to a row that is not in it, either.
         let above = row_mean(block, column, row.wrapping_sub(offset), at);
         let below = row_mean(block, column, row + offset, at);
-        sums = added(sums, window[offset as usize], above, below);
+        sums = added(sums, weight(offset), above, below);
         offset += 1;
     }
     sums

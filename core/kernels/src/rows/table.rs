@@ -473,14 +473,14 @@ macro_rules! for_each_kernel {
                 read splats: ProjectedGaussian as vectors,
                 write masks: u32,
             }
-            /// How many splats each tile shows, in 16 parts of the splats: `counts[tile][part]`. An element is a part of
+            /// How many splats each tile shows, in 32 parts of the splats: `counts[tile][part]`. An element is a part of
             /// a tile.
             CountEntries count_entries(block: ListBlock) for part in [0..block.tile_count() * LIST_PARTS; 64 a core] {
                 read splats: ProjectedGaussian as vectors,
                 read masks: u32,
                 write counts: u32,
             }
-            /// Entries of runs of 16 tiles: `sums[run]`. An element is a run.
+            /// Entries of runs of 8 tiles: `sums[run]`. An element is a run.
             SumEntries sum_entries(block: ListBlock) for run in [0..block.run_count(); 64 a core] {
                 read counts: u32,
                 write sums: u32,
@@ -567,7 +567,7 @@ macro_rules! for_each_kernel {
                 read terms: HarmonicTerm as vectors,
                 write next_terms: HarmonicTerm as vectors,
             }
-            /// What runs of 128 pixels add to the derivative by a gain: `sums[run]`. An element is a run.
+            /// What runs of 256 pixels add to the derivative by a gain: `sums[run]`. An element is a run.
             SumShares sum_shares(pixel_count: u32) for run in [0..pixel_count.div_ceil(SHARE_RUN); 64 a core] {
                 read shares: [f32; 4] as vectors,
                 write sums: [f32; 4] as vectors,

@@ -4,7 +4,7 @@
 use super::*;
 use crate::bounded::roundings;
 use crate::world::Numbers;
-use viewfuse_kernels::gaussians::windows::{MIN_SEEN, RADIUS, SMALL, WINDOW};
+use viewfuse_kernels::gaussians::windows::{MIN_SEEN, RADIUS, SMALL};
 
 /// A picture and photographs.
 struct Compared {
@@ -62,8 +62,9 @@ fn pair(
 /// The mean over a pixel's window: weights that fall off like a Gaussian of standard deviation 1.5, over their sum.
 fn mean(block: &LossBlock, pixel: usize, at: impl Fn(usize) -> Bounded) -> Bounded {
     let (width, height, radius) = (block.width as usize, block.height as usize, RADIUS as isize);
-    let all: f64 = WINDOW.iter().map(|weight| f64::from(*weight)).sum::<f64>() * 2.0 - 1.0;
-    let weight = |offset: isize| f64::from(WINDOW[offset.unsigned_abs()]) / all;
+    let fall = |offset: isize| (-0.5 * (offset as f64 / 1.5).powi(2)).exp();
+    let all: f64 = (-radius..=radius).map(fall).sum();
+    let weight = |offset: isize| fall(offset) / all;
     let (column, row) = ((pixel % width) as isize, (pixel / width) as isize);
     let (mut value, mut brought, mut magnitudes) = (0.0, 0.0, 0.0);
     for down in -radius..=radius {

@@ -4,7 +4,7 @@
 //! picture's edge: what lies outside counts as 0, in both pictures. Its derivative goes through the windows' means of
 //! `x`, `x x` and `x y`, and these windows are symmetric, so it is again three blurs.
 
-use viewfuse_kernels::gaussians::windows::{RADIUS, SMALL, similarity_gradient, window};
+use viewfuse_kernels::gaussians::windows::{RADIUS, SMALL, WINDOW, similarity_gradient};
 
 /// A channel of a photograph, in windows.
 #[derive(Clone, Debug)]
@@ -68,7 +68,7 @@ fn add_structure(pair: &Pair<'_>, share: f32, gradient: &mut [f32]) {
 
 /// Means over windows: along the rows, then along the columns, each from the centre outwards.
 fn blurred(values: &[f32], width: usize, height: usize) -> Vec<f32> {
-    let window = window();
+    let window = WINDOW;
     let mut padded = vec![0.0; width + 2 * RADIUS];
     let mut rows = vec![0.0; values.len()];
     for (row, blurred) in values.chunks_exact(width).zip(rows.chunks_exact_mut(width)) {

@@ -2,7 +2,7 @@
 //! memory is the host's, the host makes lists, loss and steps; elsewhere all of an iteration is the device's
 //! ([`resident`](super::resident)).
 
-use super::course::{Course, Optimised, Plan};
+use super::course::{Course, Optimisation, Optimised, Plan};
 use super::level::LevelView;
 use super::loss::{Pair, gradient};
 use super::particles::step_all;
@@ -19,49 +19,6 @@ use viewfuse_kernels::gaussians::steps::step_gain;
 use viewfuse_kernels::rows::{GaussianBlock, LossBlock};
 use viewfuse_scene::gaussians::GaussianScene;
 use viewfuse_scene::photographs::SourceImages;
-
-/// An optimisation, on whatever device makes its steps.
-pub trait Optimisation {
-    /// Counts each source's differences by its weight from now on; the weights are scaled to 1 in the mean.
-    fn weigh(&mut self, weights: &[f32]);
-
-    /// Goes on from Gaussians that were optimised before, with the finest level's iterations.
-    fn resume(&mut self, scene: &GaussianScene);
-
-    /// Adds iterations at the finest level.
-    fn extend(&mut self, iterations: u32);
-
-    /// So many iterations at the finest level in place of the recipe's, at least those that are done.
-    fn set_finest(&mut self, iterations: u32);
-
-    /// How many iterations are done at the finest level.
-    fn done_at_finest(&self) -> u32;
-
-    /// How many iterations are done.
-    fn done(&self) -> u32;
-
-    /// All iterations of the recipe.
-    fn iteration_count(&self) -> u32;
-
-    /// The iterations up to this number of them, as far as the recipe has so many; none if so many are done. A device
-    /// may still be at work on the last ones.
-    ///
-    /// # Errors
-    /// [`FieldError`]; where the device did not fail, the Gaussians so far are still there.
-    fn run_to(&mut self, iteration: u32, progress: &dyn Progress) -> Result<(), FieldError>;
-
-    /// Waits until the device is done with all iterations so far, so that their time can be measured.
-    ///
-    /// # Errors
-    /// [`FieldError`].
-    fn finish(&mut self) -> Result<(), FieldError>;
-
-    /// The Gaussians so far.
-    ///
-    /// # Errors
-    /// [`FieldError`] if the device fails.
-    fn optimised(&mut self) -> Result<Optimised, FieldError>;
-}
 
 /// An optimisation at its beginning: on the device, or, where that is a software driver, by the CPU's own loops, which
 /// take a part of its time. Mesa's llvmpipe, besides, ends the loops of an invocation after 65,535 iterations, so that

@@ -8,10 +8,9 @@
 //! results do not depend on the capacity. The Gaussians come back to the host when their number changes, and when they
 //! are asked for.
 
-use super::course::{Course, Optimised, Plan};
+use super::course::{Course, Optimisation, Optimised, Plan};
 use super::harmonics::Harmonics;
 use super::level::LevelView;
-use super::optimise::Optimisation;
 use super::particles::Particle;
 use crate::FieldError;
 use viewfuse_core::camera::CameraBlock;
