@@ -102,7 +102,8 @@ impl<'d, D: Device> Splatter<'d, D> {
         device.list_entries(&block, &splats, &masks, &starts, &counts, &mut keys)?;
         device.sort_entries(&block, &starts, &keys, &mut entries)?;
 
-        let (mut colours, mut depths) = (device.zeros((width * height) as usize)?, zeros(width * height)?);
+        let pixel_count = (width * height) as usize;
+        let (mut colours, mut depths) = (device.zeros(pixel_count)?, device.zeros(pixel_count)?);
         let tiles = block.tiles(self.background);
         device.blend_splats(&tiles, &starts, &entries, &splats, &mut colours, &mut depths)?;
         Ok((colours, depths))

@@ -28,7 +28,7 @@ use viewfuse_scene::gaussians::GaussianScene;
 /// Iterations after which the host sees whether the lists had room.
 const ROUND: usize = 32;
 /// Entries that there is room for at first: so many for each Gaussian, and at least these.
-const ENTRIES_A_GAUSSIAN: usize = 16;
+const ENTRIES_A_GAUSSIAN: usize = 8;
 const MIN_ENTRIES: usize = 4096;
 /// Gaussians must be fewer: their number has 24 bits.
 const MAX_GAUSSIANS: usize = 1 << 24;
