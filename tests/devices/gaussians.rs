@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::{Device, Memory};
 use viewfuse::field::gaussians::{
-    Optimised, Recipe, Splatter, Tiles, optimisation_by_host, optimisation_on_device, optimised,
+    Drawn, Optimised, Recipe, Splatter, Tiles, optimisation_by_host, optimisation_on_device, optimised,
 };
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::photographs::to_rgb8;
@@ -214,8 +214,8 @@ fn by_host<D: Device>(device: &D, recipe: Recipe, end: u32) -> Optimised {
     optimisation.optimised().expect("Gaussians")
 }
 
-/// The first iterations differ by last digits at most; then these make steps of other signs where derivatives are nearly
-/// 0, so that only scores are compared. On the CPU all but the sums for the gains are the host's, bit by bit.
+/// The first iterations differ by last digits at most; then these make steps of other signs where derivatives are
+/// nearly 0, so that only scores are compared. On the CPU all but the sums for the gains are the host's, bit by bit.
 fn iterations_of_a_device_are_the_hosts(candidate: &Candidate) -> Result<(), Failed> {
     let device = candidate.vulkan(&GpuOptions::default())?;
     let recipe = small_recipe();
@@ -281,7 +281,7 @@ fn a_picture_has_the_same_bits_with_lists_of_the_device(candidate: &Candidate) -
     let before = device.transfers();
     let [ours, hosts] = [true, false].map(|are_lists_on_device| {
         let drawn = splatter.drawn(&uploaded, made.gaussians.len(), &camera(), are_lists_on_device);
-        let (colours, depths) = drawn.expect("a picture");
+        let Drawn { colours, depths } = drawn.expect("a picture");
         let transfers = device.transfers();
         (device.download(&colours).expect("colours"), device.download(&depths).expect("depths"), transfers)
     });

@@ -24,6 +24,7 @@ mod losses;
 mod march_rays;
 mod match_cost;
 mod matrices;
+mod particles;
 mod paths;
 mod pick_depth;
 mod pick_disparity;

@@ -6,8 +6,8 @@ use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::gaussian::GaussianBlock;
 use viewfuse_kernels::gaussians::adam::{FIRST_DECAY, SECOND_DECAY};
 
-/// Absolute error of a spherical harmonic: a direction that is off by 4e-7, slopes of at most 10, and some ten roundings
-/// of numbers up to 4.
+/// Absolute error of a spherical harmonic: a direction that is off by 4e-7, slopes of at most 10, and some ten
+/// roundings of numbers up to 4.
 const HARMONIC_ERROR: f64 = 1.0e-5;
 
 /// 1 less a decay to the power of the steps.

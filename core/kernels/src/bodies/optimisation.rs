@@ -257,12 +257,12 @@ pub fn gather_gradients(
     let splat = splats.fetch(at);
     let side = SPLAT_TILE as u32;
     let [left, right, top, bottom] = splat.pixels(block.camera.width, block.camera.height);
-    let tile_columns = (block.camera.width + side - 1) / side;
+    let tile_columns = block.camera.width.div_ceil(side);
     let mut all = SplatGradient::ZERO;
     // Nothing is covered where an end is not behind its first one.
-    let (mut row, end_row) = (top / side, if left < right { (bottom + side - 1) / side } else { 0 });
+    let (mut row, end_row) = (top / side, if left < right { bottom.div_ceil(side) } else { 0 });
     while row < end_row {
-        let (mut column, end_column) = (left / side, (right + side - 1) / side);
+        let (mut column, end_column) = (left / side, right.div_ceil(side));
         while column < end_column {
             if is_reached(&splat, [left, right, top, bottom], column, row) {
                 let tile = (row * tile_columns + column) as usize;

@@ -69,11 +69,6 @@ pub struct ListBlock {
 const _: () = assert!(size_of::<ListBlock>() == 16);
 
 #[inline(always)]
-fn quotient_above(count: u32, size: u32) -> u32 {
-    count / size + (count % size != 0) as u32
-}
-
-#[inline(always)]
 fn lesser(a: u32, b: u32) -> u32 {
     if a < b { a } else { b }
 }
@@ -82,37 +77,37 @@ impl ListBlock {
     /// Columns of tiles.
     #[inline(always)]
     pub fn tile_columns(&self) -> u32 {
-        quotient_above(self.width, SPLAT_TILE as u32)
+        self.width.div_ceil(SPLAT_TILE as u32)
     }
 
     /// Tiles of the picture, row by row.
     #[inline(always)]
     pub fn tile_count(&self) -> u32 {
-        self.tile_columns() * quotient_above(self.height, SPLAT_TILE as u32)
+        self.tile_columns() * self.height.div_ceil(SPLAT_TILE as u32)
     }
 
     /// Bins of the picture, row by row.
     #[inline(always)]
     pub fn bin_count(&self) -> u32 {
-        quotient_above(self.width, BIN) * quotient_above(self.height, BIN)
+        self.width.div_ceil(BIN) * self.height.div_ceil(BIN)
     }
 
     /// Masks of a bin.
     #[inline(always)]
     pub fn mask_count(&self) -> u32 {
-        quotient_above(self.splat_count, MASK_SPLATS)
+        self.splat_count.div_ceil(MASK_SPLATS)
     }
 
     /// Masks of a part.
     #[inline(always)]
     fn masks_of_part(&self) -> u32 {
-        quotient_above(self.mask_count(), LIST_PARTS)
+        self.mask_count().div_ceil(LIST_PARTS)
     }
 
     /// Runs of tiles.
     #[inline(always)]
     pub fn run_count(&self) -> u32 {
-        quotient_above(self.tile_count(), TILE_RUN)
+        self.tile_count().div_ceil(TILE_RUN)
     }
 
     /// The place of `starts` that element `element` of `start_tiles` writes: behind the last one are those of the
@@ -133,7 +128,7 @@ impl ListBlock {
     #[inline(always)]
     pub fn mask(&self, splats: &(impl Fetch<ProjectedGaussian> + ?Sized), element: u32) -> u32 {
         let (bin, first) = (element / self.mask_count(), element % self.mask_count() * MASK_SPLATS);
-        let bin_columns = quotient_above(self.width, BIN);
+        let bin_columns = self.width.div_ceil(BIN);
         let (column, row) = (bin % bin_columns * BIN, bin / bin_columns * BIN);
         let (mut mask, mut bit) = (0, 0);
         while bit < MASK_SPLATS {
@@ -163,7 +158,7 @@ impl ListBlock {
     ) -> u32 {
         let (tile, part) = (element / LIST_PARTS, element % LIST_PARTS);
         let (tile_column, tile_row) = (tile % self.tile_columns(), tile / self.tile_columns());
-        let bin = tile_row / BIN_TILES * quotient_above(self.width, BIN) + tile_column / BIN_TILES;
+        let bin = tile_row / BIN_TILES * self.width.div_ceil(BIN) + tile_column / BIN_TILES;
         let (count, of_bin) = (self.mask_count(), bin * self.mask_count());
         let mut mask = lesser(part * self.masks_of_part(), count);
         let end = lesser(mask + self.masks_of_part(), count);
@@ -215,10 +210,9 @@ impl ListBlock {
     /// the last part it is the number of keys. If the capacity is exceeded, all begin at 0, and there are none.
     #[inline(always)]
     pub fn first_of_part(starts: &[u32], counts: &[u32], element: u32) -> u32 {
-        let tile = element / LIST_PARTS;
+        let (tile, part) = (element / LIST_PARTS, element % LIST_PARTS);
         let start = starts[tile as usize];
-        let is_last = element % LIST_PARTS == 0;
-        if is_last || starts[tile as usize + 1] == start {
+        if part == 0 || starts[tile as usize + 1] == start {
             return start;
         }
         start + ListBlock::sum(counts, tile * LIST_PARTS, element)

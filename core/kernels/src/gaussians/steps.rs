@@ -191,8 +191,8 @@ pub fn colour_along(
     [max(colour[0], 0.0), max(colour[1], 0.0), max(colour[2], 0.0)]
 }
 
-/// Derivatives by the colour of degree 0, from those by the colour that is `seen` and the degree of the harmonics: where
-/// there are harmonics colours end at 0.
+/// Derivatives by the colour of degree 0, from those by the colour that is `seen` and the degree of the harmonics:
+/// where there are harmonics colours end at 0.
 #[inline(always)]
 pub fn by_colour(gradient: [f32; 3], seen: [f32; 3], degree: u32) -> [f32; 3] {
     let ends = |channel: usize| degree > 0 && seen[channel] <= 0.0;

@@ -38,8 +38,8 @@ pub fn optimisation<'d, D: Device>(
     }
 }
 
-/// An optimisation whose lists, loss and steps are the host's, with the kernels of its pictures and their derivatives on
-/// a device: what [`optimisation`] takes for the CPU.
+/// An optimisation whose lists, loss and steps are the host's, with the kernels of its pictures and their derivatives
+/// on a device: what [`optimisation`] takes for the CPU.
 ///
 /// # Errors
 /// [`FieldError`].
@@ -54,8 +54,8 @@ pub fn optimisation_by_host<'d, D: Device>(
 }
 
 /// An optimisation whose iterations are a device's own: what [`optimisation`] takes for a GPU. The lists of a picture's
-/// tiles have room for so many entries at first, or for what pictures usually have; results do not depend on it. A scene
-/// that is too large for this on the device is optimised by [`optimisation_by_host`].
+/// tiles have room for so many entries at first, or for what pictures usually have; results do not depend on it. A
+/// scene that is too large for this on the device is optimised by [`optimisation_by_host`].
 ///
 /// # Errors
 /// [`FieldError`].

@@ -18,6 +18,17 @@ pub struct Splatter<'d, D> {
     pub background: [f32; 3],
 }
 
+/// Most masks of a picture's bins, 256 MiB: where there are more, the host makes the lists.
+const MAX_MASKS: u64 = 1 << 26;
+
+/// Whether a device's memory takes the masks from which it makes the lists of a camera's picture.
+pub(super) fn can_be_listed<D: Device>(device: &D, camera: &CameraBlock, gaussian_count: usize) -> bool {
+    let CameraBlock { width, height, .. } = *camera;
+    let block = ListBlock { width, height, splat_count: gaussian_count as u32, capacity: 0 };
+    let masks = u64::from(block.bin_count()) * u64::from(block.mask_count());
+    masks <= MAX_MASKS.min(device.most_elements::<u32>() as u64)
+}
+
 /// A picture on the device, with what its derivatives need.
 #[derive(Debug)]
 pub struct Splatted<D: Device> {
@@ -28,6 +39,15 @@ pub struct Splatted<D: Device> {
     starts: D::Buffer<u32>,
     entries: D::Buffer<u32>,
     splats: D::Buffer<ProjectedGaussian>,
+    /// `[row][column]`: red, green, blue over the background, opacity.
+    pub colours: D::Buffer<[f32; 4]>,
+    /// `[row][column]`: weighted sums of depths; over the opacity, the depth along the principal axis.
+    pub depths: D::Buffer<f32>,
+}
+
+/// A picture on the device, alone.
+#[derive(Debug)]
+pub struct Drawn<D: Device> {
     /// `[row][column]`: red, green, blue over the background, opacity.
     pub colours: D::Buffer<[f32; 4]>,
     /// `[row][column]`: weighted sums of depths; over the opacity, the depth along the principal axis.
@@ -62,7 +82,7 @@ impl<'d, D: Device> Splatter<'d, D> {
         Ok(Splatted { block, tiles, lists, starts, entries, splats, colours, depths })
     }
 
-    /// The picture alone: colours and depths as in [`Splatted`]. On the device, its lists are made there, and the host
+    /// The picture alone. On the device, its lists are made there, and the host
     /// hears how many entries they have; otherwise the host makes them. Both are the same lists.
     ///
     /// # Errors
@@ -73,10 +93,10 @@ impl<'d, D: Device> Splatter<'d, D> {
         gaussian_count: usize,
         camera: &CameraBlock,
         are_lists_on_device: bool,
-    ) -> Result<(D::Buffer<[f32; 4]>, D::Buffer<f32>), DeviceError> {
+    ) -> Result<Drawn<D>, DeviceError> {
         if !are_lists_on_device {
             let Splatted { colours, depths, .. } = self.picture(gaussians, gaussian_count, camera)?;
-            return Ok((colours, depths));
+            return Ok(Drawn { colours, depths });
         }
         let device = self.device;
         let camera = CameraBlock { first_texel: 0, ..*camera };
@@ -106,7 +126,7 @@ impl<'d, D: Device> Splatter<'d, D> {
         let (mut colours, mut depths) = (device.zeros(pixel_count)?, device.zeros(pixel_count)?);
         let tiles = block.tiles(self.background);
         device.blend_splats(&tiles, &starts, &entries, &splats, &mut colours, &mut depths)?;
-        Ok((colours, depths))
+        Ok(Drawn { colours, depths })
     }
 
     /// The same as a field gives it: depths where the opacity is at least `least_opacity`, 0 elsewhere; confidences are
@@ -121,8 +141,8 @@ impl<'d, D: Device> Splatter<'d, D> {
         camera: &CameraBlock,
         least_opacity: f32,
     ) -> Result<Rendered, DeviceError> {
-        let are_lists_on_device = !self.device.is_software();
-        let (colours, depths) = self.drawn(gaussians, gaussian_count, camera, are_lists_on_device)?;
+        let are_lists_on_device = !self.device.is_software() && can_be_listed(self.device, camera, gaussian_count);
+        let Drawn { colours, depths } = self.drawn(gaussians, gaussian_count, camera, are_lists_on_device)?;
         let (mut colours, mut depths) = (self.device.download(&colours)?, self.device.download(&depths)?);
         let confidences: Vec<f32> = colours.iter().map(|colour| colour[3]).collect();
         for (depth, opacity) in depths.iter_mut().zip(&confidences) {

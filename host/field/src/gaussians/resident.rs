@@ -8,201 +8,29 @@
 //! results do not depend on the capacity. The Gaussians come back to the host when their number changes, and when they
 //! are asked for.
 
+mod arrays;
+
 use super::course::{Course, Optimisation, Optimised, Plan};
-use super::harmonics::Harmonics;
-use super::level::LevelView;
-use super::particles::Particle;
 use crate::FieldError;
+use arrays::{Entries, Level, Particles, Stepped, list_block, stepped};
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::gaussian::REST_COUNTS;
-use viewfuse_device::{Device, DeviceError, Element};
+use viewfuse_device::{Device, DeviceError};
 use viewfuse_job::progress::Progress;
 use viewfuse_kernels::gaussians::blend_gradient::SplatGradient;
 use viewfuse_kernels::gaussians::lists::ListStatus;
 use viewfuse_kernels::rows::{
-    GainBlock, GainStepBlock, GaussianBlock, HarmonicTerm, LIST_PARTS, ListBlock, LossBlock, ParticleBlock,
-    ParticleState, ProjectedGaussian, SHARE_RUN, STATUS_NUMBERS, SplatBlock, StepBlock,
+    GainStepBlock, LossBlock, ParticleBlock, SHARE_RUN, STATUS_NUMBERS, SplatBlock, StepBlock,
 };
 use viewfuse_scene::gaussians::GaussianScene;
+
+pub(super) use arrays::fits;
 
 /// Iterations after which the host sees whether the lists had room.
 const ROUND: usize = 32;
 /// Entries that there is room for at first: so many for each Gaussian, and at least these.
-const ENTRIES_A_GAUSSIAN: usize = 8;
+pub(super) const ENTRIES_A_GAUSSIAN: usize = 8;
 const MIN_ENTRIES: usize = 4096;
-/// Gaussians must be fewer: their number has 24 bits.
-const MAX_GAUSSIANS: usize = 1 << 24;
-
-/// Whether all arrays of an optimisation can be bound on a device.
-pub(super) fn fits<D: Device>(device: &D, course: &Course) -> bool {
-    let count = course.recipe.max_count.max(course.particles.len());
-    let terms = count * REST_COUNTS[course.recipe.degree.min(3) as usize] as usize;
-    let pixels = |views: &Vec<LevelView>| views.iter().map(pixel_count).sum::<usize>();
-    let most_pixels = course.levels.iter().map(pixels).max().unwrap_or(0);
-    let most_elements = device.most_elements::<ParticleState>();
-    count < MAX_GAUSSIANS.min(most_elements)
-        && terms <= device.most_elements::<HarmonicTerm>()
-        && most_pixels <= device.most_elements::<[f32; 4]>()
-        && count * ENTRIES_A_GAUSSIAN <= device.most_elements::<SplatGradient>()
-}
-
-fn pixel_count(view: &LevelView) -> usize {
-    (view.camera.width * view.camera.height) as usize
-}
-
-/// An array before and after a step.
-struct Stepped<B> {
-    now: B,
-    next: B,
-}
-
-impl<B> Stepped<B> {
-    fn swap(&mut self) {
-        std::mem::swap(&mut self.now, &mut self.next);
-    }
-}
-
-/// An array of these values, and another of as many. No device has empty ones.
-fn stepped<D: Device, T: Element>(device: &D, values: &[T]) -> Result<Stepped<D::Buffer<T>>, DeviceError> {
-    let now = if values.is_empty() { device.zeros(1)? } else { device.upload(values)? };
-    Ok(Stepped { now, next: device.zeros(values.len().max(1))? })
-}
-
-/// The photographs of a level, and arrays for a picture of the largest of them.
-struct Level<D: Device> {
-    number: usize,
-    /// `[source]`: where its pixels begin.
-    firsts: Vec<u32>,
-    photographs: D::Buffer<[f32; 4]>,
-    means: D::Buffer<[f32; 4]>,
-    variances: D::Buffer<[f32; 4]>,
-    counts: D::Buffer<u32>,
-    sums: D::Buffer<u32>,
-    starts: D::Buffer<u32>,
-    colours: D::Buffer<[f32; 4]>,
-    depths: D::Buffer<f32>,
-    by_windows: D::Buffer<[f32; 4]>,
-    by_pixels: D::Buffer<[f32; 4]>,
-    shares: D::Buffer<[f32; 4]>,
-    share_sums: D::Buffer<[f32; 4]>,
-    bin_count: u32,
-}
-
-impl<D: Device> Level<D> {
-    fn new(device: &D, number: usize, views: &[LevelView]) -> Result<Level<D>, DeviceError> {
-        let (mut photographs, mut means, mut variances) = (Vec::new(), Vec::new(), Vec::new());
-        let mut firsts = Vec::new();
-        for view in views {
-            firsts.push(photographs.len() as u32);
-            let of = |channels: [&[f32]; 4], pixel: usize| {
-                channels.map(|channel| channel.get(pixel).copied().unwrap_or(0.0))
-            };
-            let [red, green, blue] = &view.structure;
-            let [a, b, c, d] = &view.channels;
-            for pixel in 0..pixel_count(view) {
-                photographs.push(of([a, b, c, d], pixel));
-                means.push(of([&red.means, &green.means, &blue.means, &[]], pixel));
-                variances.push(of([&red.variances, &green.variances, &blue.variances, &[]], pixel));
-            }
-        }
-        let most = |of: fn(&ListBlock) -> u32| {
-            let blocks = views.iter().map(|view| list_block(&view.camera, 0, 0));
-            blocks.map(|block| of(&block)).max().unwrap_or(0).max(1) as usize
-        };
-        let (tile_count, run_count) = (most(ListBlock::tile_count), most(ListBlock::run_count));
-        let pixels = views.iter().map(pixel_count).max().unwrap_or(0).max(1);
-        Ok(Level {
-            number,
-            firsts,
-            photographs: device.upload_owned(photographs)?,
-            means: device.upload_owned(means)?,
-            variances: device.upload_owned(variances)?,
-            counts: device.zeros(tile_count * LIST_PARTS as usize)?,
-            sums: device.zeros(run_count)?,
-            starts: device.zeros(tile_count + 1)?,
-            colours: device.zeros(pixels)?,
-            depths: device.zeros(pixels)?,
-            by_windows: device.zeros(3 * pixels)?,
-            by_pixels: device.zeros(pixels)?,
-            shares: device.zeros(pixels)?,
-            share_sums: device.zeros(pixels.div_ceil(SHARE_RUN as usize))?,
-            bin_count: most(ListBlock::bin_count) as u32,
-        })
-    }
-}
-
-fn list_block(camera: &CameraBlock, splat_count: u32, capacity: u32) -> ListBlock {
-    ListBlock { width: camera.width, height: camera.height, splat_count, capacity }
-}
-
-/// Arrays of entries.
-struct Entries<D: Device> {
-    capacity: usize,
-    keys: D::Buffer<[u32; 2]>,
-    sorted: D::Buffer<u32>,
-    sums: D::Buffer<SplatGradient>,
-}
-
-impl<D: Device> Entries<D> {
-    fn new(device: &D, capacity: usize) -> Result<Entries<D>, DeviceError> {
-        let capacity = capacity.max(1);
-        let (keys, sorted) = (device.zeros(capacity)?, device.zeros(capacity)?);
-        Ok(Entries { capacity, keys, sorted, sums: device.zeros(capacity)? })
-    }
-}
-
-/// The Gaussians on the device.
-struct Particles<D: Device> {
-    count: u32,
-    /// Terms of each Gaussian in the array of all.
-    term_count: u32,
-    gaussians: Stepped<D::Buffer<GaussianBlock>>,
-    states: Stepped<D::Buffer<ParticleState>>,
-    terms: Stepped<D::Buffer<HarmonicTerm>>,
-    gains: Stepped<D::Buffer<GainBlock>>,
-    splats: D::Buffer<ProjectedGaussian>,
-    gradients: D::Buffer<GaussianBlock>,
-    masks: D::Buffer<u32>,
-}
-
-impl<D: Device> Particles<D> {
-    fn new(device: &D, course: &Course, term_count: u32, bin_count: u32) -> Result<Particles<D>, DeviceError> {
-        let all = &course.particles;
-        let gaussians: Vec<GaussianBlock> = all.iter().map(|particle| particle.gaussian).collect();
-        let states: Vec<ParticleState> = all.iter().map(|particle| particle.state).collect();
-        let term =
-            |particle: &Particle, index: u32| particle.harmonics.0.get(index as usize).copied().unwrap_or_default();
-        let terms: Vec<HarmonicTerm> =
-            all.iter().flat_map(|particle| (0..term_count).map(move |index| term(particle, index))).collect();
-        let count = all.len() as u32;
-        let mask_count = list_block(&CameraBlock::default(), count, 0).mask_count();
-        Ok(Particles {
-            count,
-            term_count,
-            gaussians: stepped(device, &gaussians)?,
-            states: stepped(device, &states)?,
-            terms: stepped(device, &terms)?,
-            gains: stepped(device, &course.gains)?,
-            splats: device.zeros(all.len().max(1))?,
-            gradients: device.zeros(all.len().max(1))?,
-            masks: device.zeros((bin_count * mask_count).max(1) as usize)?,
-        })
-    }
-
-    /// As they are now.
-    fn download(&self, device: &D) -> Result<Vec<Particle>, DeviceError> {
-        let gaussians = device.download(&self.gaussians.now)?;
-        let states = device.download(&self.states.now)?;
-        let terms = if self.term_count > 0 { device.download(&self.terms.now)? } else { Vec::new() };
-        let particle = |(index, (gaussian, state)): (usize, (GaussianBlock, ParticleState))| {
-            let first = index * self.term_count as usize;
-            let count = state.rest_count.min(self.term_count) as usize;
-            Particle { gaussian, harmonics: Harmonics(terms[first..first + count].to_vec()), state }
-        };
-        let all = gaussians.into_iter().zip(states).take(self.count as usize);
-        Ok(all.enumerate().map(particle).collect())
-    }
-}
 
 /// An optimisation on a device.
 pub(super) struct Resident<'d, D: Device> {
