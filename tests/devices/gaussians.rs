@@ -3,26 +3,30 @@
 use crate::candidate::{Candidate, tests};
 use libtest_mimic::Failed;
 use std::sync::OnceLock;
-use viewfuse::device::choice::AnyDevice;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::{Device, Memory};
-use viewfuse::field::AnyField;
-use viewfuse::field::gaussians::{Optimised, Recipe, Splatter, Tiles, optimised};
-use viewfuse::field::point_cloud::{CloudPoint, point_cloud};
-use viewfuse::field::render::{RenderOptions, Stage, open_album};
+use viewfuse::field::gaussians::{
+    Drawn, Optimised, Recipe, Splatter, Tiles, optimisation_by_host, optimisation_on_device, optimised,
+};
 use viewfuse::job::progress::Silent;
-use viewfuse::scene::Scene;
-use viewfuse::scene::few_shot::Selection;
-use viewfuse::scene::photographs::{SourceImages, to_rgb8};
-use viewfuse::weighting::Weighting;
+use viewfuse::scene::photographs::to_rgb8;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::metrics::psnr;
+use viewfuse_kernels::gaussians::lists::ListStatus;
 use viewfuse_kernels::gaussians::{SplatBlock, TileBlock};
-use viewfuse_kernels::rows::GaussianBlock;
-use viewfuse_tests::places::data;
+use viewfuse_kernels::rows::{GaussianBlock, LIST_PARTS, ListBlock, ProjectedGaussian};
+use viewfuse_tests::cloud::toy_cloud;
 use viewfuse_vulkan::GpuOptions;
 
-tests!(derivatives_of_a_scene_are_the_cpus, a_scene_is_as_good_as_the_cpus);
+tests!(
+    derivatives_of_a_scene_are_the_cpus,
+    a_scene_is_as_good_as_the_cpus,
+    lists_of_tiles_are_the_hosts,
+    iterations_of_a_device_are_the_hosts,
+    a_devices_scene_depends_on_no_capacity_and_no_run,
+    an_iteration_needs_no_transfer,
+    a_picture_has_the_same_bits_with_lists_of_the_device,
+);
 
 /// Most splats of a tile: fewer than those whose loops Mesa's llvmpipe ends (`viewfuse_field::gaussians::optimised`).
 const MAX_LISTED: u32 = 100;
@@ -37,28 +41,9 @@ fn recipe() -> Recipe {
     Recipe { iterations: [0, 24, 16, 16], ..Recipe::default() }
 }
 
-/// Photographs of the sample scene, and points on its surfaces.
-fn start() -> &'static (SourceImages, Vec<CloudPoint>) {
-    static START: OnceLock<(SourceImages, Vec<CloudPoint>)> = OnceLock::new();
-    START.get_or_init(|| {
-        let scene = Scene::open(data("toy")).expect("a scene");
-        let selection = Selection { sources: Some("0..19/2".to_owned()), ..Selection::default() };
-        let sources = selection.sources_without(&scene, &[], 2).expect("sources");
-        let options = RenderOptions { size: Some([64; 2]), ..RenderOptions::default() };
-        let (field, device) = (AnyField::default(), AnyDevice::Cpu(Cpu));
-        let renderer = field.on(&device);
-        let album = open_album(&scene, sources.clone(), renderer.as_ref(), &options, &Silent).expect("photographs");
-        let stage = Stage::prepare(&scene, &album, &sources, renderer.as_ref(), &options, &Silent);
-        let mut stage = stage.expect("a stage");
-        let weighting = Weighting::open("distance:power=2").expect("a scheme");
-        let points = point_cloud(&mut stage, &weighting, Recipe::cloud(sources.len()), &Silent).expect("points");
-        (stage.images.as_ref().clone(), points)
-    })
-}
-
 /// A scene of Gaussians that a device optimised.
 fn scene<D: Device>(device: &D) -> Optimised {
-    let (images, points) = start();
+    let (images, points) = toy_cloud();
     optimised(device, images, points, recipe(), &Silent).expect("steps").expect("enough points")
 }
 
@@ -70,7 +55,7 @@ fn cpus_scene() -> &'static Optimised {
 
 /// The first source's camera.
 fn camera() -> CameraBlock {
-    start().0.images[0].camera.block(0)
+    toy_cloud().0.images[0].camera.block(0)
 }
 
 /// The longest list of splats of a tile.
@@ -132,7 +117,7 @@ fn derivatives_of_a_scene_are_the_cpus(candidate: &Candidate) -> Result<(), Fail
 
 /// The PSNR of the Gaussians at the sources, decibels.
 fn score(made: &Optimised) -> f64 {
-    let images = &start().0;
+    let images = &toy_cloud().0;
     let splatter = Splatter { device: &Cpu, near: made.near, background: made.background };
     let score = |index: usize| {
         let camera = images.images[index].camera.block(0);
@@ -151,5 +136,158 @@ fn a_scene_is_as_good_as_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
     }
     let (score, cpus) = (score(&ours), score(cpus_scene()));
     assert!(score > 15.0 && score > cpus - MAX_LOSS, "{score} dB, on the CPU {cpus} dB");
+    Ok(())
+}
+
+/// A device's lists of a picture's tiles.
+fn lists_on<D: Device>(device: &D, block: ListBlock, splats: &[ProjectedGaussian]) -> (Vec<u32>, Vec<u32>, ListStatus) {
+    let zeros = |count: u32| device.zeros(count as usize).expect("memory");
+    let splats = device.upload(splats).expect("splats");
+    let mut masks = zeros(block.bin_count() * block.mask_count());
+    let (mut counts, mut sums) = (zeros(block.tile_count() * LIST_PARTS), zeros(block.run_count()));
+    let (mut starts, status, mut after) = (zeros(block.tile_count() + 1), zeros(3), zeros(3));
+    let (mut keys, mut entries) = (device.zeros(block.capacity as usize).expect("memory"), zeros(block.capacity));
+    let mut run = || {
+        device.mark_bins(&block, &splats, &mut masks)?;
+        device.count_entries(&block, &splats, &masks, &mut counts)?;
+        device.sum_entries(&block, &counts, &mut sums)?;
+        device.start_tiles(&block, &counts, &sums, &status, &mut starts, &mut after)?;
+        device.list_entries(&block, &splats, &masks, &starts, &counts, &mut keys)?;
+        device.sort_entries(&block, &starts, &keys, &mut entries)?;
+        let status = device.download(&after)?;
+        Ok::<_, viewfuse::device::DeviceError>((device.download(&starts)?, device.download(&entries)?, status))
+    };
+    let (starts, mut entries, status) = run().expect("lists");
+    entries.truncate(starts[starts.len() - 1] as usize);
+    (starts, entries, ListStatus::of([status[0], status[1], status[2]]))
+}
+
+/// Of all Gaussians of the CPU's scene from several places, and of none of them.
+fn lists_of_tiles_are_the_hosts(candidate: &Candidate) -> Result<(), Failed> {
+    let device = candidate.vulkan(&GpuOptions::default())?;
+    let made = cpus_scene();
+    for image in toy_cloud().0.images.iter().step_by(3) {
+        let camera = image.camera.block(0);
+        for gaussians in [&made.gaussians[..], &made.gaussians[..1]] {
+            let gaussian_count = gaussians.len() as u32;
+            let block = SplatBlock { camera, near: made.near, gaussian_count, padding: [0; 2] };
+            let mut splats = Cpu.zeros(gaussians.len())?;
+            Cpu.project_gaussians(&block, &gaussians.to_vec(), &mut splats)?;
+            let expected = Tiles::of(&TileBlock::new(camera.width, camera.height, made.background), &splats);
+            let total = expected.entries.len() as u32;
+            let CameraBlock { width, height, .. } = camera;
+            let block = ListBlock { width, height, splat_count: gaussian_count, capacity: total.max(1) };
+            let on_cpu = lists_on(&Cpu, block, &splats);
+            let status = ListStatus { is_over: false, done: 1, most: total };
+            assert_eq!(on_cpu, (expected.starts.clone(), expected.entries.clone(), status), "on the CPU");
+            assert!(lists_on(&device, block, &splats) == on_cpu, "{gaussian_count} Gaussians");
+            if total > 1 {
+                let (starts, entries, status) = lists_on(&device, ListBlock { capacity: total - 1, ..block }, &splats);
+                assert!(starts.iter().all(|start| *start == 0) && entries.is_empty());
+                assert_eq!(status, ListStatus { is_over: true, done: 0, most: total });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Few Gaussians on small pictures, in all that an optimisation has: levels, harmonics, growth.
+fn small_recipe() -> Recipe {
+    let small = Recipe { side: 32, iterations: [0, 6, 6, 30], cell: 8.0, random_count: 100, ..Recipe::default() };
+    Recipe { max_per_pixel: 0.5, degree: 3, grows: true, ..small }
+}
+
+/// What becomes of a recipe on a device, after so many iterations.
+fn on_device<D: Device>(device: &D, recipe: Recipe, end: u32, capacity: Option<usize>) -> Optimised {
+    let (images, points) = toy_cloud();
+    let optimisation = optimisation_on_device(device, images, points, recipe, capacity).expect("a device");
+    let mut optimisation = optimisation.expect("enough points");
+    optimisation.run_to(end, &Silent).expect("steps");
+    optimisation.optimised().expect("Gaussians")
+}
+
+/// The same by the host's lists, loss and steps.
+fn by_host<D: Device>(device: &D, recipe: Recipe, end: u32) -> Optimised {
+    let (images, points) = toy_cloud();
+    let mut optimisation = optimisation_by_host(device, images, points, recipe).expect("a device").expect("points");
+    optimisation.run_to(end, &Silent).expect("steps");
+    optimisation.optimised().expect("Gaussians")
+}
+
+/// The first iterations differ by last digits at most; then these make steps of other signs where derivatives are
+/// nearly 0, so that only scores are compared. On the CPU all but the sums for the gains are the host's, bit by bit.
+fn iterations_of_a_device_are_the_hosts(candidate: &Candidate) -> Result<(), Failed> {
+    let device = candidate.vulkan(&GpuOptions::default())?;
+    let recipe = small_recipe();
+    let mut constant = recipe;
+    constant.rates[5] = 0.0;
+    let all = recipe.iterations.iter().sum();
+    let (cpus, hosts) = (on_device(&Cpu, constant, all, None), by_host(&Cpu, constant, all));
+    assert_eq!(hosts.degree, 3, "all that an optimisation has");
+    assert!(cpus == hosts, "on the CPU, without gains");
+    let (cpus, hosts) = (on_device(&Cpu, recipe, all, None), by_host(&Cpu, recipe, all));
+    assert!((score(&cpus) - score(&hosts)).abs() < MAX_LOSS, "{} and {} dB", score(&cpus), score(&hosts));
+    assert!(hosts.gains != vec![[1.0; 3]; hosts.gains.len()], "gains are optimised");
+    let apart = |a: &[f32; 3], b: &[f32; 3]| (0..3).map(|axis| (a[axis] - b[axis]).abs()).fold(0.0, f32::max);
+    let gains = cpus.gains.iter().zip(&hosts.gains).map(|(a, b)| apart(a, b)).fold(0.0, f32::max);
+    assert!(gains < 0.01, "gains are {gains} apart");
+
+    let ours = on_device(&device, recipe, all, None);
+    assert!(score(&ours) > score(&hosts) - MAX_LOSS, "{} dB, by the host {} dB", score(&ours), score(&hosts));
+    Ok(())
+}
+
+fn a_devices_scene_depends_on_no_capacity_and_no_run(candidate: &Candidate) -> Result<(), Failed> {
+    let device = candidate.vulkan(&GpuOptions::default())?;
+    let (recipe, end) = (small_recipe(), u32::MAX);
+    let once = on_device(&device, recipe, end, None);
+    assert!(once == on_device(&device, recipe, end, None), "the same in every run");
+    assert!(once == on_device(&device, recipe, end, Some(1)), "with lists that are too short at first");
+    assert!(on_device(&Cpu, recipe, end, None) == on_device(&Cpu, recipe, end, Some(100)), "on the CPU, too");
+    Ok(())
+}
+
+/// At one level: 12 bytes are read after 32 iterations.
+fn an_iteration_needs_no_transfer(candidate: &Candidate) -> Result<(), Failed> {
+    let device = candidate.vulkan(&GpuOptions::default())?;
+    let (images, points) = toy_cloud();
+    for degree in [0, 1] {
+        let recipe = Recipe { iterations: [0, 0, 0, 200], grows: false, degree, ..small_recipe() };
+        let optimisation = optimisation_on_device(&device, images, points, recipe, None)?;
+        let mut optimisation = optimisation.expect("enough points");
+        // From here on there are harmonics, if there are any at all.
+        optimisation.run_to(64, &Silent)?;
+        let dispatches = |device: &viewfuse::device::vulkan::Vulkan| {
+            device.kernel_times().iter().map(|time| time.dispatches).sum::<u64>()
+        };
+        let (before, dispatched) = (device.transfers(), dispatches(&device));
+        optimisation.run_to(64 + 31, &Silent)?;
+        assert_eq!(device.transfers(), before, "no transfer in 31 iterations");
+        optimisation.run_to(64 + 32, &Silent)?;
+        let after = device.transfers();
+        assert_eq!(after.uploads, before.uploads);
+        assert_eq!((after.downloads - before.downloads, after.downloaded_bytes - before.downloaded_bytes), (1, 12));
+        let a_piece = (dispatches(&device) - dispatched) as f64 / 32.0;
+        assert_eq!(a_piece, 15.0 + f64::from(degree), "dispatches an iteration");
+    }
+    Ok(())
+}
+
+fn a_picture_has_the_same_bits_with_lists_of_the_device(candidate: &Candidate) -> Result<(), Failed> {
+    let device = candidate.vulkan(&GpuOptions::default())?;
+    let made = cpus_scene();
+    let uploaded = device.upload(&made.gaussians)?;
+    let splatter = Splatter { device: &device, near: made.near, background: made.background };
+    let before = device.transfers();
+    let [ours, hosts] = [true, false].map(|are_lists_on_device| {
+        let drawn = splatter.drawn(&uploaded, made.gaussians.len(), &camera(), are_lists_on_device);
+        let Drawn { colours, depths } = drawn.expect("a picture");
+        let transfers = device.transfers();
+        (device.download(&colours).expect("colours"), device.download(&depths).expect("depths"), transfers)
+    });
+    assert!(ours.0 == hosts.0 && ours.1 == hosts.1);
+    assert!(ours.0.iter().any(|colour| colour[3] > 0.5), "something is seen");
+    let downloaded = ours.2.downloaded_bytes - before.downloaded_bytes;
+    assert!(downloaded == 12 && ours.2.uploads == before.uploads, "{downloaded} bytes");
     Ok(())
 }

@@ -29,18 +29,21 @@ const LEFT_BY_THEIR_BODY: [(&str, usize); 9] = [
 
 /// Kernels with arrays of an invocation's own that a loop's counter indexes. rust-gpu unrolls nothing: until a driver
 /// does, these arrays are memory and not registers.
-const INDEXED_BY_A_COUNTER: [&str; 23] = [
+const INDEXED_BY_A_COUNTER: [&str; 30] = [
     "add_noise",
     "blend_gradient",
     "blend_planes",
     "blend_splats",
     "census_cost",
     "coarse_depths",
+    "compare_pixels",
     "compare_views",
+    "compare_windows",
     "composite",
     "embed_points",
     "follow_paths",
     "front_cost",
+    "gather_gradients",
     "hull_entry",
     "join_paths",
     "look_up_texels",
@@ -50,8 +53,12 @@ const INDEXED_BY_A_COUNTER: [&str; 23] = [
     "pick_disparity",
     "plane_opacity",
     "project_gradients",
+    "project_particles",
     "random_draws",
     "row_sums",
+    "step_gains",
+    "step_harmonics",
+    "step_particles",
     "window_cost",
 ];
 

@@ -4,6 +4,7 @@
 
 pub mod alone;
 pub mod checkpoints;
+pub mod cloud;
 pub mod command;
 pub mod contract;
 pub mod devices;

@@ -10,6 +10,7 @@
 mod gaussians;
 mod layers;
 mod lists;
+mod optimisation;
 mod pictures;
 mod plane_sweep;
 mod points;
@@ -22,6 +23,7 @@ mod volumes;
 pub use gaussians::*;
 pub use layers::*;
 pub use lists::*;
+pub use optimisation::*;
 pub use pictures::*;
 pub use plane_sweep::*;
 pub use points::*;

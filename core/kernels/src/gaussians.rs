@@ -1,16 +1,19 @@
 //! Gaussians of a scene: projected to a camera, composited front to back, and the derivatives by their parameters.
 //!
 //! A picture is made of tiles of [`SPLAT_TILE`] by [`SPLAT_TILE`] pixels. Each tile has a list of the splats that cover
-//! pixels of it, the nearest first; the host sorts and lists them between the two dispatches. Stages, each a
-//! data-parallel kernel:
+//! pixels of it, the nearest first; the host sorts and lists them, or kernels do ([`lists`]). An iteration of an
+//! optimisation is a sequence of kernels whose data stay on the device. Stages, each a data-parallel kernel:
 //!
 //! ```text
+//! lists               which splats each tile shows                ListBlock, is_reached, rank
 //! lanes               pixels of a row, and a splat's opacity there        Lanes, SplatLanes
 //! blend               pixels from the splats of their tile                BlendedLanes
 //! blend_gradient      derivatives of a tile's pixels by its splats        TileGradient
 //! footprint           a Gaussian's ellipse, with what its derivatives need   Footprint
 //! project_gradient    ... and of the splats by their Gaussians            project_gradient
+//! windows             how far a picture is from a photograph, and the derivatives   LossBlock, pixel_gradient
 //! adam                a step against the derivative                       adam_step
+//! steps               ... of Gaussians, harmonics and gains               step_particle, step_term, step_gain
 //! ```
 //!
 //! Forward: [`viewfuse_core::gaussian`]. Backward: the chain rule by hand, as in "3D Gaussian Splatting" (Kerbl et al.
@@ -21,7 +24,10 @@ pub mod blend;
 pub mod blend_gradient;
 pub mod footprint;
 pub mod lanes;
+pub mod lists;
 pub mod project_gradient;
+pub mod steps;
+pub mod windows;
 
 use bytemuck::{Pod, Zeroable};
 use viewfuse_core::camera::CameraBlock;

@@ -95,7 +95,7 @@ macro_rules! floats {
     )+ };
 }
 
-floats!(f32, TargetRay, GaussianBlock, ProjectedGaussian, SplatGradient);
+floats!(f32, TargetRay, GaussianBlock, ProjectedGaussian, SplatGradient, HarmonicTerm);
 
 impl<const N: usize> Floats for [f32; N]
 where
@@ -109,6 +109,34 @@ where
 impl Floats for u32 {
     fn floats(values: Vec<u32>) -> Vec<f32> {
         values.into_iter().map(|value| value as f32).collect()
+    }
+}
+
+/// Keys: the bits of a depth, and an index.
+impl Floats for [u32; 2] {
+    fn floats(values: Vec<[u32; 2]>) -> Vec<f32> {
+        values.into_iter().flat_map(|[depth, index]| [f32::from_bits(depth), index as f32]).collect()
+    }
+}
+
+/// Numbers of steps are small enough to be exact, as are those of pictures and coefficients.
+impl Floats for ParticleState {
+    fn floats(values: Vec<ParticleState>) -> Vec<f32> {
+        let counted = |state: ParticleState| {
+            let counts = [state.step_count as f32, state.moved, state.moved_count as f32, state.rest_count as f32];
+            state.moments.into_iter().flatten().chain(counts)
+        };
+        values.into_iter().flat_map(counted).collect()
+    }
+}
+
+impl Floats for GainBlock {
+    fn floats(values: Vec<GainBlock>) -> Vec<f32> {
+        let counted = |gain: GainBlock| {
+            let moments = gain.moments.into_iter().flatten();
+            gain.value.into_iter().chain([gain.step_count as f32]).chain(moments).chain(gain.padding)
+        };
+        values.into_iter().flat_map(counted).collect()
     }
 }
 

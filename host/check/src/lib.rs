@@ -15,7 +15,8 @@
 //!   network_oracle, point_oracle,
 //!   group_norm_oracle,
 //!   matrix_oracle, volume_oracle,
-//!   sweep_oracle, gaussian_oracle
+//!   sweep_oracle, gaussian_oracle,
+//!   list_oracle, step_oracle
 //! poses, ray_inputs, world,     inputs for a seed
 //!   swept
 //! dispatch                      each kernel's parameters and arrays, from its row: upload, run, download
@@ -38,6 +39,7 @@ pub mod gaussian_oracle;
 pub mod group_norm_oracle;
 pub mod half;
 pub mod hull_oracle;
+pub mod list_oracle;
 pub mod matrix_oracle;
 pub mod measure;
 pub mod network_oracle;
@@ -49,6 +51,7 @@ pub mod rates;
 pub mod ray_inputs;
 pub mod ray_oracle;
 pub mod report;
+pub mod step_oracle;
 pub mod sweep_oracle;
 pub mod swept;
 pub mod verify;

@@ -13,19 +13,22 @@
 //! harmonics  colours by direction
 //! particles  Gaussians with the state of their optimisation: steps, pruning, splitting
 //! growth     more Gaussians where the photographs ask for them
-//! optimise   the loop
+//! course     what an iteration does, wherever its steps are made
+//! resident   an optimisation whose iterations are a device's own
+//! optimise   the loop, on the device or by the host
 //! covers     whether given Gaussians show what the sources show
 //! given      a scene of Gaussians that is there already, as a field
 //! ```
 //!
 //! No network and no data but the scene's own photographs. The start is the cloud of the sources' depths
-//! ([`crate::point_cloud`]): gradient descent does not repair wrong surfaces. The kernels run on the device; sorting,
-//! lists of tiles, the loss and the steps on the host, in one order, so that the same seed gives the same scene for any
-//! number of threads.
+//! ([`crate::point_cloud`]): gradient descent does not repair wrong surfaces. On a GPU an iteration is the device's own;
+//! on the CPU lists of tiles, the loss and the steps are the host's. All sums run in one order, so that the same seed
+//! gives the same scene in every run, and on the CPU for any number of threads.
 //!
 //! Source: "3D Gaussian Splatting for Real-Time Radiance Field Rendering" (Kerbl et al. 2023); the pyramid, the faint
 //! Gaussians at random and the penalty on opacity are for few views.
 
+mod course;
 mod covers;
 mod given;
 mod growth;
@@ -37,13 +40,15 @@ mod particles;
 mod picture;
 mod quality;
 mod recipe;
+mod resident;
 mod residuals;
 mod start;
 mod tiles;
 
+pub use course::{Optimisation, Optimised};
 pub use given::{GivenGaussians, behind, scene_of};
-pub use optimise::{Optimisation, Optimised, optimisation, optimised};
-pub use picture::{Splatted, Splatter};
+pub use optimise::{optimisation, optimisation_by_host, optimisation_on_device, optimised};
+pub use picture::{Drawn, Splatted, Splatter};
 pub use quality::{Quality, RecipeOptions};
 pub use recipe::{MAX_COUNT, MAX_ITERATIONS, Recipe};
 pub use residuals::Residuals;

@@ -191,7 +191,7 @@ impl<'a> SceneOptimisation<'a> {
             optimisation.weigh(&self.weights()?);
             self.advance(optimisation.as_mut(), device, &album, progress, None, &mut keep, &mut scores)?;
         }
-        let gaussians = optimisation.optimised().scene();
+        let gaussians = optimisation.optimised().map_err(RenderError::from)?.scene();
         let sources = &self.sources[..self.sources.len().min(FIT_SOURCES)];
         let is_alone = self.held_out.is_empty() && !progress.is_cancelled();
         let fit = is_alone.then(|| self.score(&gaussians, device, &album, sources)).transpose()?;
@@ -239,7 +239,7 @@ impl<'a> SceneOptimisation<'a> {
             optimisation.run_to(optimisation.done() + 1, &Silent).map_err(RenderError::from)?;
             progress.step();
             if let Some(clock) = &mut clock
-                && clock.has_measured(optimisation, progress)
+                && clock.has_measured(optimisation, progress).map_err(RenderError::from)?
             {
                 every = scored_every(optimisation.iteration_count());
             }
@@ -247,7 +247,7 @@ impl<'a> SceneOptimisation<'a> {
             if !done.is_multiple_of(every) && done != iteration_count {
                 continue;
             }
-            let gaussians = optimisation.optimised().scene();
+            let gaussians = optimisation.optimised().map_err(RenderError::from)?.scene();
             if done < iteration_count {
                 keep(&gaussians)?;
             }

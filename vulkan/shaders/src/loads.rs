@@ -10,6 +10,7 @@ use viewfuse_core::gaussian::{GaussianBlock, ProjectedGaussian};
 use viewfuse_core::pose::PoseBlock;
 use viewfuse_core::rays::RayPoint;
 use viewfuse_kernels::gaussians::blend_gradient::SplatGradient;
+use viewfuse_kernels::gaussians::steps::{HarmonicTerm, ParticleState};
 use viewfuse_kernels::plane_sweep::Planes;
 use viewfuse_kernels::plane_sweep::frustum::SweptView;
 use viewfuse_kernels::store::Store;
@@ -221,6 +222,56 @@ impl IntoVectors for SplatGradient {
     }
 }
 
+impl InVectors for ParticleState {
+    type Vectors = [UVec4; 8];
+
+    #[inline(always)]
+    fn from_vectors([first, second, third, fourth, fifth, sixth, seventh, last]: [UVec4; 8]) -> ParticleState {
+        let ([a, b], [c, d], [e, f], [g, h]) = (pairs(first), pairs(second), pairs(third), pairs(fourth));
+        let ([i, j], [k, l], [m, n]) = (pairs(fifth), pairs(sixth), pairs(seventh));
+        ParticleState {
+            moments: [a, b, c, d, e, f, g, h, i, j, k, l, m, n],
+            step_count: last.x,
+            moved: f32::from_bits(last.y),
+            moved_count: last.z,
+            rest_count: last.w,
+        }
+    }
+}
+
+impl IntoVectors for ParticleState {
+    #[inline(always)]
+    fn into_vectors(self) -> [UVec4; 8] {
+        let [a, b, c, d, e, f, g, h, i, j, k, l, m, n] = self.moments;
+        let last = UVec4::new(self.step_count, self.moved.to_bits(), self.moved_count, self.rest_count);
+        [words(a, b), words(c, d), words(e, f), words(g, h), words(i, j), words(k, l), words(m, n), last]
+    }
+}
+
+impl InVectors for HarmonicTerm {
+    type Vectors = [Vec4; 3];
+
+    #[inline(always)]
+    fn from_vectors([value, first, last]: [Vec4; 3]) -> HarmonicTerm {
+        HarmonicTerm {
+            value: [value.x, value.y, value.z],
+            padding: 0.0,
+            moments: [[first.x, first.y], [first.z, first.w], [last.x, last.y]],
+            padding_end: [0.0; 2],
+        }
+    }
+}
+
+impl IntoVectors for HarmonicTerm {
+    #[inline(always)]
+    fn into_vectors(self) -> [Vec4; 3] {
+        let ([x, y, z], [[a, b], [c, d], [e, f]]) = (self.value, self.moments);
+        [Vec4::new(x, y, z, 0.0), Vec4::new(a, b, c, d), Vec4::new(e, f, 0.0, 0.0)]
+    }
+}
+
+const _: () = assert!(size_of::<<ParticleState as InVectors>::Vectors>() == size_of::<ParticleState>());
+const _: () = assert!(size_of::<<HarmonicTerm as InVectors>::Vectors>() == size_of::<HarmonicTerm>());
 const _: () = assert!(size_of::<<CameraBlock as InVectors>::Vectors>() == size_of::<CameraBlock>());
 const _: () = assert!(size_of::<<SweptView as InVectors>::Vectors>() == size_of::<SweptView>());
 const _: () = assert!(size_of::<<RayPoint as InVectors>::Vectors>() == size_of::<RayPoint>());
@@ -244,4 +295,15 @@ fn camera(right: UVec4, down: UVec4, forward: UVec4, intrinsics: UVec4, last: UV
 #[inline(always)]
 fn floats(words: UVec4) -> [f32; 4] {
     [f32::from_bits(words.x), f32::from_bits(words.y), f32::from_bits(words.z), f32::from_bits(words.w)]
+}
+
+#[inline(always)]
+fn pairs(words: UVec4) -> [[f32; 2]; 2] {
+    let [a, b, c, d] = floats(words);
+    [[a, b], [c, d]]
+}
+
+#[inline(always)]
+fn words([a, b]: [f32; 2], [c, d]: [f32; 2]) -> UVec4 {
+    UVec4::new(a.to_bits(), b.to_bits(), c.to_bits(), d.to_bits())
 }

@@ -458,6 +458,127 @@ macro_rules! for_each_kernel {
                 read sums: SplatGradient as vectors,
                 write gradients: GaussianBlock as vectors,
             }
+            /// Gaussians whose colours depend on the direction, as a camera sees them: `terms[gaussian][term]` are their
+            /// spherical harmonics. An element is a Gaussian.
+            ProjectParticles project_particles(block: ParticleBlock)
+            for gaussian in [0..block.gaussian_count; 128 a core] {
+                read gaussians: GaussianBlock as vectors,
+                read states: ParticleState as vectors,
+                read terms: HarmonicTerm as vectors,
+                write splats: ProjectedGaussian as vectors,
+            }
+            /// Which splats' boxes reach each bin of 8 by 8 tiles: `masks[bin][mask]`, 32 splats a mask. An element is a
+            /// mask of a bin.
+            MarkBins mark_bins(block: ListBlock) for mask in [0..block.bin_count() * block.mask_count(); 64 a core] {
+                read splats: ProjectedGaussian as vectors,
+                write masks: u32,
+            }
+            /// How many splats each tile shows, in 32 parts of the splats: `counts[tile][part]`. An element is a part of
+            /// a tile.
+            CountEntries count_entries(block: ListBlock) for part in [0..block.tile_count() * LIST_PARTS; 64 a core] {
+                read splats: ProjectedGaussian as vectors,
+                read masks: u32,
+                write counts: u32,
+            }
+            /// Entries of runs of 8 tiles: `sums[run]`. An element is a run.
+            SumEntries sum_entries(block: ListBlock) for run in [0..block.run_count(); 64 a core] {
+                read counts: u32,
+                write sums: u32,
+            }
+            /// Where each tile's list begins, `starts[tile]`, with one tile more, and the status after this picture. If
+            /// there are more entries than the capacity, or were before, all lists are empty. An element is a tile, or a
+            /// number of the status.
+            StartTiles start_tiles(block: ListBlock)
+            for element in [0..block.tile_count() + 1 + STATUS_NUMBERS; 64 a core] {
+                read counts: u32,
+                read sums: u32,
+                read status: u32,
+                write starts[block.place_of_start(element)]: u32,
+                write next_status[block.place_of_status(element)]: u32,
+            }
+            /// The splats that each tile shows, in the order of their indices: `keys[starts[tile]..starts[tile + 1]]`,
+            /// the bits of their depths and their indices. An element is a part of a tile.
+            ListEntries list_entries(block: ListBlock) for part in [0..block.tile_count() * LIST_PARTS; 64 a core] {
+                read splats: ProjectedGaussian as vectors,
+                read masks: u32,
+                read starts: u32,
+                read counts: u32,
+                write keys[ListBlock::first_of_part(starts, counts, part)]: [u32; 2],
+            }
+            /// The lists that `blend_splats` takes: each tile's keys by depth, and of one depth by index,
+            /// `entries[starts[tile]..starts[tile + 1]]`. An element is an entry; behind the last one nothing is written.
+            SortEntries sort_entries(block: ListBlock) for entry in [0..block.capacity], looped {
+                read starts: u32,
+                read keys: [u32; 2],
+                write entries: u32,
+            }
+            /// Derivatives of `1 - SSIM` of a picture and a photograph by the means of windows: `by_windows[row][column]`
+            /// (by those of x, x x and x y; red, green, blue). `photographs`, `means` and `variances` are of several
+            /// photographs. An element is a pixel.
+            CompareWindows compare_windows(block: LossBlock)
+            for pixel in [0..block.width * block.height; 16 a core] {
+                read colours: [f32; 4] as vectors,
+                read photographs: [f32; 4] as vectors,
+                read means: [f32; 4] as vectors,
+                read variances: [f32; 4] as vectors,
+                read gains: GainBlock,
+                write by_windows[3 * pixel]: [f32; 4] as vectors,
+            }
+            /// Derivatives of a loss by the pixels, `by_pixels[row][column]` (by red, green, blue and opacity), and what
+            /// they add to that by the photograph's gain, `shares[row][column]`. An element is a pixel.
+            ComparePixels compare_pixels(block: LossBlock)
+            for pixel in [0..block.width * block.height; 16 a core] {
+                read colours: [f32; 4] as vectors,
+                read photographs: [f32; 4] as vectors,
+                read by_windows: [f32; 4] as vectors,
+                read gains: GainBlock,
+                write by_pixels: [f32; 4] as vectors,
+                write shares: [f32; 4] as vectors,
+            }
+            /// Derivatives by the Gaussians' parameters, in the places of these, from the entries of the tiles' lists:
+            /// as `project_gradients`, which has the entries of each Gaussian listed. An element is a Gaussian.
+            GatherGradients gather_gradients(block: SplatBlock) for gaussian in [0..block.gaussian_count; 64 a core] {
+                read gaussians: GaussianBlock as vectors,
+                read splats: ProjectedGaussian as vectors,
+                read starts: u32,
+                read entries: u32,
+                read sums: SplatGradient as vectors,
+                write gradients: GaussianBlock as vectors,
+            }
+            /// Gaussians after a step against the derivatives. An element is a Gaussian.
+            StepParticles step_particles(block: StepBlock) for gaussian in [0..block.gaussian_count(); 128 a core] {
+                read gaussians: GaussianBlock as vectors,
+                read states: ParticleState as vectors,
+                read splats: ProjectedGaussian as vectors,
+                read gradients: GaussianBlock as vectors,
+                read status: u32,
+                write next_gaussians: GaussianBlock as vectors,
+                write next_states: ParticleState as vectors,
+            }
+            /// Spherical harmonics after a step against the derivatives: `next_terms[gaussian][term]`. An element is a
+            /// term.
+            StepHarmonics step_harmonics(block: StepBlock)
+            for term in [0..block.gaussian_count() * block.term_count(); 256 a core] {
+                read gaussians: GaussianBlock as vectors,
+                read states: ParticleState as vectors,
+                read splats: ProjectedGaussian as vectors,
+                read gradients: GaussianBlock as vectors,
+                read status: u32,
+                read terms: HarmonicTerm as vectors,
+                write next_terms: HarmonicTerm as vectors,
+            }
+            /// What runs of 256 pixels add to the derivative by a gain: `sums[run]`. An element is a run.
+            SumShares sum_shares(pixel_count: u32) for run in [0..pixel_count.div_ceil(SHARE_RUN); 64 a core] {
+                read shares: [f32; 4] as vectors,
+                write sums: [f32; 4] as vectors,
+            }
+            /// The photographs' gains after a step of one of them; their mean is 1. An element is a photograph.
+            StepGains step_gains(block: GainStepBlock) for gain in [0..block.gain_count; 64 a core] {
+                read sums: [f32; 4] as vectors,
+                read status: u32,
+                read gains: GainBlock,
+                write next_gains: GainBlock,
+            }
             /// Linear combinations of pictures: `mixed[element]` of `state[element]` and four results, the newest
             /// first. What has coefficient 0 is not read and may be any buffer. An element is a channel of a pixel.
             MixPictures mix_pictures(block: Mix; element_count) for channel in [0..element_count; 4096 a core] {

@@ -8,12 +8,12 @@ use viewfuse_core::camera::CameraBlock;
 use viewfuse_kernels::gaussians::SPLAT_TILE;
 
 /// Depth from which on Gaussians are seen.
-const NEAR: f32 = 0.5;
+pub(super) const NEAR: f32 = 0.5;
 /// Splats of a picture, besides those of its pixels.
 const SPLATS: usize = 24;
 
 /// Gaussians in the middle of a world, some of them behind the camera or too faint to be seen.
-fn gaussians(numbers: &mut Numbers, count: u32) -> Vec<GaussianBlock> {
+pub(super) fn gaussians(numbers: &mut Numbers, count: u32) -> Vec<GaussianBlock> {
     let gaussian = |_| GaussianBlock {
         position: [0; 3].map(|_| numbers.between(-2.4, 2.4)),
         opacity: numbers.between(-7.0, 4.0),
@@ -31,7 +31,7 @@ fn gaussians(numbers: &mut Numbers, count: u32) -> Vec<GaussianBlock> {
     (0..count).map(gaussian).collect()
 }
 
-fn block(camera: CameraBlock, gaussian_count: u32) -> SplatBlock {
+pub(super) fn block(camera: CameraBlock, gaussian_count: u32) -> SplatBlock {
     SplatBlock { camera: CameraBlock { first_texel: 0, ..camera }, near: NEAR, gaussian_count, padding: [0; 2] }
 }
 
@@ -43,6 +43,26 @@ struct Picture {
     entries: Vec<u32>,
 }
 
+/// A splat on a picture of this size, or beside it.
+pub(super) fn splat(numbers: &mut Numbers, [width, height]: [u32; 2], depth: f32) -> ProjectedGaussian {
+    let [right, down] = [numbers.between(0.8, 4.0), numbers.between(0.8, 4.0)];
+    // The covariance of a correlation.
+    let correlation = numbers.between(-0.7, 0.7);
+    let rest = 1.0 / (1.0 - correlation * correlation);
+    ProjectedGaussian {
+        mean: [numbers.between(-2.0, width as f32 + 2.0), numbers.between(-2.0, height as f32 + 2.0)],
+        depth,
+        opacity: numbers.between(0.05, 1.0),
+        conic: [rest / (right * right), -correlation * rest / (right * down), rest / (down * down)],
+        padding: 0.0,
+        colour: [0; 3].map(|_| numbers.between(0.1, 1.0)),
+        padding_colour: 0.0,
+        // Beyond this the opacity is below the least that counts.
+        extent: [3.4 * right, 3.4 * down],
+        padding_end: [0.0; 2],
+    }
+}
+
 impl Picture {
     fn new(numbers: &mut Numbers, size: u32) -> Picture {
         let width = f64::from(size).sqrt().ceil() as u32;
@@ -50,24 +70,7 @@ impl Picture {
         let background = [0; 3].map(|_| numbers.between(0.2, 0.9));
         let block = TileBlock::new(width, height, background);
         let count = SPLATS + size as usize / 16;
-        let splat = |index: usize| {
-            let [right, down] = [numbers.between(0.8, 4.0), numbers.between(0.8, 4.0)];
-            // The covariance of a correlation.
-            let correlation = numbers.between(-0.7, 0.7);
-            let rest = 1.0 / (1.0 - correlation * correlation);
-            ProjectedGaussian {
-                mean: [numbers.between(-2.0, width as f32 + 2.0), numbers.between(-2.0, height as f32 + 2.0)],
-                depth: 1.0 + 0.01 * index as f32,
-                opacity: numbers.between(0.05, 1.0),
-                conic: [rest / (right * right), -correlation * rest / (right * down), rest / (down * down)],
-                padding: 0.0,
-                colour: [0; 3].map(|_| numbers.between(0.1, 1.0)),
-                padding_colour: 0.0,
-                // Beyond this the opacity is below the least that counts.
-                extent: [3.4 * right, 3.4 * down],
-                padding_end: [0.0; 2],
-            }
-        };
+        let splat = |index: usize| splat(numbers, [width, height], 1.0 + 0.01 * index as f32);
         let splats: Vec<ProjectedGaussian> = (0..count).map(splat).collect();
         let side = SPLAT_TILE as u32;
         let (mut starts, mut entries) = (vec![0], Vec::new());

@@ -1,10 +1,11 @@
 //! Loops over bodies that are written by hand: what elements write is not in their order, or a row's elements share
 //! work.
 
-use crate::parallel::for_each_row;
+use crate::parallel::{Rest, for_each_piece, for_each_row};
 use pulp::Arch;
 use viewfuse_core::depths::{FineBlock, merged_depth};
 use viewfuse_kernels::network::attend::{softmax_scale, softmax_value};
+use viewfuse_kernels::rows::ListBlock;
 
 pub(super) fn softmax_rows(column_count: &u32, row_count: u32, scores: &[f32], weights: &mut [f32]) {
     let columns = *column_count as usize;
@@ -27,5 +28,18 @@ pub(super) fn merge_depths(block: &FineBlock, ray_count: u32, coarse: &[f32], fi
             let (depth, place) = merged_depth(coarse, fine, block.coarse_count, block.fine_count(), index);
             merged[place as usize] = depth;
         }
+    });
+}
+
+/// Each tile's keys are sorted, in the order that the body's ranks have.
+pub(super) fn sort_entries(block: &ListBlock, starts: &[u32], keys: &[[u32; 2]], entries: &mut [u32]) {
+    let mut entries = Rest::new(entries);
+    let of = |tile: u32| starts[tile as usize] as usize;
+    let take = move |tiles: std::ops::Range<u32>| entries.take(of(tiles.start), of(tiles.end));
+    for_each_piece(0..block.tile_count(), 8, take, |tiles, entries| {
+        let (first, end) = (of(tiles.start), of(tiles.end));
+        let mut sorted = keys[first..end].to_vec();
+        tiles.for_each(|tile| sorted[of(tile) - first..of(tile + 1) - first].sort_unstable());
+        entries.values.iter_mut().zip(sorted).for_each(|(entry, [_, index])| *entry = index);
     });
 }

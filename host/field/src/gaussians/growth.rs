@@ -72,8 +72,9 @@ mod tests {
     fn the_number_is_the_stated_one_and_the_transparent_go() {
         let mut particles: Vec<Particle> = (0..100).map(|index| particle(4.0 * index as f32, 0.0)).collect();
         particles[3].gaussian.opacity = -9.0;
-        particles[7].scored(5.0);
-        particles[8].scored(9.0);
+        for (index, moved) in [(7, 5.0), (8, 9.0)] {
+            (particles[index].state.moved, particles[index].state.moved_count) = (moved, 1);
+        }
         grow(&mut particles, 1, 100, 103);
         assert_eq!(particles.len(), 100, "one went, and one came for it");
         let near = |index: f32| {

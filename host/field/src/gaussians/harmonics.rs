@@ -2,29 +2,18 @@
 
 use viewfuse_core::Vec3;
 use viewfuse_core::gaussian::{REST_COUNTS, harmonics};
-use viewfuse_kernels::gaussians::adam::adam_step;
-
-/// Their learning rate is this share of the colour's: four times that of the published code, which has ten times the
-/// iterations (`host/results/gaussian_quality.md`).
-const RATE_SHARE: f32 = 0.2;
-
-/// A coefficient of red, green and blue.
-#[derive(Clone, Copy, Debug, Default)]
-struct Term {
-    value: [f32; 3],
-    moments: [[f32; 2]; 3],
-}
+use viewfuse_kernels::gaussians::steps::{HarmonicTerm, colour_along, step_term};
 
 /// The coefficients in their order; none for a colour that is the same from everywhere.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Harmonics(Vec<Term>);
+pub(super) struct Harmonics(pub(super) Vec<HarmonicTerm>);
 
 impl Harmonics {
     /// Of coefficients `[channel][coefficient]`.
     pub(super) fn new(coefficients: &[f32]) -> Harmonics {
         let count = coefficients.len() / 3;
         let value = |index: usize| [0, 1, 2].map(|channel| coefficients[channel * count + index]);
-        Harmonics((0..count).map(|index| Term { value: value(index), ..Term::default() }).collect())
+        Harmonics((0..count).map(|index| HarmonicTerm { value: value(index), ..HarmonicTerm::default() }).collect())
     }
 
     /// The coefficients, `[channel][coefficient]`, with zeros up to `count` a channel.
@@ -40,34 +29,26 @@ impl Harmonics {
 
     /// The same coefficients at the beginning of an optimisation.
     pub(super) fn begun_anew(&self) -> Harmonics {
-        Harmonics(self.0.iter().map(|term| Term { value: term.value, ..Term::default() }).collect())
+        Harmonics(self.0.iter().map(|term| HarmonicTerm { value: term.value, ..HarmonicTerm::default() }).collect())
     }
 
     /// Adds those of this degree, as zeros, if they are not there.
     pub(super) fn raise(&mut self, degree: u32) {
         let count = REST_COUNTS[degree.min(3) as usize] as usize;
         if self.0.len() < count {
-            self.0.resize(count, Term::default());
+            self.0.resize(count, HarmonicTerm::default());
         }
     }
 
     /// A colour of degree 0 as it is seen along a direction of length 1: at least 0, once there are harmonics.
-    pub(super) fn along(&self, mut colour: [f32; 3], unit: Vec3) -> [f32; 3] {
-        if self.0.is_empty() {
-            return colour;
-        }
-        for (term, basis) in self.0.iter().zip(harmonics(unit)) {
-            colour.iter_mut().zip(term.value).for_each(|(colour, value)| *colour += basis * value);
-        }
-        colour.map(|channel| channel.max(0.0))
+    pub(super) fn along(&self, colour: [f32; 3], unit: Vec3) -> [f32; 3] {
+        colour_along(colour, &self.0[..], 0, self.0.len() as u32, unit)
     }
 
     /// Steps against the derivatives by the colour along a direction of length 1.
     pub(super) fn step(&mut self, by_colour: [f32; 3], unit: Vec3, colour_rate: f32, corrections: [f32; 2]) {
-        for (Term { value, moments }, basis) in self.0.iter_mut().zip(harmonics(unit)) {
-            for ((value, moments), by) in value.iter_mut().zip(moments).zip(by_colour) {
-                adam_step(value, moments, by * basis, RATE_SHARE * colour_rate, corrections);
-            }
+        for (term, basis) in self.0.iter_mut().zip(harmonics(unit)) {
+            *term = step_term(term, by_colour, basis, colour_rate, corrections);
         }
     }
 }

@@ -4,20 +4,13 @@
 //! picture's edge: what lies outside counts as 0, in both pictures. Its derivative goes through the windows' means of
 //! `x`, `x x` and `x y`, and these windows are symmetric, so it is again three blurs.
 
-/// Radius of a window in pixels.
-const RADIUS: usize = 4;
-/// The window along an axis, from its centre on, before it is divided by its sum.
-const WINDOW: [f32; RADIUS + 1] = [1.0, 0.800_737_4, 0.411_112_3, 0.135_335_28, 0.028_565_5];
-/// SSIM's constants for colours from 0 to 1.
-const CONSTANTS: [f32; 2] = [1.0e-4, 9.0e-4];
-/// Differences below this count by their square: the derivative is then continuous.
-const SMALL: f32 = 0.01;
+use viewfuse_kernels::gaussians::windows::{RADIUS, SMALL, WINDOW, similarity_gradient};
 
 /// A channel of a photograph, in windows.
 #[derive(Clone, Debug)]
 pub(super) struct Structure {
-    means: Vec<f32>,
-    variances: Vec<f32>,
+    pub(super) means: Vec<f32>,
+    pub(super) variances: Vec<f32>,
 }
 
 impl Structure {
@@ -61,21 +54,10 @@ fn add_structure(pair: &Pair<'_>, share: f32, gradient: &mut [f32]) {
     let products: Vec<f32> = picture.iter().zip(photograph).map(|(x, y)| x * y).collect();
     let (mut squares, mut products) = (blurred(&squares, width, height), blurred(&products, width, height));
     let mut by_means = vec![0.0; means.len()];
-    let [first, second] = CONSTANTS;
     for index in 0..means.len() {
-        let (x, y) = (means[index], structure.means[index]);
-        let (xx, xy) = (squares[index] - x * x, products[index] - x * y);
-        let (light, contrast) = (2.0 * x * y + first, 2.0 * xy + second);
-        let (lights, contrasts) = (x * x + y * y + first, xx + structure.variances[index] + second);
-        let inverse = 1.0 / (lights * contrasts);
-        let similarity = light * contrast * inverse;
-        // By the window's means of x x, of x y and of x.
-        let by_square = -similarity / contrasts;
-        let by_product = 2.0 * light * inverse;
-        let by_mean = 2.0 * y * contrast * inverse - 2.0 * x * similarity / lights;
-        by_means[index] = -share * (by_mean - 2.0 * x * by_square - y * by_product);
-        squares[index] = -share * by_square;
-        products[index] = -share * by_product;
+        let window = [means[index], squares[index], products[index]];
+        let by = similarity_gradient(window, structure.means[index], structure.variances[index]);
+        [by_means[index], squares[index], products[index]] = by.map(|by| -share * by);
     }
     let by_means = blurred(&by_means, width, height);
     let (squares, products) = (blurred(&squares, width, height), blurred(&products, width, height));
@@ -86,8 +68,7 @@ fn add_structure(pair: &Pair<'_>, share: f32, gradient: &mut [f32]) {
 
 /// Means over windows: along the rows, then along the columns, each from the centre outwards.
 fn blurred(values: &[f32], width: usize, height: usize) -> Vec<f32> {
-    let sum = WINDOW[0] + 2.0 * WINDOW[1..].iter().sum::<f32>();
-    let window = WINDOW.map(|weight| weight / sum);
+    let window = WINDOW;
     let mut padded = vec![0.0; width + 2 * RADIUS];
     let mut rows = vec![0.0; values.len()];
     for (row, blurred) in values.chunks_exact(width).zip(rows.chunks_exact_mut(width)) {

@@ -7,47 +7,19 @@ use viewfuse_core::Vec3;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::gaussian::{axes, opacity};
 use viewfuse_device::parallel::for_each;
-use viewfuse_kernels::gaussians::adam::{FIRST_DECAY, SECOND_DECAY, adam_step};
+use viewfuse_kernels::gaussians::steps::{ParticleState, StepBlock, by_colour, corrections, direction, step_particle};
 use viewfuse_kernels::rows::GaussianBlock;
 
 /// Most times that a Gaussian is split in a row.
 const MAX_SPLITS: u32 = 3;
-/// Logarithm of the greatest quotient of a Gaussian's scales: ten.
-const MAX_ELONGATION: f32 = 2.3;
-/// Greatest magnitude of an opacity's logit.
-const MAX_LOGIT: f32 = 6.0;
-/// Greatest standard deviation, in footprints of the level.
-const MAX_SCALE: f32 = 8.0;
 
-/// A Gaussian and the moments of its derivatives.
+/// A Gaussian and the state of its optimisation.
 #[derive(Clone, Debug)]
 pub(super) struct Particle {
     /// Its colour is that of degree 0.
     pub(super) gaussian: GaussianBlock,
     pub(super) harmonics: Harmonics,
-    moments: [[f32; 2]; 14],
-    step_count: i32,
-    /// Sum of the lengths of the derivative by its place in a picture, and of how many pictures.
-    moved: (f32, u32),
-}
-
-/// What an iteration does to the particles.
-pub(super) struct Step<'a> {
-    /// Derivatives by the Gaussians' parameters.
-    pub(super) gradients: &'a [GaussianBlock],
-    /// Whether each Gaussian is in the picture: others stay as they are.
-    pub(super) in_sight: &'a [bool],
-    pub(super) camera: CameraBlock,
-    /// Of position, log scale, rotation, opacity, colour.
-    pub(super) rates: [f32; 5],
-    /// What the opacity's derivative grows by, a unit of it.
-    pub(super) opacity_penalty: f32,
-    /// Size of the level's pixel at the median depth, world units.
-    pub(super) footprint: f32,
-    /// Median depth, world units.
-    pub(super) depth: f32,
-    /// Degree of the spherical harmonics so far.
-    pub(super) degree: u32,
+    pub(super) state: ParticleState,
 }
 
 impl Particle {
@@ -56,84 +28,45 @@ impl Particle {
     }
 
     pub(super) fn begun(gaussian: GaussianBlock, harmonics: Harmonics) -> Particle {
-        Particle { gaussian, harmonics, moments: [[0.0; 2]; 14], step_count: 0, moved: (0.0, 0) }
+        let state = ParticleState { rest_count: harmonics.count() as u32, ..ParticleState::default() };
+        Particle { gaussian, harmonics, state }
     }
 
     /// As a camera sees it.
     pub(super) fn block(&self, camera: &CameraBlock) -> GaussianBlock {
-        GaussianBlock { colour: self.harmonics.along(self.gaussian.colour, self.direction(camera)), ..self.gaussian }
-    }
-
-    /// From a camera to its mean, of length 1; 0 at the camera itself.
-    fn direction(&self, camera: &CameraBlock) -> Vec3 {
-        (Vec3::from_array(self.gaussian.position) - camera.centre_world()).normalize_or_zero()
+        let unit = direction(&self.gaussian, camera);
+        GaussianBlock { colour: self.harmonics.along(self.gaussian.colour, unit), ..self.gaussian }
     }
 
     /// How much the loss moves it: 0 if it was in no picture.
     pub(super) fn score(&self) -> f32 {
-        self.moved.0 / self.moved.1.max(1) as f32
-    }
-
-    /// Counts a picture with a derivative of this length.
-    pub(super) fn scored(&mut self, length: f32) {
-        if length.is_finite() {
-            self.moved = (self.moved.0 + length, self.moved.1 + 1);
-        }
+        self.state.moved / self.state.moved_count.max(1) as f32
     }
 
     pub(super) fn reset_score(&mut self) {
-        self.moved = (0.0, 0);
+        (self.state.moved, self.state.moved_count) = (0.0, 0);
     }
 
-    fn step(&mut self, gradient: &GaussianBlock, step: &Step<'_>) {
-        self.step_count += 1;
-        let corrections = [1.0 - FIRST_DECAY.powi(self.step_count), 1.0 - SECOND_DECAY.powi(self.step_count)];
-        let unit = self.direction(&step.camera);
-        let mut by_colour = gradient.colour;
-        if step.degree > 0 {
-            self.harmonics.raise(step.degree);
-            let seen = self.harmonics.along(self.gaussian.colour, unit);
-            // Colours end at 0.
-            by_colour.iter_mut().zip(seen).filter(|(_, seen)| *seen <= 0.0).for_each(|(by, _)| *by = 0.0);
+    fn step(&mut self, gradient: &GaussianBlock, block: &StepBlock) {
+        let mut seen = self.gaussian.colour;
+        if block.degree > 0 {
+            let unit = direction(&self.gaussian, &block.camera);
+            self.harmonics.raise(block.degree);
+            seen = self.harmonics.along(self.gaussian.colour, unit);
+            let by_colour = by_colour(gradient.colour, seen, block.degree);
             if by_colour.iter().all(|by| by.is_finite()) {
-                self.harmonics.step(by_colour, unit, step.rates[4], corrections);
+                self.harmonics.step(by_colour, unit, block.rates[4], corrections(self.state.step_count + 1));
             }
         }
-        let gaussian = &mut self.gaussian;
-        let solid = opacity(gaussian.opacity);
-        let penalty = step.opacity_penalty * solid * (1.0 - solid);
-        let [place, scale, turn, opaque, colour] = step.rates;
-        let mut moments = self.moments.iter_mut();
-        let mut all = |values: &mut [f32], gradients: &[f32], rate: f32| {
-            for ((value, gradient), moments) in values.iter_mut().zip(gradients).zip(&mut moments) {
-                if gradient.is_finite() {
-                    adam_step(value, moments, *gradient, rate, corrections);
-                }
-            }
-        };
-        all(&mut gaussian.position, &gradient.position, place);
-        all(&mut gaussian.log_scales, &gradient.log_scales, scale);
-        all(&mut gaussian.rotation, &gradient.rotation, turn);
-        all(std::slice::from_mut(&mut gaussian.opacity), &[gradient.opacity + penalty], opaque);
-        all(&mut gaussian.colour, &by_colour, colour);
-        let [x, y, z] = gaussian.position;
-        let depth = step.camera.pose.rotate_to_camera(Vec3::new(x, y, z) - step.camera.centre_world()).z;
-        let most = (MAX_SCALE * step.footprint * (depth / step.depth).max(1.0)).ln();
-        let scales = &mut gaussian.log_scales;
-        scales.iter_mut().for_each(|scale| *scale = scale.min(most));
-        let least = scales.iter().copied().fold(f32::NEG_INFINITY, f32::max) - MAX_ELONGATION;
-        scales.iter_mut().for_each(|scale| *scale = scale.max(least));
-        gaussian.opacity = gaussian.opacity.clamp(-MAX_LOGIT, MAX_LOGIT);
-        // A place in the picture moves by the focal length over the depth.
-        self.scored(Vec3::from_array(gradient.position).length() * depth / step.camera.intrinsics[0]);
+        (self.gaussian, self.state) = step_particle(&self.gaussian, &self.state, gradient, seen, block, f32::ln);
     }
 }
 
-/// Steps all Gaussians that are seen.
-pub(super) fn step_all(particles: &mut [Particle], step: &Step<'_>) {
+/// Steps all Gaussians that are in the picture.
+pub(super) fn step_all(particles: &mut [Particle], gradients: &[GaussianBlock], in_sight: &[bool], block: &StepBlock) {
     for_each(particles, 128, |index, particle| {
-        if step.in_sight[index] {
-            particle.step(&step.gradients[index], step);
+        if in_sight[index] {
+            particle.step(&gradients[index], block);
         }
     });
 }

@@ -5,7 +5,7 @@ use crate::Rendered;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::{Device, DeviceError};
 use viewfuse_kernels::gaussians::{SplatBlock, TileBlock};
-use viewfuse_kernels::rows::{GaussianBlock, ProjectedGaussian};
+use viewfuse_kernels::rows::{GaussianBlock, LIST_PARTS, ListBlock, ProjectedGaussian, STATUS_NUMBERS};
 
 /// Makes pictures of Gaussians on a device.
 #[derive(Debug)]
@@ -18,6 +18,17 @@ pub struct Splatter<'d, D> {
     pub background: [f32; 3],
 }
 
+/// Most masks of a picture's bins, 256 MiB: where there are more, the host makes the lists.
+const MAX_MASKS: u64 = 1 << 26;
+
+/// Whether a device's memory takes the masks from which it makes the lists of a camera's picture.
+pub(super) fn can_be_listed<D: Device>(device: &D, camera: &CameraBlock, gaussian_count: usize) -> bool {
+    let CameraBlock { width, height, .. } = *camera;
+    let block = ListBlock { width, height, splat_count: gaussian_count as u32, capacity: 0 };
+    let masks = u64::from(block.bin_count()) * u64::from(block.mask_count());
+    masks <= MAX_MASKS.min(device.most_elements::<u32>() as u64)
+}
+
 /// A picture on the device, with what its derivatives need.
 #[derive(Debug)]
 pub struct Splatted<D: Device> {
@@ -28,6 +39,15 @@ pub struct Splatted<D: Device> {
     starts: D::Buffer<u32>,
     entries: D::Buffer<u32>,
     splats: D::Buffer<ProjectedGaussian>,
+    /// `[row][column]`: red, green, blue over the background, opacity.
+    pub colours: D::Buffer<[f32; 4]>,
+    /// `[row][column]`: weighted sums of depths; over the opacity, the depth along the principal axis.
+    pub depths: D::Buffer<f32>,
+}
+
+/// A picture on the device, alone.
+#[derive(Debug)]
+pub struct Drawn<D: Device> {
     /// `[row][column]`: red, green, blue over the background, opacity.
     pub colours: D::Buffer<[f32; 4]>,
     /// `[row][column]`: weighted sums of depths; over the opacity, the depth along the principal axis.
@@ -62,6 +82,53 @@ impl<'d, D: Device> Splatter<'d, D> {
         Ok(Splatted { block, tiles, lists, starts, entries, splats, colours, depths })
     }
 
+    /// The picture alone. On the device, its lists are made there, and the host
+    /// hears how many entries they have; otherwise the host makes them. Both are the same lists.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn drawn(
+        &self,
+        gaussians: &D::Buffer<GaussianBlock>,
+        gaussian_count: usize,
+        camera: &CameraBlock,
+        are_lists_on_device: bool,
+    ) -> Result<Drawn<D>, DeviceError> {
+        if !are_lists_on_device {
+            let Splatted { colours, depths, .. } = self.picture(gaussians, gaussian_count, camera)?;
+            return Ok(Drawn { colours, depths });
+        }
+        let device = self.device;
+        let camera = CameraBlock { first_texel: 0, ..*camera };
+        let CameraBlock { width, height, .. } = camera;
+        let gaussian_count = gaussian_count as u32;
+        let mut splats = device.zeros(gaussian_count.max(1) as usize)?;
+        let projected = SplatBlock { camera, near: self.near, gaussian_count, padding: [0; 2] };
+        device.project_gaussians(&projected, gaussians, &mut splats)?;
+
+        let block = ListBlock { width, height, splat_count: gaussian_count, capacity: u32::MAX };
+        let zeros = |count: u32| device.zeros(count.max(1) as usize);
+        let mut masks = zeros(block.bin_count() * block.mask_count())?;
+        let (mut counts, mut sums) = (zeros(block.tile_count() * LIST_PARTS)?, zeros(block.run_count())?);
+        let (mut starts, before, mut status) =
+            (zeros(block.tile_count() + 1)?, zeros(STATUS_NUMBERS)?, zeros(STATUS_NUMBERS)?);
+        device.mark_bins(&block, &splats, &mut masks)?;
+        device.count_entries(&block, &splats, &masks, &mut counts)?;
+        device.sum_entries(&block, &counts, &mut sums)?;
+        device.start_tiles(&block, &counts, &sums, &before, &mut starts, &mut status)?;
+        let entry_count = device.download(&status)?.last().copied().unwrap_or(0);
+        let block = ListBlock { capacity: entry_count, ..block };
+        let (mut keys, mut entries) = (device.zeros(entry_count.max(1) as usize)?, zeros(entry_count)?);
+        device.list_entries(&block, &splats, &masks, &starts, &counts, &mut keys)?;
+        device.sort_entries(&block, &starts, &keys, &mut entries)?;
+
+        let pixel_count = (width * height) as usize;
+        let (mut colours, mut depths) = (device.zeros(pixel_count)?, device.zeros(pixel_count)?);
+        let tiles = block.tiles(self.background);
+        device.blend_splats(&tiles, &starts, &entries, &splats, &mut colours, &mut depths)?;
+        Ok(Drawn { colours, depths })
+    }
+
     /// The same as a field gives it: depths where the opacity is at least `least_opacity`, 0 elsewhere; confidences are
     /// the opacities.
     ///
@@ -74,9 +141,9 @@ impl<'d, D: Device> Splatter<'d, D> {
         camera: &CameraBlock,
         least_opacity: f32,
     ) -> Result<Rendered, DeviceError> {
-        let picture = self.picture(gaussians, gaussian_count, camera)?;
-        let mut colours = self.device.download(&picture.colours)?;
-        let mut depths = self.device.download(&picture.depths)?;
+        let are_lists_on_device = !self.device.is_software() && can_be_listed(self.device, camera, gaussian_count);
+        let Drawn { colours, depths } = self.drawn(gaussians, gaussian_count, camera, are_lists_on_device)?;
+        let (mut colours, mut depths) = (self.device.download(&colours)?, self.device.download(&depths)?);
         let confidences: Vec<f32> = colours.iter().map(|colour| colour[3]).collect();
         for (depth, opacity) in depths.iter_mut().zip(&confidences) {
             *depth = if *opacity >= least_opacity { *depth / opacity } else { 0.0 };

@@ -1,6 +1,7 @@
 //! A picture's tiles, and which splats each shows, the nearest first.
 
 use viewfuse_device::parallel::map;
+use viewfuse_kernels::gaussians::lists::is_reached;
 use viewfuse_kernels::gaussians::{SPLAT_TILE, TileBlock};
 use viewfuse_kernels::rows::ProjectedGaussian;
 
@@ -79,10 +80,8 @@ fn for_each_tile(block: &TileBlock, splat: &ProjectedGaussian, mut work: impl Fn
     let side = SPLAT_TILE as u32;
     let [left, right, top, bottom] = splat.pixels(block.width, block.height);
     for row in top / side..=(bottom - 1) / side {
-        let rows = [top.max(row * side), (bottom - 1).min(row * side + side - 1)];
         for column in left / side..=(right - 1) / side {
-            let columns = [left.max(column * side), (right - 1).min(column * side + side - 1)];
-            if splat.reaches(columns, rows) {
+            if is_reached(splat, [left, right, top, bottom], column, row) {
                 work(row * block.tile_columns + column);
             }
         }

@@ -1,6 +1,7 @@
 //! How long an optimisation takes: said once a few iterations of the finest level are measured, and how many fit into a
 //! time.
 
+use crate::FieldError;
 use crate::gaussians::Optimisation;
 use std::time::{Duration, Instant};
 use viewfuse_job::progress::Progress;
@@ -30,15 +31,27 @@ impl Clock {
 
     /// To be called after each iteration: once, when the first ones of the finest level are measured, it sets how many
     /// there are, says how long they will take, and returns true.
-    pub(super) fn has_measured(&mut self, optimisation: &mut dyn Optimisation, progress: &dyn Progress) -> bool {
+    ///
+    /// # Errors
+    /// [`FieldError`] if the device fails.
+    pub(super) fn has_measured(
+        &mut self,
+        optimisation: &mut dyn Optimisation,
+        progress: &dyn Progress,
+    ) -> Result<bool, FieldError> {
         let done = optimisation.done_at_finest();
         if self.is_told || done == 0 {
-            return false;
+            return Ok(false);
         }
-        let &mut (begun, first) = self.finest.get_or_insert_with(|| (Instant::now(), done));
+        let Some((begun, first)) = self.finest else {
+            optimisation.finish()?;
+            self.finest = Some((Instant::now(), done));
+            return Ok(false);
+        };
         if done < first + MEASURED {
-            return false;
+            return Ok(false);
         }
+        optimisation.finish()?;
         self.is_told = true;
         let one = GROWN * begun.elapsed().as_secs_f64() / f64::from(done - first);
         if let Some(limit) = self.limit {
@@ -49,7 +62,7 @@ impl Clock {
         }
         let left = optimisation.iteration_count() - optimisation.done();
         progress.note(&format!("{left} iterations more, about {}", words(f64::from(left) * one)));
-        true
+        Ok(true)
     }
 }
 

@@ -153,7 +153,7 @@ impl<D: Device> Alone<'_, D> {
             let splats = match begun {
                 Some(mut optimisation) => {
                     let ran = optimisation.run_to(end, &Quiet(progress));
-                    let optimised = optimisation.optimised();
+                    let optimised = optimisation.optimised()?;
                     if end < recipe.all_iterations() {
                         self.optimisation = Some(optimisation);
                     }

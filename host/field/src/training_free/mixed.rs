@@ -79,7 +79,7 @@ impl<'a, D: Device> Mixed<'a, D> {
             let splats = match self.depths.optimisation(recipe, progress)? {
                 Some(mut optimisation) => {
                     optimisation.run_to(u32::MAX, &Quiet(progress))?;
-                    Some(Splats::upload(self.depths.device, optimisation.optimised(), &recipe)?)
+                    Some(Splats::upload(self.depths.device, optimisation.optimised()?, &recipe)?)
                 }
                 None => None,
             };

@@ -1,0 +1,343 @@
+//! An iteration of the optimisation of Gaussians: lists of tiles, the loss and the steps. Where a picture's lists were
+//! too long ([`ListStatus`](crate::gaussians::lists::ListStatus)), steps leave everything as it is.
+
+use crate::gaussians::blend_gradient::SplatGradient;
+use crate::gaussians::lists::{LIST_PARTS, ListBlock, TILE_RUN, entry_of, is_reached, rank};
+use crate::gaussians::project_gradient;
+use crate::gaussians::steps::{
+    GainStepBlock, HarmonicTerm, ParticleBlock, ParticleState, StepBlock, by_colour, colour_along, corrections,
+    direction, step_gain, step_particle, step_term,
+};
+use crate::gaussians::windows::{GainBlock, LossBlock, SHARE_RUN, pixel_gradient, structure};
+use crate::gaussians::{SPLAT_TILE, SplatBlock};
+use crate::store::Store;
+use viewfuse_core::fetch::Fetch;
+use viewfuse_core::gaussian::{GaussianBlock, ProjectedGaussian, REST_COUNTS, harmonics, project};
+use viewfuse_core::math::{has_finite_bits, ln};
+
+/// A Gaussian as the camera sees it, with its colour along the direction.
+#[inline(always)]
+pub fn project_particles(
+    block: &ParticleBlock,
+    gaussians: &(impl Fetch<GaussianBlock> + ?Sized),
+    states: &(impl Fetch<ParticleState> + ?Sized),
+    terms: &(impl Fetch<HarmonicTerm> + ?Sized),
+    splats: &mut (impl Store<ProjectedGaussian> + ?Sized),
+    gaussian: u32,
+) {
+    let at = gaussian as usize;
+    let mut seen = gaussians.fetch(at);
+    if block.term_count > 0 {
+        let (count, unit) = (states.fetch(at).rest_count, direction(&seen, &block.camera));
+        let count = if count < block.term_count { count } else { block.term_count };
+        seen.colour = colour_along(seen.colour, terms, gaussian * block.term_count, count, unit);
+    }
+    splats.store(at, project(&seen, &block.camera, block.near));
+}
+
+/// Which splats' boxes reach a bin.
+#[inline(always)]
+pub fn mark_bins(
+    block: &ListBlock,
+    splats: &(impl Fetch<ProjectedGaussian> + ?Sized),
+    masks: &mut (impl Store<u32> + ?Sized),
+    mask: u32,
+) {
+    masks.store(mask as usize, block.mask(splats, mask));
+}
+
+/// How many splats of a part a tile shows.
+#[inline(always)]
+pub fn count_entries(
+    block: &ListBlock,
+    splats: &(impl Fetch<ProjectedGaussian> + ?Sized),
+    masks: &[u32],
+    counts: &mut (impl Store<u32> + ?Sized),
+    part: u32,
+) {
+    counts.store(part as usize, block.fold_entries(splats, masks, part, 0, |count, _, _| count + 1));
+}
+
+/// The entries of a run of tiles.
+#[inline(always)]
+pub fn sum_entries(block: &ListBlock, counts: &[u32], sums: &mut (impl Store<u32> + ?Sized), run: u32) {
+    let end = if (run + 1) * TILE_RUN < block.tile_count() { (run + 1) * TILE_RUN } else { block.tile_count() };
+    sums.store(run as usize, ListBlock::sum(counts, run * TILE_RUN * LIST_PARTS, end * LIST_PARTS));
+}
+
+/// Where a tile's list begins; behind the last one, where it ends, and then the numbers of the status.
+#[inline(always)]
+pub fn start_tiles(
+    block: &ListBlock,
+    counts: &[u32],
+    sums: &[u32],
+    status: &[u32],
+    starts: &mut (impl Store<u32> + ?Sized),
+    next_status: &mut (impl Store<u32> + ?Sized),
+    element: u32,
+) {
+    let tile_count = block.tile_count();
+    let tile = if element < tile_count { element } else { tile_count };
+    let [before, all] = block.of_runs(sums, tile);
+    let is_over = all > block.capacity || status[0] != 0;
+    if element <= tile_count {
+        let first = tile / TILE_RUN * TILE_RUN * LIST_PARTS;
+        let start = before + ListBlock::sum(counts, first, tile * LIST_PARTS);
+        starts.store(element as usize, if is_over { 0 } else { start });
+        return;
+    }
+    let number = element - tile_count - 1;
+    let value = match number {
+        0 => u32::from(is_over),
+        1 => status[1] + u32::from(!is_over),
+        _ => {
+            if status[2] > all {
+                status[2]
+            } else {
+                all
+            }
+        }
+    };
+    next_status.store(number as usize, value);
+}
+
+/// The keys of the splats of a part that a tile shows: the bits of their depths and their indices.
+#[inline(always)]
+pub fn list_entries(
+    block: &ListBlock,
+    splats: &(impl Fetch<ProjectedGaussian> + ?Sized),
+    masks: &[u32],
+    starts: &[u32],
+    counts: &[u32],
+    keys: &mut (impl Store<[u32; 2]> + ?Sized),
+    part: u32,
+) {
+    let tile = (part / LIST_PARTS) as usize;
+    if starts[tile] == starts[tile + 1] {
+        return;
+    }
+    let first = ListBlock::first_of_part(starts, counts, part);
+    let end = first + counts[part as usize];
+    block.fold_entries(splats, masks, part, first, move |place, depth, index| {
+        if place < end {
+            keys.store(place as usize, [depth.to_bits(), index]);
+        }
+        place + 1
+    });
+}
+
+/// Puts the splat of a key where it belongs in the list of its tile.
+#[inline(always)]
+pub fn sort_entries(
+    block: &ListBlock,
+    starts: &[u32],
+    keys: &(impl Fetch<[u32; 2]> + ?Sized),
+    entries: &mut (impl Store<u32> + ?Sized),
+    entry: u32,
+) {
+    if entry < starts[block.tile_count() as usize] {
+        let tile = block.tile_of_entry(starts, entry) as usize;
+        let (start, end) = (starts[tile], starts[tile + 1]);
+        entries.store((start + rank(keys, start, end, entry)) as usize, keys.fetch(entry as usize)[1]);
+    }
+}
+
+/// The derivatives of `1 - SSIM` by the means of a pixel's window.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+pub fn compare_windows(
+    block: &LossBlock,
+    colours: &(impl Fetch<[f32; 4]> + ?Sized),
+    photographs: &(impl Fetch<[f32; 4]> + ?Sized),
+    means: &(impl Fetch<[f32; 4]> + ?Sized),
+    variances: &(impl Fetch<[f32; 4]> + ?Sized),
+    gains: &(impl Fetch<GainBlock> + ?Sized),
+    by_windows: &mut (impl Store<[f32; 4]> + ?Sized),
+    pixel: u32,
+) {
+    let gain = gains.fetch(block.source as usize).value;
+    let by = structure(block, gain, colours, photographs, means, variances, pixel);
+    let mut number = 0;
+    while number < 3 {
+        let [red, green, blue] = by[number];
+        by_windows.store(3 * pixel as usize + number, [red, green, blue, 0.0]);
+        number += 1;
+    }
+}
+
+/// The derivatives of the loss by a pixel, and what it adds to that by the gain.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+pub fn compare_pixels(
+    block: &LossBlock,
+    colours: &(impl Fetch<[f32; 4]> + ?Sized),
+    photographs: &(impl Fetch<[f32; 4]> + ?Sized),
+    by_windows: &(impl Fetch<[f32; 4]> + ?Sized),
+    gains: &(impl Fetch<GainBlock> + ?Sized),
+    by_pixels: &mut (impl Store<[f32; 4]> + ?Sized),
+    shares: &mut (impl Store<[f32; 4]> + ?Sized),
+    pixel: u32,
+) {
+    let gain = gains.fetch(block.source as usize).value;
+    let (by, share) = pixel_gradient(block, gain, colours, photographs, by_windows, pixel);
+    by_pixels.store(pixel as usize, by);
+    shares.store(pixel as usize, share);
+}
+
+/// What a run of pixels adds to the derivative by the gain, in their order.
+#[inline(always)]
+pub fn sum_shares(
+    pixel_count: &u32,
+    shares: &(impl Fetch<[f32; 4]> + ?Sized),
+    sums: &mut (impl Store<[f32; 4]> + ?Sized),
+    run: u32,
+) {
+    let mut sum = [0.0; 4];
+    let mut pixel = run * SHARE_RUN;
+    let end = if pixel + SHARE_RUN < *pixel_count { pixel + SHARE_RUN } else { *pixel_count };
+    while pixel < end {
+        let [red, green, blue, _] = shares.fetch(pixel as usize);
+        sum = [sum[0] + red, sum[1] + green, sum[2] + blue, 0.0];
+        pixel += 1;
+    }
+    sums.store(run as usize, sum);
+}
+
+/// A photograph's gain after the step of that of the picture's: their mean stays 1. `sums` are of the runs of pixels.
+#[inline(always)]
+pub fn step_gains(
+    block: &GainStepBlock,
+    sums: &(impl Fetch<[f32; 4]> + ?Sized),
+    status: &[u32],
+    gains: &(impl Fetch<GainBlock> + ?Sized),
+    next_gains: &mut (impl Store<GainBlock> + ?Sized),
+    gain: u32,
+) {
+    if status[0] != 0 {
+        next_gains.store(gain as usize, gains.fetch(gain as usize));
+        return;
+    }
+    let (mut sum, mut run) = ([0.0; 3], 0);
+    while run < block.run_count {
+        let [red, green, blue, _] = sums.fetch(run as usize);
+        sum = [sum[0] + red, sum[1] + green, sum[2] + blue];
+        run += 1;
+    }
+    let by_gain = [block.factor * sum[0], block.factor * sum[1], block.factor * sum[2]];
+    let stepped = step_gain(&gains.fetch(block.source as usize), by_gain, block.rate);
+    let (mut all, mut source) = ([0.0; 3], 0);
+    while source < block.gain_count {
+        let value = if source == block.source { stepped.value } else { gains.fetch(source as usize).value };
+        all = [all[0] + value[0], all[1] + value[1], all[2] + value[2]];
+        source += 1;
+    }
+    let mut next = gains.fetch(gain as usize);
+    if gain == block.source {
+        next = stepped;
+    }
+    let count = block.gain_count as f32;
+    next.value = [next.value[0] / (all[0] / count), next.value[1] / (all[1] / count), next.value[2] / (all[2] / count)];
+    next_gains.store(gain as usize, next);
+}
+
+/// The derivative by a Gaussian, from the entries of its splat in the lists of the tiles that show it, tile by tile.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+pub fn gather_gradients(
+    block: &SplatBlock,
+    gaussians: &(impl Fetch<GaussianBlock> + ?Sized),
+    splats: &(impl Fetch<ProjectedGaussian> + ?Sized),
+    starts: &[u32],
+    entries: &[u32],
+    sums: &(impl Fetch<SplatGradient> + ?Sized),
+    gradients: &mut (impl Store<GaussianBlock> + ?Sized),
+    gaussian: u32,
+) {
+    let at = gaussian as usize;
+    let splat = splats.fetch(at);
+    let side = SPLAT_TILE as u32;
+    let [left, right, top, bottom] = splat.pixels(block.camera.width, block.camera.height);
+    let tile_columns = block.camera.width.div_ceil(side);
+    let mut all = SplatGradient::ZERO;
+    // Nothing is covered where an end is not behind its first one.
+    let (mut row, end_row) = (top / side, if left < right { bottom.div_ceil(side) } else { 0 });
+    while row < end_row {
+        let (mut column, end_column) = (left / side, right.div_ceil(side));
+        while column < end_column {
+            if is_reached(&splat, [left, right, top, bottom], column, row) {
+                let tile = (row * tile_columns + column) as usize;
+                let end = starts[tile + 1];
+                let entry = entry_of(entries, splats, starts[tile], end, gaussian, splat.depth);
+                if entry < end {
+                    all.add(&sums.fetch(entry as usize));
+                }
+            }
+            column += 1;
+        }
+        row += 1;
+    }
+    let gradient = project_gradient::project_gradient(&gaussians.fetch(at), &block.camera, &splat, &all);
+    gradients.store(at, gradient);
+}
+
+/// Whether a splat has pixels of the picture.
+#[inline(always)]
+fn is_in_sight(splat: &ProjectedGaussian, block: &StepBlock) -> bool {
+    let [left, right, top, bottom] = splat.pixels(block.camera.width, block.camera.height);
+    left < right && top < bottom
+}
+
+/// A Gaussian and its state after the step, which it takes if it is in the picture.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+pub fn step_particles(
+    block: &StepBlock,
+    gaussians: &(impl Fetch<GaussianBlock> + ?Sized),
+    states: &(impl Fetch<ParticleState> + ?Sized),
+    splats: &(impl Fetch<ProjectedGaussian> + ?Sized),
+    gradients: &(impl Fetch<GaussianBlock> + ?Sized),
+    status: &[u32],
+    next_gaussians: &mut (impl Store<GaussianBlock> + ?Sized),
+    next_states: &mut (impl Store<ParticleState> + ?Sized),
+    gaussian: u32,
+) {
+    let at = gaussian as usize;
+    let (mut next, mut after) = (gaussians.fetch(at), states.fetch(at));
+    let splat = splats.fetch(at);
+    if status[0] == 0 && is_in_sight(&splat, block) {
+        (next, after) = step_particle(&next, &after, &gradients.fetch(at), splat.colour, block, ln);
+    }
+    next_gaussians.store(at, next);
+    next_states.store(at, after);
+}
+
+/// A term of a Gaussian's spherical harmonics after the step, which it takes if the Gaussian is in the picture and the
+/// term's degree is optimised.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+pub fn step_harmonics(
+    block: &StepBlock,
+    gaussians: &(impl Fetch<GaussianBlock> + ?Sized),
+    states: &(impl Fetch<ParticleState> + ?Sized),
+    splats: &(impl Fetch<ProjectedGaussian> + ?Sized),
+    gradients: &(impl Fetch<GaussianBlock> + ?Sized),
+    status: &[u32],
+    terms: &(impl Fetch<HarmonicTerm> + ?Sized),
+    next_terms: &mut (impl Store<HarmonicTerm> + ?Sized),
+    term: u32,
+) {
+    let at = (term / block.term_count()) as usize;
+    let number = term % block.term_count();
+    let mut next = terms.fetch(term as usize);
+    let (splat, state) = (splats.fetch(at), states.fetch(at));
+    let of_degree = REST_COUNTS[block.degree as usize];
+    let count = if state.rest_count > of_degree { state.rest_count } else { of_degree };
+    if status[0] == 0 && number < count && is_in_sight(&splat, block) {
+        let by = by_colour(gradients.fetch(at).colour, splat.colour, block.degree);
+        if has_finite_bits(by[0]) && has_finite_bits(by[1]) && has_finite_bits(by[2]) {
+            let basis = harmonics(direction(&gaussians.fetch(at), &block.camera))[number as usize];
+            next = step_term(&next, by, basis, block.rates[4], corrections(state.step_count + 1));
+        }
+    }
+    next_terms.store(term as usize, next);
+}

@@ -1,0 +1,328 @@
+//! What an optimisation does next, wherever its steps are made: levels of the pyramid, growth, the order of the
+//! sources, learning rates.
+
+use super::given::{behind, scene_of};
+use super::growth::{grow, growth_at};
+use super::harmonics::Harmonics;
+use super::level::{LevelView, level};
+use super::particles::{Particle, refined};
+use super::recipe::Recipe;
+use super::start::{Extent, start};
+use crate::FieldError;
+use crate::point_cloud::CloudPoint;
+use viewfuse_core::Vec3;
+use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::gaussian::REST_COUNTS;
+use viewfuse_core::random::uniform;
+use viewfuse_device::parallel::map;
+use viewfuse_job::progress::Progress;
+use viewfuse_kernels::gaussians::steps::StepBlock;
+use viewfuse_kernels::rows::{GainBlock, GaussianBlock, LossBlock};
+use viewfuse_scene::gaussians::GaussianScene;
+use viewfuse_scene::photographs::{SourceImages, longest_side};
+
+/// Levels of the pyramid.
+const LEVELS: usize = 4;
+/// Share of the finest level's iterations from which on the harmonics of degree 1 are optimised; those of degree 2 and 3
+/// from twice and thrice as much.
+const DEGREE_SHARE: f32 = 0.15;
+
+/// Gaussians of a scene, optimised so far.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Optimised {
+    /// The Gaussians; their colours are those of degree 0.
+    pub gaussians: Vec<GaussianBlock>,
+    /// Degree of the spherical harmonics.
+    pub degree: u32,
+    /// Coefficients of the degrees above 0: `[gaussian][channel][coefficient]`.
+    pub f_rest: Vec<f32>,
+    /// Depth along the principal axis from which on they are seen, world units.
+    pub near: f32,
+    /// What is seen where nothing is: red, green, blue.
+    pub background: [f32; 3],
+    /// How much brighter each source is than the Gaussians: red, green, blue.
+    pub gains: Vec<[f32; 3]>,
+}
+
+impl Optimised {
+    /// The Gaussians as a scene that can be written.
+    pub fn scene(&self) -> GaussianScene {
+        GaussianScene { degree: self.degree, f_rest: self.f_rest.clone(), ..scene_of(&self.gaussians) }
+    }
+}
+
+/// An optimisation, on whatever device makes its steps.
+pub trait Optimisation {
+    /// Counts each source's differences by its weight from now on; the weights are scaled to 1 in the mean.
+    fn weigh(&mut self, weights: &[f32]);
+
+    /// Goes on from Gaussians that were optimised before, with the finest level's iterations.
+    fn resume(&mut self, scene: &GaussianScene);
+
+    /// Adds iterations at the finest level.
+    fn extend(&mut self, iterations: u32);
+
+    /// So many iterations at the finest level in place of the recipe's, at least those that are done.
+    fn set_finest(&mut self, iterations: u32);
+
+    /// How many iterations are done at the finest level.
+    fn done_at_finest(&self) -> u32;
+
+    /// How many iterations are done.
+    fn done(&self) -> u32;
+
+    /// All iterations of the recipe.
+    fn iteration_count(&self) -> u32;
+
+    /// The iterations up to this number of them, as far as the recipe has so many; none if so many are done. A device
+    /// may still be at work on the last ones.
+    ///
+    /// # Errors
+    /// [`FieldError`]; where the device did not fail, the Gaussians so far are still there.
+    fn run_to(&mut self, iteration: u32, progress: &dyn Progress) -> Result<(), FieldError>;
+
+    /// Waits until the device is done with all iterations so far, so that their time can be measured.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    fn finish(&mut self) -> Result<(), FieldError>;
+
+    /// The Gaussians so far.
+    ///
+    /// # Errors
+    /// [`FieldError`] if the device fails.
+    fn optimised(&mut self) -> Result<Optimised, FieldError>;
+}
+
+/// An iteration.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plan {
+    /// The level, 0 for the finest.
+    pub(super) level: usize,
+    /// The source that is drawn.
+    pub(super) source: usize,
+    /// What it does to the Gaussians.
+    pub(super) step: StepBlock,
+    /// What it counts in the loss; the photograph begins at pixel 0.
+    pub(super) loss: LossBlock,
+    /// Learning rate of the gain.
+    pub(super) gain_rate: f32,
+}
+
+/// An optimisation's recipe, its photographs, and how far it is.
+pub(super) struct Course {
+    pub(super) recipe: Recipe,
+    pub(super) extent: Extent,
+    /// Depth along the principal axis from which on Gaussians are seen, world units.
+    pub(super) near: f32,
+    /// What is seen where nothing is: red, green, blue.
+    pub(super) background: [f32; 3],
+    /// `[level][source]`, the finest level first.
+    pub(super) levels: Vec<Vec<LevelView>>,
+    pub(super) particles: Vec<Particle>,
+    /// How many Gaussians the finest level began with.
+    first_count: usize,
+    /// `[source]`.
+    pub(super) gains: Vec<GainBlock>,
+    /// How much each source counts, 1 in the mean.
+    weights: Vec<f32>,
+    /// The sources that are still to be drawn in this round.
+    round: Vec<usize>,
+    pub(super) iteration: u32,
+    level: Option<usize>,
+}
+
+/// Most Gaussians for the pixels of the largest source.
+fn most_for(views: &[LevelView], max_per_pixel: f32) -> usize {
+    let pixels = views.iter().map(|view| view.camera.width * view.camera.height).max().unwrap_or(0);
+    (pixels as f32 * max_per_pixel).ceil() as usize
+}
+
+impl Course {
+    /// Begins with the sources' surface points; `None` if there are too few of them.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub(super) fn new(
+        images: &SourceImages,
+        points: &[CloudPoint],
+        mut recipe: Recipe,
+    ) -> Result<Option<Course>, FieldError> {
+        let own_side = images.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
+        let side = own_side.min(recipe.side);
+        let levels = map(LEVELS, 1, |number| level(images, side, number as u32));
+        let levels: Vec<Vec<LevelView>> =
+            levels.into_iter().collect::<Result<_, _>>().map_err(FieldError::unsuitable)?;
+        let finest = levels.first().and_then(|views| views.first()).map_or(1.0, |view| view.camera.intrinsics[0]);
+        let Some(extent) = Extent::of(points, images, finest) else { return Ok(None) };
+        recipe.max_count = recipe.max_count.min(most_for(&levels[0], recipe.max_per_pixel));
+        let particles = start(points, images, &extent, &recipe).into_iter().map(Particle::new).collect();
+        let source_count = images.images.len();
+        Ok(Some(Course {
+            near: recipe.near * extent.depth,
+            background: behind(images),
+            recipe,
+            extent,
+            levels,
+            first_count: 0,
+            particles,
+            gains: vec![GainBlock { value: [1.0; 3], ..GainBlock::default() }; source_count],
+            weights: vec![1.0; source_count],
+            round: Vec::new(),
+            iteration: 0,
+            level: None,
+        }))
+    }
+
+    pub(super) fn weigh(&mut self, weights: &[f32]) {
+        let mean = weights.iter().sum::<f32>() / weights.len().max(1) as f32;
+        if mean > 0.0 && weights.len() == self.weights.len() {
+            self.weights = weights.iter().map(|weight| weight / mean).collect();
+        }
+    }
+
+    pub(super) fn resume(&mut self, scene: &GaussianScene) {
+        let count = 3 * REST_COUNTS[scene.degree.min(3) as usize] as usize;
+        let flat = GaussianScene { gaussians: scene.gaussians.clone(), ..GaussianScene::default() };
+        let particle = |(index, gaussian): (usize, GaussianBlock)| {
+            let rest = scene.f_rest.get(index * count..(index + 1) * count).filter(|_| self.recipe.degree > 0);
+            Particle::begun(gaussian, rest.map_or_else(Harmonics::default, Harmonics::new))
+        };
+        self.particles = flat.blocks(Vec3::ZERO).into_iter().enumerate().map(particle).collect();
+        self.first_count = self.particles.len();
+        let [.., finest] = self.recipe.iterations;
+        self.iteration = self.iteration_count() - finest;
+        self.level = Some(self.level_of(self.iteration).0);
+    }
+
+    pub(super) fn extend(&mut self, iterations: u32) {
+        let [.., finest] = &mut self.recipe.iterations;
+        *finest += iterations;
+    }
+
+    pub(super) fn set_finest(&mut self, iterations: u32) {
+        let least = self.done_at_finest();
+        let [.., finest] = &mut self.recipe.iterations;
+        *finest = iterations.max(least);
+    }
+
+    pub(super) fn done_at_finest(&self) -> u32 {
+        let [.., finest] = self.recipe.iterations;
+        self.iteration.saturating_sub(self.iteration_count() - finest)
+    }
+
+    pub(super) fn iteration_count(&self) -> u32 {
+        self.recipe.iterations.iter().sum()
+    }
+
+    pub(super) fn optimised(&self) -> Optimised {
+        let count = self.particles.iter().map(|particle| particle.harmonics.count()).max().unwrap_or(0);
+        let degree = REST_COUNTS.iter().position(|rest| *rest as usize == count).unwrap_or(0);
+        Optimised {
+            gaussians: self.particles.iter().map(|particle| particle.gaussian).collect(),
+            degree: degree as u32,
+            f_rest: self.particles.iter().flat_map(|particle| particle.harmonics.coefficients(count)).collect(),
+            near: self.near,
+            background: self.background,
+            gains: self.gains.iter().map(|gain| gain.value).collect(),
+        }
+    }
+
+    /// The level of an iteration, and how far through it is.
+    fn level_of(&self, iteration: u32) -> (usize, f32) {
+        let mut first = 0;
+        for (coarse, count) in self.recipe.iterations.iter().enumerate() {
+            if iteration < first + count {
+                return (LEVELS - 1 - coarse, (iteration - first) as f32 / *count as f32);
+            }
+            first += count;
+        }
+        (0, 1.0)
+    }
+
+    /// The next source: each once a round, in an order drawn for the round.
+    fn next_source(&mut self) -> usize {
+        if self.round.is_empty() {
+            self.round = (0..self.gains.len()).collect();
+            for last in (1..self.round.len()).rev() {
+                let drawn = uniform(self.recipe.seed, self.iteration, last as u32) * (last + 1) as f32;
+                self.round.swap(last, (drawn as usize).min(last));
+            }
+        }
+        self.round.pop().unwrap_or_default()
+    }
+
+    /// Whether the number of Gaussians grows before the next iteration, and how many times it has grown then.
+    fn growth(&self, level: usize, share: f32) -> Option<u32> {
+        let finest = if level == 0 { self.recipe.iterations[LEVELS - 1] } else { 0 };
+        let growth = growth_at((share * finest as f32).round() as u32, finest.max(1));
+        growth.filter(|_| self.recipe.grows)
+    }
+
+    /// Whether the next iteration begins with other Gaussians than the last one ended with, or at another level.
+    pub(super) fn changes(&self) -> bool {
+        let (level, share) = self.level_of(self.iteration);
+        self.level != Some(level) || self.growth(level, share).is_some()
+    }
+
+    /// Makes the Gaussians those of the next iteration, and says what it does. The gains' mean is 1 after it.
+    pub(super) fn plan(&mut self) -> Plan {
+        let (level, share) = self.level_of(self.iteration);
+        let footprint = self.extent.footprint * (1 << level) as f32;
+        if self.level != Some(level) {
+            if self.level.is_some() {
+                let cameras: Vec<CameraBlock> = self.levels[0].iter().map(|view| view.camera).collect();
+                self.particles = refined(&self.particles, &cameras, &self.extent, footprint, &self.recipe);
+            }
+            self.level = Some(level);
+            self.first_count = self.particles.len();
+        }
+        if let Some(growth) = self.growth(level, share) {
+            grow(&mut self.particles, growth, self.first_count, self.recipe.max_count);
+        }
+        let degree = if level == 0 { self.recipe.degree.min((share / DEGREE_SHARE) as u32) } else { 0 };
+        let source = self.next_source();
+        let done = self.iteration as f32 / self.iteration_count() as f32;
+        self.iteration += 1;
+        let (view, recipe) = (&self.levels[level][source], &self.recipe);
+        let CameraBlock { width, height, .. } = view.camera;
+        let [place, scale, turn, opaque, colour, gain_rate] = recipe.rates;
+        let rates = [
+            place * footprint * 0.3_f32.powf(share),
+            scale * 0.2_f32.powf(done),
+            turn,
+            opaque * 0.2_f32.powf(done),
+            colour * 0.1_f32.powf(done),
+        ];
+        let opacity_penalty = recipe.opacity_penalty / (width * height) as f32;
+        let step = StepBlock {
+            camera: view.camera,
+            rates,
+            opacity_penalty,
+            footprint,
+            depth: self.extent.depth,
+            degree: degree.min(3),
+            counts: 0,
+        };
+        let loss = LossBlock {
+            width,
+            height,
+            first: 0,
+            source: source as u32,
+            has_silhouette: u32::from(view.has_silhouette),
+            structure_share: recipe.structure_share,
+            silhouette_share: recipe.silhouette_share,
+            factor: self.weights[source] / (3 * width * height) as f32,
+        };
+        Plan { level, source, step, loss, gain_rate }
+    }
+
+    /// Keeps the mean of the gains at 1: the Gaussians have the sources' mean exposure.
+    pub(super) fn level_gains(&mut self) {
+        for channel in 0..3 {
+            let sum: f32 = self.gains.iter().map(|gain| gain.value[channel]).sum();
+            let mean = sum / self.gains.len().max(1) as f32;
+            self.gains.iter_mut().for_each(|gain| gain.value[channel] /= mean);
+        }
+    }
+}

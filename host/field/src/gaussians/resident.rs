@@ -1,0 +1,242 @@
+//! An optimisation whose iterations are a device's own: Gaussians, photographs, lists of tiles, the loss and the steps
+//! stay in its memory.
+//!
+//! An iteration is 15 dispatches, 16 with spherical harmonics; nothing is uploaded for it and nothing downloaded. The
+//! device does not tell how many entries the lists of a picture have, so there is a capacity for them: every
+//! [`ROUND`] iterations the host reads 12 bytes, whether it sufficed. From the first picture on for which it did not,
+//! nothing was stepped; the host then enlarges the lists and dispatches the iterations from that one on again, so that
+//! results do not depend on the capacity. The Gaussians come back to the host when their number changes, and when they
+//! are asked for.
+
+mod arrays;
+
+use super::course::{Course, Optimisation, Optimised, Plan};
+use crate::FieldError;
+use arrays::{Entries, Level, Particles, Stepped, list_block, stepped};
+use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::gaussian::REST_COUNTS;
+use viewfuse_device::{Device, DeviceError};
+use viewfuse_job::progress::Progress;
+use viewfuse_kernels::gaussians::blend_gradient::SplatGradient;
+use viewfuse_kernels::gaussians::lists::ListStatus;
+use viewfuse_kernels::rows::{
+    GainStepBlock, LossBlock, ParticleBlock, SHARE_RUN, STATUS_NUMBERS, SplatBlock, StepBlock,
+};
+use viewfuse_scene::gaussians::GaussianScene;
+
+pub(super) use arrays::fits;
+
+/// Iterations after which the host sees whether the lists had room.
+const ROUND: usize = 32;
+/// Entries that there is room for at first: so many for each Gaussian, and at least these.
+pub(super) const ENTRIES_A_GAUSSIAN: usize = 8;
+const MIN_ENTRIES: usize = 4096;
+
+/// An optimisation on a device.
+pub(super) struct Resident<'d, D: Device> {
+    device: &'d D,
+    course: Course,
+    /// What the lists have room for at first.
+    first_capacity: Option<usize>,
+    level: Option<Level<D>>,
+    particles: Option<Particles<D>>,
+    entries: Option<Entries<D>>,
+    status: Option<Stepped<D::Buffer<u32>>>,
+    /// Iterations that are dispatched, of which it is not yet known whether the lists had room.
+    pending: Vec<Plan>,
+}
+
+impl<'d, D: Device> Resident<'d, D> {
+    pub(super) fn new(device: &'d D, course: Course, first_capacity: Option<usize>) -> Resident<'d, D> {
+        let (level, particles, entries, status, pending) = (None, None, None, None, Vec::new());
+        Resident { device, course, first_capacity, level, particles, entries, status, pending }
+    }
+
+    /// Takes what an iteration needs to the device, as far as it is not there.
+    fn load(&mut self, plan: &Plan) -> Result<(), DeviceError> {
+        let (device, course) = (self.device, &self.course);
+        let level = match self.level.take().filter(|level| level.number == plan.level) {
+            Some(level) => level,
+            None => Level::new(device, plan.level, &course.levels[plan.level])?,
+        };
+        if self.particles.is_none() {
+            // Harmonics are optimised at the finest level.
+            let degree = if plan.level == 0 { course.recipe.degree.min(3) } else { 0 };
+            let there = course.particles.iter().map(|particle| particle.harmonics.count()).max().unwrap_or(0) as u32;
+            let term_count = REST_COUNTS[degree as usize].max(there);
+            self.particles = Some(Particles::new(device, course, term_count, level.bin_count)?);
+            let usual = (course.particles.len() * ENTRIES_A_GAUSSIAN).max(MIN_ENTRIES);
+            let least = self.first_capacity.unwrap_or(usual).min(device.most_elements::<SplatGradient>());
+            if self.entries.as_ref().is_none_or(|entries| entries.capacity < least) {
+                self.entries = Some(Entries::new(device, least)?);
+            }
+        }
+        if self.status.is_none() {
+            self.status = Some(stepped(device, &[0; STATUS_NUMBERS as usize])?);
+        }
+        self.level = Some(level);
+        Ok(())
+    }
+
+    /// Dispatches an iteration.
+    fn dispatch(&mut self, plan: &Plan) -> Result<(), DeviceError> {
+        let (device, near, background) = (self.device, self.course.near, self.course.background);
+        let (Some(level), Some(particles)) = (&mut self.level, &mut self.particles) else { return Ok(()) };
+        let (Some(entries), Some(status)) = (&mut self.entries, &mut self.status) else { return Ok(()) };
+        let Particles { count: gaussian_count, term_count, gaussians, states, terms, gains, .. } = particles;
+        let (gaussian_count, term_count) = (*gaussian_count, *term_count);
+        let (splats, gradients, masks) = (&mut particles.splats, &mut particles.gradients, &mut particles.masks);
+        let camera = CameraBlock { first_texel: 0, ..plan.step.camera };
+        let projected = ParticleBlock { camera, near, gaussian_count, term_count, padding: 0 };
+        device.project_particles(&projected, &gaussians.now, &states.now, &terms.now, splats)?;
+
+        let lists = list_block(&camera, gaussian_count, entries.capacity as u32);
+        let (counts, starts) = (&mut level.counts, &mut level.starts);
+        device.mark_bins(&lists, splats, masks)?;
+        device.count_entries(&lists, splats, masks, counts)?;
+        device.sum_entries(&lists, counts, &mut level.sums)?;
+        device.start_tiles(&lists, counts, &level.sums, &status.now, starts, &mut status.next)?;
+        status.swap();
+        device.list_entries(&lists, splats, masks, starts, counts, &mut entries.keys)?;
+        device.sort_entries(&lists, starts, &entries.keys, &mut entries.sorted)?;
+
+        let tiles = lists.tiles(background);
+        device.blend_splats(&tiles, starts, &entries.sorted, splats, &mut level.colours, &mut level.depths)?;
+        let loss = LossBlock { first: level.firsts[plan.source], ..plan.loss };
+        let (colours, photographs) = (&level.colours, &level.photographs);
+        if loss.structure_share > 0.0 {
+            let (means, variances) = (&level.means, &level.variances);
+            device.compare_windows(&loss, colours, photographs, means, variances, &gains.now, &mut level.by_windows)?;
+        }
+        let (by_pixels, shares) = (&mut level.by_pixels, &mut level.shares);
+        device.compare_pixels(&loss, colours, photographs, &level.by_windows, &gains.now, by_pixels, shares)?;
+
+        device.blend_gradient(&tiles, starts, &entries.sorted, splats, colours, by_pixels, &mut entries.sums)?;
+        let projected = SplatBlock { camera, near, gaussian_count, padding: [0; 2] };
+        let (sorted, sums) = (&entries.sorted, &entries.sums);
+        device.gather_gradients(&projected, &gaussians.now, splats, starts, sorted, sums, gradients)?;
+        let step = StepBlock { camera, ..plan.step }.with_counts(gaussian_count, term_count);
+        let (before, after) = (&gaussians.now, &mut gaussians.next);
+        device.step_particles(&step, before, &states.now, splats, gradients, &status.now, after, &mut states.next)?;
+        if step.degree > 0 && term_count > 0 {
+            let (now, next) = (&terms.now, &mut terms.next);
+            device.step_harmonics(&step, before, &states.now, splats, gradients, &status.now, now, next)?;
+            terms.swap();
+        }
+        gaussians.swap();
+        states.swap();
+
+        let pixel_count = camera.width * camera.height;
+        device.sum_shares(&pixel_count, &level.shares, &mut level.share_sums)?;
+        let gain = GainStepBlock {
+            source: loss.source,
+            gain_count: self.course.gains.len() as u32,
+            run_count: pixel_count.div_ceil(SHARE_RUN),
+            rate: plan.gain_rate,
+            factor: loss.factor,
+            padding: [0; 3],
+        };
+        device.step_gains(&gain, &level.share_sums, &status.now, &gains.now, &mut gains.next)?;
+        gains.swap();
+        Ok(())
+    }
+
+    /// Sees to it that all iterations so far are done: those from the first one on whose lists had no room are
+    /// dispatched again, with longer lists.
+    fn settle(&mut self) -> Result<(), DeviceError> {
+        while !self.pending.is_empty() {
+            let Some(status) = &mut self.status else { return Ok(()) };
+            let numbers = self.device.download(&status.now)?;
+            let [is_over, done, most] = [0, 1, 2].map(|number| numbers.get(number).copied().unwrap_or(0));
+            status.now = self.device.zeros(STATUS_NUMBERS as usize)?;
+            let status = ListStatus::of([is_over, done, most]);
+            if !status.is_over {
+                self.pending.clear();
+                return Ok(());
+            }
+            self.pending.drain(..(status.done as usize).min(self.pending.len()));
+            let most = status.most as usize;
+            self.entries = None;
+            self.entries = Some(Entries::new(self.device, most + most / 4)?);
+            for plan in self.pending.clone() {
+                self.dispatch(&plan)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The Gaussians and gains to the host. They stay on the device, too.
+    fn bring(&mut self) -> Result<(), DeviceError> {
+        self.settle()?;
+        if let Some(particles) = &self.particles {
+            self.course.particles = particles.download(self.device)?;
+            self.course.gains = self.device.download(&particles.gains.now)?;
+        }
+        Ok(())
+    }
+
+    fn iterate(&mut self) -> Result<(), DeviceError> {
+        if self.course.changes() {
+            self.bring()?;
+            self.particles = None;
+        }
+        let plan = self.course.plan();
+        self.load(&plan)?;
+        self.pending.push(plan);
+        self.dispatch(&plan)?;
+        if self.pending.len() >= ROUND { self.settle() } else { Ok(()) }
+    }
+}
+
+impl<D: Device> Optimisation for Resident<'_, D> {
+    fn weigh(&mut self, weights: &[f32]) {
+        self.course.weigh(weights);
+    }
+
+    fn resume(&mut self, scene: &GaussianScene) {
+        (self.particles, self.pending) = (None, Vec::new());
+        self.status = None;
+        self.course.resume(scene);
+    }
+
+    fn extend(&mut self, iterations: u32) {
+        self.course.extend(iterations);
+    }
+
+    fn set_finest(&mut self, iterations: u32) {
+        self.course.set_finest(iterations);
+    }
+
+    fn done_at_finest(&self) -> u32 {
+        self.course.done_at_finest()
+    }
+
+    fn done(&self) -> u32 {
+        self.course.iteration
+    }
+
+    fn iteration_count(&self) -> u32 {
+        self.course.iteration_count()
+    }
+
+    fn run_to(&mut self, iteration: u32, progress: &dyn Progress) -> Result<(), FieldError> {
+        let end = iteration.min(self.iteration_count());
+        progress.expect(end.saturating_sub(self.done()) as usize);
+        while self.done() < end {
+            progress.check()?;
+            self.iterate()?;
+            progress.step();
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self) -> Result<(), FieldError> {
+        self.settle()?;
+        Ok(self.device.finish()?)
+    }
+
+    fn optimised(&mut self) -> Result<Optimised, FieldError> {
+        self.bring()?;
+        Ok(self.course.optimised())
+    }
+}

@@ -1,0 +1,197 @@
+//! Arrays of an optimisation in a device's memory.
+
+use super::super::course::Course;
+use super::super::harmonics::Harmonics;
+use super::super::level::LevelView;
+use super::super::particles::Particle;
+use super::super::picture::can_be_listed;
+use super::ENTRIES_A_GAUSSIAN;
+use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::gaussian::REST_COUNTS;
+use viewfuse_device::{Device, DeviceError, Element};
+use viewfuse_kernels::gaussians::blend_gradient::SplatGradient;
+use viewfuse_kernels::rows::{
+    GainBlock, GaussianBlock, HarmonicTerm, LIST_PARTS, ListBlock, ParticleState, ProjectedGaussian, SHARE_RUN,
+};
+
+/// Gaussians must be fewer: their number has 24 bits.
+const MAX_GAUSSIANS: usize = 1 << 24;
+
+/// Whether all arrays of an optimisation can be bound on a device.
+pub(in crate::gaussians) fn fits<D: Device>(device: &D, course: &Course) -> bool {
+    let count = course.recipe.max_count.max(course.particles.len());
+    let terms = count * REST_COUNTS[course.recipe.degree.min(3) as usize] as usize;
+    let pixels = |views: &Vec<LevelView>| views.iter().map(pixel_count).sum::<usize>();
+    let most_pixels = course.levels.iter().map(pixels).max().unwrap_or(0);
+    let cameras = course.levels.iter().flatten().map(|view| &view.camera);
+    count < MAX_GAUSSIANS.min(device.most_elements::<ParticleState>())
+        && cameras.into_iter().all(|camera| can_be_listed(device, camera, count))
+        && terms <= device.most_elements::<HarmonicTerm>()
+        && most_pixels <= device.most_elements::<[f32; 4]>()
+        && count * ENTRIES_A_GAUSSIAN <= device.most_elements::<SplatGradient>()
+}
+
+fn pixel_count(view: &LevelView) -> usize {
+    (view.camera.width * view.camera.height) as usize
+}
+
+/// An array before and after a step.
+pub(super) struct Stepped<B> {
+    pub(super) now: B,
+    pub(super) next: B,
+}
+
+impl<B> Stepped<B> {
+    /// After the step.
+    pub(super) fn swap(&mut self) {
+        std::mem::swap(&mut self.now, &mut self.next);
+    }
+}
+
+/// An array of these values, and another of as many. No device has empty ones.
+pub(super) fn stepped<D: Device, T: Element>(device: &D, values: &[T]) -> Result<Stepped<D::Buffer<T>>, DeviceError> {
+    let now = if values.is_empty() { device.zeros(1)? } else { device.upload(values)? };
+    Ok(Stepped { now, next: device.zeros(values.len().max(1))? })
+}
+
+/// The photographs of a level, and arrays for a picture of the largest of them.
+pub(super) struct Level<D: Device> {
+    pub(super) number: usize,
+    /// `[source]`: where its pixels begin.
+    pub(super) firsts: Vec<u32>,
+    pub(super) photographs: D::Buffer<[f32; 4]>,
+    pub(super) means: D::Buffer<[f32; 4]>,
+    pub(super) variances: D::Buffer<[f32; 4]>,
+    pub(super) counts: D::Buffer<u32>,
+    pub(super) sums: D::Buffer<u32>,
+    pub(super) starts: D::Buffer<u32>,
+    pub(super) colours: D::Buffer<[f32; 4]>,
+    pub(super) depths: D::Buffer<f32>,
+    pub(super) by_windows: D::Buffer<[f32; 4]>,
+    pub(super) by_pixels: D::Buffer<[f32; 4]>,
+    pub(super) shares: D::Buffer<[f32; 4]>,
+    pub(super) share_sums: D::Buffer<[f32; 4]>,
+    pub(super) bin_count: u32,
+}
+
+impl<D: Device> Level<D> {
+    pub(super) fn new(device: &D, number: usize, views: &[LevelView]) -> Result<Level<D>, DeviceError> {
+        let (mut photographs, mut means, mut variances) = (Vec::new(), Vec::new(), Vec::new());
+        let mut firsts = Vec::new();
+        for view in views {
+            firsts.push(photographs.len() as u32);
+            let of = |channels: [&[f32]; 4], pixel: usize| {
+                channels.map(|channel| channel.get(pixel).copied().unwrap_or(0.0))
+            };
+            let [red, green, blue] = &view.structure;
+            let [a, b, c, d] = &view.channels;
+            for pixel in 0..pixel_count(view) {
+                photographs.push(of([a, b, c, d], pixel));
+                means.push(of([&red.means, &green.means, &blue.means, &[]], pixel));
+                variances.push(of([&red.variances, &green.variances, &blue.variances, &[]], pixel));
+            }
+        }
+        let most = |of: fn(&ListBlock) -> u32| {
+            let blocks = views.iter().map(|view| list_block(&view.camera, 0, 0));
+            blocks.map(|block| of(&block)).max().unwrap_or(0).max(1) as usize
+        };
+        let (tile_count, run_count) = (most(ListBlock::tile_count), most(ListBlock::run_count));
+        let pixels = views.iter().map(pixel_count).max().unwrap_or(0).max(1);
+        Ok(Level {
+            number,
+            firsts,
+            photographs: device.upload_owned(photographs)?,
+            means: device.upload_owned(means)?,
+            variances: device.upload_owned(variances)?,
+            counts: device.zeros(tile_count * LIST_PARTS as usize)?,
+            sums: device.zeros(run_count)?,
+            starts: device.zeros(tile_count + 1)?,
+            colours: device.zeros(pixels)?,
+            depths: device.zeros(pixels)?,
+            by_windows: device.zeros(3 * pixels)?,
+            by_pixels: device.zeros(pixels)?,
+            shares: device.zeros(pixels)?,
+            share_sums: device.zeros(pixels.div_ceil(SHARE_RUN as usize))?,
+            bin_count: most(ListBlock::bin_count) as u32,
+        })
+    }
+}
+
+/// A picture of a camera.
+pub(super) fn list_block(camera: &CameraBlock, splat_count: u32, capacity: u32) -> ListBlock {
+    ListBlock { width: camera.width, height: camera.height, splat_count, capacity }
+}
+
+/// Arrays of entries.
+pub(super) struct Entries<D: Device> {
+    pub(super) capacity: usize,
+    pub(super) keys: D::Buffer<[u32; 2]>,
+    pub(super) sorted: D::Buffer<u32>,
+    pub(super) sums: D::Buffer<SplatGradient>,
+}
+
+impl<D: Device> Entries<D> {
+    pub(super) fn new(device: &D, capacity: usize) -> Result<Entries<D>, DeviceError> {
+        let capacity = capacity.max(1);
+        let (keys, sorted) = (device.zeros(capacity)?, device.zeros(capacity)?);
+        Ok(Entries { capacity, keys, sorted, sums: device.zeros(capacity)? })
+    }
+}
+
+/// The Gaussians on the device.
+pub(super) struct Particles<D: Device> {
+    pub(super) count: u32,
+    /// Terms of each Gaussian in the array of all.
+    pub(super) term_count: u32,
+    pub(super) gaussians: Stepped<D::Buffer<GaussianBlock>>,
+    pub(super) states: Stepped<D::Buffer<ParticleState>>,
+    pub(super) terms: Stepped<D::Buffer<HarmonicTerm>>,
+    pub(super) gains: Stepped<D::Buffer<GainBlock>>,
+    pub(super) splats: D::Buffer<ProjectedGaussian>,
+    pub(super) gradients: D::Buffer<GaussianBlock>,
+    pub(super) masks: D::Buffer<u32>,
+}
+
+impl<D: Device> Particles<D> {
+    pub(super) fn new(
+        device: &D,
+        course: &Course,
+        term_count: u32,
+        bin_count: u32,
+    ) -> Result<Particles<D>, DeviceError> {
+        let all = &course.particles;
+        let gaussians: Vec<GaussianBlock> = all.iter().map(|particle| particle.gaussian).collect();
+        let states: Vec<ParticleState> = all.iter().map(|particle| particle.state).collect();
+        let term =
+            |particle: &Particle, index: u32| particle.harmonics.0.get(index as usize).copied().unwrap_or_default();
+        let terms: Vec<HarmonicTerm> =
+            all.iter().flat_map(|particle| (0..term_count).map(move |index| term(particle, index))).collect();
+        let count = all.len() as u32;
+        let mask_count = list_block(&CameraBlock::default(), count, 0).mask_count();
+        Ok(Particles {
+            count,
+            term_count,
+            gaussians: stepped(device, &gaussians)?,
+            states: stepped(device, &states)?,
+            terms: stepped(device, &terms)?,
+            gains: stepped(device, &course.gains)?,
+            splats: device.zeros(all.len().max(1))?,
+            gradients: device.zeros(all.len().max(1))?,
+            masks: device.zeros((bin_count * mask_count).max(1) as usize)?,
+        })
+    }
+
+    /// As they are now.
+    pub(super) fn download(&self, device: &D) -> Result<Vec<Particle>, DeviceError> {
+        let gaussians = device.download(&self.gaussians.now)?;
+        let states = device.download(&self.states.now)?;
+        let terms = if self.term_count > 0 { device.download(&self.terms.now)? } else { Vec::new() };
+        let particle = |(index, (gaussian, state)): (usize, (GaussianBlock, ParticleState))| {
+            let first = index * self.term_count as usize;
+            let count = state.rest_count.min(self.term_count) as usize;
+            Particle { gaussian, harmonics: Harmonics(terms[first..first + count].to_vec()), state }
+        };
+        let all = gaussians.into_iter().zip(states).take(self.count as usize);
+        Ok(all.enumerate().map(particle).collect())
+    }
+}
