@@ -206,7 +206,7 @@ impl Case for ComparePixels {
 
 impl Case for SumShares {
     const HAS_REAL_PARAMETERS: bool = false;
-    const LIMITS: Limits = Limits { tolerance: 1.0e-3, least: 1.0e-1 };
+    const LIMITS: Limits = Limits { tolerance: 1.0e-2, least: 1.0e-1 };
     const REASON: &'static str = "a sum in any order";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] =
         &[("shares", |case| increase(case.shares.as_flattened_mut()))];
