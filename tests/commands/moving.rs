@@ -166,7 +166,7 @@ fn a_run_that_was_killed_twice_ends_with_the_same_bytes() {
 
 fn another_run_begins_anew() {
     let folder = toy();
-    let arguments = "render toy --orbit 60 --size 24x24 --device cpu --no-sheets --replace -o cut";
+    let arguments = "render toy --orbit 600 --size 24x24 --device cpu --no-sheets --replace -o cut";
     killed(&folder, arguments, 2);
     let printed = done(&folder, &format!("{PATH} --replace -o cut"));
     assert!(!printed.contains("continued"), "{printed}");

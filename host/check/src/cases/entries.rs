@@ -79,9 +79,13 @@ impl Case for MarkBins {
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] =
         &[("splats", |case| increase(case.splats.iter_mut().flat_map(|splat| &mut splat.mean)))];
 
+    /// Several pictures, for one has few masks.
     fn inputs(seed: u64, size: u32) -> Vec<MarkBins> {
-        let Lists { block, splats, masks, .. } = Lists::new(seed, size);
-        vec![MarkBins { block, splats, masks: Output::Zeros(masks.len()) }]
+        let picture = |picture: u64| {
+            let Lists { block, splats, masks, .. } = Lists::new(seed.wrapping_mul(4) + picture, size);
+            MarkBins { block, splats, masks: Output::Zeros(masks.len()) }
+        };
+        (0..4).map(picture).collect()
     }
 
     /// Of each mask its lower half, and its upper one.
@@ -140,8 +144,11 @@ impl Case for SumEntries {
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] =
         &[("counts", |case| case.counts.iter_mut().for_each(|count| *count += 1))];
 
+    /// Of a picture with many runs of tiles.
     fn inputs(seed: u64, size: u32) -> Vec<SumEntries> {
-        let Lists { block, counts, .. } = Lists::new(seed, size);
+        let numbers = &mut Numbers::new(seed);
+        let block = ListBlock { width: 1251 + size % 7, height: 701, splat_count: 64, capacity: 0 };
+        let counts = (0..block.tile_count() * LIST_PARTS).map(|_| numbers.between(0.0, 9.0) as u32).collect();
         vec![SumEntries { block, counts, sums: Output::Zeros(block.run_count() as usize) }]
     }
 
