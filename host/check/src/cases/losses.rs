@@ -126,8 +126,9 @@ impl Case for CompareWindows {
                 let by_x = by_mean - two * x * by_square - y * by_product;
                 [by_x, by_square, by_product].map(|by| -by * block.structure_share.into())
             };
-            let of = [channel(0), channel(1), channel(2)];
-            [0, 1, 2].map(|number| [of[0][number], of[1][number], of[2][number], Bounded::ZERO])
+            let derivatives = [channel(0), channel(1), channel(2)];
+            [0, 1, 2]
+                .map(|number| [derivatives[0][number], derivatives[1][number], derivatives[2][number], Bounded::ZERO])
         };
         decided(map(self.colours.len(), 1, pixel).into_iter().flatten().flatten(), 0)
     }

@@ -81,10 +81,10 @@ impl Case for ProjectParticles {
             let count = states[index].rest_count.min(block.term_count) as usize;
             if splat[3].value > 0.0 && count > 0 {
                 let basis = harmonics(gaussian, &block.camera);
-                let of = &terms[index * block.term_count as usize..][..count];
+                let terms = &terms[index * block.term_count as usize..][..count];
                 for channel in 0..3 {
                     let sum =
-                        of.iter().zip(basis).fold(Bounded::from(gaussian.colour[channel]), |sum, (term, basis)| {
+                        terms.iter().zip(basis).fold(Bounded::from(gaussian.colour[channel]), |sum, (term, basis)| {
                             sum + basis * term.value[channel].into()
                         });
                     splat[8 + channel] = sum.greater(Bounded::ZERO);

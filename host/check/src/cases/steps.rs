@@ -272,15 +272,15 @@ impl Case for StepGains {
             let takes = status[0] == 0;
             let is_source = takes && index == block.source as usize;
             let value = [0, 1, 2].map(|channel| {
-                let of = |index: usize| match index == block.source as usize {
+                let stepped = |index: usize| match index == block.source as usize {
                     true => steps[channel][0],
                     false => gains[index].value[channel].into(),
                 };
                 if !takes {
                     return gain.value[channel].into();
                 }
-                let all = (0..gains.len()).fold(Bounded::ZERO, |sum, index| sum + of(index));
-                of(index) / (all / block.gain_count.into())
+                let all = (0..gains.len()).fold(Bounded::ZERO, |sum, index| sum + stepped(index));
+                stepped(index) / (all / block.gain_count.into())
             });
             let moment = |number: usize| match is_source {
                 true => steps[number / 2][1 + number % 2],

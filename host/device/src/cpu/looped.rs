@@ -34,12 +34,12 @@ pub(super) fn merge_depths(block: &FineBlock, ray_count: u32, coarse: &[f32], fi
 /// Each tile's keys are sorted, in the order that the body's ranks have.
 pub(super) fn sort_entries(block: &ListBlock, starts: &[u32], keys: &[[u32; 2]], entries: &mut [u32]) {
     let mut entries = Rest::new(entries);
-    let of = |tile: u32| starts[tile as usize] as usize;
-    let take = move |tiles: std::ops::Range<u32>| entries.take(of(tiles.start), of(tiles.end));
+    let start = |tile: u32| starts[tile as usize] as usize;
+    let take = move |tiles: std::ops::Range<u32>| entries.take(start(tiles.start), start(tiles.end));
     for_each_piece(0..block.tile_count(), 8, take, |tiles, entries| {
-        let (first, end) = (of(tiles.start), of(tiles.end));
+        let (first, end) = (start(tiles.start), start(tiles.end));
         let mut sorted = keys[first..end].to_vec();
-        tiles.for_each(|tile| sorted[of(tile) - first..of(tile + 1) - first].sort_unstable());
+        tiles.for_each(|tile| sorted[start(tile) - first..start(tile + 1) - first].sort_unstable());
         entries.values.iter_mut().zip(sorted).for_each(|(entry, [_, index])| *entry = index);
     });
 }

@@ -80,15 +80,15 @@ impl<D: Device> Level<D> {
         let mut firsts = Vec::new();
         for view in views {
             firsts.push(photographs.len() as u32);
-            let of = |channels: [&[f32]; 4], pixel: usize| {
+            let number = |channels: [&[f32]; 4], pixel: usize| {
                 channels.map(|channel| channel.get(pixel).copied().unwrap_or(0.0))
             };
             let [red, green, blue] = &view.structure;
             let [a, b, c, d] = &view.channels;
             for pixel in 0..pixel_count(view) {
-                photographs.push(of([a, b, c, d], pixel));
-                means.push(of([&red.means, &green.means, &blue.means, &[]], pixel));
-                variances.push(of([&red.variances, &green.variances, &blue.variances, &[]], pixel));
+                photographs.push(number([a, b, c, d], pixel));
+                means.push(number([&red.means, &green.means, &blue.means, &[]], pixel));
+                variances.push(number([&red.variances, &green.variances, &blue.variances, &[]], pixel));
             }
         }
         let most = |of: fn(&ListBlock) -> u32| {
