@@ -283,7 +283,7 @@ fn a_form_that_is_wrong_is_told_once(candidate: &Candidate) -> Result<(), Failed
 fn rates_of_rounded_products(candidate: &Candidate) -> Result<(), Failed> {
     let Some(device) = with_units(candidate)? else { return Ok(()) };
     let rates = measure_rates(&device, 1, &Silent)?;
-    let forms = Form::ROUNDED.map(Form::name);
+    let forms = Precision::ROUNDED.map(|precision| precision.form().map_or("none", Form::name));
     assert_eq!((&rates.rounded_forms[..], &rates.faults[..]), (&forms[..], &[][..]));
     for (kernel, form) in ["linear", "convolve"].into_iter().flat_map(|kernel| forms.map(|form| (kernel, form))) {
         let rate = rates.kernels.iter().find(|rate| rate.kernel == kernel && rate.form == Some(form));

@@ -10,10 +10,10 @@ use viewfuse::device::argument;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::{Device, Element, KernelTime, LayerShape, Memory};
 use viewfuse_core::fetch::Fetch;
-use viewfuse_kernels::network::tile::{Left, Shape, Tiles};
+use viewfuse_kernels::network::tile::{Fours, Left, Outputs, Right, Shape, Tiles};
 use viewfuse_kernels::pages::{Pages, PagesMut};
 use viewfuse_kernels::rows::*;
-use viewfuse_kernels::store::Store;
+use viewfuse_kernels::store::{Store, StoreFours};
 use viewfuse_kernels::workgroup::Workgroup;
 use viewfuse_kernels::{bodies, for_each_kernel};
 
@@ -86,19 +86,12 @@ macro_rules! spoil {
 struct Whole;
 
 impl Tiles for Whole {
-    fn multiply<L: Left>(
-        self,
-        _invocation: u32,
-        shape: Shape,
-        left: L,
-        right: impl Fn(u32, u32) -> f32 + Copy,
-        mut store: impl FnMut(u32, u32, f32),
-    ) {
+    fn multiply<L: Left>(self, _invocation: u32, shape: Shape, left: L, right: impl Right, mut outputs: impl Outputs) {
         for row in 0..shape.row_count {
             for column in 0..shape.column_count {
                 let number = |inner| left.number(left.row(row), left.inner(inner));
-                let products = (0..shape.inner_count).map(|inner| number(inner) * right(inner, column));
-                store(row, column, products.sum());
+                let products = (0..shape.inner_count).map(|inner| number(inner) * right.number(inner, column));
+                outputs.put(row, column, products.sum());
             }
         }
     }
@@ -114,6 +107,8 @@ impl<T: Copy> Fetch<T> for Read<'_, T> {
     }
 }
 
+impl Fours for Read<'_, f32> {}
+
 /// One that is written.
 struct Write<'a, T>(&'a mut [T]);
 
@@ -122,6 +117,8 @@ impl<T> Store<T> for Write<'_, T> {
         self.0[index] = value;
     }
 }
+
+impl StoreFours for Write<'_, f32> {}
 
 /// One that all invocations of a workgroup write.
 struct Shared<'a, T>(&'a Mutex<&'a mut [T]>);

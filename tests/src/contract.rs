@@ -202,7 +202,7 @@ impl Breaches<'_> {
         self.unless(specialised == (kernel.has_pages() || form.needs_subgroups()), || {
             format!("{name}: {} the specialisation constant", if specialised { "uses" } else { "does not use" })
         });
-        self.look_at_buffers(kernel, name, &buffers);
+        self.look_at_buffers((kernel, form), name, &buffers);
         self.look_at_accesses(name, &functions);
         let most = if kernel.has_barriers(form) { form.shared_bytes() } else { 0 };
         self.look_at_sharing(most, name, &shared, &functions);
@@ -210,7 +210,7 @@ impl Breaches<'_> {
         self.look_at_matrices(name, &functions);
     }
 
-    fn look_at_buffers(&mut self, kernel: Kernel, name: &str, buffers: &[Word]) {
+    fn look_at_buffers(&mut self, (kernel, form): (Kernel, Form), name: &str, buffers: &[Word]) {
         let mut bound = BTreeMap::new();
         for buffer in buffers {
             let set = self.declarations.decorated(*buffer, Decoration::DescriptorSet);
@@ -233,7 +233,7 @@ impl Breaches<'_> {
                 format!("{name}: binding {number} ({}): {access:?}, not {:?}", array.name, array.access)
             });
             let content = self.declarations.content(buffer);
-            self.unless(content == wanted_content(array), || {
+            self.unless(content == wanted_content(array, form), || {
                 format!("{name}: binding {number} ({}): {content:?}, not {} bytes", array.name, array.stride)
             });
         }
@@ -342,8 +342,9 @@ impl Breaches<'_> {
 }
 
 /// What a binding should hold. Structs that exist once are no arrays.
-fn wanted_content(array: &Array) -> Content {
+fn wanted_content(array: &Array, form: Form) -> Content {
     match array.layout {
+        Layout::Whole if form.needs_fours() => Content::Elements { stride: 4 * array.stride },
         Layout::One => Content::Fixed { bytes: array.least_bytes },
         Layout::Whole | Layout::Pages => Content::Elements { stride: array.stride },
     }

@@ -76,7 +76,7 @@ impl Gpu {
                 Some(shape) => {
                     let form = match form {
                         Some(form) => form,
-                        None => gpu.form(state, &job, &Class::new(kernel, shape))?,
+                        None => gpu.form(state, &job, &Class::new(kernel, shape, kernel.is_in_fours(parameters)))?,
                     };
                     (form, 0..form.elements(shape.row_count, shape.column_count))
                 }

@@ -131,9 +131,9 @@ mod tests {
         for kernel in Kernel::ALL {
             for form in kernel.forms().iter().chain(kernel.rounded_forms()).copied() {
                 let (module, known) = match form {
+                    _ if form.needs_matrices() => (&matrices, &OF_MATRICES[..]),
                     Form::Subgroup => (&subgroups, &OF_SUBGROUPS[..]),
-                    Form::Half | Form::TwoHalves => (&matrices, &OF_MATRICES[..]),
-                    Form::Single | Form::Large | Form::Small => (&kernels, &[][..]),
+                    _ => (&kernels, &[][..]),
                 };
                 let module = excerpt(module, kernel.entry_point(form));
                 let coded = |wanted| instructions(&module).filter(move |(code, _)| *code == wanted);

@@ -11,10 +11,8 @@ use viewfuse_kernels::network::tile::Shape;
 pub(crate) const ROUNDS: u32 = 3;
 /// Multiply-adds of a product that is worth a measurement.
 const MIN_WORK: u64 = 1 << 22;
-/// The fewest large tiles that are worth a measurement: with fewer, most units of any GPU have none.
-const MIN_LARGE_TILES: u32 = 32;
-/// The most tiles with which small ones are measured, too: with more, every GPU has several for each unit.
-const MAX_TILES_WITH_SMALL: u32 = 512;
+/// Tiles that keep a large GPU busy, about two for each unit: with fewer, smaller tiles are faster.
+pub(crate) const ENOUGH_TILES: u32 = 256;
 /// Tiles that are measured: as many as keep a GPU busy, and few where a processor does their work.
 const MEASURED_TILES: u32 = 4096;
 const MEASURED_TILES_OF_SOFTWARE: u32 = 16;
@@ -25,18 +23,29 @@ const MAX_ROWS: u32 = 14;
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Class {
     shape: Shape,
+    is_in_fours: bool,
     key: Key,
 }
+
+/// What a class of products whose arrays lie in fours has behind its kernel's name.
+const IN_FOURS: &str = "::in_fours";
 
 /// The kernel's name and the logarithms of rows, inner indices and columns.
 type Key = (String, [u32; 3]);
 
 impl Class {
-    pub(crate) fn new(kernel: Kernel, shape: Shape) -> Class {
+    /// Whether the arrays lie in fours belongs to it.
+    pub(crate) fn new(kernel: Kernel, shape: Shape, is_in_fours: bool) -> Class {
         let logarithm = |count: u32| u32::BITS - count.saturating_sub(1).leading_zeros();
         let Shape { row_count, inner_count, column_count } = shape;
         let sizes = [logarithm(row_count).min(MAX_ROWS), logarithm(inner_count), logarithm(column_count)];
-        Class { shape, key: (kernel.name().to_owned(), sizes) }
+        let name = kernel.name().to_owned() + if is_in_fours { IN_FOURS } else { "" };
+        Class { shape, is_in_fours, key: (name, sizes) }
+    }
+
+    /// Whether its arrays lie in fours.
+    pub(crate) fn is_in_fours(&self) -> bool {
+        self.is_in_fours
     }
 
     /// The forms that come into question, [`Form::Single`] first: one for little work. Sizes of tiles are a matter of
@@ -44,13 +53,15 @@ impl Class {
     pub(crate) fn candidates(&self, is_software: bool) -> impl Iterator<Item = Form> {
         let Shape { row_count, inner_count, column_count } = self.shape;
         let work = u64::from(row_count) * u64::from(inner_count) * u64::from(column_count);
-        let tiles = move |form: Form| form.elements(row_count, column_count) / form.invocations();
+        let tiles = move |form: Form| form.tiles(row_count, column_count);
+        // Of those in fours one: measured in a process that has just compiled them, GPUs are not what they are later.
+        let mut sizes = [Form::Large, Form::Small, Form::Tiny].into_iter();
+        let in_fours = sizes.find(|form| tiles(*form) >= ENOUGH_TILES).unwrap_or(Form::Tiny);
+        let has_fours = self.is_in_fours && !is_software;
         let fits = move |form: &Form| match form {
             Form::Single => true,
-            Form::Large => !is_software && tiles(Form::Large) >= MIN_LARGE_TILES,
-            Form::Small => !is_software && tiles(Form::Single) <= MAX_TILES_WITH_SMALL,
-            Form::Subgroup => true,
-            Form::Half | Form::TwoHalves => false,
+            Form::Subgroup => !has_fours,
+            form => has_fours && *form == in_fours,
         };
         Form::ALL.into_iter().filter(fits).take(if work >= MIN_WORK { Form::ALL.len() } else { 1 })
     }
@@ -60,7 +71,7 @@ impl Class {
         let Shape { row_count, column_count, .. } = self.shape;
         let tiles = if is_software { MEASURED_TILES_OF_SOFTWARE } else { MEASURED_TILES };
         let rows = TILE * tiles.div_ceil(column_count.div_ceil(TILE)).max(1);
-        form.elements(row_count.min(rows.next_multiple_of(Form::Large.side())), column_count)
+        form.elements(row_count.min(rows.next_multiple_of(Form::Large.rows())), column_count)
     }
 }
 
@@ -111,10 +122,11 @@ impl Choices {
 fn parse_line(line: &str) -> Option<(Key, Form)> {
     let words: Vec<&str> = line.split(' ').collect();
     let &[kernel, rows, inner, columns, form] = &words[..] else { return None };
-    let kernel = Kernel::ALL.into_iter().find(|known| known.is_tiled() && known.name() == kernel)?;
+    let name = kernel.strip_suffix(IN_FOURS).unwrap_or(kernel);
+    Kernel::ALL.into_iter().find(|known| known.is_tiled() && known.name() == name)?;
     let form = Form::ALL.into_iter().find(|known| known.name() == form)?;
     let sizes = [rows.parse().ok()?, inner.parse().ok()?, columns.parse().ok()?];
-    Some(((kernel.name().to_owned(), sizes), form))
+    Some(((kernel.to_owned(), sizes), form))
 }
 
 #[cfg(test)]
@@ -124,7 +136,7 @@ mod tests {
     use viewfuse_kernels::network::linear::LinearBlock;
 
     fn class(row_count: u32, inner_count: u32, column_count: u32) -> Class {
-        Class::new(Kernel::Linear, Shape { row_count, inner_count, column_count })
+        Class::new(Kernel::Linear, Shape { row_count, inner_count, column_count }, true)
     }
 
     #[test]
@@ -141,24 +153,26 @@ mod tests {
 
     #[test]
     fn candidates_are_a_matter_of_the_work_the_outputs_and_the_kind_of_device() {
-        use Form::{Large, Single, Small, Subgroup};
+        use Form::{Large, Single, Small, Subgroup, Tiny};
         let candidates = |class: Class, is_software| class.candidates(is_software).collect::<Vec<_>>();
         for is_software in [true, false] {
             assert_eq!(candidates(class(128, 128, 128), is_software), [Single], "little work");
         }
         assert_eq!(candidates(class(4096, 512, 512), true), [Single, Subgroup]);
-        assert_eq!(candidates(class(32_768, 512, 512), false), [Single, Large, Subgroup]);
-        assert_eq!(candidates(class(2046, 512, 512), false), [Single, Large, Small, Subgroup]);
+        assert_eq!(candidates(class(32_768, 512, 512), false), [Single, Large]);
+        assert_eq!(candidates(class(2046, 512, 512), false), [Single, Small]);
         // A convolution of 16x16 pixels with 512 channels.
-        assert_eq!(candidates(class(256, 4608, 512), false), [Single, Small, Subgroup]);
+        assert_eq!(candidates(class(256, 4608, 512), false), [Single, Tiny]);
+        let shape = Shape { row_count: 32_768, inner_count: 510, column_count: 512 };
+        assert_eq!(candidates(Class::new(Kernel::Linear, shape, false), false), [Single, Subgroup]);
     }
 
     #[test]
     fn a_measurement_is_of_the_first_rows() {
-        // Five tiles of columns: four bands of tiles, two of large ones, eight of small ones.
+        // Five tiles of columns: four bands of tiles, two of large ones, eight of tiny ones.
         let class = class(10_000, 64, 300);
         let tiles = |form: Form| class.measured_elements(form, true) / form.invocations();
-        assert_eq!([Form::Single, Form::Large, Form::Small].map(tiles), [4 * 5, 2 * 3, 8 * 10]);
+        assert_eq!([Form::Single, Form::Large, Form::Tiny].map(tiles), [4 * 5, 2 * 5, 8 * 10]);
         assert_eq!(class.measured_elements(Form::Single, false), Form::Single.elements(10_000, 300));
     }
 

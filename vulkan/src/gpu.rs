@@ -170,8 +170,8 @@ impl Gpu {
         }) {
             let missing = vec![Missing::Feature(match form {
                 Form::Subgroup => "subgroups of 8 to 64 invocations",
-                Form::Half | Form::TwoHalves => "matrix units of 16x16x16 f16 with f32 sums",
-                Form::Single | Form::Large | Form::Small => "workgroups of 256 invocations that share 32 KiB",
+                _ if form.needs_matrices() => "matrix units of 16x16x16 f16 with f32 sums",
+                _ => "workgroups of 256 invocations that share 48 KiB",
             })];
             return Err(VulkanError::Missing(adapter.name.clone(), missing));
         }

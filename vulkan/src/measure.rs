@@ -22,7 +22,7 @@ impl Gpu {
     /// The form for a class of products.
     pub(crate) fn form(&self, state: &mut State, job: &DispatchJob<'_>, class: &Class) -> Result<Form, VulkanError> {
         if let Some(form) = self.form {
-            if form.needs_matrices() && !job.kernel.rounded_forms().contains(&form) {
+            if form.needs_fours() && !class.is_in_fours() {
                 return Ok(Form::Single);
             }
             return match state.pipelines.fits(job.kernel, form, job.page_shift)? {

@@ -230,9 +230,9 @@ impl Pipelines {
         let stand_ins = self.stand_ins.filter(|_| form.needs_matrices());
         let entry_point = kernel.entry_point(form).to_owned() + if stand_ins.is_some() { "_stand_in" } else { "" };
         let bytes = match form {
+            _ if form.needs_matrices() => stand_ins.unwrap_or(MATRICES),
             Form::Subgroup => SUBGROUPS,
-            Form::Half | Form::TwoHalves => stand_ins.unwrap_or(MATRICES),
-            Form::Single | Form::Large | Form::Small => MODULE,
+            _ => MODULE,
         };
         let module = self.module(bytes, &entry_point)?;
         // No kernel's name has a zero in it.

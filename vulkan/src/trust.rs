@@ -2,6 +2,7 @@
 
 use crate::buffer::{Bound, Buffer};
 use crate::error::VulkanError;
+use crate::forms::ENOUGH_TILES;
 use crate::gpu::Gpu;
 use crate::kernel::{Form, Kernel};
 use bytemuck::bytes_of;
@@ -27,8 +28,15 @@ impl Gpu {
         elements: Range<u32>,
         arrays: &[Bound<'_>],
     ) -> Result<(), VulkanError> {
-        let is_used = form.needs_matrices() && self.trusts(kernel, form)?;
-        self.dispatch_in(kernel, is_used.then_some(form), parameters, elements, arrays)
+        let form = match kernel.shape(parameters) {
+            Some(shape) if form.needs_matrices() && kernel.is_in_fours(parameters) => Some(sized(form, shape)),
+            _ => None,
+        };
+        let form = match form {
+            Some(form) if self.trusts(kernel, form)? => Some(form),
+            _ => None,
+        };
+        self.dispatch_in(kernel, form, parameters, elements, arrays)
     }
 
     /// Whether this device is trusted with a form of rounded factors of a kernel: it has the units, and a product of
@@ -101,14 +109,14 @@ impl Probe {
                     in_channels: 8,
                     out_height: 13,
                     out_width: 11,
-                    out_channels: 145,
+                    out_channels: 148,
                     size: 3,
                     stride: 1,
                     padding: 1,
                     ..ConvolveBlock::default()
                 }
                 .packed();
-                let shape = Shape { row_count: 143, inner_count: 72, column_count: 145 };
+                let shape = Shape { row_count: 143, inner_count: 72, column_count: 148 };
                 let mut inputs = numbers(143 * 8);
                 (inputs[5], inputs[600]) = (-70_000.0, 1e30);
                 let rows = (0..143).flat_map(|row| (0..72).map(move |inner| (row, inner)));
@@ -116,10 +124,10 @@ impl Probe {
                 (bytes_of(&block).to_vec(), shape, inputs, left)
             }
             _ => {
-                let shape = Shape { row_count: 143, inner_count: 67, column_count: 145 };
+                let shape = Shape { row_count: 143, inner_count: 68, column_count: 148 };
                 let Shape { row_count, inner_count, column_count } = shape;
                 let block = LinearBlock { row_count, inner_count, column_count, ..LinearBlock::default() };
-                let mut inputs = numbers(143 * 67);
+                let mut inputs = numbers(143 * 68);
                 (inputs[5], inputs[9000]) = (-70_000.0, 1e30);
                 (bytes_of(&block).to_vec(), shape, inputs.clone(), inputs)
             }
@@ -162,15 +170,27 @@ impl Probe {
     }
 }
 
+/// A form in the largest tiles of which a product has enough, or in its smallest. A matter of the product alone: another
+/// form has its sums in another order.
+fn sized(form: Form, shape: Shape) -> Form {
+    let sizes = form.sizes();
+    let has_enough = |form: &&Form| {
+        // Large tiles are worth more the more there is to round.
+        let enough = if **form == Form::TwoHalves { ENOUGH_TILES / 2 } else { ENOUGH_TILES };
+        form.tiles(shape.row_count, shape.column_count) >= enough
+    };
+    sizes.iter().find(has_enough).copied().unwrap_or(sizes[sizes.len() - 1])
+}
+
 /// The most that rounded factors change of a product.
 fn product_bound(form: Form, left: f64, right: f64) -> f64 {
     let (relative, absolute) = match form {
-        Form::Half => (2_f64.powi(-11), 2_f64.powi(-14)),
+        Form::Half | Form::HalfSmall | Form::HalfTiny => (2_f64.powi(-11), 2_f64.powi(-14)),
         _ => (2_f64.powi(-22), 2_f64.powi(-25)),
     };
     let [left_error, right_error] = [left, right].map(|factor| (factor.abs() * relative).max(absolute));
     // Of two parts, the product of the low ones is omitted.
-    let omitted = if form == Form::TwoHalves { (left * right).abs() * relative } else { 0.0 };
+    let omitted = if form.sizes()[0] == Form::TwoHalves { (left * right).abs() * relative } else { 0.0 };
     left_error * right.abs() + right_error * left.abs() + left_error * right_error + omitted
 }
 
@@ -223,11 +243,11 @@ mod tests {
                 Form::ROUNDED.map(|form| probe.is_within(form, &outputs))
             };
             let last = exact.len() - 1;
-            assert_eq!(changed(last, f32::INFINITY), [false; 2]);
-            assert_eq!(changed(last, f32::NAN), [false; 2]);
-            assert_eq!(changed(last, exact[last] + 50.0), [false; 2]);
+            assert_eq!(changed(last, f32::INFINITY), [false; Form::ROUNDED.len()]);
+            assert_eq!(changed(last, f32::NAN), [false; Form::ROUNDED.len()]);
+            assert_eq!(changed(last, exact[last] + 50.0), [false; Form::ROUNDED.len()]);
             assert!(exact[0].is_nan());
-            assert_eq!(changed(0, 0.0), [false; 2]);
+            assert_eq!(changed(0, 0.0), [false; Form::ROUNDED.len()]);
         }
     }
 }

@@ -7,7 +7,8 @@
 use crate::backend::{Backend, Toolchain};
 use crate::phis::split_phis;
 use crate::refine::{RefineError, refine};
-use crate::split::{CAPABILITIES, MATRIX_EXTENSION, Modules, split};
+use crate::split::{CAPABILITIES, FORMS_IN_FOURS, MATRIX_EXTENSION, Modules, split};
+use crate::unroll::unroll;
 use rspirv::spirv::Capability;
 use spirv_builder::{SpirvBuilder, SpirvBuilderError};
 use std::path::{Path, PathBuf};
@@ -53,12 +54,14 @@ pub fn compile(backend: &Backend, root: &Path, target: &Path) -> Result<Modules,
     let path = compiled.module.unwrap_single();
     let bytes = std::fs::read(path).map_err(|cause| CompileError::Read(path.to_path_buf(), cause))?;
     let Modules { kernels, subgroups, matrices, stand_ins } = split(&bytes)?;
-    let of_matrices = |bytes: &[u8]| refine(&split_phis(bytes)?);
+    let of_tiles =
+        |bytes: &[u8], is_chosen: fn(&str) -> bool| unroll(&refine(&split_phis(bytes, is_chosen)?)?, is_chosen);
+    let is_in_fours = |name: &str| name.split_once("::").is_some_and(|(_, form)| FORMS_IN_FOURS.contains(&form));
     Ok(Modules {
-        kernels: refine(&kernels)?,
+        kernels: of_tiles(&kernels, is_in_fours)?,
         subgroups: refine(&subgroups)?,
-        matrices: of_matrices(&matrices)?,
-        stand_ins: of_matrices(&stand_ins)?,
+        matrices: of_tiles(&matrices, |_| true)?,
+        stand_ins: of_tiles(&stand_ins, |_| true)?,
     })
 }
 

@@ -10,6 +10,7 @@
 //! compile   sources -> modules               spirv-builder, without its optimiser
 //! split     module -> modules                what not every device can do is a module of its own
 //! phis      module -> module                 matrices join one by one, not as arrays
+//! unroll    module -> module                 innermost loops of tiles are to be written out
 //! legalise  module -> module                 no composites of pointers
 //! loops     module -> module                 the branch on a loop's condition leaves the loop
 //! share     module -> module                 workgroup memory is visible to all its invocations
@@ -28,3 +29,4 @@ pub mod share;
 pub mod split;
 pub mod stamp;
 pub mod tokens;
+pub mod unroll;

@@ -12,25 +12,36 @@ use std::collections::HashMap;
 /// The types of the members of each array and struct whose length is known.
 type Members = HashMap<u32, Vec<u32>>;
 
-/// Splits the phis of a module, bytes to bytes.
+/// Splits the phis of the entry points whose names are chosen, bytes to bytes.
 ///
 /// # Errors
 /// If the bytes are not SPIR-V.
-pub fn split_phis(bytes: &[u8]) -> Result<Vec<u8>, RefineError> {
+pub fn split_phis(bytes: &[u8], is_chosen: impl Fn(&str) -> bool) -> Result<Vec<u8>, RefineError> {
     let mut module = read(bytes)?;
+    let chosen = entries(&module, is_chosen);
     let members = members(&module);
     let mut bound = module.header.as_ref().map_or(0, |header| header.bound);
     let mut fresh = || {
         bound += 1;
         bound - 1
     };
-    for function in &mut module.functions {
+    let functions = module.functions.iter_mut();
+    for function in functions.filter(|function| function.def_id().is_some_and(|id| chosen.contains(&id))) {
         while split_one(function, &members, &mut fresh).is_some() {}
     }
     if let Some(header) = &mut module.header {
         header.bound = bound;
     }
     Ok(module.assemble().iter().flat_map(|word| word.to_le_bytes()).collect())
+}
+
+/// The functions of the entry points whose names are chosen.
+pub(crate) fn entries(module: &Module, is_chosen: impl Fn(&str) -> bool) -> Vec<u32> {
+    let chosen = module.entry_points.iter().filter_map(|entry| match &entry.operands[..] {
+        [_, function, Operand::LiteralString(name), ..] if is_chosen(name) => function.id_ref_any(),
+        _ => None,
+    });
+    chosen.collect()
 }
 
 fn members(module: &Module) -> Members {

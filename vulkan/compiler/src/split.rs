@@ -21,9 +21,10 @@ pub const CAPABILITIES: [Enabled; 5] = [
 /// The extension of SPIR-V for matrix units.
 pub const MATRIX_EXTENSION: &str = "SPV_KHR_cooperative_matrix";
 
-/// The kernels whose products matrix units compute: what networks take most of their time for. Others' entry points for
-/// them are left out.
-pub const WITH_MATRICES: [&str; 2] = ["linear", "convolve"];
+/// What stands before the names of entry points for arrays in fours, which are forms of the kernels that follow.
+const IN_FOURS: &str = "in_fours::";
+/// The forms of those that every device may run.
+pub const FORMS_IN_FOURS: [&str; 3] = ["large", "small", "tiny"];
 
 /// The compiled kernels, as bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -48,15 +49,14 @@ enum Part {
 }
 
 impl Part {
-    /// That of an entry point; `None` for one that is left out.
-    fn of(name: &str) -> Option<Part> {
-        let (kernel, form) = name.split_once("::").unwrap_or((name, ""));
-        let of_matrices = |part| WITH_MATRICES.contains(&kernel).then_some(part);
+    /// That of an entry point.
+    fn of(name: &str) -> Part {
+        let (_, form) = name.split_once("::").unwrap_or((name, ""));
         match form {
-            "subgroup" => Some(Part::Subgroups),
-            "half" | "two_halves" => of_matrices(Part::Matrices),
-            "half_stand_in" | "two_halves_stand_in" => of_matrices(Part::StandIns),
-            _ => Some(Part::Kernels),
+            "subgroup" => Part::Subgroups,
+            _ if form.ends_with("_stand_in") => Part::StandIns,
+            _ if form.starts_with("half") || form.starts_with("two_halves") => Part::Matrices,
+            _ => Part::Kernels,
         }
     }
 
@@ -77,10 +77,17 @@ impl Part {
 /// # Errors
 /// If the bytes are not SPIR-V.
 pub fn split(bytes: &[u8]) -> Result<Modules, RefineError> {
-    let whole = read(bytes)?;
+    let mut whole = read(bytes)?;
+    for entry in &mut whole.entry_points {
+        if let Some(Operand::LiteralString(name)) = entry.operands.get_mut(2)
+            && let Some(rest) = name.strip_prefix(IN_FOURS)
+        {
+            *name = rest.to_owned();
+        }
+    }
     let take = |part: Part| -> Vec<u8> {
         let mut module = whole.clone();
-        retain(&mut module, |name| Part::of(name) == Some(part));
+        retain(&mut module, |name| Part::of(name) == part);
         module.capabilities.retain(|capability| match capability.operands.first() {
             Some(Operand::Capability(capability)) => part.keeps(*capability),
             _ => true,

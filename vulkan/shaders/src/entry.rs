@@ -198,45 +198,13 @@ macro_rules! entry {
         ) {
             let $block = &push.parameters;
             let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
-            let tiles = Staged { tile: PhantomData::<Single>, rows, columns };
+            let tiles = Staged { rows, columns };
             bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
         }
 
         /// The other forms.
         pub mod $method {
             use super::*;
-
-            /// In large tiles.
-            #[spirv(compute(threads(256)))]
-            #[allow(clippy::too_many_arguments)]
-            pub fn large(
-                #[spirv(global_invocation_id)] id: UVec3,
-                #[spirv(push_constant)] push: &Push<$Block>,
-                $($parameters)*
-                #[spirv(workgroup)] rows: &mut SharedOfLarge,
-                #[spirv(workgroup)] columns: &mut SharedOfLarge,
-            ) {
-                let $block = &push.parameters;
-                let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
-                let tiles = Staged { tile: PhantomData::<Large>, rows, columns };
-                bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
-            }
-
-            /// In small tiles.
-            #[spirv(compute(threads(64)))]
-            #[allow(clippy::too_many_arguments)]
-            pub fn small(
-                #[spirv(global_invocation_id)] id: UVec3,
-                #[spirv(push_constant)] push: &Push<$Block>,
-                $($parameters)*
-                #[spirv(workgroup)] rows: &mut SharedOfSmall,
-                #[spirv(workgroup)] columns: &mut SharedOfSmall,
-            ) {
-                let $block = &push.parameters;
-                let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
-                let tiles = Staged { tile: PhantomData::<Small>, rows, columns };
-                bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
-            }
 
             /// By subgroups.
             #[spirv(compute(threads(64)))]
@@ -254,74 +222,105 @@ macro_rules! entry {
                 let tiles = Subgroup { size, subgroup, lane };
                 bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
             }
+        }
+    };
+}
 
-            /// By matrix units, in f16.
-            #[spirv(compute(threads(128)))]
-            #[allow(clippy::too_many_arguments)]
-            #[cfg(target_arch = "spirv")]
-            pub fn half(
-                #[spirv(global_invocation_id)] id: UVec3,
+/// The entry points of a kernel for arrays in fours. In brackets: the row's block and shape, then the arrays.
+macro_rules! entries_in_fours {
+    (
+        $method:ident, $Block:ty, $block:ident [$row_count:expr, $inner_count:expr, $column_count:expr],
+        [$($binding:literal $array:ident),*], $last:literal
+    ) => {
+        /// The forms of a kernel.
+        pub mod $method {
+            use super::super::*;
+
+            entries_in_fours! {
+                staged $method, $Block, $block [$row_count, $inner_count, $column_count], [$($binding $array),*], $last,
+                /// In tiles of 128 times 64.
+                large Large (256) LargeRows LargeColumns,
+                /// In tiles of 64 times 64.
+                small Small (256) SmallRows SmallColumns,
+                /// In tiles of 32 times 32.
+                tiny Tiny (64) TinyRows TinyColumns
+            }
+            entries_in_fours! {
+                halves $method, $Block, $block [$row_count, $inner_count, $column_count], [$($binding $array),*], $last,
+                /// By matrix units, in f16.
+                half half_stand_in Half (128) SharedOfHalf,
+                /// The same in tiles of 64 times 64.
+                half_small half_small_stand_in HalfSmall (128) SharedOfHalfSmall,
+                /// The same in tiles of 32 times 32.
+                half_tiny half_tiny_stand_in HalfTiny (128) SharedOfHalfTiny,
+                /// By matrix units, in f16 in two parts.
+                two_halves two_halves_stand_in TwoHalves (256) SharedOfTwoHalves,
+                /// The same in tiles of 64 times 64.
+                two_halves_small two_halves_small_stand_in TwoHalvesSmall (128) SharedOfTwoHalvesSmall,
+                /// The same in tiles of 32 times 32.
+                two_halves_tiny two_halves_tiny_stand_in TwoHalvesTiny (128) SharedOfTwoHalvesTiny
+            }
+        }
+    };
+    (
+        staged $method:ident, $Block:ty, $block:ident [$row_count:expr, $inner_count:expr, $column_count:expr],
+        $arrays:tt, $last:literal, $($(#[$doc:meta])* $form:ident $Form:ident ($threads:literal) $Rows:ident $Columns:ident),+
+    ) => {
+        $(entries_in_fours! {
+            one $method, $Block, $block [$row_count, $inner_count, $column_count], $arrays, $last,
+            [$(#[$doc])*] $form ($threads) [] [
+                #[spirv(workgroup)] rows: &mut shared::$Rows,
+                #[spirv(workgroup)] columns: &mut shared::$Columns,
+            ]
+            id { InFours { tile: PhantomData::<$Form>, rows, columns } }
+        })+
+    };
+    (
+        halves $method:ident, $Block:ty, $block:ident [$row_count:expr, $inner_count:expr, $column_count:expr],
+        $arrays:tt, $last:literal,
+        $($(#[$doc:meta])* $form:ident $stand_in:ident $Form:ident ($threads:literal) $Shared:ident),+
+    ) => {
+        $(entries_in_fours! {
+            one $method, $Block, $block [$row_count, $inner_count, $column_count], $arrays, $last,
+            [$(#[$doc])* #[cfg(target_arch = "spirv")]] $form ($threads) [
                 #[spirv(subgroup_id)] subgroup: u32,
                 #[spirv(subgroup_local_invocation_id)] lane: u32,
-                #[spirv(push_constant)] push: &Push<$Block>,
-                $($parameters)*
-                #[spirv(workgroup)] shared: &mut SharedOfHalf,
-            ) {
-                let $block = &push.parameters;
-                let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
-                let tiles = Half { units: PhantomData::<Matrices>, shared, subgroup, lane };
-                bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
+            ] [
+                #[spirv(workgroup)] shared: &mut $Shared,
+            ]
+            id { $Form { units: PhantomData::<Matrices>, shared, subgroup, lane } }
+        }
+        entries_in_fours! {
+            one $method, $Block, $block [$row_count, $inner_count, $column_count], $arrays, $last,
+            [$(#[$doc])* #[doc = "\n\nBy plain arithmetic in the place of matrix units."]] $stand_in ($threads) [] [
+                #[spirv(workgroup)] shared: &mut $Shared,
+            ]
+            id {
+                $Form { units: PhantomData::<StandIns>, shared, subgroup: id.x % $threads / 32, lane: id.x % 32 }
             }
-
-            /// By matrix units, in f16 in two parts.
-            #[spirv(compute(threads(128)))]
-            #[allow(clippy::too_many_arguments)]
-            #[cfg(target_arch = "spirv")]
-            pub fn two_halves(
-                #[spirv(global_invocation_id)] id: UVec3,
-                #[spirv(subgroup_id)] subgroup: u32,
-                #[spirv(subgroup_local_invocation_id)] lane: u32,
-                #[spirv(push_constant)] push: &Push<$Block>,
-                $($parameters)*
-                #[spirv(workgroup)] shared: &mut SharedOfTwoHalves,
-            ) {
-                let $block = &push.parameters;
-                let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
-                let tiles = TwoHalves { units: PhantomData::<Matrices>, shared, subgroup, lane };
-                bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
-            }
-
-            /// As `half`, by plain arithmetic.
-            #[spirv(compute(threads(128)))]
-            #[allow(clippy::too_many_arguments)]
-            pub fn half_stand_in(
-                #[spirv(global_invocation_id)] id: UVec3,
-                #[spirv(push_constant)] push: &Push<$Block>,
-                $($parameters)*
-                #[spirv(workgroup)] shared: &mut SharedOfHalf,
-            ) {
-                let $block = &push.parameters;
-                let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
-                let (subgroup, lane) = (id.x % 128 / 32, id.x % 32);
-                let tiles = Half { units: PhantomData::<StandIns>, shared, subgroup, lane };
-                bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
-            }
-
-            /// As `two_halves`, by plain arithmetic.
-            #[spirv(compute(threads(128)))]
-            #[allow(clippy::too_many_arguments)]
-            pub fn two_halves_stand_in(
-                #[spirv(global_invocation_id)] id: UVec3,
-                #[spirv(push_constant)] push: &Push<$Block>,
-                $($parameters)*
-                #[spirv(workgroup)] shared: &mut SharedOfTwoHalves,
-            ) {
-                let $block = &push.parameters;
-                let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
-                let (subgroup, lane) = (id.x % 128 / 32, id.x % 32);
-                let tiles = TwoHalves { units: PhantomData::<StandIns>, shared, subgroup, lane };
-                bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
-            }
+        })+
+    };
+    (
+        one $method:ident, $Block:ty, $block:ident [$row_count:expr, $inner_count:expr, $column_count:expr],
+        [$($binding:literal $array:ident),*], $last:literal,
+        [$(#[$mark:meta])*] $form:ident ($threads:literal) [$($before:tt)*] [$($memory:tt)*] $id:ident { $($tiles:tt)* }
+    ) => {
+        $(#[$mark])*
+        #[spirv(compute(threads($threads)))]
+        #[allow(clippy::too_many_arguments)]
+        pub fn $form(
+            #[spirv(global_invocation_id)] $id: UVec3,
+            $($before)*
+            #[spirv(push_constant)] push: &Push<$Block>,
+            $(#[spirv(storage_buffer, descriptor_set = 0, binding = $binding)] $array: &[Vec4],)*
+            #[spirv(storage_buffer, descriptor_set = 0, binding = $last)] outputs: &mut [Vec4],
+            $($memory)*
+        ) {
+            let $block = &push.parameters;
+            let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
+            let tiles = $($tiles)*;
+            let invocation = push.piece.first + $id.x;
+            bodies::$method($block, shape, $(EndlessFours($array),)* UncheckedFours(outputs), tiles, invocation);
         }
     };
 }

@@ -21,13 +21,15 @@ pub use viewfuse_kernels::rows::Piece;
 
 use core::marker::PhantomData;
 use loads::{InVectors, Vectors, VectorsMut};
-use spirv_std::glam::UVec3;
+use spirv_std::glam::{UVec3, Vec4};
 use spirv_std::spirv;
 #[cfg(target_arch = "spirv")]
 use tile::Matrices;
-use tile::{Half, SharedOfHalf, SharedOfTwoHalves, StandIns, TwoHalves};
-use tile::{Large, SharedOfLarge, SharedOfSingle, SharedOfSmall, Single, Small, Staged, Subgroup};
-use unchecked::{Endless, Together, Unchecked};
+use tile::{Half, HalfSmall, HalfTiny, StandIns, TwoHalves, TwoHalvesSmall, TwoHalvesTiny};
+use tile::{InFours, Large, SharedOfSingle, Small, Staged, Subgroup, Tiny, shared};
+use tile::{SharedOfHalf, SharedOfHalfSmall, SharedOfHalfTiny};
+use tile::{SharedOfTwoHalves, SharedOfTwoHalvesSmall, SharedOfTwoHalvesTiny};
+use unchecked::{Endless, EndlessFours, Together, Unchecked, UncheckedFours};
 use viewfuse_kernels::bodies;
 use viewfuse_kernels::for_each_kernel;
 use viewfuse_kernels::network::tile::Shape;
@@ -45,3 +47,15 @@ pub struct Push<P> {
 }
 
 for_each_kernel!(entries);
+
+/// The forms of arrays in fours of the kernels that have them ([`Kernel::is_in_fours`]).
+pub mod in_fours {
+    entries_in_fours! {
+        linear, LinearBlock, block [block.row_count, block.inner_count, block.column_count],
+        [0 inputs, 1 weights, 2 bias, 3 residual], 4
+    }
+    entries_in_fours! {
+        convolve, ConvolveBlock, block [block.pixel_count(), block.patch_len(), block.out_channels],
+        [0 inputs, 1 weights, 2 bias, 3 residual], 4
+    }
+}

@@ -10,81 +10,44 @@
 //! This code must not panic, see [`crate::unchecked`]. Closures capture by value: a module with logical addressing
 //! cannot hold references to references.
 
+mod fours;
 mod halves;
 mod subgroup;
 
+pub(crate) use fours::{InFours, Large, Small, Tiny, shared};
 #[cfg(target_arch = "spirv")]
 pub(crate) use halves::Matrices;
-pub(crate) use halves::{Half, SharedOfHalf, SharedOfTwoHalves, StandIns, TwoHalves};
+pub(crate) use halves::{Half, HalfSmall, HalfTiny, StandIns, TwoHalves, TwoHalvesSmall, TwoHalvesTiny};
+pub(crate) use halves::{SharedOfHalf, SharedOfHalfSmall, SharedOfHalfTiny};
+pub(crate) use halves::{SharedOfTwoHalves, SharedOfTwoHalvesSmall, SharedOfTwoHalvesTiny};
 pub(crate) use subgroup::Subgroup;
 
-use core::marker::PhantomData;
 use spirv_std::arch::{IndexUnchecked, control_barrier};
 use spirv_std::glam::Vec4;
 use spirv_std::memory::{Scope, Semantics};
-use viewfuse_kernels::network::tile::{EightSums, FourSums, Left, Shape, Sums, Tiles};
+use viewfuse_kernels::network::tile::{EightSums, Left, Outputs, Right, Shape, Sums, Tiles};
 use viewfuse_kernels::rows::Form;
 
-/// The sizes of a tile.
-pub(crate) trait Tile: Copy {
-    /// What an invocation sums.
-    type Sums: Sums;
-    const FORM: Form;
-    /// Inner indices of a step.
-    const STEP: u32;
+/// Rows and columns of a tile of [`Form::Single`], and invocations of its workgroup.
+const SIDE: u32 = Form::Single.rows();
+const INVOCATIONS: u32 = Form::Single.invocations();
+/// Inner indices of a step.
+const STEP: u32 = 8;
+/// Invocations beside one another, and below.
+const LINE: u32 = SIDE / EightSums::ROWS;
+/// Fours of a tile's rows or columns.
+const FOURS: u32 = SIDE / 4;
+/// Fours of an inner index in the workgroup's memory: odd, so that neighbouring indices lie in different banks.
+const STRIDE: u32 = FOURS + 1;
+/// Inner indices from an invocation's first four of columns to its second, and fours from its first of rows to its
+/// second.
+const NEXT_INNER: u32 = INVOCATIONS / FOURS;
+const NEXT_FOUR: u32 = INVOCATIONS / STEP;
 
-    /// Rows and columns of a tile.
-    const SIDE: u32 = Self::FORM.side();
-    /// Invocations of a workgroup.
-    const INVOCATIONS: u32 = Self::FORM.invocations();
-    /// Invocations beside one another, and below.
-    const LINE: u32 = Self::SIDE / Self::Sums::SIDE;
-    /// Fours of a tile's rows or columns.
-    const FOURS: u32 = Self::SIDE / 4;
-    /// Fours of an inner index in the workgroup's memory: odd, so that neighbouring indices lie in different banks.
-    const STRIDE: u32 = Self::FOURS + 1;
-    /// Whether an invocation fetches two fours of each matrix for a step, and not one.
-    const HAS_TWO: bool = Self::STEP * Self::FOURS > Self::INVOCATIONS;
-}
+const _: () = assert!(LINE * LINE == INVOCATIONS && STEP * FOURS == 2 * INVOCATIONS);
 
-#[derive(Clone, Copy)]
-pub(crate) struct Single;
-
-impl Tile for Single {
-    type Sums = EightSums;
-    const FORM: Form = Form::Single;
-    const STEP: u32 = 8;
-}
-
-#[derive(Clone, Copy)]
-pub(crate) struct Large;
-
-impl Tile for Large {
-    type Sums = EightSums;
-    const FORM: Form = Form::Large;
-    const STEP: u32 = 8;
-}
-
-#[derive(Clone, Copy)]
-pub(crate) struct Small;
-
-impl Tile for Small {
-    type Sums = FourSums;
-    const FORM: Form = Form::Small;
-    const STEP: u32 = 16;
-}
-
-/// Fours of a matrix in a workgroup's memory: those of two steps.
-pub(crate) const fn shared_fours<T: Tile>() -> usize {
-    assert!(T::LINE * T::LINE == T::INVOCATIONS && T::INVOCATIONS.is_multiple_of(T::STEP));
-    assert!(T::STEP * T::FOURS == if T::HAS_TWO { 2 } else { 1 } * T::INVOCATIONS);
-    (2 * T::STEP * T::STRIDE) as usize
-}
-
-/// A matrix in a workgroup's memory: `[step][inner][row or column]`, in fours.
-pub(crate) type SharedOfSingle = [Vec4; shared_fours::<Single>()];
-pub(crate) type SharedOfLarge = [Vec4; shared_fours::<Large>()];
-pub(crate) type SharedOfSmall = [Vec4; shared_fours::<Small>()];
+/// A matrix in a workgroup's memory: `[step][inner][row or column]`, in fours, of two steps.
+pub(crate) type SharedOfSingle = [Vec4; (2 * STEP * STRIDE) as usize];
 
 /// What an invocation computes of its workgroup's tile.
 #[derive(Clone, Copy)]
@@ -98,13 +61,20 @@ pub(crate) struct InvocationTile {
 }
 
 impl InvocationTile {
-    /// That of an invocation in a workgroup, whose tile has `side` rows, `line` invocations below one another.
+    /// That of an invocation in a workgroup, whose tile has `rows` and `columns`, with `line` invocations beside one
+    /// another.
     #[inline(always)]
-    pub(crate) fn new(group: u32, invocation: u32, side: u32, line: u32, shape: Shape) -> InvocationTile {
-        let group_columns = shape.column_count.div_ceil(side);
+    pub(crate) fn new(
+        group: u32,
+        invocation: u32,
+        [rows, columns]: [u32; 2],
+        line: u32,
+        shape: Shape,
+    ) -> InvocationTile {
+        let group_columns = shape.column_count.div_ceil(columns);
         InvocationTile {
-            first_row: group / group_columns * side,
-            first_column: group % group_columns * side,
+            first_row: group / group_columns * rows,
+            first_column: group % group_columns * columns,
             own_row: invocation / line,
             own_column: invocation % line,
         }
@@ -117,7 +87,7 @@ struct Share<R> {
     /// Its inner index in a step, and the four, of the left and of the right matrix.
     left: [u32; 2],
     right: [u32; 2],
-    /// The rows of its one or two fours, and its columns.
+    /// The rows of its two fours, and its columns.
     near_rows: [R; 4],
     far_rows: [R; 4],
     columns: [u32; 4],
@@ -127,45 +97,26 @@ struct Share<R> {
 type Step = [[Vec4; 2]; 2];
 
 impl<R: Copy> Share<R> {
-    /// Inner indices from a four of columns to the second, and fours from one of rows to the second.
-    const fn next<T: Tile>() -> [u32; 2] {
-        [T::INVOCATIONS / T::FOURS, T::INVOCATIONS / T::STEP]
-    }
-
     /// Neighbours fetch what lies next to one another: numbers of a row, and columns.
     #[inline(always)]
-    fn new<T: Tile, L: Left<Row = R>>(own: u32, place: InvocationTile, shape: Shape, left: L) -> Share<R> {
-        let (left_four, right_four) = (own / T::STEP, own % T::FOURS);
+    fn new<L: Left<Row = R>>(own: u32, place: InvocationTile, shape: Shape, left: L) -> Share<R> {
+        let (left_four, right_four) = (own / STEP, own % FOURS);
         let near_rows = four_rows(left, place.first_row + left_four * 4, shape);
-        let far_four = left_four + const { Self::next::<T>()[1] };
-        let far_rows = if T::HAS_TWO { four_rows(left, place.first_row + far_four * 4, shape) } else { near_rows };
+        let far_rows = four_rows(left, place.first_row + (left_four + NEXT_FOUR) * 4, shape);
         let (first, last) = (place.first_column + right_four, shape.column_count - 1);
-        let columns = [
-            first.min(last),
-            (first + T::FOURS).min(last),
-            (first + 2 * T::FOURS).min(last),
-            (first + 3 * T::FOURS).min(last),
-        ];
-        Share { left: [own % T::STEP, left_four], right: [own / T::FOURS, right_four], near_rows, far_rows, columns }
+        let columns =
+            [first.min(last), (first + FOURS).min(last), (first + 2 * FOURS).min(last), (first + 3 * FOURS).min(last)];
+        Share { left: [own % STEP, left_four], right: [own / FOURS, right_four], near_rows, far_rows, columns }
     }
 
     #[inline(always)]
-    fn fetch<T: Tile, L: Left<Row = R>>(
-        self,
-        start: u32,
-        shape: Shape,
-        left: L,
-        right: impl Fn(u32, u32) -> f32 + Copy,
-    ) -> Step {
+    fn fetch<L: Left<Row = R>>(self, start: u32, shape: Shape, left: L, right: impl Right) -> Step {
         let (row_inner, column_inner) = (start + self.left[0], start + self.right[0]);
         let near = [
             fetch_rows(left, row_inner, self.near_rows, shape),
             fetch_columns(right, column_inner, self.columns, shape),
         ];
-        if !T::HAS_TWO {
-            return [near; 2];
-        }
-        let far_inner = column_inner + const { Self::next::<T>()[0] };
+        let far_inner = column_inner + NEXT_INNER;
         [
             near,
             [fetch_rows(left, row_inner, self.far_rows, shape), fetch_columns(right, far_inner, self.columns, shape)],
@@ -174,22 +125,13 @@ impl<R: Copy> Share<R> {
 
     /// Writes a step behind the first `half` inner indices of the workgroup's memory.
     #[inline(always)]
-    fn write<T: Tile, const N: usize>(
-        self,
-        rows: &mut [Vec4; N],
-        columns: &mut [Vec4; N],
-        half: u32,
-        [near, far]: Step,
-    ) {
-        let row_place = (half + self.left[0]) * T::STRIDE + self.left[1];
-        let column_place = (half + self.right[0]) * T::STRIDE + self.right[1];
+    fn write<const N: usize>(self, rows: &mut [Vec4; N], columns: &mut [Vec4; N], half: u32, [near, far]: Step) {
+        let row_place = (half + self.left[0]) * STRIDE + self.left[1];
+        let column_place = (half + self.right[0]) * STRIDE + self.right[1];
         write(rows, row_place, near[0]);
         write(columns, column_place, near[1]);
-        if T::HAS_TWO {
-            let [inner, four] = const { Self::next::<T>() };
-            write(rows, row_place + four, far[0]);
-            write(columns, column_place + inner * T::STRIDE, far[1]);
-        }
+        write(rows, row_place + NEXT_FOUR, far[0]);
+        write(columns, column_place + NEXT_INNER * STRIDE, far[1]);
     }
 }
 
@@ -215,62 +157,54 @@ fn fetch_rows<L: Left>(left: L, inner: u32, [a, b, c, d]: [L::Row; 4], shape: Sh
 
 /// The numbers of an inner index in four columns, 0 beyond the matrix.
 #[inline(always)]
-fn fetch_columns(right: impl Fn(u32, u32) -> f32, inner: u32, [a, b, c, d]: [u32; 4], shape: Shape) -> Vec4 {
-    let four = Vec4::new(right(inner, a), right(inner, b), right(inner, c), right(inner, d));
+fn fetch_columns(right: impl Right, inner: u32, [a, b, c, d]: [u32; 4], shape: Shape) -> Vec4 {
+    let number = |column: u32| right.number(inner, column);
+    let four = Vec4::new(number(a), number(b), number(c), number(d));
     if inner < shape.inner_count { four } else { Vec4::ZERO }
 }
 
 /// A tile that goes through the workgroup's memory.
-pub(crate) struct Staged<'a, T, const N: usize> {
-    pub(crate) tile: PhantomData<T>,
-    pub(crate) rows: &'a mut [Vec4; N],
-    pub(crate) columns: &'a mut [Vec4; N],
+pub(crate) struct Staged<'a> {
+    pub(crate) rows: &'a mut SharedOfSingle,
+    pub(crate) columns: &'a mut SharedOfSingle,
 }
 
-impl<T: Tile, const N: usize> Tiles for Staged<'_, T, N> {
+impl Tiles for Staged<'_> {
     #[inline(always)]
-    fn multiply<L: Left>(
-        self,
-        invocation: u32,
-        shape: Shape,
-        left: L,
-        right: impl Fn(u32, u32) -> f32 + Copy,
-        mut store: impl FnMut(u32, u32, f32),
-    ) {
-        let Staged { tile: _, rows, columns } = self;
-        let (group, own) = (invocation / T::INVOCATIONS, invocation % T::INVOCATIONS);
-        let place = InvocationTile::new(group, own, T::SIDE, T::LINE, shape);
-        let share = Share::new::<T, L>(own, place, shape, left);
-        let mut next = share.fetch::<T, L>(0, shape, left, right);
-        share.write::<T, N>(rows, columns, 0, next);
+    fn multiply<L: Left>(self, invocation: u32, shape: Shape, left: L, right: impl Right, mut outputs: impl Outputs) {
+        let Staged { rows, columns } = self;
+        let (group, own) = (invocation / INVOCATIONS, invocation % INVOCATIONS);
+        let place = InvocationTile::new(group, own, [SIDE; 2], LINE, shape);
+        let share = Share::new(own, place, shape, left);
+        let mut next = share.fetch(0, shape, left, right);
+        share.write(rows, columns, 0, next);
         wait_for_all();
-        let mut sums = T::Sums::ZERO;
+        let mut sums = EightSums::ZERO;
         let (mut start, mut half) = (0, 0);
         while start < shape.inner_count {
-            let has_next = start + T::STEP < shape.inner_count;
+            let has_next = start + STEP < shape.inner_count;
             if has_next {
-                next = share.fetch::<T, L>(start + T::STEP, shape, left, right);
+                next = share.fetch(start + STEP, shape, left, right);
             }
-            let (row_place, column_place) = (half * T::STRIDE + place.own_row, half * T::STRIDE + place.own_column);
+            let (row_place, column_place) = (half * STRIDE + place.own_row, half * STRIDE + place.own_column);
             let (lent_rows, lent_columns) = (&*rows, &*columns);
             let mut inner = 0;
-            while inner < T::STEP {
-                let at = inner * T::STRIDE;
-                let row_fours = T::Sums::fours(move |four| read(lent_rows, row_place + at + four * T::LINE));
-                let column_fours = T::Sums::fours(move |four| read(lent_columns, column_place + at + four * T::LINE));
+            while inner < STEP {
+                let at = inner * STRIDE;
+                let row_fours = EightSums::rows(move |four| read(lent_rows, row_place + at + four * LINE));
+                let column_fours = EightSums::columns(move |four| read(lent_columns, column_place + at + four * LINE));
                 sums.add(row_fours, column_fours);
                 inner += 1;
             }
-            half = T::STEP - half;
+            half = STEP - half;
             if has_next {
-                share.write::<T, N>(rows, columns, half, next);
+                share.write(rows, columns, half, next);
             }
             wait_for_all();
-            start += T::STEP;
+            start += STEP;
         }
-        let column =
-            move |four: u32, index: u32| place.first_column + four * T::LINE + place.own_column + index * T::FOURS;
-        store_sums(sums, place, T::LINE, shape, column, &mut store);
+        let column = move |four: u32, index: u32| place.first_column + four * LINE + place.own_column + index * FOURS;
+        store_sums(sums, place, LINE, shape, column, &mut outputs);
     }
 }
 
@@ -282,15 +216,15 @@ pub(crate) fn store_sums<S: Sums>(
     line: u32,
     shape: Shape,
     column: impl Fn(u32, u32) -> u32 + Copy,
-    store: &mut impl FnMut(u32, u32, f32),
+    outputs: &mut impl Outputs,
 ) {
     let mut index = 0;
-    while index < S::SIDE {
+    while index < S::ROWS {
         let row = place.first_row + row_place(line, place.own_row, index);
         sums.take_row(|four, sums| {
             let mut store_one = |column: u32, sum: f32| {
                 if row < shape.row_count && column < shape.column_count {
-                    store(row, column, sum);
+                    outputs.put(row, column, sum);
                 }
             };
             store_one(column(four, 0), sums.x);
@@ -311,7 +245,7 @@ pub(crate) fn row_place(line: u32, own: u32, index: u32) -> u32 {
 #[inline(always)]
 #[allow(unsafe_code)]
 fn read<const N: usize>(shared: &[Vec4; N], place: u32) -> Vec4 {
-    // SAFETY: halves, inner indices and fours are below those that the array was made for (`shared_fours`).
+    // SAFETY: halves, inner indices and fours are below those that the array was made for.
     unsafe { *shared.index_unchecked(place as usize) }
 }
 

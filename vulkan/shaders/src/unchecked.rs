@@ -3,8 +3,10 @@
 
 use crate::tile::wait_for_all;
 use spirv_std::arch::IndexUnchecked;
+use spirv_std::glam::Vec4;
 use viewfuse_core::fetch::Fetch;
-use viewfuse_kernels::store::Store;
+use viewfuse_kernels::network::tile::Fours;
+use viewfuse_kernels::store::{Store, StoreFours};
 use viewfuse_kernels::workgroup::Workgroup;
 
 /// An array with at least one element; an index beyond its end reads the last one.
@@ -19,6 +21,28 @@ impl<T: Copy> Fetch<T> for Endless<'_, T> {
     }
 }
 
+impl Fours for Endless<'_, f32> {}
+
+/// An array of whole fours of numbers, at least one; an index beyond its end reads the last four.
+#[derive(Clone, Copy)]
+pub(crate) struct EndlessFours<'a>(pub(crate) &'a [Vec4]);
+
+impl Fetch<f32> for EndlessFours<'_> {
+    #[inline(always)]
+    fn fetch(&self, index: usize) -> f32 {
+        let four = self.four(index as u32);
+        let [near, far] = if index & 1 == 0 { [four.x, four.z] } else { [four.y, four.w] };
+        if index & 2 == 0 { near } else { far }
+    }
+}
+
+impl Fours for EndlessFours<'_> {
+    #[inline(always)]
+    fn four(&self, index: u32) -> Vec4 {
+        Endless(self.0).fetch((index / 4) as usize)
+    }
+}
+
 /// An array of which an element is written only if it exists.
 pub(crate) struct Unchecked<'a, T>(pub(crate) &'a mut [T]);
 
@@ -29,6 +53,24 @@ impl<T> Store<T> for Unchecked<'_, T> {
             // SAFETY: just looked.
             unsafe { *self.0.index_unchecked_mut(index) = value };
         }
+    }
+}
+
+impl StoreFours for Unchecked<'_, f32> {}
+
+/// An array of whole fours of numbers, of which a four is written only if it exists.
+pub(crate) struct UncheckedFours<'a>(pub(crate) &'a mut [Vec4]);
+
+impl Store<f32> for UncheckedFours<'_> {
+    /// Of an array in fours, whole fours are written.
+    #[inline(always)]
+    fn store(&mut self, _index: usize, _value: f32) {}
+}
+
+impl StoreFours for UncheckedFours<'_> {
+    #[inline(always)]
+    fn store_four(&mut self, index: usize, values: Vec4) {
+        Unchecked(&mut *self.0).store(index / 4, values);
     }
 }
 

@@ -1,112 +1,166 @@
 //! Layers that are products of matrices: a device computes them in tiles, in its own way.
 //!
-//! Arrays come by value: closures over references to them would hold references to references, which a module with
-//! logical addressing cannot.
+//! Arrays come by value: references to them would be references to references, which a module with logical addressing
+//! cannot hold.
 
 use crate::network::attend::MatrixBlock;
-use crate::network::convolve::{ConvolveBlock, Patches, convolved};
-use crate::network::linear::{LinearBlock, first_of_sum, rectified};
-use crate::network::tile::{Matrix, Shape, Tiles};
+use crate::network::convolve::{ConvolveBlock, Patches, convolved, convolved_four};
+use crate::network::linear::{LinearBlock, first_of_sum, first_of_sums, rectified, rectified_four};
+use crate::network::tile::{Fours, Matrix, Outputs, Right, Shape, Tiles, Weights};
 use crate::network::transpose::TransposedBlock;
-use crate::store::Store;
-use viewfuse_core::fetch::Fetch;
+use crate::store::{Store, StoreFours};
+use glam::Vec4;
 
 /// A convolution of pixels and output channels.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
-pub fn convolve<A: Fetch<f32> + Copy>(
+pub fn convolve<A: Fours>(
     block: &ConvolveBlock,
     shape: Shape,
     inputs: A,
     weights: A,
     bias: A,
     residual: A,
-    mut outputs: impl Store<f32>,
+    outputs: impl StoreFours,
     tiles: impl Tiles,
     invocation: u32,
 ) {
-    let channels = shape.column_count;
-    tiles.multiply(
-        invocation,
-        shape,
-        Patches { block, inputs },
-        move |inner, channel| weights.fetch((inner * channels + channel) as usize),
-        move |pixel, channel, sum| {
-            let value = convolved(&bias, &residual, block, pixel, channel, sum);
-            outputs.store(block.place(pixel, channel), value);
-        },
-    );
+    let weights = Weights { numbers: weights, column_count: shape.column_count };
+    tiles.multiply(invocation, shape, Patches { block, inputs }, weights, Convolved { block, bias, residual, outputs });
+}
+
+struct Convolved<'a, A, O> {
+    block: &'a ConvolveBlock,
+    bias: A,
+    residual: A,
+    outputs: O,
+}
+
+impl<A: Fours, O: StoreFours> Outputs for Convolved<'_, A, O> {
+    #[inline(always)]
+    fn put(&mut self, pixel: u32, channel: u32, sum: f32) {
+        let value = convolved(&self.bias, &self.residual, self.block, pixel, channel, sum);
+        self.outputs.store(self.block.place(pixel, channel), value);
+    }
+
+    #[inline(always)]
+    fn put_four(&mut self, pixel: u32, channel: u32, sums: Vec4) {
+        let values = convolved_four(&self.bias, &self.residual, self.block, pixel, channel, sums);
+        self.outputs.store_four(self.block.place(pixel, channel), values);
+    }
 }
 
 /// A transposed convolution of input pixels and what they become.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
-pub fn convolve_transposed<A: Fetch<f32> + Copy>(
+pub fn convolve_transposed<A: Fours>(
     block: &TransposedBlock,
     shape: Shape,
     inputs: A,
     weights: A,
     bias: A,
-    mut outputs: impl Store<f32>,
+    outputs: impl Store<f32>,
     tiles: impl Tiles,
     invocation: u32,
 ) {
-    let column_count = shape.column_count;
-    tiles.multiply(
-        invocation,
-        shape,
-        Matrix { numbers: inputs, first: block.in_first, pitch: block.in_pitch, relu: 0 },
-        move |inner, column| weights.fetch((inner * column_count + column) as usize),
-        move |pixel, column, sum| outputs.store(block.place(pixel, column), block.output(&bias, column, sum)),
-    );
+    let left = Matrix { numbers: inputs, first: block.in_first, pitch: block.in_pitch, relu: 0 };
+    let weights = Weights { numbers: weights, column_count: shape.column_count };
+    tiles.multiply(invocation, shape, left, weights, Transposed { block, bias, outputs });
+}
+
+struct Transposed<'a, A, O> {
+    block: &'a TransposedBlock,
+    bias: A,
+    outputs: O,
+}
+
+impl<A: Fours, O: Store<f32>> Outputs for Transposed<'_, A, O> {
+    #[inline(always)]
+    fn put(&mut self, pixel: u32, column: u32, sum: f32) {
+        self.outputs.store(self.block.place(pixel, column), self.block.output(&self.bias, column, sum));
+    }
 }
 
 /// A linear layer of rows and columns.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
-pub fn linear<A: Fetch<f32> + Copy>(
+pub fn linear<A: Fours>(
     block: &LinearBlock,
     shape: Shape,
     inputs: A,
     weights: A,
     bias: A,
     residual: A,
-    mut outputs: impl Store<f32>,
+    outputs: impl StoreFours,
     tiles: impl Tiles,
     invocation: u32,
 ) {
-    let column_count = shape.column_count;
-    tiles.multiply(
-        invocation,
-        shape,
-        Matrix { numbers: inputs, first: 0, pitch: block.inner_count, relu: block.relu_inputs },
-        move |inner, column| weights.fetch((inner * column_count + column) as usize),
-        move |row, column, sum| {
-            let element = (row * column_count + column) as usize;
-            let first = first_of_sum(&bias, &residual, block.has_residual, element, column as usize);
-            outputs.store(element, rectified(first + sum, block.relu_outputs));
-        },
-    );
+    let left = Matrix { numbers: inputs, first: 0, pitch: block.inner_count, relu: block.relu_inputs };
+    let weights = Weights { numbers: weights, column_count: shape.column_count };
+    tiles.multiply(invocation, shape, left, weights, OfLayer { block, bias, residual, outputs });
+}
+
+struct OfLayer<'a, A, O> {
+    block: &'a LinearBlock,
+    bias: A,
+    residual: A,
+    outputs: O,
+}
+
+impl<A: Fours, O: StoreFours> Outputs for OfLayer<'_, A, O> {
+    #[inline(always)]
+    fn put(&mut self, row: u32, column: u32, sum: f32) {
+        let element = (row * self.block.column_count + column) as usize;
+        let first = first_of_sum(&self.bias, &self.residual, self.block.has_residual, element, column as usize);
+        self.outputs.store(element, rectified(first + sum, self.block.relu_outputs));
+    }
+
+    #[inline(always)]
+    fn put_four(&mut self, row: u32, column: u32, sums: Vec4) {
+        let element = row * self.block.column_count + column;
+        let first = first_of_sums(&self.bias, &self.residual, self.block.has_residual, element, column);
+        self.outputs.store_four(element as usize, rectified_four(first + sums, self.block.relu_outputs));
+    }
 }
 
 /// A product of two computed matrices.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
-pub fn matrix_product<A: Fetch<f32> + Copy>(
+pub fn matrix_product<A: Fours>(
     block: &MatrixBlock,
     shape: Shape,
     left: A,
     right: A,
-    mut outputs: impl Store<f32>,
+    outputs: impl Store<f32>,
     tiles: impl Tiles,
     invocation: u32,
 ) {
-    let column_count = shape.column_count;
-    tiles.multiply(
-        invocation,
-        shape,
-        Matrix { numbers: left, first: block.left_first, pitch: block.left_pitch, relu: 0 },
-        move |inner, column| block.right(&right, inner, column),
-        move |row, column, sum| outputs.store((row * column_count + column) as usize, sum * block.scale),
-    );
+    let left = Matrix { numbers: left, first: block.left_first, pitch: block.left_pitch, relu: 0 };
+    tiles.multiply(invocation, shape, left, Computed { block, numbers: right }, Scaled { block, outputs });
+}
+
+/// The right matrix of a product of two computed ones.
+#[derive(Clone, Copy)]
+struct Computed<'a, A> {
+    block: &'a MatrixBlock,
+    numbers: A,
+}
+
+impl<A: Fours> Right for Computed<'_, A> {
+    #[inline(always)]
+    fn number(self, inner: u32, column: u32) -> f32 {
+        self.block.right(&self.numbers, inner, column)
+    }
+}
+
+struct Scaled<'a, O> {
+    block: &'a MatrixBlock,
+    outputs: O,
+}
+
+impl<O: Store<f32>> Outputs for Scaled<'_, O> {
+    #[inline(always)]
+    fn put(&mut self, row: u32, column: u32, sum: f32) {
+        self.outputs.store((row * self.block.column_count + column) as usize, sum * self.block.scale);
+    }
 }

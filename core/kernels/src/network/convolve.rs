@@ -6,9 +6,10 @@
 //! It is the matrix product of the image's patches, `[output pixel][row of the window][column of the window][channel]`,
 //! with the weights; [`patch_value`] is that matrix, which devices compute on the fly and do not store.
 
-use super::linear::{first_of_sum, rectified};
-use super::tile::Left;
+use super::linear::{first_of_sum, first_of_sums, rectified, rectified_four};
+use super::tile::{Fours, Left, Loaded};
 use bytemuck::{Pod, Zeroable};
+use glam::Vec4;
 use viewfuse_core::fetch::Fetch;
 
 /// A dispatch of [`convolve_element`], as plain data. The yes-or-no fields are 0 or 1.
@@ -89,6 +90,18 @@ impl ConvolveBlock {
         self.out_height * self.out_width
     }
 
+    /// Whether the channels of all images are whole fours that begin at multiples of four.
+    pub const fn is_in_fours(&self) -> bool {
+        self.in_channels.is_multiple_of(4)
+            && self.in_pitch.is_multiple_of(4)
+            && self.in_first.is_multiple_of(4)
+            && self.out_channels.is_multiple_of(4)
+            && self.out_pitch.is_multiple_of(4)
+            && self.out_first.is_multiple_of(4)
+            && self.residual_pitch.is_multiple_of(4)
+            && self.residual_first.is_multiple_of(4)
+    }
+
     /// First row and column of the window that output pixel `pixel` sees, in the enlarged image, plus the padding.
     #[inline(always)]
     pub fn window(&self, pixel: u32) -> [u32; 2] {
@@ -135,15 +148,19 @@ pub fn patch_value(inputs: &(impl Fetch<f32> + ?Sized), block: &ConvolveBlock, p
 pub fn patch_number(
     inputs: &(impl Fetch<f32> + ?Sized),
     block: &ConvolveBlock,
-    [first_row, first_column]: [u32; 2],
-    [row, column, channel]: [u32; 3],
+    window: [u32; 2],
+    place: [u32; 3],
 ) -> f32 {
+    let at = patch_place(block, window, place);
+    if at == u32::MAX { 0.0 } else { inputs.fetch(at as usize) }
+}
+
+/// Where that number lies in the input, or `u32::MAX` outside the image.
+#[inline(always)]
+fn patch_place(block: &ConvolveBlock, [first_row, first_column]: [u32; 2], [row, column, channel]: [u32; 3]) -> u32 {
     let (row, column) = (first_row + row, first_column + column);
     let seen = window_pixel([block.in_height, block.in_width], block.enlarge, block.padding, row, column);
-    if seen == u32::MAX {
-        return 0.0;
-    }
-    inputs.fetch((block.in_first + seen * block.in_pitch + channel) as usize)
+    if seen == u32::MAX { seen } else { block.in_first + seen * block.in_pitch + channel }
 }
 
 /// The matrix of the patches that the output pixels see.
@@ -155,7 +172,7 @@ pub struct Patches<'a, A> {
     pub inputs: A,
 }
 
-impl<A: Fetch<f32> + Copy> Left for Patches<'_, A> {
+impl<A: Fours> Left for Patches<'_, A> {
     type Row = [u32; 2];
     type Inner = [u32; 3];
 
@@ -170,8 +187,33 @@ impl<A: Fetch<f32> + Copy> Left for Patches<'_, A> {
     }
 
     #[inline(always)]
+    fn moved(self, [row, column, channel]: [u32; 3], by: u32) -> [u32; 3] {
+        let ConvolveBlock { in_channels, size, dilation, .. } = *self.block;
+        let channel = channel + by;
+        if channel < in_channels {
+            return [row, column, channel];
+        }
+        // Pixels of the window further on; divisions are for few inner indices.
+        let (more, channel) = (channel / in_channels, channel % in_channels);
+        let place = row / dilation * size + column / dilation + more;
+        [place / size * dilation, place % size * dilation, channel]
+    }
+
+    #[inline(always)]
     fn number(self, window: [u32; 2], place: [u32; 3]) -> f32 {
         patch_number(&self.inputs, self.block, window, place)
+    }
+
+    #[inline(always)]
+    fn four(self, window: [u32; 2], place: [u32; 3]) -> Loaded {
+        let at = patch_place(self.block, window, place);
+        let is_inside = at != u32::MAX;
+        Loaded { numbers: self.inputs.four(if is_inside { at } else { 0 }), is_inside }
+    }
+
+    #[inline(always)]
+    fn finished(self, loaded: Loaded) -> Vec4 {
+        loaded.or_zero()
     }
 }
 
@@ -189,6 +231,21 @@ pub fn convolved(
     let element = (block.residual_first + pixel * block.residual_pitch + channel) as usize;
     let first = first_of_sum(bias, residual, block.has_residual, element, channel as usize);
     rectified((first + sum) * block.scale, block.relu_outputs)
+}
+
+/// [`convolved`] for four channels from `channel` on, a multiple of four.
+#[inline(always)]
+pub fn convolved_four(
+    bias: &impl Fours,
+    residual: &impl Fours,
+    block: &ConvolveBlock,
+    pixel: u32,
+    channel: u32,
+    sums: Vec4,
+) -> Vec4 {
+    let element = block.residual_first + pixel * block.residual_pitch + channel;
+    let first = first_of_sums(bias, residual, block.has_residual, element, channel);
+    rectified_four((first + sums) * block.scale, block.relu_outputs)
 }
 
 /// Channel `channel` of output pixel `pixel`: the patch times

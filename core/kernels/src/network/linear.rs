@@ -1,6 +1,8 @@
 //! Linear layer: a matrix product with bias, residual and rectified input or output, for many points at once.
 
+use super::tile::Fours;
 use bytemuck::{Pod, Zeroable};
+use glam::Vec4;
 use viewfuse_core::fetch::Fetch;
 
 /// A dispatch of [`linear_element`], as plain data. The yes-or-no fields are 0 or 1.
@@ -19,6 +21,13 @@ pub struct LinearBlock {
     pub relu_outputs: u32,
     /// Whether there is a residual.
     pub has_residual: u32,
+}
+
+impl LinearBlock {
+    /// Whether all rows of all arrays are whole fours.
+    pub const fn is_in_fours(&self) -> bool {
+        self.inner_count.is_multiple_of(4) && self.column_count.is_multiple_of(4)
+    }
 }
 
 /// Output number `element` of `inputs[row][inner]` times `weights[inner][column]` plus `bias[column]` plus
@@ -62,9 +71,25 @@ pub fn first_of_sum(
     if has_residual != 0 { first + residual.fetch(element) } else { first }
 }
 
+/// As [`first_of_sum`] for four elements in a row, from `element` and `column` on, which are multiples of four.
+#[inline(always)]
+pub fn first_of_sums(bias: &impl Fours, residual: &impl Fours, has_residual: u32, element: u32, column: u32) -> Vec4 {
+    let first = bias.four(column);
+    if has_residual != 0 { first + residual.four(element) } else { first }
+}
+
 /// `x`, or 0 instead of a negative one if `relu` is not 0. NaN stays NaN: an overflow in one layer is reported behind
 /// the last.
 #[inline]
 pub fn rectified(x: f32, relu: u32) -> f32 {
     if relu != 0 && x <= 0.0 { 0.0 } else { x }
+}
+
+/// [`rectified`] of each of four numbers.
+#[inline(always)]
+pub fn rectified_four(four: Vec4, relu: u32) -> Vec4 {
+    if relu == 0 {
+        return four;
+    }
+    Vec4::new(rectified(four.x, relu), rectified(four.y, relu), rectified(four.z, relu), rectified(four.w, relu))
 }

@@ -1,6 +1,8 @@
 //! The list of kernels as code, from their rows.
 
 use super::*;
+use crate::network::convolve::ConvolveBlock;
+use crate::network::linear::LinearBlock;
 use crate::network::tile::{Shape, TILE};
 use crate::pages::MAX_PAGES;
 use bytemuck::{Pod, Zeroable};
@@ -26,59 +28,84 @@ pub enum Form {
     /// definition of the others, and what small products take.
     #[default]
     Single,
-    /// The same for tiles of four times the size, by 256 invocations: each number that is fetched is used twice as
-    /// often.
+    /// 128 times 64 outputs, 8 times 4 an invocation, for arrays [in fours](Form::needs_fours).
     Large,
-    /// The same for tiles of a quarter of the size, 4 times 4 outputs an invocation: more workgroups, where there are
-    /// few outputs.
+    /// The same with 64 times 64 outputs, 4 times 4 an invocation: more workgroups, where there are fewer outputs.
     Small,
+    /// The same with 32 times 32 outputs, 4 times 4 an invocation.
+    Tiny,
     /// Rows pass between the invocations of a subgroup instead of through the workgroup's memory. There are no
     /// barriers. Only for devices with [subgroups that fit](Form::needs_subgroups).
     Subgroup,
     /// By a device's matrix units: the factors are rounded to f16, the sums are f32. Each factor is off by at most
     /// 2^-11 of itself, or by 2^-14 if that is more. A factor beyond 65,504 makes its outputs NaN. Only for devices
-    /// with such [units](Form::needs_matrices).
+    /// with such [units](Form::needs_matrices) and arrays [in fours](Form::needs_fours).
     Half,
+    /// The same in tiles of 64 times 64 outputs.
+    HalfSmall,
+    /// The same in tiles of 32 times 32 outputs.
+    HalfTiny,
     /// The same with factors in two parts, an f16 and what is missing: each is off by at most 2^-22 of itself, or by
     /// 2^-25 if that is more, and the product of the two missing parts, at most 2^-22 of the product, is omitted.
     TwoHalves,
+    /// The same in tiles of 64 times 64 outputs.
+    TwoHalvesSmall,
+    /// The same in tiles of 32 times 32 outputs.
+    TwoHalvesTiny,
 }
 
 impl Form {
     /// The forms of two roundings that are summed in the same order, which give the same bits.
-    pub const ALL: [Form; 4] = [Form::Single, Form::Large, Form::Small, Form::Subgroup];
+    pub const ALL: [Form; 5] = [Form::Single, Form::Large, Form::Small, Form::Tiny, Form::Subgroup];
+    /// Those of them that every tiled kernel has: the others are for arrays [in fours](Form::needs_fours).
+    pub const OF_ANY_ARRAYS: [Form; 2] = [Form::Single, Form::Subgroup];
     /// The forms of rounded factors, for devices with matrix units.
-    pub const ROUNDED: [Form; 2] = [Form::Half, Form::TwoHalves];
+    pub const ROUNDED: [Form; 6] =
+        [Form::Half, Form::HalfSmall, Form::HalfTiny, Form::TwoHalves, Form::TwoHalvesSmall, Form::TwoHalvesTiny];
 
-    /// Rows and columns of its tiles.
-    pub const fn side(self) -> u32 {
+    /// Rows of its tiles.
+    pub const fn rows(self) -> u32 {
         match self {
-            Form::Single | Form::Subgroup | Form::TwoHalves => TILE,
-            Form::Large | Form::Half => 128,
-            Form::Small => 32,
+            Form::Large | Form::Half | Form::TwoHalves => 128,
+            Form::Single | Form::Small | Form::Subgroup | Form::HalfSmall | Form::TwoHalvesSmall => TILE,
+            Form::Tiny | Form::HalfTiny | Form::TwoHalvesTiny => 32,
+        }
+    }
+
+    /// Columns of its tiles.
+    pub const fn columns(self) -> u32 {
+        match self {
+            Form::Large => 64,
+            _ => self.rows(),
         }
     }
 
     /// Invocations of a workgroup.
     pub const fn invocations(self) -> u32 {
         match self {
-            Form::Large => 256,
-            Form::Half | Form::TwoHalves => 128,
-            _ => WORKGROUP,
+            Form::Large | Form::Small | Form::TwoHalves => 256,
+            Form::Half | Form::HalfSmall | Form::HalfTiny | Form::TwoHalvesSmall | Form::TwoHalvesTiny => 128,
+            Form::Single | Form::Tiny | Form::Subgroup => WORKGROUP,
         }
     }
 
     /// Most bytes of memory that a workgroup shares.
     pub const fn shared_bytes(self) -> usize {
         match self {
-            Form::Large | Form::Half | Form::TwoHalves => 2 * SHARED_BYTES,
-            _ => SHARED_BYTES,
+            Form::TwoHalves => 3 * SHARED_BYTES,
+            Form::Large | Form::Small | Form::Half | Form::TwoHalvesSmall | Form::TwoHalvesTiny => 2 * SHARED_BYTES,
+            Form::Single | Form::Tiny | Form::Subgroup | Form::HalfSmall | Form::HalfTiny => SHARED_BYTES,
         }
+    }
+
+    /// Workgroups for so many outputs.
+    pub const fn tiles(self, row_count: u32, column_count: u32) -> u32 {
+        row_count.div_ceil(self.rows()) * column_count.div_ceil(self.columns())
     }
 
     /// Invocations for so many outputs: whole tiles.
     pub const fn elements(self, row_count: u32, column_count: u32) -> u32 {
-        row_count.div_ceil(self.side()) * column_count.div_ceil(self.side()) * self.invocations()
+        self.tiles(row_count, column_count) * self.invocations()
     }
 
     /// Whether it passes numbers between the invocations of a subgroup. Its entry points are in a module of their own,
@@ -90,7 +117,37 @@ impl Form {
     /// Whether it multiplies by the matrix units of a device, in f16 with sums in f32. Its entry points are in a
     /// module of their own. A subgroup is full and has 32 invocations.
     pub const fn needs_matrices(self) -> bool {
-        matches!(self, Form::Half | Form::TwoHalves)
+        matches!(
+            self,
+            Form::Half
+                | Form::HalfSmall
+                | Form::HalfTiny
+                | Form::TwoHalves
+                | Form::TwoHalvesSmall
+                | Form::TwoHalvesTiny
+        )
+    }
+
+    /// Whether it loads and stores whole fours: inner indices and columns are multiples of four, and all rows of its
+    /// arrays begin at such ones ([`Kernel::is_in_fours`]).
+    pub const fn needs_fours(self) -> bool {
+        !matches!(self, Form::Single | Form::Subgroup)
+    }
+
+    /// The same products in tiles of other sizes, the largest first: of a form of rounded factors those, of another one
+    /// itself.
+    pub const fn sizes(self) -> &'static [Form] {
+        match self {
+            Form::Half | Form::HalfSmall | Form::HalfTiny => &[Form::Half, Form::HalfSmall, Form::HalfTiny],
+            Form::TwoHalves | Form::TwoHalvesSmall | Form::TwoHalvesTiny => {
+                &[Form::TwoHalves, Form::TwoHalvesSmall, Form::TwoHalvesTiny]
+            }
+            Form::Single => &[Form::Single],
+            Form::Large => &[Form::Large],
+            Form::Small => &[Form::Small],
+            Form::Tiny => &[Form::Tiny],
+            Form::Subgroup => &[Form::Subgroup],
+        }
     }
 
     /// Its name in records.
@@ -99,9 +156,14 @@ impl Form {
             Form::Single => "single",
             Form::Large => "large",
             Form::Small => "small",
+            Form::Tiny => "tiny",
             Form::Subgroup => "subgroup",
             Form::Half => "half",
+            Form::HalfSmall => "half_small",
+            Form::HalfTiny => "half_tiny",
             Form::TwoHalves => "two_halves",
+            Form::TwoHalvesSmall => "two_halves_small",
+            Form::TwoHalvesTiny => "two_halves_tiny",
         }
     }
 }
@@ -257,14 +319,29 @@ macro_rules! list {
                     Form::Small => match self {
                         $(Kernel::$Kernel => concat!(stringify!($method), "::small"),)+
                     },
+                    Form::Tiny => match self {
+                        $(Kernel::$Kernel => concat!(stringify!($method), "::tiny"),)+
+                    },
                     Form::Subgroup => match self {
                         $(Kernel::$Kernel => concat!(stringify!($method), "::subgroup"),)+
                     },
                     Form::Half => match self {
                         $(Kernel::$Kernel => concat!(stringify!($method), "::half"),)+
                     },
+                    Form::HalfSmall => match self {
+                        $(Kernel::$Kernel => concat!(stringify!($method), "::half_small"),)+
+                    },
+                    Form::HalfTiny => match self {
+                        $(Kernel::$Kernel => concat!(stringify!($method), "::half_tiny"),)+
+                    },
                     Form::TwoHalves => match self {
                         $(Kernel::$Kernel => concat!(stringify!($method), "::two_halves"),)+
+                    },
+                    Form::TwoHalvesSmall => match self {
+                        $(Kernel::$Kernel => concat!(stringify!($method), "::two_halves_small"),)+
+                    },
+                    Form::TwoHalvesTiny => match self {
+                        $(Kernel::$Kernel => concat!(stringify!($method), "::two_halves_tiny"),)+
                     },
                 }
             }
@@ -321,7 +398,11 @@ crate::for_each_kernel!(list);
 impl Kernel {
     /// The forms that give the same bits.
     pub const fn forms(self) -> &'static [Form] {
-        if self.is_tiled() { &Form::ALL } else { &[Form::Single] }
+        match self {
+            Kernel::Linear | Kernel::Convolve => &Form::ALL,
+            _ if self.is_tiled() => &Form::OF_ANY_ARRAYS,
+            _ => &[Form::Single],
+        }
     }
 
     /// The forms of rounded factors that it has.
@@ -329,6 +410,19 @@ impl Kernel {
         match self {
             Kernel::Linear | Kernel::Convolve => &Form::ROUNDED,
             _ => &[],
+        }
+    }
+
+    /// Whether the arrays of a kernel with these parameters lie in fours, as [some forms](Form::needs_fours) need it.
+    pub fn is_in_fours(self, parameters: &[u8]) -> bool {
+        match self {
+            Kernel::Linear => {
+                bytemuck::try_pod_read_unaligned(parameters).is_ok_and(|block: LinearBlock| block.is_in_fours())
+            }
+            Kernel::Convolve => {
+                bytemuck::try_pod_read_unaligned(parameters).is_ok_and(|block: ConvolveBlock| block.is_in_fours())
+            }
+            _ => false,
         }
     }
 

@@ -32,8 +32,8 @@ impl Window {
 }
 
 /// The first layer of a residual network and its others, a lone pixel, more border than image; gaps, enlarged images,
-/// parts of wider ones; layers for large images, which on small ones are right as well.
-const WINDOWS: [Window; 15] = [
+/// parts of wider ones; layers for large images, which on small ones are right as well; and all of it in fours.
+const WINDOWS: [Window; 16] = [
     Window::new([7, 2, 3], [3, 64]),
     Window::new([3, 1, 1], [5, 7]),
     Window::new([3, 2, 1], [16, 65]),
@@ -49,11 +49,14 @@ const WINDOWS: [Window; 15] = [
     Window::wide(1, 1, [37, 33], true),
     Window::wide(0, 2, [5, 2], true),
     Window::wide(3, 1, [1, 18], false),
+    Window { dilation: 2, enlarge: 2, is_part: true, ..Window::new([3, 2, 2], [12, 72]) },
 ];
 
-/// Numbers between the pixels of images that are parts of wider ones, and in front of the first.
-fn gap(random: &mut Random, is_part: bool) -> u32 {
-    if is_part { 1 + random.below(5) as u32 } else { 0 }
+/// Numbers between the pixels of images that are parts of wider ones, and in front of the first: fours if so are the
+/// channels.
+fn gap(random: &mut Random, is_part: bool, channels: &[u32]) -> u32 {
+    let unit = if channels.iter().all(|count| count.is_multiple_of(4)) { 4 } else { 1 };
+    if is_part { unit * (1 + random.below(5) as u32) } else { 0 }
 }
 
 /// Whether a number of an image's buffer is one of these channels: pixel and channel.
@@ -90,7 +93,7 @@ impl Case for Convolve {
             let in_height = ((pixel_count / f64::from(in_width)) as u32 + random.below(3) as u32).max(least);
             let out = |inner: u32| (inner * enlarge + 2 * padding - reach) / stride + 1;
             let flags = index as u64 + seed;
-            let [in_gap, out_gap, residual_gap] = [0, 1, 2].map(|_| gap(random, is_part));
+            let [in_gap, out_gap, residual_gap] = [0, 1, 2].map(|_| gap(random, is_part, &channels));
             // Of some layers all pixels have the same residual.
             let is_shared = flags.is_multiple_of(3);
             let block = ConvolveBlock {
@@ -165,7 +168,7 @@ impl Case for ConvolveTransposed {
             let pixel_count = f64::from(size) / f64::from(size_of_square * size_of_square * out_channels);
             let in_width = pixel_count.sqrt() as u32 + 1 + random.below(3) as u32;
             let in_height = (pixel_count / f64::from(in_width)) as u32 + 1 + random.below(3) as u32;
-            let [in_gap, out_gap] = [0, 1].map(|_| gap(random, part == 1));
+            let [in_gap, out_gap] = [0, 1].map(|_| gap(random, part == 1, &[in_channels, out_channels]));
             let block = TransposedBlock {
                 in_height,
                 in_width,

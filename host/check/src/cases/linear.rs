@@ -101,6 +101,8 @@ impl Case for Linear {
             [63, 17, 129],
             [size.div_ceil(7), 42, 512],
             [3, 512, 70],
+            // In fours, within tiles and beyond them.
+            [131, 68, 132],
         ];
         let dispatch = |(index, [row_count, inner_count, column_count]): (usize, [u32; 3])| {
             // Neighbouring seeds give every shape every combination.

@@ -11,10 +11,10 @@
 use super::{InvocationTile, row_place, store_sums};
 use spirv_std::arch::{subgroup_broadcast_const, subgroup_shuffle};
 use spirv_std::glam::Vec4;
-use viewfuse_kernels::network::tile::{EightSums, Left, Shape, Sums, TILE, Tiles};
+use viewfuse_kernels::network::tile::{EightSums, Left, Outputs, Right, Shape, Sums, TILE, Tiles};
 
 /// Invocations that need the same rows, and inner indices that each of them loads at once.
-const CLUSTER: u32 = EightSums::SIDE;
+const CLUSTER: u32 = EightSums::ROWS;
 
 /// Where an invocation is in its workgroup: what this form has in the place of memory.
 #[derive(Clone, Copy)]
@@ -29,23 +29,16 @@ pub(crate) struct Subgroup {
 
 impl Tiles for Subgroup {
     #[inline(always)]
-    fn multiply<L: Left>(
-        self,
-        invocation: u32,
-        shape: Shape,
-        left: L,
-        right: impl Fn(u32, u32) -> f32 + Copy,
-        mut store: impl FnMut(u32, u32, f32),
-    ) {
+    fn multiply<L: Left>(self, invocation: u32, shape: Shape, left: L, right: impl Right, mut outputs: impl Outputs) {
         // Which invocations are in a subgroup is the driver's choice: the number in the workgroup follows from that.
         let invocation_of_tile = (self.subgroup * self.size + self.lane) % TILE;
-        let place = InvocationTile::new(invocation / TILE, invocation_of_tile, TILE, CLUSTER, shape);
+        let place = InvocationTile::new(invocation / TILE, invocation_of_tile, [TILE; 2], CLUSTER, shape);
         let row = (place.first_row + row_place(CLUSTER, place.own_row, place.own_column)).min(shape.row_count - 1);
         let column =
             move |four: u32, index: u32| place.first_column + row_place(CLUSTER, place.own_column, 4 * four + index);
         let row = left.row(row);
         let left = move |inner: u32| left.number(row, left.inner(inner.min(shape.inner_count - 1)));
-        let right = move |inner: u32, column: u32| right(inner, column.min(shape.column_count - 1));
+        let right = move |inner: u32, column: u32| right.number(inner, column.min(shape.column_count - 1));
         let fetch_four = move |inner: u32, column: u32| {
             Vec4::new(
                 right(inner, column),
@@ -70,7 +63,7 @@ impl Tiles for Subgroup {
             }
             start += CLUSTER;
         }
-        store_sums(sums, place, CLUSTER, shape, column, &mut store);
+        store_sums(sums, place, CLUSTER, shape, column, &mut outputs);
     }
 }
 

@@ -9,7 +9,8 @@ use core::arch::asm;
 use core::mem::MaybeUninit;
 use spirv_std::arch::IndexUnchecked;
 use spirv_std::cooperative_matrix::{CooperativeMatrix, MATRIX_A, MATRIX_ACCUMULATOR, MATRIX_B, mul_add};
-use spirv_std::glam::UVec4;
+use spirv_std::float::vec2_to_f16x2;
+use spirv_std::glam::{UVec4, Vec2};
 
 #[derive(Clone, Copy)]
 pub(crate) struct Matrices;
@@ -18,6 +19,12 @@ impl Units for Matrices {
     type Rows = CooperativeMatrix<f16, MATRIX_A, 16, 16>;
     type Columns = CooperativeMatrix<f16, MATRIX_B, 16, 16>;
     type Sums = CooperativeMatrix<f32, MATRIX_ACCUMULATOR, 16, 16>;
+
+    /// The device rounds.
+    #[inline(always)]
+    fn pair(a: f32, b: f32) -> u32 {
+        vec2_to_f16x2(Vec2::new(a, b))
+    }
 
     #[inline(always)]
     fn zero() -> Self::Sums {
@@ -38,7 +45,7 @@ impl Units for Matrices {
     #[inline(always)]
     fn rows<const N: usize>(shared: &[UVec4; N], at: u32, stride: u32) -> Self::Rows {
         let mut out = MaybeUninit::<Self::Rows>::uninit();
-        // SAFETY: the matrix is within the array (`shared_eights`); layout 0 is row after row.
+        // SAFETY: the matrix is within the array (`Sizes::shared`); layout 0 is row after row.
         unsafe {
             asm!(
                 "%u32 = OpTypeInt 32 0",

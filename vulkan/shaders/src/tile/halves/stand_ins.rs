@@ -2,7 +2,8 @@
 //! same. Factors stay in the workgroup's memory.
 
 use super::{Units, read, write};
-use spirv_std::glam::UVec4;
+use spirv_std::float::vec2_to_f16x2;
+use spirv_std::glam::{UVec4, Vec2};
 use viewfuse_core::half_precision::f16_value;
 
 #[derive(Clone, Copy)]
@@ -13,6 +14,22 @@ pub(crate) struct StandIns;
 pub(crate) struct Place {
     at: u32,
     stride: u32,
+}
+
+/// The largest f16.
+const LARGEST: u32 = 65_504.0_f32.to_bits();
+
+/// A number rounded to 11 bits (of two equally near ones, the even one).
+#[inline(always)]
+fn rounded(number: f32) -> f32 {
+    let bits = number.to_bits();
+    f32::from_bits(bits.wrapping_add(0xfff + (bits >> 13 & 1)) & 0xffff_e000)
+}
+
+/// The bits that make NaN of an f16 if the number is too large for one, or not finite.
+#[inline(always)]
+fn too_large(number: f32) -> u32 {
+    if number.to_bits() & 0x7fff_ffff > LARGEST { 0x7fff } else { 0 }
 }
 
 /// A product's number `index` of a row of eights.
@@ -38,6 +55,12 @@ impl Units for StandIns {
     type Columns = Place;
     /// Half a row: an invocation has row `lane / 2`.
     type Sums = [f32; 8];
+
+    /// By the bits: not every driver rounds to the nearest f16.
+    #[inline(always)]
+    fn pair(a: f32, b: f32) -> u32 {
+        vec2_to_f16x2(Vec2::new(rounded(a), rounded(b))) | too_large(a) | too_large(b) << 16
+    }
 
     #[inline(always)]
     fn zero() -> [f32; 8] {
