@@ -13,7 +13,8 @@ use viewfuse_vulkan::{AdapterKind, Bound, Faults, Gpu, GpuOptions, VulkanError};
 tests!(
     measuring_leaves_the_other_channels_alone,
     a_form_with_other_results_is_not_used,
-    a_form_of_other_subgroups_is_not_used
+    a_form_of_other_subgroups_is_not_used,
+    kernels_are_compiled_ahead,
 );
 
 fn numbers(count: u32) -> Vec<f32> {
@@ -67,6 +68,22 @@ fn convolve_into_a_wider_image(gpu: &Gpu) -> Result<Vec<u32>, VulkanError> {
     let elements = 0..tile_elements(block.pixel_count(), OWN);
     gpu.dispatch(Kernel::Convolve, bytes_of(&block), elements, &arrays)?;
     bits(gpu, &outputs)
+}
+
+/// Kernels that are compiled ahead give the same results, whatever became of the threads that compile.
+fn kernels_are_compiled_ahead(candidate: &Candidate) -> Result<(), Failed> {
+    let expected = linear(&candidate.gpu(&GpuOptions::default())?)?;
+    let gpu = candidate.gpu(&GpuOptions::default())?;
+    gpu.compile_ahead(&[Kernel::Linear, Kernel::Convolve, Kernel::Linear]);
+    assert!(linear(&gpu)? == expected);
+    let kept = gpu.remembered(&[]);
+    let again = candidate.gpu(&GpuOptions::default())?;
+    assert!(again.recall(&kept));
+    again.compile_ahead(&[Kernel::Linear]);
+    assert!(linear(&again)? == expected);
+    // A device that is closed at once waits for what is being compiled, and for no more.
+    candidate.gpu(&GpuOptions::default())?.compile_ahead(&Kernel::ALL);
+    Ok(())
 }
 
 fn with_faults(faults: Faults) -> GpuOptions {

@@ -34,6 +34,7 @@ tests!(
     genvss_pictures_in_rounded_products,
     numbers_that_are_too_large_are_computed_exactly,
     efforts_round_where_a_device_does,
+    little_work_is_exact,
     bounds_choose_among_precisions,
     a_form_that_is_wrong_is_told_once,
     rates_of_rounded_products,
@@ -75,7 +76,8 @@ fn with_units(candidate: &Candidate) -> Result<Option<Vulkan>, Failed> {
     if !takes_stand_ins(&candidate.adapter) {
         return Ok(None);
     }
-    Ok(Some(candidate.vulkan(&GpuOptions { stand_ins: Some(stand_ins()), ..GpuOptions::default() })?))
+    let options = GpuOptions { stand_ins: Some(stand_ins()), min_rounded_work: 0, ..GpuOptions::default() };
+    Ok(Some(candidate.vulkan(&options)?))
 }
 
 fn pixelnerf(checkpoint: &Checkpoint, precision: Precision) -> PixelNerf {
@@ -236,7 +238,7 @@ fn bounds_choose_among_precisions(candidate: &Candidate) -> Result<(), Failed> {
 
 fn efforts_round_where_a_device_does(candidate: &Candidate) -> Result<(), Failed> {
     let Some(device) = with_units(candidate)? else { return Ok(()) };
-    let without = candidate.vulkan(&GpuOptions::default())?;
+    let without = candidate.vulkan(&GpuOptions { min_rounded_work: u64::MAX, ..GpuOptions::default() })?;
     let network = pixelnerf(&body(), Precision::Exact);
     let denoising = genvs(small_genvs(), Precision::Exact);
     for (with, without) in [
@@ -247,10 +249,26 @@ fn efforts_round_where_a_device_does(candidate: &Candidate) -> Result<(), Failed
         assert_eq!(exact, ["products in f16", "products in two parts", "exact"]);
         let expected = without[..without.len() - 1].iter().map(|label| format!("{label}, products in f16"));
         assert!(cheaper.iter().cloned().eq(expected), "{cheaper:?}");
-        if !candidate.adapter.has_matrices {
-            assert!(without.iter().all(|label| !label.contains("products")), "{without:?}");
-        }
+        assert!(without.iter().all(|label| !label.contains("products")), "{without:?}");
     }
+    Ok(())
+}
+
+/// Pictures of so little work gain nothing: nothing is tried for them, not even on a device whose units are wrong.
+fn little_work_is_exact(candidate: &Candidate) -> Result<(), Failed> {
+    if !takes_stand_ins(&candidate.adapter) {
+        return Ok(());
+    }
+    let wrong = GpuOptions { stand_ins: Some(exchanged_stand_ins()), ..GpuOptions::default() };
+    let device = candidate.vulkan(&wrong)?;
+    for labels in [
+        labels(&device, &pixelnerf(&body(), Precision::Exact))?,
+        labels(&device, &genvs(small_genvs(), Precision::Exact))?,
+    ] {
+        assert!(labels.len() > 1 && labels.iter().all(|label| !label.contains("products")), "{labels:?}");
+    }
+    assert!(device.precisions_for(0).is_empty() && device.faults().is_empty(), "{:?}", device.faults());
+    assert!(device.precisions_for(u64::MAX).is_empty() && !device.faults().is_empty(), "it was tried");
     Ok(())
 }
 
@@ -258,7 +276,7 @@ fn a_form_that_is_wrong_is_told_once(candidate: &Candidate) -> Result<(), Failed
     if !takes_stand_ins(&candidate.adapter) {
         return Ok(());
     }
-    let wrong = GpuOptions { stand_ins: Some(exchanged_stand_ins()), ..GpuOptions::default() };
+    let wrong = GpuOptions { stand_ins: Some(exchanged_stand_ins()), min_rounded_work: 0, ..GpuOptions::default() };
     let device = candidate.vulkan(&wrong)?;
     assert!(device.precisions().is_empty(), "wrong products are used");
     let faults = device.faults();

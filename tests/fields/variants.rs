@@ -50,7 +50,7 @@ fn assert_encodings_serve(
     let expected = picture(&mut stage, &base);
     let mut prepared = renderer.prepare(&stage.images, &Silent).expect("prepared");
     let mut variants = others.clone();
-    variants.extend(prepared.efforts(&base).into_iter().map(|Variant { options, .. }| options));
+    variants.extend(prepared.efforts(&base, 1).into_iter().map(|Variant { options, .. }| options));
     variants.extend((0..).map(|step| prepared.candidates(&base, step)).take_while(|some| !some.is_empty()).flatten());
     variants.extend(prepared.mixtures(&base).into_iter().flat_map(|mixture| mixture.options));
     variants.push(prepared.reduced(&base, Purpose::Trial));

@@ -61,8 +61,8 @@ impl Memory for Bodies {
         Cpu.kernel_times()
     }
 
-    fn download<T: Element>(&self, buffer: &Vec<T>) -> Result<Vec<T>, DeviceError> {
-        Cpu.download(buffer)
+    fn download_first<T: Element>(&self, buffer: &Vec<T>, count: usize) -> Result<Vec<T>, DeviceError> {
+        Cpu.download_first(buffer, count)
     }
 }
 

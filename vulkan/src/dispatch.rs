@@ -108,7 +108,7 @@ impl Gpu {
         let elements = self.faults.done(form, elements);
         let listed = kernel.arrays().iter().zip(arrays);
         let uses: Vec<_> = listed.clone().map(|(array, bound)| (bound.0, array.access)).collect();
-        let pipeline = state.pipelines.get(kernel, form, page_shift)?;
+        let pipeline = self.pipelines.get((kernel, form, page_shift))?;
         let per_piece = self.handle.limits.workgroup_count.saturating_mul(form.invocations());
         let expected = state.rates[kernel as usize].time_of(counted).unwrap_or(UNKNOWN);
         let mut dispatches = 0;

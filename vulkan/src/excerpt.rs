@@ -6,6 +6,7 @@
 //! constants are those of the whole module.
 
 use std::collections::{HashMap, HashSet};
+use std::ops::Range;
 
 /// Words before the first instruction.
 const HEADER: usize = 5;
@@ -27,7 +28,11 @@ const MEMBER_DECORATE: u32 = 72;
 
 /// The instructions of a module, each with its number.
 fn instructions(module: &[u32]) -> impl Iterator<Item = (u32, &[u32])> {
-    let mut rest = module.get(HEADER..).unwrap_or_default();
+    instructions_of(module.get(HEADER..).unwrap_or_default())
+}
+
+/// Those of a part of a module.
+fn instructions_of(mut rest: &[u32]) -> impl Iterator<Item = (u32, &[u32])> {
     std::iter::from_fn(move || {
         let first = *rest.first()?;
         let (instruction, next) = rest.split_at_checked((first >> 16).max(1) as usize)?;
@@ -36,72 +41,121 @@ fn instructions(module: &[u32]) -> impl Iterator<Item = (u32, &[u32])> {
     })
 }
 
-/// The module of one entry point; without one of this name it has none.
-pub(crate) fn excerpt(module: &[u32], entry_point: &str) -> Vec<u32> {
-    let is_named = |words: &[u32]| {
-        let bytes: &[u8] = bytemuck::cast_slice(words);
-        bytes.strip_prefix(entry_point.as_bytes()).is_some_and(|rest| rest.first() == Some(&0))
-    };
-    let (mut entry, mut interface) = (None, &[][..]);
-    let (mut function, mut types) = (None, HashSet::new());
-    // Called functions, and the function that a value is computed in.
-    let (mut calls, mut place) = (HashMap::<u32, Vec<u32>>::new(), HashMap::new());
-    // Variables of the module, and those that a function may use: those whose numbers are among its words.
-    let (mut variables, mut uses) = (HashSet::new(), HashMap::<u32, HashSet<u32>>::new());
-    for (code, words) in instructions(module) {
-        match (code, words) {
-            (ENTRY_POINT, [_, _, id, name @ ..]) if is_named(name) => (entry, interface) = (Some(*id), name),
-            (VARIABLE, [_, _, id, ..]) if function.is_none() => drop(variables.insert(*id)),
-            (FIRST_TYPE..=LAST_TYPE | MATRIX_TYPE, [_, id, ..]) => drop(types.insert(*id)),
-            (FUNCTION, [_, _, id, ..]) => function = Some(*id),
-            _ => {}
-        }
-        if let (Some(function), [_, kind, id, rest @ ..]) = (function, words)
-            && types.contains(kind)
-        {
-            // Only what has a type has a value.
-            place.insert(*id, function);
-            if let (FUNCTION_CALL, [called, ..]) = (code, rest) {
-                calls.entry(function).or_default().push(*called);
+/// A module whose instructions were looked at once, for the excerpts of all its kernels.
+pub(crate) struct Index {
+    words: Vec<u32>,
+    /// Words before the first function, and of all functions, each with its number.
+    head: Range<usize>,
+    functions: HashMap<u32, Function>,
+    /// The functions' numbers in the module's order.
+    order: Vec<u32>,
+    /// `[number]`: the function that a value is computed in, 0 for none.
+    places: Vec<u32>,
+    /// `[number]`: whether it is a variable of the module.
+    variables: Vec<bool>,
+}
+
+/// A function of a module.
+#[derive(Default)]
+struct Function {
+    words: Range<usize>,
+    /// The functions that it calls.
+    calls: Vec<u32>,
+    /// The variables of the module that it may use: those whose numbers are among its words.
+    variables: Vec<u32>,
+}
+
+impl Index {
+    /// Looks at a module, given as bytes.
+    pub(crate) fn new(module: &[u8]) -> Index {
+        let words: Vec<u32> = module.chunks_exact(4).map(bytemuck::pod_read_unaligned).collect();
+        let count = words.get(3).map_or(0, |bound| *bound as usize);
+        let (mut places, mut variables, mut types) = (vec![0; count], vec![false; count], vec![false; count]);
+        let (mut functions, mut order) = (HashMap::new(), Vec::new());
+        let (mut function, mut current, mut head) = (None, Function::default(), words.len());
+        let mut at = HEADER;
+        for (code, words) in instructions(&words) {
+            let is = |marks: &[bool], id: &u32| marks.get(*id as usize).copied().unwrap_or(false);
+            match (code, words) {
+                (VARIABLE, [_, _, id, ..]) if function.is_none() => mark(&mut variables, *id, true),
+                (FIRST_TYPE..=LAST_TYPE | MATRIX_TYPE, [_, id, ..]) => mark(&mut types, *id, true),
+                (FUNCTION, [_, _, id, ..]) => {
+                    (function, current.words.start) = (Some(*id), at);
+                    head = head.min(at);
+                }
+                _ => {}
+            }
+            at += words.len();
+            let Some(id) = function else { continue };
+            if let [_, kind, value, rest @ ..] = words
+                && is(&types, kind)
+            {
+                // Only what has a type has a value.
+                mark(&mut places, *value, id);
+                if let (FUNCTION_CALL, [called, ..]) = (code, rest) {
+                    current.calls.push(*called);
+                }
+            }
+            current.variables.extend(words.iter().filter(|word| is(&variables, word)));
+            if code == FUNCTION_END {
+                current.words.end = at;
+                functions.insert(id, std::mem::take(&mut current));
+                order.push(id);
+                function = None;
             }
         }
-        if let Some(function) = function {
-            uses.entry(function).or_default().extend(words.iter().filter(|word| variables.contains(word)));
-        }
-        if code == FUNCTION_END {
-            function = None;
-        }
+        Index { head: HEADER.min(head)..head, words, functions, order, places, variables }
     }
-    let (mut needed, mut open) = (HashSet::new(), Vec::from_iter(entry));
-    while let Some(id) = open.pop() {
-        if needed.insert(id) {
-            open.extend(calls.get(&id).into_iter().flatten());
-        }
-    }
-    let used = needed.iter().filter_map(|function| uses.get(function)).flatten();
-    let used: HashSet<u32> = used.chain(interface).copied().collect();
-    let is_unused = |id: &u32| variables.contains(id) && !used.contains(id);
-    let mut excerpt = module.get(..HEADER).unwrap_or_default().to_vec();
-    let mut is_needed = true;
-    for (code, words) in instructions(module) {
-        if let (FUNCTION, [_, _, id, ..]) = (code, words) {
-            is_needed = needed.contains(id);
-        }
-        let is_kept = match (code, words) {
-            (NAME | MEMBER_NAME, _) => false,
-            (ENTRY_POINT, [_, _, id, ..]) | (EXECUTION_MODE, [_, id, ..]) => entry == Some(*id),
-            (DECORATE | MEMBER_DECORATE, [_, id, ..]) => {
-                !is_unused(id) && place.get(id).is_none_or(|place| needed.contains(place))
-            }
-            (VARIABLE, [_, _, id, ..]) => is_needed && !is_unused(id),
-            _ => is_needed,
+
+    /// The module of one entry point; without one of this name it has none.
+    pub(crate) fn excerpt(&self, entry_point: &str) -> Vec<u32> {
+        let is_named = |words: &[u32]| {
+            let bytes: &[u8] = bytemuck::cast_slice(words);
+            bytes.strip_prefix(entry_point.as_bytes()).is_some_and(|rest| rest.first() == Some(&0))
         };
-        if is_kept {
-            excerpt.extend(words);
+        let head = || instructions_of(&self.words[self.head.clone()]);
+        let found = head().find_map(|instruction| match instruction {
+            (ENTRY_POINT, [_, _, id, name @ ..]) if is_named(name) => Some((*id, name)),
+            _ => None,
+        });
+        let (entry, interface) = found.map_or((None, &[][..]), |(id, interface)| (Some(id), interface));
+        let (mut needed, mut open) = (HashSet::new(), Vec::from_iter(entry));
+        while let Some(id) = open.pop() {
+            if needed.insert(id) {
+                open.extend(self.functions.get(&id).into_iter().flat_map(|function| &function.calls));
+            }
         }
-        is_needed |= code == FUNCTION_END;
+        let used = needed.iter().filter_map(|id| self.functions.get(id)).flat_map(|function| &function.variables);
+        let used: HashSet<u32> = used.chain(interface).copied().collect();
+        let is_unused = |id: &u32| self.variables.get(*id as usize) == Some(&true) && !used.contains(id);
+        let is_placed = |id: &u32| match self.places.get(*id as usize) {
+            None | Some(0) => true,
+            Some(place) => needed.contains(place),
+        };
+        let mut excerpt = self.words.get(..HEADER).unwrap_or_default().to_vec();
+        for (code, words) in head() {
+            let is_kept = match (code, words) {
+                (NAME | MEMBER_NAME, _) => false,
+                (ENTRY_POINT, [_, _, id, ..]) | (EXECUTION_MODE, [_, id, ..]) => entry == Some(*id),
+                (DECORATE | MEMBER_DECORATE, [_, id, ..]) => !is_unused(id) && is_placed(id),
+                (VARIABLE, [_, _, id, ..]) => !is_unused(id),
+                _ => true,
+            };
+            if is_kept {
+                excerpt.extend(words);
+            }
+        }
+        let functions = self.order.iter().filter(|id| needed.contains(id)).filter_map(|id| self.functions.get(id));
+        functions.for_each(|function| excerpt.extend(&self.words[function.words.clone()]));
+        excerpt
     }
-    excerpt
+}
+
+/// Sets what is known of a number; numbers beyond the module's bound have nothing.
+fn mark<T>(marks: &mut [T], id: u32, value: T) {
+    if let Some(mark) = marks.get_mut(id as usize) {
+        *mark = value;
+    }
 }
 
 #[cfg(test)]
@@ -126,7 +180,7 @@ mod tests {
 
     #[test]
     fn an_excerpt_relies_on_nothing_that_was_not_asked_for() {
-        let (kernels, subgroups, matrices) = (words(MODULE), words(SUBGROUPS), words(MATRICES));
+        let [kernels, subgroups, matrices] = [MODULE, SUBGROUPS, MATRICES].map(Index::new);
         let mut seen = 0;
         for kernel in Kernel::ALL {
             for form in kernel.forms().iter().chain(kernel.rounded_forms()).copied() {
@@ -135,7 +189,7 @@ mod tests {
                     Form::Subgroup => (&subgroups, &OF_SUBGROUPS[..]),
                     _ => (&kernels, &[][..]),
                 };
-                let module = excerpt(module, kernel.entry_point(form));
+                let module = module.excerpt(kernel.entry_point(form));
                 let coded = |wanted| instructions(&module).filter(move |(code, _)| *code == wanted);
                 assert_eq!(coded(ENTRY_POINT).count(), 1, "{} {}", kernel.name(), form.name());
                 for (_, capability) in coded(CAPABILITY) {
@@ -150,10 +204,10 @@ mod tests {
 
     #[test]
     fn an_excerpt_declares_the_workgroup_memory_of_its_kernel() {
-        let module = words(MODULE);
+        let (index, module) = (Index::new(MODULE), words(MODULE));
         for kernel in Kernel::ALL {
             for form in kernel.forms().iter().filter(|form| !form.needs_subgroups()) {
-                let part = excerpt(&module, kernel.entry_point(*form));
+                let part = index.excerpt(kernel.entry_point(*form));
                 let declared =
                     |module| instructions(module).filter(|(code, words)| *code == VARIABLE && words[3] == WORKGROUP);
                 let shared = declared(&part).count();
@@ -165,13 +219,13 @@ mod tests {
 
     #[test]
     fn an_excerpt_has_one_entry_point_and_little_else() {
-        let module = words(MODULE);
+        let (index, module) = (Index::new(MODULE), words(MODULE));
         let count = |module: &[u32], wanted| instructions(module).filter(|(code, _)| *code == wanted).count();
         for kernel in Kernel::ALL {
-            let part = excerpt(&module, kernel.entry_point(Form::Single));
+            let part = index.excerpt(kernel.entry_point(Form::Single));
             assert_eq!((count(&part, ENTRY_POINT), count(&part, EXECUTION_MODE)), (1, 1), "{}", kernel.name());
             assert!(count(&part, FUNCTION) >= 1 && part.len() < module.len() / 4, "{}", kernel.name());
         }
-        assert_eq!(count(&excerpt(&module, "fuse"), ENTRY_POINT), 0, "only whole names");
+        assert_eq!(count(&index.excerpt("fuse"), ENTRY_POINT), 0, "only whole names");
     }
 }

@@ -92,6 +92,12 @@ impl Choices {
         self.has_new = true;
     }
 
+    /// The forms that were chosen for any class of a kernel.
+    pub(crate) fn forms_of(&self, kernel: Kernel) -> Vec<Form> {
+        let of_kernel = |((name, _), form): (&Key, &Form)| (name == kernel.name()).then_some(*form);
+        Form::ALL.into_iter().filter(|form| self.forms.iter().filter_map(of_kernel).any(|of| of == *form)).collect()
+    }
+
     /// Adds another process's choices for classes without one.
     pub(crate) fn merge(&mut self, others: Choices) {
         for (key, form) in others.forms {

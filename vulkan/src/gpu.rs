@@ -1,6 +1,7 @@
 //! A device that runs kernels.
 
 use crate::adapter::{Adapter, AdapterKind, Limits};
+use crate::ahead::Ahead;
 use crate::buffer::Array;
 use crate::error::{Missing, VulkanError};
 use crate::forms::Choices;
@@ -10,14 +11,18 @@ use crate::kernel::{Access, Form, Kernel};
 use crate::pipelines::Pipelines;
 use crate::staging::Ring;
 use crate::submissions::{Done, Submission, Submissions};
+use crate::trust::Verdicts;
 use ash::vk;
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// Bytes of the widest element of an array in pages.
 pub(crate) const WIDEST_PAGED: u64 = 16;
+
+/// [`GpuOptions::min_rounded_work`] where nothing else is said: a twentieth of a second of exact products on the largest
+/// GPUs, half a second on those of a tenth of their rate.
+const MIN_ROUNDED_WORK: u64 = 1 << 39;
 
 /// Options of an opened device.
 #[derive(Clone, Copy, Debug)]
@@ -38,6 +43,9 @@ pub struct GpuOptions {
     /// A module whose entry points take the place of those for matrix units, so that tests see the same places,
     /// barriers and roundings on any device; `None` for the device's own units.
     pub stand_ins: Option<&'static [u8]>,
+    /// Multiply-adds of a picture from which on forms of rounded factors are worth their trial, which compiles for
+    /// seconds in a first process, and gains less than that for less work.
+    pub min_rounded_work: u64,
     /// The longest time that a piece of a dispatch may be expected to take; `None` for the device's default:
     /// [`GpuOptions::longest_piece_on`]. The results are the same bits.
     pub longest_piece: Option<Duration>,
@@ -74,6 +82,7 @@ impl Default for GpuOptions {
             limits,
             form: None,
             stand_ins: None,
+            min_rounded_work: MIN_ROUNDED_WORK,
             longest_piece: None,
             faults: Faults::default(),
         }
@@ -114,7 +123,9 @@ pub struct Tally {
 /// may overlap.
 pub struct Gpu {
     // Dropped in this order: submissions finish before their resources are freed.
+    pub(crate) ahead: Ahead,
     state: Mutex<State>,
+    pub(crate) pipelines: Arc<Pipelines>,
     pub(crate) handle: Arc<Handle>,
     pub(crate) page_shift: u32,
     pub(crate) barriers: bool,
@@ -122,18 +133,18 @@ pub struct Gpu {
     pub(crate) is_software: bool,
     pub(crate) longest_piece: Option<Duration>,
     pub(crate) faults: Faults,
-    has_stand_ins: bool,
+    pub(crate) has_stand_ins: bool,
+    min_rounded_work: u64,
 }
 
 pub(crate) struct State {
     pub(crate) submissions: Submissions,
-    pub(crate) pipelines: Pipelines,
     /// Forms of tiled kernels, as far as they are known.
     pub(crate) choices: Choices,
     /// Forms that are not used, because their results or their subgroups were others.
     pub(crate) refused: Vec<(Kernel, Form)>,
     /// Whether forms of rounded factors are used, as far as it was asked.
-    pub(crate) trusted: BTreeMap<(Kernel, Form), bool>,
+    pub(crate) verdicts: Verdicts,
     /// How long elements took.
     pub(crate) rates: [Rate; Kernel::ALL.len()],
     pub(crate) upload: Option<Ring>,
@@ -185,10 +196,9 @@ impl Gpu {
             (limits.buffer_range.min(limits.allocation) / WIDEST_PAGED).max(adapter.offset_alignment).max(64);
         let state = State {
             submissions,
-            pipelines,
             choices: Choices::default(),
             refused: Vec::new(),
-            trusted: BTreeMap::new(),
+            verdicts: Verdicts::default(),
             rates: [Rate::default(); Kernel::ALL.len()],
             upload: None,
             download: None,
@@ -197,7 +207,9 @@ impl Gpu {
             failed: None,
         };
         Ok(Gpu {
+            ahead: Ahead::default(),
             state: Mutex::new(state),
+            pipelines: Arc::new(pipelines),
             handle,
             page_shift: page_len.ilog2().min(31),
             barriers: options.barriers,
@@ -206,6 +218,7 @@ impl Gpu {
             longest_piece: options.longest_piece_on(adapter.kind),
             faults: options.faults,
             has_stand_ins: options.stand_ins.is_some(),
+            min_rounded_work: options.min_rounded_work,
         })
     }
 
@@ -217,6 +230,11 @@ impl Gpu {
     /// Whether it has what a form of tiled kernels needs, or what stands in for it.
     pub(crate) fn runs(&self, form: Form) -> bool {
         self.handle.runs(form) || form.needs_matrices() && self.has_stand_ins
+    }
+
+    /// [`GpuOptions::min_rounded_work`].
+    pub fn min_rounded_work(&self) -> u64 {
+        self.min_rounded_work
     }
 
     /// The limits by which work is split.

@@ -14,6 +14,7 @@
 //! submissions                    submitted commands
 //! staging                        the memory that uploads pass through
 //! gpu                            an opened device: its state, recorded commands
+//! ahead                          pipelines that are compiled before their first use
 //! remembered                     pipelines and forms from one process to the next
 //! dispatch, pieces               dispatches, split to fit the device and its watchdog
 //! measure                        forms compared and timed
@@ -24,6 +25,7 @@
 //! Unsafe code is only in calls of Vulkan; each has a comment why it is sound.
 
 mod adapter;
+mod ahead;
 mod buffer;
 mod dispatch;
 mod error;

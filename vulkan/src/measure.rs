@@ -25,7 +25,7 @@ impl Gpu {
             if form.needs_fours() && !class.is_in_fours() {
                 return Ok(Form::Single);
             }
-            return match state.pipelines.fits(job.kernel, form, job.page_shift)? {
+            return match self.pipelines.fits((job.kernel, form, job.page_shift))? {
                 true => Ok(form),
                 false => {
                     let missing = vec![Missing::Feature("subgroups of the size that was asked for")];
@@ -66,7 +66,7 @@ impl Gpu {
     /// Invocations of a subgroup that the driver reports of the kernel's pipelines that need them; `None` where it
     /// reports nothing, or there are none yet.
     pub fn reported_subgroup_size(&self, kernel: Kernel) -> Option<u32> {
-        self.lock().pipelines.reported(kernel)
+        self.pipelines.reported(kernel)
     }
 
     /// The fastest of the forms that give what the first one gives.
@@ -78,11 +78,12 @@ impl Gpu {
         candidates: &[Form],
         outputs: &[&Arc<Array>],
     ) -> Result<Form, VulkanError> {
-        state.pipelines.prepare(job.kernel, candidates, job.page_shift)?;
+        let keys: Vec<_> = candidates.iter().map(|form| (job.kernel, *form, job.page_shift)).collect();
+        self.pipelines.prepare(&keys)?;
         let (mut fastest, mut expected) = ((Form::Single, Duration::MAX), None);
         for &form in candidates {
             // A driver that compiled it for subgroups of another size would give other results.
-            if !state.pipelines.fits(job.kernel, form, job.page_shift)? {
+            if !self.pipelines.fits((job.kernel, form, job.page_shift))? {
                 state.refuse(job.kernel, form);
                 continue;
             }

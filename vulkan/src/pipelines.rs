@@ -1,14 +1,14 @@
 //! One pipeline per kernel, form and specialisation, created at its first use.
 
 use crate::error::VulkanError;
-use crate::excerpt::excerpt;
+use crate::excerpt::Index;
 use crate::handle::Handle;
 use crate::kernel::{Form, Kernel};
 use crate::matrices;
 use ash::vk;
 use std::collections::HashMap;
 use std::ffi::CString;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock, Mutex, MutexGuard, OnceLock, PoisonError, RwLock, RwLockReadGuard};
 
 /// The kernels, as `cargo shaders` compiles them.
 pub(crate) const MODULE: &[u8] = include_bytes!("kernels.spv");
@@ -18,6 +18,13 @@ pub(crate) const SUBGROUPS: &[u8] = include_bytes!("subgroups.spv");
 /// Those that need matrix units.
 pub(crate) const MATRICES: &[u8] = include_bytes!("matrices.spv");
 
+/// The modules, each looked at once a process, when its first kernel is compiled.
+static INDICES: [LazyLock<Index>; 3] = [
+    LazyLock::new(|| Index::new(MODULE)),
+    LazyLock::new(|| Index::new(SUBGROUPS)),
+    LazyLock::new(|| Index::new(MATRICES)),
+];
+
 /// The pipeline of a kernel.
 #[derive(Clone, Copy)]
 pub(crate) struct Pipeline {
@@ -26,20 +33,29 @@ pub(crate) struct Pipeline {
     pub(crate) set_layout: vk::DescriptorSetLayout,
 }
 
-/// All pipelines of a device.
+/// A kernel, its form, and the logarithm of the elements of a page; 0 leaves the choice of pages out.
+pub(crate) type Key = (Kernel, Form, u32);
+
+/// A pipeline that is made once, by whoever needs it first; the others wait for it.
+type Made = Arc<OnceLock<Result<vk::Pipeline, VulkanError>>>;
+
+/// All pipelines of a device, which any thread may make.
 pub(crate) struct Pipelines {
-    cache: vk::PipelineCache,
-    layouts: HashMap<Kernel, (vk::DescriptorSetLayout, vk::PipelineLayout)>,
+    /// Written to where a driver wants exclusive access; several threads make pipelines with it at a time.
+    cache: RwLock<vk::PipelineCache>,
+    layouts: Mutex<HashMap<Kernel, (vk::DescriptorSetLayout, vk::PipelineLayout)>>,
     /// The data that the cache began with.
-    recalled: Vec<u8>,
-    pipelines: HashMap<(Kernel, Form, u32), vk::Pipeline>,
-    /// The size of subgroups that the driver reports of a pipeline, where it reports one.
-    reported: HashMap<(Kernel, Form, u32), u32>,
+    recalled: Mutex<Vec<u8>>,
+    made: Mutex<HashMap<Key, Made>>,
     /// What takes the place of the driver's reports.
     pretended: Option<u32>,
     /// What takes the place of the module for matrix units.
-    stand_ins: Option<&'static [u8]>,
+    stand_ins: Option<Index>,
     handle: Arc<Handle>,
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Pipelines {
@@ -50,30 +66,29 @@ impl Pipelines {
         pretended: Option<u32>,
         stand_ins: Option<&'static [u8]>,
     ) -> Result<Pipelines, VulkanError> {
-        let mut pipelines = Pipelines {
-            cache: vk::PipelineCache::null(),
-            layouts: HashMap::new(),
-            recalled: Vec::new(),
-            pipelines: HashMap::new(),
-            reported: HashMap::new(),
-            pretended,
-            stand_ins,
-            handle: handle.clone(),
-        };
         // SAFETY: an empty cache needs nothing.
-        pipelines.cache = unsafe { handle.device.create_pipeline_cache(&vk::PipelineCacheCreateInfo::default(), None) }
+        let cache = unsafe { handle.device.create_pipeline_cache(&vk::PipelineCacheCreateInfo::default(), None) }
             .map_err(|result| handle.failure("vkCreatePipelineCache", result))?;
-        Ok(pipelines)
+        Ok(Pipelines {
+            cache: RwLock::new(cache),
+            layouts: Mutex::default(),
+            recalled: Mutex::default(),
+            made: Mutex::default(),
+            pretended,
+            stand_ins: stand_ins.map(Index::new),
+            handle: handle.clone(),
+        })
     }
 
     /// Begins with the data of another process's cache, which is of this device and driver. A driver that does not take
     /// it goes on without.
-    pub(crate) fn recall(&mut self, data: &[u8]) {
-        if let Some(cache) = self.cache_of(data) {
-            // SAFETY: pipelines do not need the cache that they were created with.
-            unsafe { self.handle.device.destroy_pipeline_cache(self.cache, None) };
-            self.cache = cache;
-            self.recalled = data.to_vec();
+    pub(crate) fn recall(&self, data: &[u8]) {
+        if let Some(new) = self.cache_of(data) {
+            let mut cache = self.cache.write().unwrap_or_else(PoisonError::into_inner);
+            // SAFETY: pipelines do not need the cache that they were created with, and nobody else uses it now.
+            unsafe { self.handle.device.destroy_pipeline_cache(*cache, None) };
+            *cache = new;
+            *locked(&self.recalled) = data.to_vec();
         }
     }
 
@@ -84,93 +99,87 @@ impl Pipelines {
         unsafe { self.handle.device.create_pipeline_cache(&info, None) }.ok()
     }
 
+    fn shared_cache(&self) -> RwLockReadGuard<'_, vk::PipelineCache> {
+        self.cache.read().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Whether the cache's data is other than the data that it began with.
     pub(crate) fn has_new(&self) -> bool {
-        !self.pipelines.is_empty() && self.cached() != self.recalled
+        !locked(&self.made).is_empty() && self.cached() != *locked(&self.recalled)
     }
 
     /// The cache's data.
     pub(crate) fn cached(&self) -> Vec<u8> {
+        let cache = self.shared_cache();
         // SAFETY: the cache is the device's.
-        unsafe { self.handle.device.get_pipeline_cache_data(self.cache) }.unwrap_or_default()
+        unsafe { self.handle.device.get_pipeline_cache_data(*cache) }.unwrap_or_default()
     }
 
     /// Adds what another process's cache has, unless the cache began with that. A driver that does not take it goes on
     /// without.
-    pub(crate) fn merge(&mut self, data: &[u8]) {
-        if data.is_empty() || data == self.recalled {
+    pub(crate) fn merge(&self, data: &[u8]) {
+        if data.is_empty() || data == &locked(&self.recalled)[..] {
             return;
         }
-        let Some(cache) = self.cache_of(data) else { return };
+        let Some(other) = self.cache_of(data) else { return };
+        let cache = self.cache.write().unwrap_or_else(PoisonError::into_inner);
         let Handle { device, .. } = &*self.handle;
-        // SAFETY: two different caches of the device; nobody else uses this one, and all access to the other is
-        // exclusive.
+        // SAFETY: two different caches of the device; nobody else uses the one, and access to the other is exclusive.
         unsafe {
-            let _ = device.merge_pipeline_caches(self.cache, &[cache]);
-            device.destroy_pipeline_cache(cache, None);
+            let _ = device.merge_pipeline_caches(*cache, &[other]);
+            device.destroy_pipeline_cache(other, None);
         }
     }
 
-    /// The pipeline of a kernel for pages of `2^page_shift` elements; 0 leaves the choice of pages out.
-    pub(crate) fn get(&mut self, kernel: Kernel, form: Form, page_shift: u32) -> Result<Pipeline, VulkanError> {
-        let (set_layout, layout) = self.layouts(kernel)?;
-        self.prepare(kernel, &[form], page_shift)?;
-        Ok(Pipeline { raw: self.pipelines[&(kernel, form, page_shift)], layout, set_layout })
+    /// A pipeline, made now if it is not there.
+    pub(crate) fn get(&self, key: Key) -> Result<Pipeline, VulkanError> {
+        let (set_layout, layout) = self.layouts(key.0)?;
+        let made = locked(&self.made).entry(key).or_default().clone();
+        Ok(Pipeline { raw: made.get_or_init(|| self.create(key, layout)).clone()?, layout, set_layout })
     }
 
-    /// Makes the pipelines of some forms of a kernel that are not there, side by side: a driver takes up to seconds for
-    /// each.
-    pub(crate) fn prepare(&mut self, kernel: Kernel, forms: &[Form], page_shift: u32) -> Result<(), VulkanError> {
-        let (_, layout) = self.layouts(kernel)?;
-        let is_missing = |form: &&Form| !self.pipelines.contains_key(&(kernel, **form, page_shift));
-        let missing: Vec<Form> = forms.iter().filter(is_missing).copied().collect();
-        let this = &*self;
-        let create = |form: Form| (form, this.create(kernel, form, layout, page_shift));
-        let created: Vec<_> = match missing[..] {
-            [form] => vec![create(form)],
+    /// Makes the pipelines that are not there side by side: a driver takes up to seconds for each.
+    pub(crate) fn prepare(&self, keys: &[Key]) -> Result<(), VulkanError> {
+        match keys {
+            [key] => self.get(*key).map(drop),
             _ => std::thread::scope(|scope| {
-                let threads: Vec<_> = missing.iter().map(|form| scope.spawn(move || create(*form))).collect();
-                threads.into_iter().filter_map(|thread| thread.join().ok()).collect()
+                let threads: Vec<_> = keys.iter().map(|key| scope.spawn(|| self.get(*key).map(drop))).collect();
+                // All are waited for, also if one fails.
+                let made: Vec<_> = threads.into_iter().filter_map(|thread| thread.join().ok()).collect();
+                made.into_iter().collect()
             }),
-        };
-        // Of several that were made none is lost, also if one fails.
-        let mut outcome = Ok(());
-        for (form, pipeline) in created {
-            match pipeline {
-                Ok(pipeline) => self.keep(kernel, form, page_shift, pipeline),
-                Err(error) => outcome = Err(error),
-            }
         }
-        outcome
     }
 
-    fn keep(&mut self, kernel: Kernel, form: Form, page_shift: u32, pipeline: vk::Pipeline) {
-        self.pipelines.insert((kernel, form, page_shift), pipeline);
-        if form.needs_subgroups()
-            && let Some(size) = self.pretended.or_else(|| self.handle.reported_subgroup_size(pipeline))
-        {
-            self.reported.insert((kernel, form, page_shift), size);
-        }
+    /// Whether a pipeline is there.
+    pub(crate) fn has(&self, key: Key) -> bool {
+        locked(&self.made).get(&key).is_some_and(|made| made.get().is_some())
     }
 
     /// Whether a form has the subgroups that it demands, as far as the driver reports it of the pipeline, which is made
     /// if it is not there.
-    pub(crate) fn fits(&mut self, kernel: Kernel, form: Form, page_shift: u32) -> Result<bool, VulkanError> {
-        if !form.needs_subgroups() {
+    pub(crate) fn fits(&self, key: Key) -> Result<bool, VulkanError> {
+        if !key.1.needs_subgroups() {
             return Ok(true);
         }
-        self.get(kernel, form, page_shift)?;
-        let reported = self.reported.get(&(kernel, form, page_shift)).copied();
+        let reported = self.reported_of(self.get(key)?.raw);
         Ok(reported.is_none() || reported == self.handle.subgroup_size())
+    }
+
+    fn reported_of(&self, pipeline: vk::Pipeline) -> Option<u32> {
+        self.pretended.or_else(|| self.handle.reported_subgroup_size(pipeline))
     }
 
     /// The size of subgroups that the driver reports of a kernel's pipelines, where it reports one.
     pub(crate) fn reported(&self, kernel: Kernel) -> Option<u32> {
-        self.reported.iter().find(|((reported, ..), _)| *reported == kernel).map(|(_, size)| *size)
+        let made = locked(&self.made);
+        let asked = made.iter().filter(|((of, form, _), _)| *of == kernel && form.needs_subgroups());
+        asked.filter_map(|(_, made)| made.get()?.as_ref().ok()).find_map(|pipeline| self.reported_of(*pipeline))
     }
 
-    fn layouts(&mut self, kernel: Kernel) -> Result<(vk::DescriptorSetLayout, vk::PipelineLayout), VulkanError> {
-        if let Some(layouts) = self.layouts.get(&kernel) {
+    fn layouts(&self, kernel: Kernel) -> Result<(vk::DescriptorSetLayout, vk::PipelineLayout), VulkanError> {
+        let mut known = locked(&self.layouts);
+        if let Some(layouts) = known.get(&kernel) {
             return Ok(*layouts);
         }
         let bindings: Vec<_> = (0..kernel.binding_count() as u32)
@@ -201,17 +210,11 @@ impl Pipelines {
                 return Err(self.handle.failure("vkCreatePipelineLayout", result));
             }
         };
-        self.layouts.insert(kernel, (set_layout, layout));
+        known.insert(kernel, (set_layout, layout));
         Ok((set_layout, layout))
     }
 
-    fn create(
-        &self,
-        kernel: Kernel,
-        form: Form,
-        layout: vk::PipelineLayout,
-        page_shift: u32,
-    ) -> Result<vk::Pipeline, VulkanError> {
+    fn create(&self, (kernel, form, page_shift): Key, layout: vk::PipelineLayout) -> Result<vk::Pipeline, VulkanError> {
         let subgroup_size = match form.needs_matrices() {
             true => matrices::SUBGROUP,
             false => self.handle.subgroup_size().unwrap_or_default(),
@@ -227,14 +230,14 @@ impl Pipelines {
         let specialization = vk::SpecializationInfo::default().map_entries(used).data(bytemuck::bytes_of(&data));
         let mut required =
             vk::PipelineShaderStageRequiredSubgroupSizeCreateInfoEXT::default().required_subgroup_size(subgroup_size);
-        let stand_ins = self.stand_ins.filter(|_| form.needs_matrices());
+        let stand_ins = self.stand_ins.as_ref().filter(|_| form.needs_matrices());
         let entry_point = kernel.entry_point(form).to_owned() + if stand_ins.is_some() { "_stand_in" } else { "" };
-        let bytes = match form {
-            _ if form.needs_matrices() => stand_ins.unwrap_or(MATRICES),
-            Form::Subgroup => SUBGROUPS,
-            _ => MODULE,
+let index = match form {
+            _ if form.needs_matrices() => stand_ins.unwrap_or(&INDICES[2]),
+            Form::Subgroup => &INDICES[1],
+            _ => &INDICES[0],
         };
-        let module = self.module(bytes, &entry_point)?;
+        let module = self.module(&index.excerpt(&entry_point))?;
         // No kernel's name has a zero in it.
         let name = CString::new(entry_point).unwrap_or_default();
         let mut stage = vk::PipelineShaderStageCreateInfo::default()
@@ -249,9 +252,10 @@ impl Pipelines {
             stage = stage.flags(full).push_next(&mut required);
         }
         let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
+        let cache = self.shared_cache();
         // SAFETY: the module has an entry point of this name with these bindings: a test reads it back. The cache may
         // be used by several threads.
-        let created = unsafe { self.handle.device.create_compute_pipelines(self.cache, &info, None) };
+        let created = unsafe { self.handle.device.create_compute_pipelines(*cache, &info, None) };
         // SAFETY: pipelines do not need the module that they were created with.
         unsafe { self.handle.device.destroy_shader_module(module, None) };
         match created {
@@ -260,11 +264,8 @@ impl Pipelines {
         }
     }
 
-    /// A module of this entry point alone.
-    fn module(&self, bytes: &[u8], entry_point: &str) -> Result<vk::ShaderModule, VulkanError> {
-        let code: Vec<u32> = bytes.chunks_exact(4).map(bytemuck::pod_read_unaligned).collect();
-        let code = excerpt(&code, entry_point);
-        let info = vk::ShaderModuleCreateInfo::default().code(&code);
+    fn module(&self, code: &[u32]) -> Result<vk::ShaderModule, VulkanError> {
+        let info = vk::ShaderModuleCreateInfo::default().code(code);
         // SAFETY: the whole module was validated when it was made, and a part that nothing else refers to stays valid;
         // the device has the features that it needs.
         unsafe { self.handle.device.create_shader_module(&info, None) }
@@ -280,12 +281,14 @@ impl Drop for Pipelines {
         let Handle { device, .. } = &*self.handle;
         // SAFETY: submissions are waited for before the pipelines are dropped; null handles are ignored.
         unsafe {
-            self.pipelines.values().for_each(|pipeline| device.destroy_pipeline(*pipeline, None));
-            for (set_layout, layout) in self.layouts.values() {
+            for pipeline in locked(&self.made).values().filter_map(|made| made.get()?.as_ref().ok()) {
+                device.destroy_pipeline(*pipeline, None);
+            }
+            for (set_layout, layout) in locked(&self.layouts).values() {
                 device.destroy_pipeline_layout(*layout, None);
                 device.destroy_descriptor_set_layout(*set_layout, None);
             }
-            device.destroy_pipeline_cache(self.cache, None);
+            device.destroy_pipeline_cache(*self.shared_cache(), None);
         }
     }
 }

@@ -1,9 +1,11 @@
-//! What a device remembers from one process to the next: compiled pipelines and the fastest forms.
+//! What a device remembers from one process to the next: compiled pipelines, the fastest forms, and which forms of
+//! rounded factors it is trusted with.
 //!
 //! ```text
 //! head       magic, the modules' checksum, vendor, device, driver's version, cache UUID
-//! lengths    of the forms and of the pipelines
+//! lengths    of the forms, of the verdicts and of the pipelines
 //! forms      text, a line a class
+//! verdicts   text, a line a form that was tried
 //! pipelines  the data of a VkPipelineCache
 //! checksum   CRC-32 of all before it: against damage, not against malice
 //! ```
@@ -15,11 +17,12 @@ use crate::adapter::Identity;
 use crate::forms::Choices;
 use crate::gpu::Gpu;
 use crate::pipelines::{MATRICES, MODULE, SUBGROUPS};
+use crate::trust::Verdicts;
 
-const MAGIC: &[u8; 16] = b"viewfuse device\x02";
+const MAGIC: &[u8; 16] = b"viewfuse device\x03";
 /// Bytes of the head, of the lengths and of a checksum.
 const HEAD: usize = 16 + 4 + 4 * 3 + 16;
-const LENGTHS: usize = 8;
+const LENGTHS: usize = 12;
 const CHECKSUM: usize = 4;
 /// Bytes of the header of a pipeline cache, and its version.
 const CACHE_HEADER: usize = 32;
@@ -52,56 +55,67 @@ impl Gpu {
     /// Takes what [`Gpu::remembered`] gave to an earlier process, before the first dispatch. Returns whether it was
     /// taken: data of another device or driver, of another version of the kernels, and damaged data, is ignored.
     pub fn recall(&self, remembered: &[u8]) -> bool {
-        let Some((choices, pipelines)) = decode(&self.handle.identity(), remembered) else { return false };
+        let Some((choices, verdicts, pipelines)) = decode(&self.handle.identity(), remembered) else { return false };
         let mut state = self.lock();
         state.choices = choices;
+        // Verdicts are on the device's own units.
+        if !self.has_stand_ins {
+            state.verdicts = verdicts;
+        }
         if !pipelines.is_empty() {
-            state.pipelines.recall(pipelines);
+            self.pipelines.recall(pipelines);
         }
         true
     }
 
-    /// Whether the device remembers more than it recalled.
+    /// Whether the device remembers more than it recalled. It compiles nothing more ahead.
     pub fn has_new_memories(&self) -> bool {
+        self.ahead.stop();
         let state = self.lock();
-        state.choices.has_new() || state.pipelines.has_new()
+        state.choices.has_new() || (state.verdicts.has_new() && !self.has_stand_ins) || self.pipelines.has_new()
     }
 
     /// What the device remembers, and what others did that wrote `kept` in the meantime: [`Gpu::remembered`] of another
     /// process, or anything else, which is ignored then.
     pub fn remembered(&self, kept: &[u8]) -> Vec<u8> {
+        self.ahead.stop();
         let (identity, state) = (self.handle.identity(), &mut *self.lock());
-        if let Some((choices, pipelines)) = decode(&identity, kept) {
+        let mut verdicts = if self.has_stand_ins { Verdicts::default() } else { state.verdicts.clone() };
+        if let Some((choices, others, pipelines)) = decode(&identity, kept) {
             state.choices.merge(choices);
-            state.pipelines.merge(pipelines);
+            verdicts.merge(others);
+            self.pipelines.merge(pipelines);
         }
-        encode(&identity, &state.choices, &state.pipelines.cached())
+        encode(&identity, &state.choices, &verdicts, &self.pipelines.cached())
     }
 }
 
-fn encode(identity: &Identity, choices: &Choices, pipelines: &[u8]) -> Vec<u8> {
-    let text = choices.text();
+fn encode(identity: &Identity, choices: &Choices, verdicts: &Verdicts, pipelines: &[u8]) -> Vec<u8> {
+    let texts = [choices.text(), verdicts.text()];
     let pipelines = if identity.has_header(pipelines) { pipelines } else { &[] };
     let mut bytes = identity.head();
-    bytes.extend((text.len() as u32).to_le_bytes());
-    bytes.extend((pipelines.len() as u32).to_le_bytes());
-    bytes.extend(text.as_bytes());
+    for length in [texts[0].len(), texts[1].len(), pipelines.len()] {
+        bytes.extend((length as u32).to_le_bytes());
+    }
+    texts.iter().for_each(|text| bytes.extend(text.as_bytes()));
     bytes.extend(pipelines);
     bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
     bytes
 }
 
-fn decode<'a>(identity: &Identity, bytes: &'a [u8]) -> Option<(Choices, &'a [u8])> {
+fn decode<'a>(identity: &Identity, bytes: &'a [u8]) -> Option<(Choices, Verdicts, &'a [u8])> {
     let (content, sum) = bytes.split_last_chunk::<CHECKSUM>()?;
     if crc32fast::hash(content).to_le_bytes() != *sum || !content.starts_with(&identity.head()) {
         return None;
     }
     let length = |at: usize| Some(u32::from_le_bytes(content.get(at..at + 4)?.try_into().ok()?) as usize);
-    let (text_len, pipelines_len) = (length(HEAD)?, length(HEAD + 4)?);
-    let (text, pipelines) = content.get(HEAD + LENGTHS..)?.split_at_checked(text_len)?;
-    let choices = Choices::parse(std::str::from_utf8(text).ok()?)?;
+    let (choices_len, verdicts_len, pipelines_len) = (length(HEAD)?, length(HEAD + 4)?, length(HEAD + 8)?);
+    let (choices, rest) = content.get(HEAD + LENGTHS..)?.split_at_checked(choices_len)?;
+    let (verdicts, pipelines) = rest.split_at_checked(verdicts_len)?;
+    let choices = Choices::parse(std::str::from_utf8(choices).ok()?)?;
+    let verdicts = Verdicts::parse(std::str::from_utf8(verdicts).ok()?)?;
     let is_whole = pipelines.len() == pipelines_len && (pipelines.is_empty() || identity.has_header(pipelines));
-    is_whole.then_some((choices, pipelines))
+    is_whole.then_some((choices, verdicts, pipelines))
 }
 
 #[cfg(test)]
@@ -121,20 +135,24 @@ mod tests {
         Choices::parse("convolve 14 6 7 subgroup\nlinear 9 6 7 single\n").expect("choices")
     }
 
+    fn verdicts() -> Verdicts {
+        Verdicts::parse("linear half true\nconvolve two_halves false\n").expect("verdicts")
+    }
+
     #[test]
     fn what_is_remembered_is_recalled() {
         for data in [pipelines(), Vec::new()] {
-            let bytes = encode(&IDENTITY, &choices(), &data);
-            assert_eq!(decode(&IDENTITY, &bytes), Some((choices(), &data[..])));
+            let bytes = encode(&IDENTITY, &choices(), &verdicts(), &data);
+            assert_eq!(decode(&IDENTITY, &bytes), Some((choices(), verdicts(), &data[..])));
         }
         // A cache without the right header is not kept.
-        let bytes = encode(&IDENTITY, &choices(), &[1; 100]);
-        assert_eq!(decode(&IDENTITY, &bytes), Some((choices(), &[][..])));
+        let bytes = encode(&IDENTITY, &choices(), &verdicts(), &[1; 100]);
+        assert_eq!(decode(&IDENTITY, &bytes), Some((choices(), verdicts(), &[][..])));
     }
 
     #[test]
     fn damaged_data_is_ignored() {
-        let bytes = encode(&IDENTITY, &choices(), &pipelines());
+        let bytes = encode(&IDENTITY, &choices(), &verdicts(), &pipelines());
         for length in 0..bytes.len() {
             assert_eq!(decode(&IDENTITY, &bytes[..length]), None, "{length} bytes");
         }
@@ -147,7 +165,7 @@ mod tests {
 
     #[test]
     fn another_device_driver_or_module_recalls_nothing() {
-        let bytes = encode(&IDENTITY, &choices(), &pipelines());
+        let bytes = encode(&IDENTITY, &choices(), &verdicts(), &pipelines());
         let others = [
             Identity { vendor: 1, ..IDENTITY },
             Identity { device: 1, ..IDENTITY },

@@ -35,7 +35,7 @@ impl Gpu {
             if is_one_piece && (1..=INLINE).contains(&bytes.len()) {
                 return gpu.update(state, array, bytes);
             }
-            for_each_stretch(array, gpu.staging_bytes(), |memory, offset, range| {
+            for_each_stretch(array, array.len, gpu.staging_bytes(), |memory, offset, range| {
                 gpu.write_piece(state, array, memory, offset, &bytes[range])
             })
         })
@@ -112,16 +112,25 @@ impl Gpu {
     /// # Errors
     /// If the device fails, or failed before; [`VulkanError::OtherDevice`].
     pub fn download<T: Pod>(&self, buffer: &Buffer<T>) -> Result<Vec<T>, VulkanError> {
+        self.download_first(buffer, buffer.len())
+    }
+
+    /// The first `count` values, or all if there are fewer.
+    ///
+    /// # Errors
+    /// As [`Gpu::download`].
+    pub fn download_first<T: Pod>(&self, buffer: &Buffer<T>, count: usize) -> Result<Vec<T>, VulkanError> {
         buffer.array.check_owner(&self.handle)?;
-        let mut values = vec![T::zeroed(); buffer.len()];
+        let mut values = vec![T::zeroed(); count.min(buffer.len())];
         self.read(&buffer.array, bytemuck::cast_slice_mut(&mut values))?;
         Ok(values)
     }
 
-    /// Reads all bytes of an array.
+    /// Reads the first bytes of an array, whole elements.
     fn read(&self, array: &Arc<Array>, bytes: &mut [u8]) -> Result<(), VulkanError> {
+        let count = bytes.len() / array.stride;
         self.with_state(|gpu, state| {
-            for_each_stretch(array, gpu.staging_bytes(), |memory, offset, range| {
+            for_each_stretch(array, count, gpu.staging_bytes(), |memory, offset, range| {
                 gpu.read_piece(state, array, memory, offset, &mut bytes[range])
             })
         })
@@ -258,18 +267,19 @@ impl Gpu {
     }
 }
 
-/// Calls with each range of at most `most` bytes of an array within one chunk: the chunk, the byte in it, and the bytes
-/// of the whole array.
+/// Calls with each range of at most `most` bytes of the first `len` elements of an array within one chunk: the chunk,
+/// the byte in it, and the bytes of the whole array.
 fn for_each_stretch(
     array: &Array,
+    len: usize,
     most: usize,
     mut work: impl FnMut(&Memory, u64, Range<usize>) -> Result<(), VulkanError>,
 ) -> Result<(), VulkanError> {
     let most_elements = (most / array.stride).max(1);
     let mut first = 0;
-    while first < array.len {
+    while first < len {
         let (memory, offset, there) = array.place(first);
-        let count = there.min(most_elements);
+        let count = there.min(most_elements).min(len - first);
         work(memory, offset, first * array.stride..(first + count) * array.stride)?;
         first += count;
     }

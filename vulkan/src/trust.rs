@@ -6,6 +6,7 @@ use crate::forms::ENOUGH_TILES;
 use crate::gpu::Gpu;
 use crate::kernel::{Form, Kernel};
 use bytemuck::bytes_of;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use viewfuse_kernels::network::convolve::{ConvolveBlock, patch_value};
 use viewfuse_kernels::network::linear::LinearBlock;
@@ -52,25 +53,87 @@ impl Gpu {
         if !kernel.rounded_forms().contains(&form) || !self.runs(form) {
             return Ok(false);
         }
-        let known = {
-            let state = &mut *self.lock();
-            let known = state.trusted.get(&(kernel, form)).copied();
-            // A driver that does not compile it is only not trusted.
-            known.or_else(|| state.pipelines.get(kernel, form, 0).is_err().then_some(false))
-        };
-        let is_trusted = match known {
-            Some(is_trusted) => is_trusted,
-            None => Probe::new(kernel).is_kept_by(self, form)?,
-        };
-        self.lock().trusted.insert((kernel, form), is_trusted);
+        let known = self.lock().verdicts.get(kernel, form);
+        // A driver that does not compile it is only not trusted.
+        let known = known.or_else(|| self.pipelines.get((kernel, form, 0)).is_err().then_some(false));
+        if let Some(is_trusted) = known {
+            self.lock().verdicts.set(kernel, form, is_trusted);
+            return Ok(is_trusted);
+        }
+        let is_trusted = Probe::new(kernel).is_kept_by(self, form)?;
+        self.lock().verdicts.set(kernel, form, is_trusted);
         Ok(is_trusted)
+    }
+
+    /// Compiles what [`Gpu::trusts`] will try, side by side: a driver takes a second for each of these forms.
+    pub fn compile_trials(&self, trials: &[(Kernel, Form)]) {
+        let is_open = |(kernel, form): &&(Kernel, Form)| {
+            kernel.rounded_forms().contains(form)
+                && self.runs(*form)
+                && self.lock().verdicts.get(*kernel, *form).is_none()
+        };
+        let keys: Vec<_> = trials.iter().filter(is_open).map(|(kernel, form)| (*kernel, *form, 0)).collect();
+        // What does not compile is not trusted.
+        let _ = self.pipelines.prepare(&keys);
     }
 
     /// The forms of rounded factors that were asked for and are not used: their results were beyond their bounds, or
     /// the driver does not compile them. On a device without faults there are none.
     pub fn distrusted_forms(&self) -> Vec<(Kernel, Form)> {
-        let state = self.lock();
-        state.trusted.iter().filter(|(_, is_trusted)| !**is_trusted).map(|(form, _)| *form).collect()
+        self.lock().verdicts.distrusted()
+    }
+}
+
+/// Whether forms of rounded factors are used, as far as they were tried by this process or by earlier ones.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Verdicts {
+    forms: BTreeMap<(Kernel, Form), bool>,
+    has_new: bool,
+}
+
+impl Verdicts {
+    fn get(&self, kernel: Kernel, form: Form) -> Option<bool> {
+        self.forms.get(&(kernel, form)).copied()
+    }
+
+    fn set(&mut self, kernel: Kernel, form: Form, is_trusted: bool) {
+        self.has_new |= self.forms.insert((kernel, form), is_trusted) != Some(is_trusted);
+    }
+
+    fn distrusted(&self) -> Vec<(Kernel, Form)> {
+        self.forms.iter().filter(|(_, is_trusted)| !**is_trusted).map(|(form, _)| *form).collect()
+    }
+
+    /// Adds another process's verdicts on forms without one.
+    pub(crate) fn merge(&mut self, others: Verdicts) {
+        for (form, is_trusted) in others.forms {
+            self.forms.entry(form).or_insert(is_trusted);
+        }
+    }
+
+    /// Whether one was found since they were read.
+    pub(crate) fn has_new(&self) -> bool {
+        self.has_new
+    }
+
+    /// A line a form: kernel, form, whether it is used.
+    pub(crate) fn text(&self) -> String {
+        let line = |((kernel, form), is_trusted): (&(Kernel, Form), &bool)| {
+            format!("{} {} {is_trusted}\n", kernel.name(), form.name())
+        };
+        self.forms.iter().map(line).collect()
+    }
+
+    /// Verdicts from their text; `None` if it is not one.
+    pub(crate) fn parse(text: &str) -> Option<Verdicts> {
+        let parse_line = |line: &str| {
+            let words: Vec<&str> = line.split(' ').collect();
+            let &[kernel, form, is_trusted] = &words[..] else { return None };
+            let kernel = Kernel::ALL.into_iter().find(|known| known.name() == kernel)?;
+            let form = Form::ROUNDED.into_iter().find(|known| known.name() == form)?;
+            Some(((kernel, form), is_trusted.parse().ok()?))
+        };
+        Some(Verdicts { forms: text.lines().map(parse_line).collect::<Option<_>>()?, has_new: false })
     }
 }
 
@@ -225,6 +288,25 @@ mod tests {
     /// To this many bits less, by cutting.
     fn cut(bits: u32) -> impl Fn(f32) -> f32 {
         move |number| f32::from_bits(number.to_bits() >> bits << bits)
+    }
+
+    #[test]
+    fn verdicts_are_kept() {
+        let mut verdicts = Verdicts::default();
+        verdicts.set(Kernel::Linear, Form::Half, true);
+        verdicts.set(Kernel::Convolve, Form::TwoHalves, false);
+        let parsed = Verdicts::parse(&verdicts.text()).expect("verdicts");
+        assert_eq!((&parsed.forms, parsed.has_new(), verdicts.has_new()), (&verdicts.forms, false, true));
+        assert_eq!(parsed.distrusted(), [(Kernel::Convolve, Form::TwoHalves)]);
+        let mut merged = Verdicts::parse("linear half false\n").expect("a verdict");
+        merged.merge(parsed);
+        assert_eq!(merged.get(Kernel::Linear, Form::Half), Some(false), "what was tried here");
+        assert_eq!(merged.get(Kernel::Convolve, Form::TwoHalves), Some(false), "what was tried elsewhere");
+        merged.set(Kernel::Linear, Form::Half, false);
+        assert!(!merged.has_new(), "the same again");
+        for broken in ["linear half", "lines half true", "linear single true", "linear half yes", "\n"] {
+            assert_eq!(Verdicts::parse(broken), None, "{broken}");
+        }
     }
 
     #[test]

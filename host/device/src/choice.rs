@@ -9,6 +9,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::Arc;
+use viewfuse_kernels::rows::Kernel;
 use viewfuse_vulkan::{Adapter, GpuOptions, Instance, InstanceOptions, VulkanError};
 
 /// The requested device.
@@ -66,6 +67,14 @@ impl AnyDevice {
         match self {
             AnyDevice::Cpu(cpu) => cpu.name(),
             AnyDevice::Vulkan(vulkan) => vulkan.name(),
+        }
+    }
+
+    /// Begins to compile kernels; see [`Device::compile_ahead`].
+    pub fn compile_ahead(&self, kernels: &[Kernel]) {
+        match self {
+            AnyDevice::Cpu(cpu) => cpu.compile_ahead(kernels),
+            AnyDevice::Vulkan(vulkan) => vulkan.compile_ahead(kernels),
         }
     }
 

@@ -87,8 +87,8 @@ impl Memory for Cpu {
         Vec::new()
     }
 
-    fn download<T: Element>(&self, buffer: &Vec<T>) -> Result<Vec<T>, DeviceError> {
-        Ok(buffer.clone())
+    fn download_first<T: Element>(&self, buffer: &Vec<T>, count: usize) -> Result<Vec<T>, DeviceError> {
+        Ok(buffer[..count.min(buffer.len())].to_vec())
     }
 }
 

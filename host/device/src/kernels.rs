@@ -65,6 +65,16 @@ macro_rules! device {
                 Precision::ROUNDED.into_iter().filter(|precision| self.rounds(*precision)).collect()
             }
 
+            /// Those of [`Device::precisions`] where pictures of so many multiply-adds of layers gain from them; none where
+            /// their trial would take longer than they save. A matter of the work alone, not of measured times.
+            fn precisions_for(&self, _multiply_adds: u64) -> Vec<Precision> {
+                self.precisions()
+            }
+
+            /// Begins to compile kernels, given in the order of their first use, and returns at once: they are there
+            /// when they are needed, or sooner than without. Nothing on a device whose kernels are compiled.
+            fn compile_ahead(&self, _kernels: &[Kernel]) {}
+
             /// What of the device is not used because its results were wrong, each in one sentence. Empty on a device
             /// without faults.
             fn faults(&self) -> Vec<String> {

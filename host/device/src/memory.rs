@@ -88,9 +88,17 @@ pub trait Memory {
         Transfers::default()
     }
 
+    /// The first `count` values of a buffer, or all if it has fewer.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    fn download_first<T: Element>(&self, buffer: &Self::Buffer<T>, count: usize) -> Result<Vec<T>, DeviceError>;
+
     /// The values of a buffer.
     ///
     /// # Errors
     /// If the device is lost.
-    fn download<T: Element>(&self, buffer: &Self::Buffer<T>) -> Result<Vec<T>, DeviceError>;
+    fn download<T: Element>(&self, buffer: &Self::Buffer<T>) -> Result<Vec<T>, DeviceError> {
+        self.download_first(buffer, usize::MAX)
+    }
 }

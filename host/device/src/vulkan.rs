@@ -169,8 +169,8 @@ impl Memory for Vulkan {
         *self.counted()
     }
 
-    fn download<T: Element>(&self, buffer: &Buffer<T>) -> Result<Vec<T>, DeviceError> {
-        let values = self.gpu.download(buffer)?;
+    fn download_first<T: Element>(&self, buffer: &Buffer<T>, count: usize) -> Result<Vec<T>, DeviceError> {
+        let values = self.gpu.download_first(buffer, count)?;
         let mut transfers = self.counted();
         transfers.downloads += 1;
         transfers.downloaded_bytes += size_of_val(&values[..]) as u64;
@@ -224,6 +224,27 @@ macro_rules! dispatches {
                 precision.form().is_some_and(|form| {
                     ROUNDED_KERNELS.into_iter().fold(true, |all, kernel| is_trusted(kernel, form) && all)
                 })
+            }
+
+            fn precisions(&self) -> Vec<Precision> {
+                let forms = || Precision::ROUNDED.into_iter().filter_map(Precision::form);
+                let trials = ROUNDED_KERNELS.into_iter().flat_map(|kernel| forms().map(move |form| (kernel, form)));
+                self.gpu.compile_trials(&trials.collect::<Vec<_>>());
+                Precision::ROUNDED.into_iter().filter(|precision| self.rounds(*precision)).collect()
+            }
+
+            fn precisions_for(&self, multiply_adds: u64) -> Vec<Precision> {
+                match multiply_adds < self.gpu.min_rounded_work() {
+                    true => Vec::new(),
+                    false => self.precisions(),
+                }
+            }
+
+            fn compile_ahead(&self, kernels: &[Kernel]) {
+                // The cores of a software driver have its kernels to run.
+                if !self.is_software {
+                    self.gpu.compile_ahead(kernels);
+                }
             }
 
             fn faults(&self) -> Vec<String> {

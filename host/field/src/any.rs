@@ -23,6 +23,7 @@ impl<F: Field + Send + Sync + 'static> OnAnyDevice for F {
     }
 
     fn on<'a>(&'a self, device: &'a AnyDevice) -> Box<dyn Renderer + 'a> {
+        device.compile_ahead(Field::about(self).kernels);
         match device {
             AnyDevice::Cpu(device) => Box::new(On { device, field: self }),
             AnyDevice::Vulkan(device) => Box::new(On { device: device.as_ref(), field: self }),
@@ -41,7 +42,7 @@ impl AnyField {
         self.0.about()
     }
 
-    /// The field on a device.
+    /// The field on a device, which begins to compile the kernels that the field needs.
     pub fn on<'a>(&'a self, device: &'a AnyDevice) -> Box<dyn Renderer + 'a> {
         self.0.on(device)
     }

@@ -13,6 +13,7 @@ use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
+use viewfuse_kernels::rows::Kernel;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_weighting::sources::SourceWeights;
 
@@ -92,8 +93,9 @@ pub trait Prepared {
 
     /// The efforts of these options, the cheapest first, the exact one last: what a bound on the error or on the time
     /// chooses from. None for a field with one way to render. Labels, errors and times are the same for the life of the
-    /// prepared views.
-    fn efforts(&self, _options: &AnyOptions) -> Vec<Variant<AnyOptions>> {
+    /// prepared views. `pixel_count` are about the pixels of a picture: what takes a while to be tried on a device is
+    /// listed where pictures are work enough for it.
+    fn efforts(&self, _options: &AnyOptions, _pixel_count: u64) -> Vec<Variant<AnyOptions>> {
         Vec::new()
     }
 
@@ -235,6 +237,9 @@ pub struct About {
     pub ends_rays: bool,
     /// Whether its options can be reduced while a camera moves; otherwise its pictures are made smaller.
     pub has_previews: bool,
+    /// The kernels that its pictures usually need, in the order of their first use: a device compiles them while files
+    /// are read.
+    pub kernels: &'static [Kernel],
     /// Whether a picture takes milliseconds once the sources are prepared, because the scene is there and is only
     /// drawn: a moving camera then gets larger pictures, and more of them.
     pub is_live: bool,
@@ -250,6 +255,7 @@ impl About {
             longest_side: LONGEST_DEFAULT_SIDE,
             ends_rays: false,
             has_previews: false,
+            kernels: &[],
             is_live: false,
         }
     }

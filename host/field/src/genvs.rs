@@ -39,6 +39,7 @@ use std::sync::Arc;
 use viewfuse_core::camera::Camera;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
+use viewfuse_kernels::rows::Kernel;
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
 use viewfuse_scene::photographs::{SourceImage, SourceImages};
 use views::{Counts, SourceView, Views, padded};
@@ -117,10 +118,31 @@ impl Genvs {
     }
 }
 
+/// Those of a picture, in the order of their first use.
+const KERNELS: [Kernel; 17] = [
+    Kernel::Convolve,
+    Kernel::Linear,
+    Kernel::MaxPool,
+    Kernel::ConvolveDepthwise,
+    Kernel::ChannelMeans,
+    Kernel::Upsample,
+    Kernel::ConvolveTransposed,
+    Kernel::FindNonFinite,
+    Kernel::GatherVolume,
+    Kernel::WeighFeatures,
+    Kernel::SumFeatures,
+    Kernel::DenoiserInput,
+    Kernel::GroupNormPartials,
+    Kernel::GroupNormStatistics,
+    Kernel::GroupNorm,
+    Kernel::MatrixProduct,
+    Kernel::SoftmaxRows,
+];
+
 impl Field for Genvs {
     fn about(&self) -> About {
         let side = self.architecture.image_side as u32;
-        About { source_side: SourceSide::Pixels(side), longest_side: side, ..About::new(ROW.name) }
+        About { source_side: SourceSide::Pixels(side), longest_side: side, kernels: &KERNELS, ..About::new(ROW.name) }
     }
 
     fn options(&self) -> AnyOptions {

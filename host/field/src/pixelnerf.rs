@@ -44,11 +44,34 @@ use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::rays::CastBlock;
 use viewfuse_device::{Device, DeviceError, Precision};
 use viewfuse_job::progress::Progress;
+use viewfuse_kernels::rows::Kernel;
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
 use viewfuse_nn::image::{Image, Size};
 use viewfuse_scene::photographs::{SourceImage, SourceImages};
 use viewfuse_scene::unit::RigUnit;
 use visibility::Visibility;
+
+/// Those of a picture of a bounded error, in the order of their first use.
+const KERNELS: [Kernel; 18] = [
+    Kernel::Convolve,
+    Kernel::Linear,
+    Kernel::MaxPool,
+    Kernel::Upsample,
+    Kernel::EmbedPoints,
+    Kernel::GatherLatents,
+    Kernel::VisibleWeights,
+    Kernel::FuseViews,
+    Kernel::FindNonFinite,
+    Kernel::CastRays,
+    Kernel::CoarseDepths,
+    Kernel::PlacePoints,
+    Kernel::Radiance,
+    Kernel::Composite,
+    Kernel::WeighSamples,
+    Kernel::RandomDraws,
+    Kernel::FineDepths,
+    Kernel::MergeDepths,
+];
 
 /// A PixelNeRF with its parameters, ready for any device.
 pub struct PixelNerf {
@@ -154,7 +177,7 @@ impl PixelNerf {
 impl Field for PixelNerf {
     fn about(&self) -> About {
         let source_side = SourceSide::Pixels(self.architecture.source_side);
-        About { source_side, ends_rays: true, ..About::new(ROW.name) }
+        About { source_side, ends_rays: true, kernels: &KERNELS, ..About::new(ROW.name) }
     }
 
     fn options(&self) -> AnyOptions {
@@ -255,7 +278,11 @@ impl<D: Device> Views<'_, D> {
     ) -> Result<Rendered, FieldError> {
         let PixelNerfOptions { sampling, omissions, .. } = options;
         let Request { camera, .. } = request;
-        let most_points = (camera.pinhole.width() * camera.pinhole.height() * sampling.coarse_count) as usize;
+        let pixel_count = (camera.pinhole.width() * camera.pinhole.height()) as usize;
+        let most_points = match omissions.nodes {
+            0 => pixel_count * sampling.coarse_count as usize,
+            _ => node_picture::most_points(pixel_count),
+        };
         let views = self.used(request.views, &request.view_weights(), Some(&self.cast(request)))?;
         let renderer = self.renderer(&views, request, options, progress);
         let mut workspace = self.workspace(request, most_points)?;
@@ -327,9 +354,12 @@ impl<D: Device> Prepared for Views<'_, D> {
         Ok(())
     }
 
-    fn efforts(&self, options: &AnyOptions) -> Vec<Variant<AnyOptions>> {
-        let efforts = |options| variants::efforts(options, &self.device.precisions());
-        erased(options.of().map_or_else(Vec::new, efforts))
+    fn efforts(&self, options: &AnyOptions, pixel_count: u64) -> Vec<Variant<AnyOptions>> {
+        let Some(options) = options.of::<PixelNerfOptions>() else { return Vec::new() };
+        let samples = options.sampling.counts().map(u64::from).iter().sum::<u64>();
+        let point = self.field.architecture.point_multiply_adds(self.cameras.len() as u64);
+        let precisions = self.device.precisions_for(pixel_count * samples * point);
+        erased(variants::efforts(options, &precisions))
     }
 
     fn check(&self) -> Check {

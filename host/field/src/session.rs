@@ -33,13 +33,16 @@ pub(crate) struct Session<'a> {
     pub(crate) shares: Vec<f32>,
     /// What was told of the device's faults.
     faults: Vec<String>,
+    /// About the pixels of a picture.
+    pixel_count: u64,
 }
 
 impl<'a> Session<'a> {
-    /// Takes source views to the device.
+    /// Takes source views to the device, for pictures of about so many pixels.
     pub(crate) fn open(
         renderer: &'a dyn Renderer,
         sources: &SourceImages,
+        pixel_count: u64,
         progress: &dyn Progress,
     ) -> Result<Session<'a>, FieldError> {
         let prepared = renderer.prepare(sources, progress)?;
@@ -57,13 +60,14 @@ impl<'a> Session<'a> {
             mixture: None,
             shares: Vec::new(),
             faults: Vec::new(),
+            pixel_count,
         })
     }
 
     /// The efforts of the options; none for a field with one way to render. The first question of all may try what the
     /// device can do.
     pub(crate) fn efforts(&self) -> Vec<Variant<AnyOptions>> {
-        self.prepared.efforts(&self.options)
+        self.prepared.efforts(&self.options, self.pixel_count)
     }
 
     /// Renders what follows under other options than the field's own, if there are some, and mixes pictures, if there
@@ -92,7 +96,8 @@ impl<'a> Session<'a> {
     fn apply(&mut self, options: &AnyOptions) -> Result<bool, FieldError> {
         let reduced = self.purpose.map(|purpose| self.prepared.reduced(options, purpose));
         let options = reduced.unwrap_or_else(|| options.clone());
-        let effort = self.effort.and_then(|effort| self.prepared.efforts(&options).into_iter().nth(effort));
+        let effort =
+            self.effort.and_then(|effort| self.prepared.efforts(&options, self.pixel_count).into_iter().nth(effort));
         let options = effort.map_or(options, |effort| effort.options);
         if options == self.current {
             return Ok(false);

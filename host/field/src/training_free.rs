@@ -29,6 +29,7 @@ use super::{About, AnyField, AnyOptions, Field, FieldError, Options, Prepared, S
 use std::path::{Path, PathBuf};
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
+use viewfuse_kernels::rows::Kernel;
 use viewfuse_scene::photographs::SourceImages;
 
 pub use gaussians::Gaussians;
@@ -124,6 +125,44 @@ fn open(given: &Given) -> Result<AnyField, OpenError> {
     Ok(AnyField::new(TrainingFree { cache, ..TrainingFree::default() }))
 }
 
+/// Those of the sweep, of the hull, and of Gaussians, each in the order of their first use: which of them a scene needs
+/// is known when its photographs are read.
+const KERNELS: [Kernel; 33] = [
+    Kernel::CompareViews,
+    Kernel::CensusCost,
+    Kernel::RowSums,
+    Kernel::WindowCost,
+    Kernel::FollowPaths,
+    Kernel::JoinPaths,
+    Kernel::PickDisparity,
+    Kernel::PlaneOpacity,
+    Kernel::FrontCost,
+    Kernel::BlendPlanes,
+    Kernel::HullEntry,
+    Kernel::MatchCost,
+    Kernel::SumRow,
+    Kernel::MeanColumn,
+    Kernel::PickDepth,
+    Kernel::MarchRays,
+    Kernel::ProjectParticles,
+    Kernel::CountEntries,
+    Kernel::SumEntries,
+    Kernel::ListEntries,
+    Kernel::MarkBins,
+    Kernel::SortEntries,
+    Kernel::StartTiles,
+    Kernel::BlendSplats,
+    Kernel::CompareWindows,
+    Kernel::ComparePixels,
+    Kernel::BlendGradient,
+    Kernel::SumShares,
+    Kernel::GatherGradients,
+    Kernel::StepParticles,
+    Kernel::StepHarmonics,
+    Kernel::StepGains,
+    Kernel::ProjectGaussians,
+];
+
 impl Field for TrainingFree {
     fn about(&self) -> About {
         About {
@@ -132,6 +171,7 @@ impl Field for TrainingFree {
             source_side: SourceSide::Share(self.source_share),
             ends_rays: true,
             has_previews: true,
+            kernels: &KERNELS,
             ..About::new(ROW.name)
         }
     }

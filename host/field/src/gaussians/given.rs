@@ -10,7 +10,7 @@ use viewfuse_core::gaussian::{DILATION, SH_0, image_axes, opacity};
 use viewfuse_core::random::uniform;
 use viewfuse_device::{Device, DeviceError};
 use viewfuse_job::progress::Progress;
-use viewfuse_kernels::rows::GaussianBlock;
+use viewfuse_kernels::rows::{GaussianBlock, Kernel};
 use viewfuse_scene::gaussians::{Gaussian, GaussianFile, GaussianScene};
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_scene::{Scene, SceneError};
@@ -49,10 +49,22 @@ struct Uploaded<D: Device> {
     camera: CameraBlock,
 }
 
+/// Those of a picture, in the order of their first use.
+const KERNELS: [Kernel; 8] = [
+    Kernel::ProjectGaussians,
+    Kernel::CountEntries,
+    Kernel::SumEntries,
+    Kernel::ListEntries,
+    Kernel::MarkBins,
+    Kernel::SortEntries,
+    Kernel::StartTiles,
+    Kernel::BlendSplats,
+];
+
 impl Field for GivenGaussians {
     /// The Gaussians are only drawn.
     fn about(&self) -> About {
-        About { is_live: true, ..About::new("gaussians") }
+        About { is_live: true, kernels: &KERNELS, ..About::new("gaussians") }
     }
 
     fn prepare<'a, D: Device>(

@@ -22,6 +22,9 @@ use viewfuse_nn::image::{Image, Size};
 use viewfuse_nn::scratch::Scratch;
 use viewfuse_scene::photographs::SourceImage;
 
+/// Calls of the denoiser for a picture, about: what is worth it by the work of a picture.
+const USUAL_CALLS: u64 = 16;
+
 /// Photographs and parameters on a device, with the volumes of the views that are encoded.
 pub(super) struct Views<'a, D: Device> {
     pub(super) field: &'a Genvs,
@@ -241,12 +244,13 @@ impl<D: Device> Prepared for Views<'_, D> {
         Ok(())
     }
 
-    fn efforts(&self, options: &AnyOptions) -> Vec<Variant<AnyOptions>> {
+    fn efforts(&self, options: &AnyOptions, pixel_count: u64) -> Vec<Variant<AnyOptions>> {
         // They differ in the calls of the denoiser.
         let Some((options, denoiser)) = options.of().zip(self.field.architecture.denoiser.as_ref()) else {
             return Vec::new();
         };
-        erased(variants::efforts(options, denoiser.estimate, &self.device.precisions()))
+        let precisions = self.device.precisions_for(USUAL_CALLS * denoiser.multiply_adds(pixel_count));
+        erased(variants::efforts(options, denoiser.estimate, &precisions))
     }
 
     fn check(&self) -> Check {

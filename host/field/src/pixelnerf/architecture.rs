@@ -115,6 +115,13 @@ impl Architecture {
         self
     }
 
+    /// Multiply-adds of a point network at a point that so many views see, where the grids hold `lin_z` outputs.
+    pub fn point_multiply_adds(&self, view_count: u64) -> u64 {
+        let [width, blocks, injected] = [self.width, self.block_count, self.injected_count].map(|size| size as u64);
+        let block = 2 * width * width;
+        view_count * (self.embedded_len() as u64 * width + injected * block) + (blocks - injected) * block + 4 * width
+    }
+
     /// Channels of the latents: those of the stem and of all levels behind one another.
     pub fn latent_channels(&self) -> usize {
         self.stem_channels + self.levels.iter().map(|level| level.channels).sum::<usize>()

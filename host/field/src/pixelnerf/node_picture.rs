@@ -34,6 +34,11 @@ const EMPTY: [f32; 4] = [0.0; 4];
 const AT_ONCE: usize = 4;
 const MIN_POINTS: usize = 4096;
 
+/// The most points that are evaluated at a time, of a picture of so many pixels.
+pub(super) fn most_points(pixel_count: usize) -> usize {
+    (AT_ONCE * pixel_count).max(MIN_POINTS)
+}
+
 /// A picture so far.
 struct Unfinished {
     picture: Rendered,
@@ -205,7 +210,7 @@ impl<D: Device> Renderer<'_, D> {
         Ok(Marched { rays, values, known })
     }
 
-    /// The second pass's raw outputs at points, four each; more than there are points.
+    /// The second pass's raw outputs at points, four each.
     fn evaluate_at(
         &self,
         workspace: &mut Workspace<D>,
@@ -217,7 +222,7 @@ impl<D: Device> Renderer<'_, D> {
         let left_out = self.fine.evaluate_visible(workspace, self.views, points.len() as u32);
         workspace.points = points_before;
         evaluated.unseen += left_out?;
-        Ok(self.device.download(&workspace.raw)?)
+        Ok(self.device.download_first(&workspace.raw, 4 * points.len())?)
     }
 
     /// The density below which a node is empty: more nodes are for less error.

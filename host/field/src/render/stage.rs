@@ -106,10 +106,10 @@ impl<'a> Stage<'a> {
         let poses: Vec<_> = sources.iter().map(|&view| unit.pose(&scene.views[view].camera.pose)).collect();
         let source_poses = SourcePoses::new(&poses).map_err(RenderError::Sources)?;
         let side = working_side(scene, options, renderer.about().longest_side)?;
-        let stage = Stage::new(images, (unit, source_poses), renderer, options, progress);
+        let stage = Stage::new(images, (unit, source_poses), side, renderer, options, progress);
         let sources = Some(SceneSources { scene, album, views: sources.to_vec() });
         let first = scene.views.first().map(|view| view.camera);
-        Ok(Stage { scene: sources, first, side, ..stage.map_err(|error| RenderError::of(error, scene))? })
+        Ok(Stage { scene: sources, first, ..stage.map_err(|error| RenderError::of(error, scene))? })
     }
 
     /// The same for images of no scene: frames have no truth.
@@ -125,22 +125,27 @@ impl<'a> Stage<'a> {
         let unit = RigUnit::of(&images.images.iter().map(|image| image.camera).collect::<Vec<_>>());
         let poses: Vec<_> = images.images.iter().map(|image| unit.pose(&image.camera.pose)).collect();
         let sources = SourcePoses::new(&poses).map_err(FieldError::unsuitable)?;
-        Stage::new(images, (unit, sources), renderer, options, progress)
+        let largest = images.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
+        let side = options.size.map_or(largest, |[width, height]| width.max(height));
+        Stage::new(images, (unit, sources), side, renderer, options, progress)
     }
 
     fn new(
         images: Arc<SourceImages>,
         (unit, sources): (RigUnit, SourcePoses),
+        side: u32,
         renderer: &'a dyn Renderer,
         options: &'a RenderOptions,
         progress: &dyn Progress,
     ) -> Result<Stage<'a>, FieldError> {
         let mut costs = StageCosts::default();
-        let session = timed(&mut costs.prepare, || Session::open(renderer, &images, progress))?;
-        let controller = options.bound.map(|bound| Controller::new(bound, &session));
+        let (session, controller) = timed(&mut costs.prepare, || {
+            let session = Session::open(renderer, &images, u64::from(side).pow(2), progress)?;
+            // The question which efforts there are may try what the device can do.
+            let controller = options.bound.map(|bound| Controller::new(bound, &session));
+            Ok::<_, FieldError>((session, controller))
+        })?;
         let first = images.images.first().map(|image| image.camera);
-        let largest = images.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
-        let side = options.size.map_or(largest, |[width, height]| width.max(height));
         let mut stage = Stage { scene: None, options, side, first, unit, sources, images, session, controller, costs };
         stage.session.vary(options.field.as_ref(), options.mixture.as_ref(), progress)?;
         Ok(stage)

@@ -214,7 +214,7 @@ impl<D: Device> Prepared for Alone<'_, D> {
         self.depths.set(&options.hull, &options.sweep)
     }
 
-    fn efforts(&self, options: &AnyOptions) -> Vec<Variant<AnyOptions>> {
+    fn efforts(&self, options: &AnyOptions, _pixel_count: u64) -> Vec<Variant<AnyOptions>> {
         let side = self.depths.images.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
         erased(options.of::<Gaussians>().map_or_else(Vec::new, |options| options.efforts(side)))
     }

@@ -185,7 +185,7 @@ impl<D: Device> Prepared for Mixed<'_, D> {
     }
 
     /// Those of the sweep or of the hull: less than the exact one is measured against pictures without Gaussians.
-    fn efforts(&self, options: &AnyOptions) -> Vec<Variant<AnyOptions>> {
+    fn efforts(&self, options: &AnyOptions, _pixel_count: u64) -> Vec<Variant<AnyOptions>> {
         let Some(options) = options.of::<TrainingFree>() else { return Vec::new() };
         let images = &self.depths.images;
         let side = images.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);

@@ -329,6 +329,17 @@ impl Denoiser {
         (name("aux_norm"), convolution)
     }
 
+    /// Multiply-adds of the convolutions of a call for pictures of so many pixels.
+    pub fn multiply_adds(&self, pixel_count: u64) -> u64 {
+        let steps = self.down().into_iter().map(|step| match step {
+            DenoiserStep::Convolution(convolution) | DenoiserStep::Residual(convolution) => convolution.multiply_adds(),
+            DenoiserStep::Block(block) => block.multiply_adds(),
+        });
+        let blocks = self.up().into_iter().map(|block| block.multiply_adds());
+        let trained = steps.chain(blocks).sum::<u64>() + self.exit().1.multiply_adds();
+        trained / (self.image_side as u64).pow(2) * pixel_count
+    }
+
     /// Its tensors, in the order of the data.
     pub(super) fn tensors(&self) -> Vec<TensorShape> {
         let mut tensors = Vec::new();
@@ -354,6 +365,11 @@ impl Denoiser {
 }
 
 impl Convolution {
+    /// For pictures of the trained size.
+    fn multiply_adds(&self) -> u64 {
+        (9 * self.in_channels * self.out_channels * self.side.pow(2)) as u64
+    }
+
     fn tensors(&self, tensors: &mut Vec<TensorShape>) {
         with_bias(tensors, &self.name, &[self.out_channels, self.in_channels, 3, 3]);
     }
@@ -363,6 +379,14 @@ impl Block {
     /// A block without attention and without skip connection.
     fn new(name: String, in_channels: usize, out_channels: usize, side: usize, resampling: Resampling) -> Block {
         Block { name, in_channels, joined_channels: 0, out_channels, side, resampling, has_attention: false }
+    }
+
+    /// Those of the convolutions, for pictures of the trained size.
+    fn multiply_adds(&self) -> u64 {
+        let (from, to) = (self.in_channels, self.out_channels);
+        let skip = if self.has_skip() { from * to } else { 0 };
+        let attention = if self.has_attention { 4 * to * to } else { 0 };
+        ((9 * from * to + 9 * to * to + skip + attention) * self.side.pow(2)) as u64
     }
 
     fn tensors(&self, tensors: &mut Vec<TensorShape>, embedding: usize) {

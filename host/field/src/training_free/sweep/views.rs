@@ -178,7 +178,7 @@ impl<D: Device> Prepared for Views<'_, D> {
         options.of().map_or(Ok(()), |settings| self.go_on_with(*settings))
     }
 
-    fn efforts(&self, options: &AnyOptions) -> Vec<Variant<AnyOptions>> {
+    fn efforts(&self, options: &AnyOptions, _pixel_count: u64) -> Vec<Variant<AnyOptions>> {
         let side = self.scene.small.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
         erased(options.of::<Sweep>().map_or_else(Vec::new, |settings| settings.efforts(side)))
     }
