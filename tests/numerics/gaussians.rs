@@ -9,6 +9,7 @@ use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::pose::Pose;
 use viewfuse_kernels::gaussians::TileBlock;
 use viewfuse_kernels::gaussians::lanes::falloff;
+use viewfuse_kernels::gaussians::shown::{bytes_of_pixel, shown_pixel, surface_depth};
 use viewfuse_kernels::rows::{GaussianBlock, ProjectedGaussian};
 
 const SIZE: [u32; 2] = [21, 18];
@@ -196,4 +197,19 @@ fn pictures_do_not_depend_on_the_number_of_threads() {
         })
     };
     assert_eq!(picture(1), picture(3));
+}
+
+/// Bytes of shown pixels are those that the host's conversions make.
+#[test]
+fn shown_pixels_are_rounded_as_on_the_host() {
+    let steps = (0..=510_u32).flat_map(|half| {
+        let near = half as f32 / 510.0;
+        [near.next_down(), near, near.next_up()]
+    });
+    for value in steps.chain([-1.0, 2.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -0.0]) {
+        let clamped = value.clamp(0.0, 1.0);
+        let [colour, opacity] = [(clamped * 255.0 + 0.5) as u8, (clamped * 255.0).round() as u8];
+        assert_eq!(bytes_of_pixel(shown_pixel([value, 0.0, 1.0, value])), [colour, 0, 255, opacity], "{value}");
+    }
+    assert_eq!([0.5, 0.49, f32::NAN].map(|opacity| surface_depth(3.0, opacity, 0.5)), [6.0, 0.0, 0.0]);
 }

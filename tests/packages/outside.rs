@@ -98,7 +98,7 @@ fn field_layout_and_weighting_of_ones_own_render_together() {
     let mut writer = RunWriter::new(output.path(), &scene, "lines".to_owned(), &job, &nearest);
     let run = RenderRun { scene: &scene, job: &job, renderer: renderer.as_ref(), options: &options, progress: &Silent };
     let finished = render(&run, &nearest, |sources, frame| {
-        writer.write(sources, &frame).map_err(Box::<dyn std::error::Error>::from)
+        writer.write(sources, frame).map_err(Box::<dyn std::error::Error>::from)
     })
     .expect("a picture");
     let record = writer.finish(renderer.as_ref(), &options, finished, Circumstances::default()).expect("a record");

@@ -8,6 +8,7 @@
 //! lists               which splats each tile shows                ListBlock, is_reached, rank
 //! lanes               pixels of a row, and a splat's opacity there        Lanes, SplatLanes
 //! blend               pixels from the splats of their tile                BlendedLanes
+//! shown               pixels in bytes, with depths             shown_pixel, surface_depth
 //! blend_gradient      derivatives of a tile's pixels by its splats        TileGradient
 //! footprint           a Gaussian's ellipse, with what its derivatives need   Footprint
 //! project_gradient    ... and of the splats by their Gaussians            project_gradient
@@ -26,6 +27,7 @@ pub mod footprint;
 pub mod lanes;
 pub mod lists;
 pub mod project_gradient;
+pub mod shown;
 pub mod steps;
 pub mod windows;
 

@@ -33,6 +33,7 @@ mod points;
 mod rays;
 mod resample;
 mod sample_mask;
+mod shown;
 mod steps;
 mod volumes;
 mod window;

@@ -10,6 +10,7 @@
 //! error         the errors of any device                                DeviceError
 //! memory        buffers on a device                                     Memory, Element, KernelTime
 //! parallel      one parallel driver under all kernels of the CPU
+//! queue         work on other threads while the caller goes on          Queue
 //! precision     how precisely a layer multiplies                        Precision
 //! kernels       a method for each kernel, made from the rows            Device, LayerShape
 //! bundles       arguments that belong together                          Layer, HullScene, Pixels, Rays
@@ -26,6 +27,7 @@ pub mod kernels;
 pub mod memory;
 pub mod parallel;
 pub mod precision;
+pub mod queue;
 pub mod vulkan;
 
 pub use bundles::{HullScene, Layer, Pixels, Rays};

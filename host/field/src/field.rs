@@ -62,6 +62,19 @@ pub trait Prepared {
     /// [`FieldError`].
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError>;
 
+    /// As [`Prepared::render`], rounded where the picture is made, so that less of it comes from a device; `None` from
+    /// fields that do not.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    fn render_rounded(
+        &mut self,
+        _request: &Request<'_>,
+        _progress: &dyn Progress,
+    ) -> Result<Option<Rounded>, FieldError> {
+        Ok(None)
+    }
+
     /// The record of its work so far; the stage counts encoded views.
     fn record(&self) -> Record {
         Record::default()
@@ -322,6 +335,19 @@ pub struct Rendered {
     pub depths: Vec<f32>,
     /// How far each pixel can be relied on, in `[0, 1]`; empty for fields that do not tell.
     pub confidences: Vec<f32>,
+    /// Width of the picture.
+    pub width: u32,
+    /// Height of the picture.
+    pub height: u32,
+}
+
+/// A rendered target view, as it is shown. Row-major, one entry a pixel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rounded {
+    /// Red, green, blue and confidence in 255ths.
+    pub pixels: Vec<[u8; 4]>,
+    /// Depth along the principal axis in world units, 0 where there is no surface.
+    pub depths: Vec<f32>,
     /// Width of the picture.
     pub width: u32,
     /// Height of the picture.

@@ -64,7 +64,7 @@ pub use any::AnyField;
 pub use error::FieldError;
 pub use field::{
     About, Check, DepthMap, Encoding, Field, Geometry, LONGEST_DEFAULT_SIDE, Prepared, Purpose, Rendered, Request,
-    SourceSide, Surfaces,
+    Rounded, SourceSide, Surfaces,
 };
 pub use mixture::Mixture;
 pub use record::{Denoising, LeftOut, Omission, Record, VIEWS};

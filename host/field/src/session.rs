@@ -1,7 +1,7 @@
 //! The life cycle of source views, the same for all fields: prepared, encoded when needed, used for rendering.
 
 use super::error::FieldError;
-use super::field::{Encoding, Prepared, Purpose, Rendered, Request};
+use super::field::{Encoding, Prepared, Purpose, Rendered, Request, Rounded};
 use super::mixture::{Mixture, between};
 use super::record::{Record, VIEWS};
 use super::renderer::Renderer;
@@ -174,6 +174,27 @@ impl<'a> Session<'a> {
         let rendered = self.render_encoded(camera, weights, early_termination, progress)?;
         self.tell_faults(progress);
         Ok(rendered)
+    }
+
+    /// As [`Session::render`], rounded by the field; `None` if it does not round, and for mixtures.
+    pub(crate) fn render_rounded(
+        &mut self,
+        camera: &Camera,
+        weights: &SourceWeights,
+        early_termination: f32,
+        progress: &dyn Progress,
+    ) -> Result<Option<Rounded>, FieldError> {
+        if self.mixture.is_some() {
+            return Ok(None);
+        }
+        self.encode(weights, progress)?;
+        let request = Request { camera, weights, views: &self.views(weights), early_termination };
+        let rounded = self.prepared.render_rounded(&request, progress)?;
+        if rounded.is_some() {
+            self.shares.clear();
+            self.tell_faults(progress);
+        }
+        Ok(rounded)
     }
 
     fn render_encoded(

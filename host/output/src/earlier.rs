@@ -1,8 +1,7 @@
 //! What an earlier run left in an output folder, as its record and its journal say.
 
-use crate::depth::DepthFormat;
-use crate::journal::FrameJournal;
-use crate::record::{FrameRecord, RECORD, SUFFIXES};
+use crate::journal::{FrameJournal, files_of};
+use crate::record::{FrameRecord, RECORD};
 use crate::video::VideoFormat;
 use serde::Deserialize;
 use std::collections::BTreeSet;
@@ -46,13 +45,6 @@ struct WrittenBackground {
 #[derive(Deserialize)]
 struct WrittenFrame {
     target: String,
-}
-
-/// The names of a target's files, whether they are there or not.
-pub(crate) fn files_of(target: &str) -> Vec<String> {
-    let pictures = SUFFIXES.iter().map(|suffix| format!("{target}{suffix}.png"));
-    let depths = DepthFormat::ALL.iter().map(|format| format!("{target}_depth.{format}"));
-    pictures.chain(depths).collect()
 }
 
 /// Names of the targets of the record in a folder; `None` if the file is no record of a render. An empty one is: of a

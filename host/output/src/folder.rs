@@ -3,7 +3,8 @@
 
 pub use crate::earlier::recorded_background;
 
-use crate::earlier::{earlier_files, earlier_run, files_of, recorded_targets, was_interrupted};
+use crate::earlier::{earlier_files, earlier_run, recorded_targets, was_interrupted};
+use crate::journal::files_of;
 use crate::record::{FrameRecord, RECORD, SUFFIXES};
 use crate::video::VideoFormat;
 use std::collections::{BTreeSet, HashMap};

@@ -1,7 +1,8 @@
 //! Animated GIF, for pages and messages that take no WebP: 256 colours a frame, chosen for it, without transparency.
 
 use crate::rate::FrameRate;
-use gif::{Encoder, EncodingError, Frame, Repeat};
+pub(crate) use gif::EncodingError;
+use gif::{Encoder, Frame, Repeat};
 use image::RgbImage;
 use std::io::{self, Write};
 
@@ -29,7 +30,7 @@ impl<W: Write> Gif<W> {
     }
 
     /// Writes a frame of the animation's size. Of more than 50 a second some are left out, so that the pace is kept.
-    pub(crate) fn frame(&mut self, picture: &RgbImage) -> Result<(), EncodingError> {
+    pub(crate) fn add(&mut self, mut frame: Frame<'static>) -> Result<(), EncodingError> {
         self.count += 1;
         // Rounding the times, not the durations, keeps the pace.
         let end = (100.0 * self.count as f64 / self.rate.per_second()).round() as u64;
@@ -39,11 +40,14 @@ impl<W: Write> Gif<W> {
         }
         let delay = delay.clamp(MIN_DELAY, u64::from(u16::MAX));
         self.written += delay;
-        let (width, height) = (side(picture.width())?, side(picture.height())?);
-        let mut frame = Frame::from_rgb_speed(width, height, picture.as_raw(), SPEED);
         frame.delay = delay as u16;
         self.encoder.write_frame(&frame)
     }
+}
+
+/// A picture in 256 colours, which are chosen for it.
+pub(crate) fn frame(picture: &RgbImage) -> Result<Frame<'static>, EncodingError> {
+    Ok(Frame::from_rgb_speed(side(picture.width())?, side(picture.height())?, picture.as_raw(), SPEED))
 }
 
 /// A side as the format says it.

@@ -1,9 +1,10 @@
 //! Finished frames of a run that is not: what an interrupted run continues from. It survives a kill at any time.
 //!
-//! `frames.jsonl` begins with a line that says which run it is of, followed by a line for each frame whose files are
-//! all there. A last line without a line break is not whole and does not count.
+//! `frames.jsonl` begins with a line that says which run it is of and which targets it has, followed by a line for each
+//! frame whose files are all there; of other targets some files may be there. A last line without a line break is not whole and does not count.
 
-use crate::record::FrameRecord;
+use crate::depth::DepthFormat;
+use crate::record::{FrameRecord, SUFFIXES};
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,11 +19,21 @@ const MAX_LINE: u64 = 16 << 20;
 /// What every journal begins with, as [`Head`] is written.
 const BEGINNING: &[u8] = b"{\"run\":\"";
 
+/// The names of a target's files, whether they are there or not.
+pub(crate) fn files_of(target: &str) -> Vec<String> {
+    let pictures = SUFFIXES.iter().map(|suffix| format!("{target}{suffix}.png"));
+    let depths = DepthFormat::ALL.iter().map(|format| format!("{target}_depth.{format}"));
+    pictures.chain(depths).collect()
+}
+
 /// The first line.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Head {
     run: String,
+    /// The names of its targets.
+    #[serde(default)]
+    targets: Vec<String>,
 }
 
 /// A finished frame.
@@ -44,7 +55,7 @@ struct FinishedFiles {
 #[derive(Debug)]
 pub struct FrameJournal {
     path: PathBuf,
-    run: String,
+    head: Head,
     /// How much of the file is whole and of this run.
     whole: u64,
     lines: Option<Journal>,
@@ -85,14 +96,19 @@ impl Reading {
 
 impl FrameJournal {
     /// The journal of a folder for a run, and the frames that an earlier start of the same run has finished: those
-    /// whose files are all there. `run` is any text that differs for runs that would write different frames. Nothing is
-    /// written yet.
+    /// whose files are all there. `run` is any text that differs for runs that would write different frames, which are of
+    /// these targets. Nothing is written yet.
     ///
     /// # Errors
     /// [`WriteError::Io`] if there is a journal that cannot be read, [`WriteError::Foreign`] if what has its name is
     /// none.
-    pub fn open(folder: &Path, run: &str) -> Result<(FrameJournal, Vec<FinishedFrame>), WriteError> {
-        let mut journal = FrameJournal { path: folder.join(JOURNAL), run: run.to_owned(), whole: 0, lines: None };
+    pub fn open(
+        folder: &Path,
+        run: &str,
+        targets: &[String],
+    ) -> Result<(FrameJournal, Vec<FinishedFrame>), WriteError> {
+        let head = Head { run: run.to_owned(), targets: targets.to_vec() };
+        let mut journal = FrameJournal { path: folder.join(JOURNAL), head, whole: 0, lines: None };
         let mut frames: Vec<FinishedFrame> = Vec::new();
         let Some(mut reading) = Reading::open(folder)? else { return Ok((journal, frames)) };
         if reading.head.as_ref().is_none_or(|head| head.run != run) {
@@ -116,10 +132,12 @@ impl FrameJournal {
         matches!(Reading::open(folder), Ok(Some(_)))
     }
 
-    /// The files that the journal of a folder lists, whichever run it is of.
+    /// The files that a run may have written by the journal of a folder, whichever run it is of: those that are listed,
+    /// and those of its targets, which it began to write.
     pub(crate) fn files_of_any_run(folder: &Path) -> Vec<String> {
-        let mut files = Vec::new();
-        let Ok(Some(mut reading)) = Reading::open(folder) else { return files };
+        let Ok(Some(mut reading)) = Reading::open(folder) else { return Vec::new() };
+        let targets = reading.head.iter().flat_map(|head| &head.targets);
+        let mut files: Vec<String> = targets.flat_map(|target| files_of(target)).collect();
         while let Ok(Some(line)) = reading.line() {
             let Ok(finished) = serde_json::from_slice::<FinishedFiles>(&line) else { break };
             files.extend(finished.files);
@@ -155,7 +173,7 @@ impl FrameJournal {
         let mut lines = Journal::append(&self.path).map_err(failed)?;
         lines.cut(self.whole).map_err(failed)?;
         if self.whole == 0 {
-            lines.add(line_of(&self.path, &Head { run: self.run.clone() })?).map_err(failed)?;
+            lines.add(line_of(&self.path, &self.head)?).map_err(failed)?;
         }
         self.lines = Some(lines);
         Ok(())

@@ -24,6 +24,7 @@
 //! selected  the few sources that targets need: JSON, lines
 //! journal  what an interrupted run continues from
 //! earlier  what an earlier run left in a folder
+//! unwritten  frames whose files other threads write
 //! run      all of it in a folder
 //! folder   checks of that folder before work begins
 //! ```
@@ -49,6 +50,7 @@ pub mod run;
 pub mod scripts;
 pub mod selected;
 pub mod sheet;
+mod unwritten;
 pub mod video;
 pub mod webp;
 pub mod weights;

@@ -4,8 +4,8 @@
 //! A run that was interrupted continues: [`RunWriter::resume`] tells which targets are finished.
 
 use crate::depth::{DepthFormat, write_depth};
-use crate::earlier::{earlier_files, files_of};
-use crate::journal::{FinishedFrame, FrameJournal};
+use crate::earlier::earlier_files;
+use crate::journal::{FrameJournal, files_of};
 use crate::png::{without_background, write_png};
 use crate::rate::FrameRate;
 use crate::record::{
@@ -13,6 +13,7 @@ use crate::record::{
 };
 pub use crate::record::{RECORD, SUFFIXES};
 use crate::sheet::{Sheet, SheetSource, depth_picture};
+use crate::unwritten::{File, Frames};
 use crate::video::{VideoError, VideoFormat, write_video};
 use image::{DynamicImage, ImageBuffer, Luma, RgbImage};
 use std::collections::BTreeSet;
@@ -48,13 +49,16 @@ impl Default for Outputs {
     }
 }
 
-/// Writes a run's frames one by one, and the record after the last.
+/// Writes a run's frames on other threads, those of the current pool, and the record after the last.
 pub struct RunWriter {
+    // Dropped before the lock: what it began to write is written then.
+    frames: Frames,
     folder: PathBuf,
     outputs: Outputs,
+    /// Whether a frame was given to be written.
+    has_begun: bool,
     /// From the beginning if the folder is there, otherwise from the first file.
     lock: Option<FolderLock>,
-    journal: Option<FrameJournal>,
     continued: usize,
     /// The targets' names, in their order.
     target_names: Vec<String>,
@@ -69,7 +73,6 @@ pub struct RunWriter {
     /// The photographs, once a contact sheet has shown them: those of all frames are the same.
     source_pictures: Vec<Arc<RgbImage>>,
     coverage: Coverage,
-    frames: Vec<FrameRecord>,
     /// Of earlier runs, which stay.
     earlier: Vec<FrameRecord>,
     size: [u32; 2],
@@ -106,10 +109,11 @@ impl RunWriter {
     /// Nothing is written yet. `scene_label` is the scene's path in the record.
     pub fn new(folder: &Path, scene: &Scene, scene_label: String, job: &FewShot, weighting: &Weighting) -> RunWriter {
         RunWriter {
+            frames: Frames::default(),
             folder: folder.to_path_buf(),
             outputs: Outputs::default(),
+            has_begun: false,
             lock: None,
-            journal: None,
             continued: 0,
             target_names: job.targets.iter().map(|target| target.name.clone()).collect(),
             scene: scene_label,
@@ -119,7 +123,6 @@ impl RunWriter {
             source_names: source_names(scene, job),
             source_pictures: Vec::new(),
             coverage: Coverage::of(&job.source_cameras(scene)),
-            frames: Vec::new(),
             earlier: Vec::new(),
             size: [0, 0],
             background: [0.0; 3],
@@ -165,16 +168,17 @@ impl RunWriter {
     /// [`WriteError::Io`] if there is a journal that cannot be read.
     pub fn resume(&mut self, run: &str) -> Result<BTreeSet<String>, WriteError> {
         self.lock()?;
-        let (journal, mut finished) = FrameJournal::open(&self.folder, run)?;
+        let (journal, mut finished) = FrameJournal::open(&self.folder, run, &self.target_names)?;
         finished.retain(|earlier| self.target_names.contains(&earlier.frame.target));
         if finished.len() == self.target_names.len() {
             // The run's background and size are known from a frame.
             finished.pop();
         }
-        self.journal = Some(journal);
         self.continued = finished.len();
-        self.frames = finished.into_iter().map(|earlier| earlier.frame).collect();
-        Ok(self.frames.iter().map(|frame| frame.target.clone()).collect())
+        let frames: Vec<FrameRecord> = finished.into_iter().map(|earlier| earlier.frame).collect();
+        let names = frames.iter().map(|frame| frame.target.clone()).collect();
+        self.frames = Frames::resumed(frames, journal);
+        Ok(names)
     }
 
     /// The frames that follow are of a scheme and settings that were chosen for the scene: they replace the weighting,
@@ -186,61 +190,74 @@ impl RunWriter {
         }
     }
 
-    /// Writes a frame's pictures. With the first one, the record of an earlier run is removed: it would be wrong for
-    /// the new pictures.
+    /// Begins to write a frame's pictures; they are there when the run is finished, or the writer dropped. With the
+    /// first one, the record of an earlier run is removed: it would be wrong for the new pictures.
     ///
     /// # Errors
-    /// [`WriteError`].
-    pub fn write(&mut self, sources: &SourceImages, frame: &Frame) -> Result<(), WriteError> {
-        if self.frames.len() == self.continued {
+    /// [`WriteError`], also that of an earlier frame.
+    pub fn write(&mut self, sources: &SourceImages, frame: Frame) -> Result<(), WriteError> {
+        if !self.has_begun {
             self.begin()?;
+            self.has_begun = true;
         }
-        let name = &frame.target.name;
-        let size = [frame.picture.width(), frame.picture.height()];
-        let mut files = vec![format!("{name}.png")];
-        let picture = match self.outputs.alpha {
-            true => DynamicImage::ImageRgba8(without_background(&frame.colours, size, sources.background)),
-            false => DynamicImage::ImageRgb8(frame.picture.clone()),
-        };
-        write_png(&self.folder.join(&files[0]), &picture)?;
-        let depths: Vec<f32> = frame.depths.iter().map(|depth| self.space.file_length(*depth)).collect();
-        for format in DepthFormat::ALL {
-            let file = format!("{name}_depth.{format}");
-            let path = self.folder.join(&file);
-            if !frame.depths.is_empty() && self.outputs.depths.contains(format) {
-                write_depth(&path, *format, &depths, size)?;
-                files.push(file);
-            } else {
-                // One of an earlier run would belong to another picture.
-                remove_if_there(&path)?;
-            }
-        }
+        self.size = frame.picture.dimensions().into();
+        self.background = sources.background;
+        self.warnings.clone_from(&sources.warnings);
         if self.outputs.sheet && self.source_pictures.is_empty() {
             self.source_pictures = (0..sources.images.len()).map(|source| Arc::new(sources.picture(source))).collect();
         }
-        let sheet = self.outputs.sheet.then(|| DynamicImage::ImageRgb8(self.sheet(frame)));
-        let confidences = confidence_map(frame).map(DynamicImage::ImageLuma8);
-        for (what, picture) in [("confidence", confidences), ("sheet", sheet)] {
-            let file = format!("{name}_{what}.png");
-            let path = self.folder.join(&file);
-            match picture {
-                Some(picture) => {
-                    write_png(&path, &picture)?;
-                    files.push(file);
-                }
-                None => remove_if_there(&path)?,
+        let record = FrameRecord::of(&frame, &self.source_names, &self.coverage, &self.space)
+            .expecting(self.chosen.as_ref(), &frame);
+        let bytes = bytes_of(&frame);
+        let files = self.files(&Arc::new(frame))?;
+        self.frames.add(record, files, bytes)
+    }
+
+    /// The files of a frame. Those of an earlier run that it does not have would belong to another picture, and are
+    /// removed.
+    fn files(&self, frame: &Arc<Frame>) -> Result<Vec<File>, WriteError> {
+        let (target, size) = (&frame.target.name, self.size);
+        let mut files = Vec::new();
+        let mut add = |name: String, write: Option<Writing>| {
+            let path = self.folder.join(&name);
+            match write {
+                Some(write) => files.push(File { name, write: Box::new(move || write(&path)) }),
+                None => return remove_if_there(&path),
             }
+            Ok(())
+        };
+        let (shown, is_transparent, background) = (Arc::clone(frame), self.outputs.alpha, self.background);
+        let picture: Writing = Box::new(move |path| {
+            let picture = match is_transparent {
+                true => DynamicImage::ImageRgba8(without_background(&shown.colours, size, background)),
+                false => DynamicImage::ImageRgb8(shown.picture.clone()),
+            };
+            write_png(path, &picture)
+        });
+        add(format!("{target}.png"), Some(picture))?;
+        for format in DepthFormat::ALL {
+            let (shown, space) = (Arc::clone(frame), self.space);
+            let depth: Writing = Box::new(move |path| {
+                let depths: Vec<f32> = shown.depths.iter().map(|depth| space.file_length(*depth)).collect();
+                write_depth(path, *format, &depths, size)
+            });
+            let is_written = !frame.depths.is_empty() && self.outputs.depths.contains(format);
+            add(format!("{target}_depth.{format}"), is_written.then_some(depth))?;
         }
-        self.size = size;
-        self.background = sources.background;
-        self.warnings.clone_from(&sources.warnings);
-        let record = FrameRecord::of(frame, &self.source_names, &self.coverage, &self.space)
-            .expecting(self.chosen.as_ref(), frame);
-        if let Some(journal) = &mut self.journal {
-            journal.add(&FinishedFrame { frame: record.clone(), files })?;
-        }
-        self.frames.push(record);
-        Ok(())
+        let shown = Arc::clone(frame);
+        let confidence: Writing = Box::new(move |path| match confidence_map(&shown) {
+            Some(map) => write_png(path, &DynamicImage::ImageLuma8(map)),
+            None => Ok(()),
+        });
+        add(format!("{target}_confidence.png"), (!frame.confidences.is_empty()).then_some(confidence))?;
+        let sheet = self.outputs.sheet.then(|| {
+            let (shown, title, sources) = (Arc::clone(frame), self.title(frame), self.sheet_sources(frame));
+            let write: Writing =
+                Box::new(move |path| write_png(path, &DynamicImage::ImageRgb8(sheet(&shown, title, sources))));
+            write
+        });
+        add(format!("{target}_sheet.png"), sheet)?;
+        Ok(files)
     }
 
     /// Before the first file: what an earlier run left, which would be wrong beside the new pictures, goes.
@@ -253,7 +270,7 @@ impl RunWriter {
         let written: BTreeSet<String> =
             self.target_names.iter().chain(stay).flat_map(|target| files_of(target)).collect();
         let earlier = earlier_files(&self.folder);
-        match &mut self.journal {
+        match self.frames.journal() {
             Some(journal) => journal.begin()?,
             None => FrameJournal::remove_any(&self.folder)?,
         }
@@ -262,16 +279,17 @@ impl RunWriter {
         if self.earlier.is_empty() { remove_if_there(&self.folder.join(RECORD)) } else { Ok(()) }
     }
 
-    /// Writes the pictures of all targets, which are there, as `video.FORMAT`; returns its path. For before the record.
+    /// Writes the pictures of all targets, which were given, as `video.FORMAT`; returns its path. For before the record.
     ///
     /// # Errors
     /// [`VideoError`].
     pub fn write_video(
-        &self,
+        &mut self,
         format: VideoFormat,
         rate: FrameRate,
         progress: &dyn Progress,
     ) -> Result<PathBuf, VideoError> {
+        self.frames.settle()?;
         let path = self.folder.join(format!("video.{format}"));
         let frames: Vec<PathBuf> =
             self.target_names.iter().map(|name| self.folder.join(format!("{name}.png"))).collect();
@@ -285,7 +303,7 @@ impl RunWriter {
     /// # Errors
     /// [`WriteError`].
     pub fn finish(
-        mut self,
+        self,
         renderer: &dyn Renderer,
         options: &RenderOptions,
         finished: Finished,
@@ -296,8 +314,9 @@ impl RunWriter {
             circumstances;
         let path = self.folder.join(RECORD);
         let place = |frame: &FrameRecord| self.target_names.iter().position(|name| *name == frame.target);
-        self.frames.sort_by_key(place);
-        let frame_time = Duration::from_secs_f64(self.frames.iter().map(|frame| frame.seconds).sum());
+        let (mut frames, journal) = self.frames.finished()?;
+        frames.sort_by_key(place);
+        let frame_time = Duration::from_secs_f64(frames.iter().map(|frame| frame.seconds).sum());
         let record = RunRecord {
             viewfuse: program,
             scene: self.scene,
@@ -327,34 +346,54 @@ impl RunWriter {
             continued: self.continued,
             settings,
             earlier: self.earlier.len(),
-            frames: self.earlier.into_iter().chain(self.frames).collect(),
+            frames: self.earlier.into_iter().chain(frames).collect(),
         };
         let json = serde_json::to_vec_pretty(&record)
             .map_err(|cause| WriteError::Encode { path: path.clone(), cause: cause.into() })?;
         write_whole(&path, &json)?;
-        self.journal.map_or(Ok(()), FrameJournal::remove)?;
+        journal.map_or(Ok(()), FrameJournal::remove)?;
         Ok(record)
     }
 
-    /// The contact sheet of a frame.
-    fn sheet(&self, frame: &Frame) -> RgbImage {
-        let (width, height) = frame.picture.dimensions();
+    /// The first line of a frame's contact sheet.
+    fn title(&self, frame: &Frame) -> String {
+        format!("{}  target {}  weights {}", self.scene_name, frame.target.name, self.weighting)
+    }
+
+    /// The sources on a frame's contact sheet.
+    fn sheet_sources(&self, frame: &Frame) -> Vec<SheetSource> {
         let named = self.source_names.iter().zip(&self.source_pictures).enumerate();
         let source = |(index, (name, picture)): (usize, (&String, &Arc<RgbImage>))| SheetSource {
             name: name.clone(),
             weight: frame.omission.weights.get(index as u32),
             picture: Arc::clone(picture),
         };
-        let empty_as_nan: Vec<f32> = frame.depths.iter().map(|z| if *z > 0.0 { *z } else { f32::NAN }).collect();
-        Sheet {
-            title: format!("{}  target {}  weights {}", self.scene_name, frame.target.name, self.weighting),
-            sources: named.map(source).collect(),
-            prediction: frame.picture.clone(),
-            depth: (!frame.depths.is_empty()).then(|| depth_picture(&empty_as_nan, width, height)),
-            truth: frame.truth.as_ref().map(|truth| (truth.picture.clone(), truth.psnr, truth.ssim)),
-        }
-        .draw()
+        named.map(source).collect()
     }
+}
+
+/// Writes a file of a frame.
+type Writing = Box<dyn FnOnce(&Path) -> Result<(), WriteError> + Send>;
+
+/// The bytes of a frame in memory.
+fn bytes_of(frame: &Frame) -> usize {
+    let truth = frame.truth.as_ref().map_or(0, |truth| truth.picture.as_raw().len());
+    let numbers = size_of_val(&frame.depths[..]) + size_of_val(&frame.confidences[..]);
+    size_of_val(&frame.colours[..]) + numbers + frame.picture.as_raw().len() + truth
+}
+
+/// The contact sheet of a frame.
+fn sheet(frame: &Frame, title: String, sources: Vec<SheetSource>) -> RgbImage {
+    let (width, height) = frame.picture.dimensions();
+    let empty_as_nan: Vec<f32> = frame.depths.iter().map(|z| if *z > 0.0 { *z } else { f32::NAN }).collect();
+    Sheet {
+        title,
+        sources,
+        prediction: frame.picture.clone(),
+        depth: (!frame.depths.is_empty()).then(|| depth_picture(&empty_as_nan, width, height)),
+        truth: frame.truth.as_ref().map(|truth| (truth.picture.clone(), truth.psnr, truth.ssim)),
+    }
+    .draw()
 }
 
 /// A frame's confidences in steps of 1/255; `None` for fields that do not tell.

@@ -1,8 +1,8 @@
 //! The frames of a run as one file: an animated picture, or a video.
 
-use crate::gif::Gif;
+use crate::gif::{self, Gif};
 use crate::rate::FrameRate;
-use crate::webp::Animation;
+use crate::webp::{self, Animation};
 use crate::y4m::Y4m;
 use image::{DynamicImage, ImageError, Rgb, RgbImage};
 use std::fmt;
@@ -10,6 +10,8 @@ use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::str::FromStr;
+use std::sync::Arc;
+use viewfuse_device::queue::{Queue, width};
 use viewfuse_job::files::{WholeFile, WriteError, write_whole};
 use viewfuse_job::process::Process;
 use viewfuse_job::progress::{Interrupted, Progress};
@@ -129,16 +131,25 @@ pub fn write_video(
         VideoFormat::Webp => {
             let mut animation = Animation::new(frames.size, rate);
             let encode = |cause: ImageError| WriteError::Encode { path: path.to_path_buf(), cause: cause.into() };
-            frames.each(|frame| Ok(animation.add(&frame).map_err(encode)?))?;
+            frames.each(
+                |frame| webp::encoded(&frame),
+                |frame| {
+                    animation.add(&frame.map_err(encode)?);
+                    Ok(())
+                },
+            )?;
             Ok(write_whole(path, &animation.finish())?)
         }
         VideoFormat::Gif => {
             let encode =
-                |cause: ::gif::EncodingError| WriteError::Encode { path: path.to_path_buf(), cause: cause.into() };
+                |cause: gif::EncodingError| WriteError::Encode { path: path.to_path_buf(), cause: cause.into() };
             let mut file = WholeFile::create(path)?;
             let mut output = Unfailing(&mut file);
             let mut animation = Gif::begin(&mut output, frames.size, rate).map_err(encode)?;
-            frames.each(|frame| Ok(animation.frame(&over(frame, background)).map_err(encode)?))?;
+            frames.each(
+                move |frame| gif::frame(&over(frame, background)),
+                |frame| Ok(frame.and_then(|frame| animation.add(frame)).map_err(encode)?),
+            )?;
             // The end of the file is written when the encoder goes.
             drop(animation);
             Ok(file.finish()?)
@@ -161,16 +172,30 @@ struct Frames<'a> {
 }
 
 impl Frames<'_> {
-    fn each(&self, mut deliver: impl FnMut(DynamicImage) -> Result<(), VideoError>) -> Result<(), VideoError> {
+    /// Reads each picture and gives it to `encode` on other threads; `deliver` gets what becomes of it, in order.
+    fn each<T: Send + 'static>(
+        &self,
+        encode: impl Fn(DynamicImage) -> T + Send + Sync + 'static,
+        mut deliver: impl FnMut(T) -> Result<(), VideoError>,
+    ) -> Result<(), VideoError> {
         self.progress.expect(self.files.len());
-        for path in self.files {
+        let (encode, first) = (Arc::new(encode), self.size);
+        let mut queue: Queue<Result<T, VideoError>> = Queue::default();
+        let mut paths = self.files.iter();
+        for _ in self.files {
             self.progress.check()?;
-            let frame = read_picture(path)?;
-            let size = [frame.width(), frame.height()];
-            if size != self.size {
-                return Err(VideoError::Sizes { path: path.clone(), size, first: self.size });
+            for path in paths.by_ref().take(width() - queue.len()) {
+                let (path, encode) = (path.clone(), Arc::clone(&encode));
+                queue.add(move || {
+                    let frame = read_picture(&path)?;
+                    let size = [frame.width(), frame.height()];
+                    if size != first {
+                        return Err(VideoError::Sizes { path, size, first });
+                    }
+                    Ok(encode(frame))
+                });
             }
-            deliver(frame)?;
+            queue.next_result().map_or(Ok(()), |frame| deliver(frame?))?;
             self.progress.step();
         }
         Ok(())
@@ -184,7 +209,8 @@ impl Frames<'_> {
         failed: impl Fn(io::Error) -> VideoError,
     ) -> Result<(), VideoError> {
         let mut video = Y4m::begin(writer, self.size, rate).map_err(&failed)?;
-        self.each(|frame| video.frame(&over(frame, self.background)).map_err(&failed))?;
+        let background = self.background;
+        self.each(move |frame| over(frame, background), |frame| video.frame(&frame).map_err(&failed))?;
         video.finish().map_err(&failed).map(drop)
     }
 }

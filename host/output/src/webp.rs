@@ -20,6 +20,26 @@ const REPLACES: u8 = 0b0000_0010;
 /// Bytes before the first chunk of a file: `RIFF`, size, `WEBP`.
 const RIFF: usize = 12;
 
+/// A frame without loss, not yet in an animation.
+pub struct EncodedFrame {
+    /// The chunks of a file of this picture alone.
+    chunks: Vec<u8>,
+    is_transparent: bool,
+}
+
+/// Encodes a frame.
+///
+/// # Errors
+/// The encoder's error.
+pub fn encoded(frame: &DynamicImage) -> Result<EncodedFrame, ImageError> {
+    let mut file = Vec::new();
+    frame.write_with_encoder(WebPEncoder::new_lossless(&mut file))?;
+    Ok(EncodedFrame {
+        chunks: file.get(RIFF..).unwrap_or_default().to_vec(),
+        is_transparent: frame.color().has_alpha(),
+    })
+}
+
 /// An animation that grows frame by frame; its frames stay in memory as they are encoded, at most 4 GiB.
 pub struct Animation {
     size: [u32; 2],
@@ -36,14 +56,9 @@ impl Animation {
     }
 
     /// Appends a frame of the animation's size.
-    ///
-    /// # Errors
-    /// The encoder's error.
-    pub fn add(&mut self, frame: &DynamicImage) -> Result<(), ImageError> {
-        let mut file = Vec::new();
-        frame.write_with_encoder(WebPEncoder::new_lossless(&mut file))?;
-        let picture = file.get(RIFF..).unwrap_or_default();
-        self.is_transparent |= frame.color().has_alpha();
+    pub fn add(&mut self, frame: &EncodedFrame) {
+        let picture = &frame.chunks;
+        self.is_transparent |= frame.is_transparent;
         // Durations are whole milliseconds: rounding the times, not the durations, keeps the pace.
         let time = |index: u64| (1000.0 * index as f64 / self.rate.per_second()).round() as u64;
         let duration = time(self.count + 1) - time(self.count);
@@ -56,7 +71,6 @@ impl Animation {
         self.frames.push(REPLACES);
         self.frames.extend(picture);
         self.count += 1;
-        Ok(())
     }
 
     /// The file, which repeats without end.

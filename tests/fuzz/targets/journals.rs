@@ -51,7 +51,7 @@ impl Target for Journals {
     fn run(&mut self, bytes: &[u8]) -> Result<Verdict, String> {
         let folder = self.0.path();
         fs::write(folder.join(JOURNAL), bytes).expect("a file");
-        let (mut journal, frames) = match FrameJournal::open(folder, RUN) {
+        let (mut journal, frames) = match FrameJournal::open(folder, RUN, &[]) {
             Ok(opened) => opened,
             Err(error) => {
                 let kept = fs::read(folder.join(JOURNAL)).map_err(|error| error.to_string())?;
@@ -68,7 +68,7 @@ impl Target for Journals {
         // Going on keeps exactly the whole lines of this run, and is read as the same.
         journal.begin().map_err(|error| format!("it was opened, but does not go on: {error}"))?;
         let (_, again) =
-            FrameJournal::open(folder, RUN).map_err(|error| format!("what goes on is no journal: {error}"))?;
+            FrameJournal::open(folder, RUN, &[]).map_err(|error| format!("what goes on is no journal: {error}"))?;
         if targets(&again) != targets(&frames) {
             return Err(format!("{:?} became {:?}", targets(&frames), targets(&again)));
         }

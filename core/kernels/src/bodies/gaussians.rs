@@ -3,6 +3,7 @@
 use crate::gaussians::blend::BlendedLanes;
 use crate::gaussians::blend_gradient::{SplatGradient, TileGradient};
 use crate::gaussians::project_gradient;
+use crate::gaussians::shown::{shown_pixel, surface_depth};
 use crate::gaussians::{SPLAT_TILE, SplatBlock, TileBlock};
 use crate::store::Store;
 use viewfuse_core::fetch::Fetch;
@@ -37,6 +38,22 @@ pub fn blend_splats(
         colours.store(at, blended.pixel(0));
         depths.store(at, blended.depth[0]);
     }
+}
+
+/// A pixel as it is shown.
+#[inline(always)]
+pub fn show_pixels(
+    least_opacity: &f32,
+    colours: &(impl Fetch<[f32; 4]> + ?Sized),
+    depths: &[f32],
+    shown: &mut (impl Store<u32> + ?Sized),
+    surfaces: &mut (impl Store<f32> + ?Sized),
+    pixel: u32,
+) {
+    let at = pixel as usize;
+    let colour = colours.fetch(at);
+    shown.store(at, shown_pixel(colour));
+    surfaces.store(at, surface_depth(depths[at], colour[3], *least_opacity));
 }
 
 /// What a tile's pixels say of each splat of its list.

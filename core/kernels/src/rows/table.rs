@@ -437,6 +437,15 @@ macro_rules! for_each_kernel {
                 write colours: [f32; 4] as vectors,
                 write depths: f32,
             }
+            /// Pixels as they are shown, `shown[row][column]`: red, green, blue and opacity in 255ths, red in the lowest
+            /// byte; and `surfaces[row][column]`, depths from `depths`, weighted sums, 0 where the opacity is less than
+            /// this. An element is a pixel.
+            ShowPixels show_pixels(least_opacity: f32; pixel_count) for pixel in [0..pixel_count; 1024 a core] {
+                read colours: [f32; 4] as vectors,
+                read depths: f32,
+                write shown: u32,
+                write surfaces: f32,
+            }
             /// What the pixels of a tile say of each splat of its list: `sums[entry]`, from the derivatives of a loss
             /// by the pixels, `gradients[row][column]` (by red, green, blue and opacity). An element is a tile.
             BlendGradient blend_gradient(block: TileBlock) for tile in [0..block.tile_count(); 1 a core], together, wide {

@@ -68,7 +68,7 @@ pub(super) fn coarse(options: &RenderOptions, stage: &Stage<'_>) -> RenderOption
     let camera = stage.scene().and_then(|of| of.scene.views.first()).map(|view| view.camera);
     let size = camera.map(|camera| scaled_size(&camera, HOLD_OUT.side.min(stage.side())).into());
     let bound = (stage.session.prepared.check() == Check::Pixels).then_some(Bound::Error(MAX_ERROR));
-    RenderOptions { size, field: None, mixture: None, bound, ..options.clone() }
+    RenderOptions { size, field: None, mixture: None, bound, is_rounded: false, ..options.clone() }
 }
 
 /// The longest side of coarse pictures.

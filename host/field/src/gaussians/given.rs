@@ -2,7 +2,7 @@
 
 use super::covers;
 use super::picture::Splatter;
-use crate::{About, Encoding, Field, FieldError, Prepared, Rendered, Request};
+use crate::{About, Encoding, Field, FieldError, Prepared, Rendered, Request, Rounded};
 use std::path::Path;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::CameraBlock;
@@ -110,7 +110,7 @@ impl GivenGaussians {
     }
 }
 
-impl<D: Device> Prepare<'_, D> {
+impl<'d, D: Device> Prepare<'d, D> {
     /// The Gaussians on the device as this camera sees them. Those that all cameras see alike are taken there once.
     fn uploaded(&mut self, camera: &CameraBlock) -> Result<&Uploaded<D>, DeviceError> {
         let scene = self.scene;
@@ -136,8 +136,12 @@ impl<D: Device> Prepare<'_, D> {
         Ok(self.uploaded.insert(uploaded))
     }
 
+    fn splatter(&self) -> Splatter<'d, D> {
+        Splatter { device: self.device, near: self.near, background: self.background }
+    }
+
     fn picture(&mut self, camera: &CameraBlock) -> Result<Rendered, FieldError> {
-        let splatter = Splatter { device: self.device, near: self.near, background: self.background };
+        let splatter = self.splatter();
         let Uploaded { gaussians, count, .. } = self.uploaded(camera)?;
         Ok(splatter.rendered(gaussians, *count, camera, MIN_OPACITY)?)
     }
@@ -170,6 +174,17 @@ impl<D: Device> Prepared for Prepare<'_, D> {
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
         progress.check()?;
         self.picture(&request.camera.block(0))
+    }
+
+    fn render_rounded(
+        &mut self,
+        request: &Request<'_>,
+        progress: &dyn Progress,
+    ) -> Result<Option<Rounded>, FieldError> {
+        progress.check()?;
+        let (splatter, camera) = (self.splatter(), request.camera.block(0));
+        let Uploaded { gaussians, count, .. } = self.uploaded(&camera)?;
+        Ok(Some(splatter.rounded(gaussians, *count, &camera, MIN_OPACITY)?))
     }
 }
 

@@ -1,9 +1,10 @@
 //! Pictures of Gaussians and their derivatives, on a device.
 
 use super::tiles::Tiles;
-use crate::Rendered;
+use crate::{Rendered, Rounded};
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::{Device, DeviceError};
+use viewfuse_kernels::gaussians::shown::bytes_of_pixel;
 use viewfuse_kernels::gaussians::{SplatBlock, TileBlock};
 use viewfuse_kernels::rows::{GaussianBlock, LIST_PARTS, ListBlock, ProjectedGaussian, STATUS_NUMBERS};
 
@@ -129,6 +130,17 @@ impl<'d, D: Device> Splatter<'d, D> {
         Ok(Drawn { colours, depths })
     }
 
+    /// The picture alone, its lists made where that is faster.
+    fn drawn_usually(
+        &self,
+        gaussians: &D::Buffer<GaussianBlock>,
+        gaussian_count: usize,
+        camera: &CameraBlock,
+    ) -> Result<Drawn<D>, DeviceError> {
+        let are_lists_on_device = !self.device.is_software() && can_be_listed(self.device, camera, gaussian_count);
+        self.drawn(gaussians, gaussian_count, camera, are_lists_on_device)
+    }
+
     /// The same as a field gives it: depths where the opacity is at least `least_opacity`, 0 elsewhere; confidences are
     /// the opacities.
     ///
@@ -141,8 +153,7 @@ impl<'d, D: Device> Splatter<'d, D> {
         camera: &CameraBlock,
         least_opacity: f32,
     ) -> Result<Rendered, DeviceError> {
-        let are_lists_on_device = !self.device.is_software() && can_be_listed(self.device, camera, gaussian_count);
-        let Drawn { colours, depths } = self.drawn(gaussians, gaussian_count, camera, are_lists_on_device)?;
+        let Drawn { colours, depths } = self.drawn_usually(gaussians, gaussian_count, camera)?;
         let (mut colours, mut depths) = (self.device.download(&colours)?, self.device.download(&depths)?);
         let confidences: Vec<f32> = colours.iter().map(|colour| colour[3]).collect();
         for (depth, opacity) in depths.iter_mut().zip(&confidences) {
@@ -153,6 +164,27 @@ impl<'d, D: Device> Splatter<'d, D> {
         }
         let CameraBlock { width, height, .. } = *camera;
         Ok(Rendered { colours, depths, confidences, width, height })
+    }
+
+    /// The same, rounded on the device.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn rounded(
+        &self,
+        gaussians: &D::Buffer<GaussianBlock>,
+        gaussian_count: usize,
+        camera: &CameraBlock,
+        least_opacity: f32,
+    ) -> Result<Rounded, DeviceError> {
+        let device = self.device;
+        let Drawn { colours, depths } = self.drawn_usually(gaussians, gaussian_count, camera)?;
+        let CameraBlock { width, height, .. } = *camera;
+        let pixel_count = width * height;
+        let (mut shown, mut surfaces) = (device.zeros(pixel_count as usize)?, device.zeros(pixel_count as usize)?);
+        device.show_pixels(&least_opacity, pixel_count, &colours, &depths, &mut shown, &mut surfaces)?;
+        let pixels = device.download(&shown)?.into_iter().map(bytes_of_pixel).collect();
+        Ok(Rounded { pixels, depths: device.download(&surfaces)?, width, height })
     }
 
     /// Derivatives of a loss by the Gaussians' parameters, in the places of these, from those by the picture's pixels,

@@ -19,7 +19,8 @@ pub struct Frame {
     pub weights: SourceWeights,
     /// The views that were left out, and the weights that were used.
     pub omission: Omission<MAX_SOURCES>,
-    /// Red, green, blue in `[0, 1]` and opacity, not rounded. Row-major.
+    /// Red, green, blue in `[0, 1]` and opacity, not rounded. Row-major. Empty where the options ask for rounded frames
+    /// and the field rounds them.
     pub colours: Vec<[f32; 4]>,
     /// The picture.
     pub picture: RgbImage,

@@ -25,6 +25,9 @@ pub struct RenderOptions {
     pub mixture: Option<Mixture>,
     /// A bound on each picture's error or time, which chooses the effort.
     pub bound: Option<Bound>,
+    /// Whether frames are only shown: where the field rounds its pictures, [`Frame::colours`](crate::render::Frame::colours)
+    /// are not there then.
+    pub is_rounded: bool,
 }
 
 /// Default of the largest share of the weight that is left out: it bounds the change of a fusion of all
@@ -45,6 +48,7 @@ impl Default for RenderOptions {
             field: None,
             mixture: None,
             bound: None,
+            is_rounded: false,
         }
     }
 }

@@ -7,9 +7,10 @@ use super::{Frame, RenderError, RenderOptions, Truth, working_side};
 use crate::budget::{Controller, View};
 use crate::session::Session;
 use crate::{
-    AnyOptions, DepthMap, Encoding, FieldError, Geometry, Mixture, Purpose, Record, Rendered, Renderer, Surfaces,
-    Variant,
+    AnyOptions, DepthMap, Encoding, FieldError, Geometry, Mixture, Purpose, Record, Rendered, Renderer, Rounded,
+    Surfaces, Variant,
 };
+use image::RgbImage;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::Camera;
@@ -332,23 +333,32 @@ impl<'a> Stage<'a> {
         };
         let (omission, all) = (omitting(self.left_out_total(&weights)), omitting(0.0).weights);
         let early_termination = self.options.early_termination;
-        let (rendered, kept, encode) = match &mut self.controller {
+        let is_rounded = self.options.is_rounded;
+        let (pixels, kept, encode) = match &mut self.controller {
             Some(controller) => {
                 let view = View { camera, all: &all, used: &omission.weights, early_termination };
                 let bounded = controller.render(&mut self.session, view, progress);
-                bounded.map(|(rendered, kept, encode)| (rendered, Some(kept), encode))
+                bounded.map(|(rendered, kept, encode)| (rendered.into(), Some(kept), encode))
             }
             None => {
+                let (session, used) = (&mut self.session, &omission.weights);
                 let mut encode = Duration::ZERO;
-                timed(&mut encode, || self.session.encode(&omission.weights, progress))
-                    .and_then(|()| self.session.render(camera, &omission.weights, early_termination, progress))
-                    .map(|rendered| (rendered, None, encode))
+                timed(&mut encode, || session.encode(used, progress))
+                    .and_then(|()| match is_rounded {
+                        true => session.render_rounded(camera, used, early_termination, progress),
+                        false => Ok(None),
+                    })
+                    .and_then(|rounded| match rounded {
+                        Some(rounded) => Ok(rounded.into()),
+                        None => session.render(camera, used, early_termination, progress).map(Pixels::from),
+                    })
+                    .map(|pixels| (pixels, None, encode))
             }
         }
         .map_err(|error| self.error(error))?;
         let time = start.elapsed();
-        let Rendered { colours, depths, confidences, width, height } = rendered;
-        let picture = to_rgb8(&colours, [width, height]);
+        let Pixels { colours, picture, depths, confidences } = pixels;
+        let (width, height) = picture.dimensions();
         let truth = match (target.truth, &self.scene) {
             (Some(view), Some(SceneSources { album, .. })) => {
                 Some(Truth::compare(&picture, album.truth(view, [width, height], self.background())?))
@@ -412,6 +422,29 @@ impl<'a> Stage<'a> {
             Some(SceneSources { scene, .. }) => RenderError::of(error, scene),
             None => error.into(),
         }
+    }
+}
+
+/// The pixels of a frame; see [`Frame`].
+struct Pixels {
+    colours: Vec<[f32; 4]>,
+    picture: RgbImage,
+    depths: Vec<f32>,
+    confidences: Vec<f32>,
+}
+
+impl From<Rendered> for Pixels {
+    fn from(Rendered { colours, depths, confidences, width, height }: Rendered) -> Pixels {
+        Pixels { picture: to_rgb8(&colours, [width, height]), colours, depths, confidences }
+    }
+}
+
+impl From<Rounded> for Pixels {
+    fn from(Rounded { pixels, depths, width, height }: Rounded) -> Pixels {
+        let bytes = pixels.iter().flat_map(|[red, green, blue, _]| [*red, *green, *blue]).collect();
+        let picture = RgbImage::from_raw(width, height, bytes).unwrap_or_default();
+        let confidences = pixels.iter().map(|[.., confidence]| f32::from(*confidence) / 255.0).collect();
+        Pixels { colours: Vec::new(), picture, depths, confidences }
     }
 }
 

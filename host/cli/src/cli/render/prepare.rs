@@ -70,6 +70,7 @@ impl Prepared {
             &about,
             arguments.model.says_omissions() || !arguments.sequence.is_empty(),
         );
+        let options = RenderOptions { is_rounded: !arguments.outputs.outputs().alpha, ..options };
         let rate = arguments.outputs.rate(job.frames_per_second);
         let (mut identity, mut earlier) = (None, Vec::new());
         if !arguments.is_stream() {

@@ -59,11 +59,11 @@ fn written(
     let part = Part::begin(progress, "", 0..frames, parts);
     let write = |sources: &SourceImages, frame: Frame, chosen: Option<&Chosen>| {
         chosen.into_iter().for_each(|chosen| writer.set_chosen(chosen));
-        anyhow::Ok(writer.write(sources, &frame)?)
+        anyhow::Ok(writer.write(sources, frame)?)
     };
     let run = prepared.run(renderer.as_ref(), &part);
     let (finished, _) = auto::render(&run, prepared.weighting.as_ref(), write)?;
-    let videos = videos(&writer, formats, prepared.rate, &Part::begin(progress, "", frames..parts, parts))?;
+    let videos = videos(&mut writer, formats, prepared.rate, &Part::begin(progress, "", frames..parts, parts))?;
     let circumstances = Circumstances {
         program: env!("CARGO_PKG_VERSION"),
         device_reason: prepared.device.reason.clone(),
@@ -97,7 +97,7 @@ fn video_formats(arguments: &Arguments) -> Vec<VideoFormat> {
 
 /// Writes the pictures as videos; returns a line about each.
 fn videos(
-    writer: &RunWriter,
+    writer: &mut RunWriter,
     formats: &[VideoFormat],
     rate: FrameRate,
     progress: &dyn Progress,
