@@ -9,7 +9,10 @@ use rspirv::spirv::{
 use std::collections::HashMap;
 use viewfuse_shader_compiler::phis::split_phis;
 use viewfuse_shader_compiler::refine::read;
+use viewfuse_shader_compiler::split::Modules;
+use viewfuse_shader_compiler::unroll::unroll;
 use viewfuse_tests::module::id_of;
+use viewfuse_tests::places::repository;
 
 /// Numbers of what the modules compute with.
 const LIMIT: Word = 1;
@@ -219,6 +222,33 @@ fn phis_of_structs_and_arrays_become_those_of_their_numbers() {
         let first_other = block.instructions.iter().position(|instruction| !is_phi(instruction));
         assert!(block.instructions[first_other.expect("an end")..].iter().all(|instruction| !is_phi(instruction)));
     }
+}
+
+/// How the loops of a module are hinted.
+fn hints(module: &Module) -> Vec<LoopControl> {
+    let merges = module.all_inst_iter().filter(|instruction| instruction.class.opcode == Op::LoopMerge);
+    let hint = |merge: &Instruction| match merge.operands[2] {
+        Operand::LoopControl(hint) => hint,
+        _ => panic!("a loop without its control"),
+    };
+    merges.map(hint).collect()
+}
+
+#[test]
+fn innermost_loops_without_barriers_are_to_be_written_out() {
+    let before = module(Carried::Numbers);
+    let chosen = read(&unroll(&bytes(&before), |_| true).expect("SPIR-V")).expect("SPIR-V");
+    assert_eq!((hints(&before), hints(&chosen)), (vec![LoopControl::NONE], vec![LoopControl::UNROLL]));
+    for (limit, expected) in RESULTS {
+        assert_eq!(execute(&chosen, limit), expected, "{limit}");
+    }
+    assert!(unroll(&bytes(&before), |_| false).expect("SPIR-V") == bytes(&before), "another one is chosen");
+    assert!(unroll(&[1, 2, 3], |_| true).is_err());
+    // The loop over the steps of a tile has loops and barriers inside.
+    let tiles = read(&Modules::read(&repository()).expect("the modules").matrices).expect("SPIR-V");
+    let hints = hints(&tiles);
+    let hinted = hints.iter().filter(|hint| **hint == LoopControl::UNROLL).count();
+    assert!(hinted > 0 && hinted < hints.len(), "{hinted} of {}", hints.len());
 }
 
 #[test]

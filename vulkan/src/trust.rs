@@ -17,7 +17,9 @@ const LARGEST: f32 = 65_504.0;
 
 impl Gpu {
     /// As [`Gpu::dispatch`], with a form of rounded factors ([`Form::ROUNDED`]) where this device is trusted with it
-    /// ([`Gpu::trusts`]): other numbers, within that form's bound; otherwise as `dispatch`.
+    /// ([`Gpu::trusts`]) and the arrays lie in fours ([`Kernel::is_in_fours`]): other numbers, within that form's bound;
+    /// otherwise as `dispatch`. Of the form's [sizes](Form::sizes) that is taken which suits the product, where the
+    /// device is trusted with it as well as with the largest one.
     ///
     /// # Errors
     /// Those of [`Gpu::dispatch`].
@@ -34,7 +36,7 @@ impl Gpu {
             _ => None,
         };
         let form = match form {
-            Some(form) if self.trusts(kernel, form)? => Some(form),
+            Some(form) if self.trusts(kernel, form.sizes()[0])? && self.trusts(kernel, form)? => Some(form),
             _ => None,
         };
         self.dispatch_in(kernel, form, parameters, elements, arrays)
