@@ -6,13 +6,14 @@ use viewfuse_kernels::pixelnerf::radiance;
 
 #[test]
 fn rectification_at_its_ends() {
-    for (x, expected) in [(2.0, 2.0), (-2.0, 0.0), (0.0, 0.0), (f32::NEG_INFINITY, 0.0), (f32::INFINITY, f32::INFINITY)]
+    for (x, expected) in
+        [(2.0, 2.0), (-2.0, 0.0), (0.0, 0.0), (-0.0, 0.0), (f32::NEG_INFINITY, 0.0), (f32::INFINITY, f32::INFINITY)]
     {
         assert_eq!(rectified(x, 1), expected);
     }
     assert_eq!(rectified(-2.0, 0), -2.0);
     for relu in [0, 1] {
-        assert!(rectified(f32::NAN, relu).is_nan());
+        assert!(rectified(f32::NAN, relu).is_nan() && rectified(-f32::NAN, relu).is_nan());
     }
 }
 

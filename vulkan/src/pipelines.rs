@@ -232,7 +232,7 @@ impl Pipelines {
             vk::PipelineShaderStageRequiredSubgroupSizeCreateInfoEXT::default().required_subgroup_size(subgroup_size);
         let stand_ins = self.stand_ins.as_ref().filter(|_| form.needs_matrices());
         let entry_point = kernel.entry_point(form).to_owned() + if stand_ins.is_some() { "_stand_in" } else { "" };
-let index = match form {
+        let index = match form {
             _ if form.needs_matrices() => stand_ins.unwrap_or(&INDICES[2]),
             Form::Subgroup => &INDICES[1],
             _ => &INDICES[0],

@@ -140,7 +140,8 @@ impl Verdicts {
 }
 
 /// A product that shows whether a form is right: sizes that no tile divides, several steps, numbers of both signs and
-/// of all magnitudes, small ones and zeros among them, and two that are too large.
+/// of all magnitudes, small ones and zeros among them, and two that are too large. Outputs are rectified, which must not
+/// hide NaN.
 struct Probe {
     kernel: Kernel,
     parameters: Vec<u8>,
@@ -178,6 +179,7 @@ impl Probe {
                     size: 3,
                     stride: 1,
                     padding: 1,
+                    relu_outputs: 1,
                     ..ConvolveBlock::default()
                 }
                 .packed();
@@ -191,7 +193,8 @@ impl Probe {
             _ => {
                 let shape = Shape { row_count: 143, inner_count: 68, column_count: 148 };
                 let Shape { row_count, inner_count, column_count } = shape;
-                let block = LinearBlock { row_count, inner_count, column_count, ..LinearBlock::default() };
+                let block =
+                    LinearBlock { row_count, inner_count, column_count, relu_outputs: 1, ..LinearBlock::default() };
                 let mut inputs = numbers(143 * 68);
                 (inputs[5], inputs[9000]) = (-70_000.0, 1e30);
                 (bytes_of(&block).to_vec(), shape, inputs.clone(), inputs)
@@ -230,7 +233,7 @@ impl Probe {
                 total += (left * right).abs();
                 bound += product_bound(form, left, right);
             }
-            (f64::from(found) - sum).abs() <= bound + sum_bound(inner_count, total)
+            (f64::from(found) - sum.max(0.0)).abs() <= bound + sum_bound(inner_count, total)
         })
     }
 }
@@ -268,6 +271,7 @@ fn sum_bound(inner_count: usize, total: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use viewfuse_kernels::network::linear::rectified;
 
     /// Exact outputs of a probe, whose factors are first changed.
     fn outputs(probe: &Probe, factor: impl Fn(f32) -> f32) -> Vec<f32> {
@@ -279,7 +283,7 @@ mod tests {
                 let too_large = left.abs() > LARGEST;
                 if too_large { f64::NAN } else { f64::from(factor(left)) * f64::from(factor(right)) }
             };
-            ((0..inners).map(product).sum::<f64>() + f64::from(probe.bias[column])) as f32
+            rectified(((0..inners).map(product).sum::<f64>() + f64::from(probe.bias[column])) as f32, 1)
         };
         (0..rows)
             .flat_map(|row| (0..columns).map(move |column| (row, column)))
