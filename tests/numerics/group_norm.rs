@@ -9,7 +9,7 @@ use viewfuse_kernels::network::group_norm::{
     GroupNormBlock, group_norm_element, group_norm_partials, group_norm_statistics, silu,
 };
 
-/// An image through all three kernels: by their bodies, and by the CPU's own way.
+/// An image through both kernels: by their bodies, and by the CPU's own way.
 fn normalised(inputs: &[f32], weights: &[f32], bias: &[f32], block: &GroupNormBlock) -> [Vec<f32>; 2] {
     let groups = block.group_count as usize;
     let part_count = block.part_count() as usize;
@@ -17,15 +17,14 @@ fn normalised(inputs: &[f32], weights: &[f32], bias: &[f32], block: &GroupNormBl
     let parts: Vec<[f32; 2]> =
         (0..part_count * groups).map(|element| group_norm_partials(inputs, block, element)).collect();
     let statistics: Vec<[f32; 2]> = (0..groups).map(|group| group_norm_statistics(&parts[..], block, group)).collect();
-    let output = |element| group_norm_element(inputs, &statistics[..], weights, bias, block, element);
+    let of = |element: usize| statistics[block.group_of(element as u32) as usize];
+    let output = |element: usize| group_norm_element(inputs, of(element), weights, bias, block, element);
     let by_bodies = (0..count).map(output).collect();
 
     let [inputs, weights, bias] = [inputs, weights, bias].map(<[f32]>::to_vec);
-    let (mut parts, mut statistics) = (vec![[0.0; 2]; parts.len()], vec![[0.0; 2]; groups]);
-    let mut outputs = vec![0.0; count];
+    let (mut parts, mut outputs) = (vec![[0.0; 2]; parts.len()], vec![0.0; count]);
     Cpu.group_norm_partials(block, &inputs, &mut parts).expect("the CPU computes");
-    Cpu.group_norm_statistics(block, &parts, &mut statistics).expect("the CPU computes");
-    Cpu.group_norm(block, &inputs, &statistics, &weights, &bias, &mut outputs).expect("the CPU computes");
+    Cpu.group_norm(block, &inputs, &parts, &weights, &bias, &mut outputs).expect("the CPU computes");
     [by_bodies, outputs]
 }
 

@@ -3,8 +3,8 @@
 use viewfuse_core::fetch::Fetch;
 use viewfuse_core::math::has_finite_bits;
 
-/// Numbers of a run, which one invocation processes.
-pub const FINITE_RUN: u32 = 1024;
+/// Numbers of a run, which one invocation processes one after the other: so few that a GPU does not wait for it.
+pub const FINITE_RUN: u32 = 256;
 
 /// The result for a run without infinity and NaN, in place of an index.
 pub const ALL_FINITE: u32 = u32::MAX;

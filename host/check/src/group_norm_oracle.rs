@@ -75,15 +75,15 @@ pub fn group_norm_statistics(partials: &[[f32; 2]], block: &GroupNormBlock, grou
 /// Channel `channel` of pixel `pixel`, normalised.
 pub fn normalised(
     inputs: &[f32],
-    statistics: &[[f32; 2]],
+    statistics: &[[Bounded; 2]],
     [weights, bias]: [&[f32]; 2],
     block: &GroupNormBlock,
     [pixel, channel]: [usize; 2],
 ) -> Bounded {
     let input = inputs[block.in_first as usize + pixel * block.in_pitch as usize + channel];
     let [mean, factor] = statistics[channel * block.group_count as usize / block.channels as usize];
-    let factor = Bounded::from(factor) * weights[channel].into();
-    let value = (Bounded::from(input) - mean.into()) * factor + bias[channel].into();
+    let factor = factor * weights[channel].into();
+    let value = (Bounded::from(input) - mean) * factor + bias[channel].into();
     if block.silu_outputs == 0 { value } else { silu(value) }
 }
 

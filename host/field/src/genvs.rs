@@ -119,7 +119,7 @@ impl Genvs {
 }
 
 /// Those of a picture, in the order of their first use.
-const KERNELS: [Kernel; 17] = [
+const KERNELS: [Kernel; 16] = [
     Kernel::Convolve,
     Kernel::Linear,
     Kernel::MaxPool,
@@ -133,7 +133,6 @@ const KERNELS: [Kernel; 17] = [
     Kernel::SumFeatures,
     Kernel::DenoiserInput,
     Kernel::GroupNormPartials,
-    Kernel::GroupNormStatistics,
     Kernel::GroupNorm,
     Kernel::MatrixProduct,
     Kernel::SoftmaxRows,

@@ -228,6 +228,13 @@ impl Checkpoint {
     /// [`CheckpointError`] if there is none of that name, if it cannot be read, or if it holds a NaN, an infinity, or
     /// a number beyond `f32`.
     pub fn tensor(&self, name: &str) -> Result<Vec<f32>, CheckpointError> {
+        if let Content::Computed(formula) = &self.content {
+            let values = self.by_formula(formula, name)?;
+            return match values.iter().position(|number| !number.is_finite()) {
+                None => Ok(values),
+                Some(index) => Err(self.not_finite(name, index as u64, values[index].into())),
+            };
+        }
         let count = self.shapes.get(name).and_then(|shape| element_count(shape)).unwrap_or(0);
         let mut values = Vec::new();
         values.try_reserve_exact(count as usize).map_err(|_| CheckpointError::Content {
@@ -254,28 +261,15 @@ impl Checkpoint {
         name: &str,
         mut take: impl FnMut(Element, &[u8]) -> Result<(), CheckpointError>,
     ) -> Result<(), CheckpointError> {
-        let none = || CheckpointError::NoTensor { path: self.path.clone(), tensor: shortened(name) };
         match &self.content {
-            Content::Computed(Formula(compute)) => {
-                let shape = self.shapes.get(name).ok_or_else(none)?;
-                let values = compute(&TensorShape { name: name.to_owned(), shape: shape.clone() });
-                if element_count(shape) != Some(values.len() as u64) {
-                    return Err(CheckpointError::Content {
-                        path: self.path.clone(),
-                        what: format!(
-                            "tensor '{}' has {} values, not those of its shape",
-                            shortened(name),
-                            values.len()
-                        ),
-                    });
-                }
-                values.chunks(CHUNK_BYTES / 4).try_for_each(|chunk| {
+            Content::Computed(formula) => {
+                self.by_formula(formula, name)?.chunks(CHUNK_BYTES / 4).try_for_each(|chunk| {
                     let bytes: Vec<u8> = chunk.iter().flat_map(|value| value.to_le_bytes()).collect();
                     take(Element::F32, &bytes)
                 })
             }
             Content::File(file, places) => {
-                let place = places.get(name).ok_or_else(none)?;
+                let place = places.get(name).ok_or_else(|| self.no_tensor(name))?;
                 let file = file.lock().unwrap_or_else(PoisonError::into_inner);
                 let read = place.read(&file, |bytes| take(place.element, bytes).map_err(ReadError::Checkpoint));
                 read.map_err(|error| match error {
@@ -284,6 +278,21 @@ impl Checkpoint {
                 })
             }
         }
+    }
+
+    /// The values of a tensor of a network that a formula makes.
+    fn by_formula(&self, Formula(compute): &Formula, name: &str) -> Result<Vec<f32>, CheckpointError> {
+        let shape = self.shapes.get(name).ok_or_else(|| self.no_tensor(name))?;
+        let values = compute(&TensorShape { name: name.to_owned(), shape: shape.clone() });
+        if element_count(shape) != Some(values.len() as u64) {
+            let what = format!("tensor '{}' has {} values, not those of its shape", shortened(name), values.len());
+            return Err(CheckpointError::Content { path: self.path.clone(), what });
+        }
+        Ok(values)
+    }
+
+    fn no_tensor(&self, name: &str) -> CheckpointError {
+        CheckpointError::NoTensor { path: self.path.clone(), tensor: shortened(name) }
     }
 
     fn not_finite(&self, name: &str, index: u64, value: f64) -> CheckpointError {

@@ -17,6 +17,11 @@
 //!
 //! The variance of the last is that of an initialisation that keeps the size of the activations.
 
+use viewfuse_device::parallel::for_each;
+
+/// Elements that are enough work for a core.
+const LEAST: usize = 1 << 14;
+
 /// The tensor of that name and shape, flat and row-major. A tensor that the table does not cover (one dimension and
 /// another leaf) is `0.125 u`; one without elements is empty.
 pub fn tensor(name: &str, shape: &[usize]) -> Vec<f32> {
@@ -33,7 +38,9 @@ pub fn tensor(name: &str, shape: &[usize]) -> Vec<f32> {
         "weight" => (1.0, 0.125),
         _ => (0.0, 0.125),
     };
-    (0..shape.iter().product()).map(|i| offset + factor * unit(hash, i)).collect()
+    let mut values = vec![0.0; shape.iter().product()];
+    for_each(&mut values, LEAST, |i, value| *value = offset + factor * unit(hash, i));
+    values
 }
 
 /// Element `i` of the sequence that a hash starts, in `[-1, 1)`.

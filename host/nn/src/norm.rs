@@ -34,12 +34,10 @@ impl<D: Device> GroupNorm<D> {
             variance_floor: self.epsilon,
             silu_outputs: u32::from(silu),
         };
-        let mut parts = device.zeros((block.part_count() * block.group_count) as usize)?;
-        let mut statistics = device.zeros(block.group_count as usize)?;
-        device.group_norm_partials(&block, &image.values, &mut parts)?;
-        device.group_norm_statistics(&block, &parts, &mut statistics)?;
         let mut output = scratch.image(image.size)?;
-        device.group_norm(&block, &image.values, &statistics, &self.weights, &self.bias, &mut output.values)?;
+        let partials = scratch.partials((block.part_count() * block.group_count) as usize)?;
+        device.group_norm_partials(&block, &image.values, partials)?;
+        device.group_norm(&block, &image.values, partials, &self.weights, &self.bias, &mut output.values)?;
         Ok(output)
     }
 }

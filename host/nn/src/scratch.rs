@@ -10,12 +10,14 @@ pub struct Scratch<'a, D: Device> {
     device: &'a D,
     precision: Precision,
     free: Vec<(usize, D::Buffer<f32>)>,
+    /// Statistics of parts of an image, and for how many there is room.
+    partials: Option<(usize, D::Buffer<[f32; 2]>)>,
 }
 
 impl<'a, D: Device> Scratch<'a, D> {
     /// Without any buffers. Convolutions are exact.
     pub fn new(device: &'a D) -> Scratch<'a, D> {
-        Scratch { device, precision: Precision::Exact, free: Vec::new() }
+        Scratch { device, precision: Precision::Exact, free: Vec::new(), partials: None }
     }
 
     /// Convolutions that run with it have this precision from now on, on devices that have another than the exact one.
@@ -55,6 +57,19 @@ impl<'a, D: Device> Scratch<'a, D> {
             None => (len, self.device.zeros(len)?),
         };
         Ok(Image { values, size, pitch, first, capacity })
+    }
+
+    /// The buffer for statistics of the parts of one image after the other, of at least so many, undefined.
+    ///
+    /// # Errors
+    /// If the device has no memory left.
+    pub fn partials(&mut self, count: usize) -> Result<&mut D::Buffer<[f32; 2]>, DeviceError> {
+        let known = self.partials.take().filter(|(room, _)| *room >= count);
+        let (_, partials) = self.partials.insert(match known {
+            Some(partials) => partials,
+            None => (count, self.device.zeros(count)?),
+        });
+        Ok(partials)
     }
 
     /// Takes an image's buffer back for reuse.

@@ -2,6 +2,7 @@
 
 use super::convolution::Convolution;
 use super::linear::Linear;
+use viewfuse_device::parallel::for_each_rows;
 use viewfuse_device::{Device, DeviceError, Layer, LayerShape};
 
 /// The fewest rows and columns of images for which a device may use its algorithm for large images.
@@ -166,21 +167,29 @@ impl BatchNorm {
 
 /// Rows and columns of the squares in which [`reordered`] goes through a matrix: as many numbers as a line of a cache has.
 const SQUARE: usize = 16;
+/// Numbers that are enough work for a core.
+const LEAST: usize = 1 << 14;
 
-/// `values[row][column]` of so many rows, as `[place(column)][row]`; what has no place in it is 0.
+/// `values[row][column]` of so many rows, as `[place(column)][row]`; what has no place in it is 0. Columns have
+/// different places.
 fn reordered(values: &[f32], row_count: usize, place_count: usize, place: impl Fn(usize) -> usize) -> Vec<f32> {
+    let row_count = row_count.max(1);
     let mut placed = vec![0.0; place_count * row_count];
-    let columns = values.len() / row_count.max(1);
-    for first_column in (0..columns).step_by(SQUARE) {
-        let places: Vec<usize> = (first_column..columns.min(first_column + SQUARE)).map(&place).collect();
-        for first_row in (0..row_count).step_by(SQUARE) {
-            let rows = first_row..row_count.min(first_row + SQUARE);
-            for (column, place) in (first_column..).zip(&places) {
-                let placed = &mut placed[place * row_count..][rows.clone()];
-                rows.clone().zip(placed).for_each(|(row, placed)| *placed = values[row * columns + column]);
+    let columns = values.len() / row_count;
+    let mut places: Vec<Option<&mut [f32]>> = placed.chunks_exact_mut(row_count).map(Some).collect();
+    let mut targets: Vec<Option<&mut [f32]>> =
+        (0..columns).map(|column| places.get_mut(place(column))?.take()).collect();
+    for_each_rows(&mut targets, SQUARE, LEAST / row_count, &|first, targets| {
+        for (square, targets) in targets.chunks_mut(SQUARE).enumerate() {
+            for first_row in (0..row_count).step_by(SQUARE) {
+                let rows = first_row..row_count.min(first_row + SQUARE);
+                for (column, target) in (first * SQUARE + square * SQUARE..).zip(&mut *targets) {
+                    let placed = target.as_deref_mut().map_or(&mut [][..], |target| &mut target[rows.clone()]);
+                    rows.clone().zip(placed).for_each(|(row, placed)| *placed = values[row * columns + column]);
+                }
             }
         }
-    }
+    });
     placed
 }
 

@@ -330,6 +330,15 @@ macro_rules! shared_numbers {
     (blend_gradient) => {
         bodies::together::BLEND_GRADIENT_SHARED
     };
+    (group_norm_partials) => {
+        bodies::together::GROUP_NORM_PARTIALS_SHARED
+    };
+    (softmax_rows) => {
+        bodies::together::SOFTMAX_ROWS_SHARED
+    };
+    (group_norm) => {
+        bodies::together::GROUP_NORM_SHARED
+    };
 }
 
 /// How a body that must not panic gets a binding.
@@ -339,6 +348,9 @@ macro_rules! unchecked {
     };
     ($kind:ident $array:ident, vectors) => {
         &Vectors(&Endless($array))
+    };
+    (write $array:ident) => {
+        &mut Unchecked($array)
     };
     ($kind:ident $array:ident) => {
         &Endless($array)

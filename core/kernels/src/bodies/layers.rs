@@ -2,7 +2,7 @@
 
 use crate::network::attend::{softmax_scale, softmax_value};
 use crate::network::depthwise::{DepthwiseBlock, depthwise_element};
-use crate::network::group_norm::{self, GroupNormBlock, MeanBlock};
+use crate::network::group_norm::{self, GroupNormBlock, MeanBlock, RUN};
 use crate::network::resample::{PoolBlock, UpsampleBlock, pooled_element, upsampled_element};
 use crate::store::Store;
 
@@ -47,31 +47,29 @@ pub fn group_norm_partials(
     partials.store(group as usize, group_norm::group_norm_partials(inputs, block, group as usize));
 }
 
-/// Mean and factor of a group.
-#[inline]
-pub fn group_norm_statistics(
-    block: &GroupNormBlock,
-    partials: &[[f32; 2]],
-    statistics: &mut (impl Store<[f32; 2]> + ?Sized),
-    group: u32,
-) {
-    statistics.store(group as usize, group_norm::group_norm_statistics(partials, block, group as usize));
-}
-
-/// A channel of a pixel.
+/// A run of outputs.
 #[inline]
 pub fn group_norm(
     block: &GroupNormBlock,
     inputs: &[f32],
-    statistics: &[[f32; 2]],
+    partials: &[[f32; 2]],
     weights: &[f32],
     bias: &[f32],
     outputs: &mut (impl Store<f32> + ?Sized),
-    channel: u32,
+    run: u32,
 ) {
-    let element = channel as usize;
-    let value = group_norm::group_norm_element(inputs, statistics, weights, bias, block, element);
-    outputs.store(element, value);
+    let (mut element, all) = (run * RUN, block.output_count());
+    let end = if all - element < RUN { all } else { element + RUN };
+    let (mut group, mut statistics) = (u32::MAX, [0.0; 2]);
+    while element < end {
+        if group != block.group_of(element) {
+            group = block.group_of(element);
+            statistics = group_norm::group_norm_statistics(partials, block, group as usize);
+        }
+        let value = group_norm::group_norm_element(inputs, statistics, weights, bias, block, element as usize);
+        outputs.store(element as usize, value);
+        element += 1;
+    }
 }
 
 /// The weights of a row's scores.

@@ -2,6 +2,12 @@
 //! Its results are those of the body of that name, which is the definition. It must not panic: others wait for it.
 //! Arrays hold at least one element and may be read beyond their end.
 
+mod norms;
+
+pub use norms::{
+    GROUP_NORM_PARTIALS_SHARED, GROUP_NORM_SHARED, SOFTMAX_ROWS_SHARED, group_norm, group_norm_partials, softmax_rows,
+};
+
 use crate::gaussians::blend_gradient::{GradientLanes, GradientSums, NUMBERS, SplatGradient};
 use crate::gaussians::lanes::sum;
 use crate::gaussians::{MIN_TRANSMITTANCE, SPLAT_TILE, TileBlock};

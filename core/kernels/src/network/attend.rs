@@ -79,12 +79,24 @@ pub fn softmax_scale(scores: &(impl Fetch<f32> + ?Sized), first: usize, column_c
     let mut sum = 0.0;
     column = 0;
     while column < column_count as usize {
-        let below = scores.fetch(first + column) - largest;
-        // The exponential of NaN is 0.
-        sum += if has_nan_bits(below) { below } else { exp(below) };
+        sum += softmax_summand(scores.fetch(first + column), largest);
         column += 1;
     }
-    [largest, if sum == 0.0 { 0.0 } else { 1.0 / sum }]
+    [largest, softmax_factor(sum)]
+}
+
+/// `e^(score - largest)` for the sum of a row; NaN for NaN.
+#[inline]
+pub fn softmax_summand(score: f32, largest: f32) -> f32 {
+    let below = score - largest;
+    // The exponential of NaN is 0.
+    if has_nan_bits(below) { below } else { exp(below) }
+}
+
+/// What the numbers of a row of this sum are multiplied by.
+#[inline]
+pub fn softmax_factor(sum: f32) -> f32 {
+    if sum == 0.0 { 0.0 } else { 1.0 / sum }
 }
 
 /// Weight of a score in its row: `e^(score - largest)` times the row's factor.

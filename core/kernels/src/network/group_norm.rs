@@ -2,7 +2,8 @@
 //! channel by channel; and the mean of every channel.
 //!
 //! Statistics are computed in two steps, so that a device has enough parallel work: first of parts of the image, each
-//! in two passes (the mean, then the deviations from it), then the parts' merged (Chan, Golub, LeVeque 1979). Means are
+//! in two passes (the mean, then the deviations from it), then the parts' merged (Chan, Golub, LeVeque 1979) by each
+//! run of outputs for itself, which is less work than to wait for another kernel. Means are
 //! sums of differences from one of the values, and no difference of large sums is taken: of a group whose values are
 //! 1e4 times its deviation only the mean's own rounding is lost, and a constant group has deviations of exactly 0.
 
@@ -13,8 +14,11 @@ use viewfuse_core::math::{exp, has_finite_bits, max, sqrt};
 /// Pixels whose statistics are taken together.
 pub const PART: u32 = 64;
 
-/// A dispatch of [`group_norm_partials`], [`group_norm_statistics`] or [`group_norm_element`], as plain data. The
-/// yes-or-no field is 0 or 1.
+/// Outputs whose statistics are merged together.
+pub const RUN: u32 = 4096;
+
+/// A dispatch of [`group_norm_partials`] or of outputs ([`group_norm_statistics`], [`group_norm_element`]), as plain
+/// data. The yes-or-no field is 0 or 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct GroupNormBlock {
@@ -41,15 +45,41 @@ impl GroupNormBlock {
         self.pixel_count.div_ceil(PART)
     }
 
+    /// Runs of outputs.
+    #[inline]
+    pub fn run_count(&self) -> u32 {
+        self.output_count().div_ceil(RUN)
+    }
+
+    /// Outputs: channels of all pixels.
+    #[inline]
+    pub fn output_count(&self) -> u32 {
+        self.pixel_count * self.channels
+    }
+
+    /// The group of an output.
+    #[inline]
+    pub fn group_of(&self, element: u32) -> u32 {
+        element % self.channels / self.group_channels()
+    }
+
     /// Channels of a group.
     #[inline]
     pub fn group_channels(&self) -> u32 {
         self.channels / self.group_count
     }
 
+    /// Pixels of a part.
     #[inline]
-    fn pixels_of(&self, part: u32) -> u32 {
+    pub fn pixels_of(&self, part: u32) -> u32 {
         PART.min(self.pixel_count - part * PART)
+    }
+
+    /// The first input of element `element` of `[part][group]`.
+    #[inline]
+    pub fn first_of(&self, element: u32) -> u32 {
+        let (part, group) = (element / self.group_count, element % self.group_count);
+        self.in_first + part * PART * self.in_pitch + group * self.group_channels()
     }
 }
 
@@ -57,9 +87,8 @@ impl GroupNormBlock {
 /// `[part][group]`. Sums run pixel by pixel; the mean's is of differences from the group's first value in the part.
 #[inline]
 pub fn group_norm_partials(inputs: &(impl Fetch<f32> + ?Sized), block: &GroupNormBlock, element: usize) -> [f32; 2] {
-    let (part, group) = (element as u32 / block.group_count, element as u32 % block.group_count);
-    let (pixels, channels) = (block.pixels_of(part), block.group_channels());
-    let first = block.in_first + part * PART * block.in_pitch + group * channels;
+    let (pixels, channels) = (block.pixels_of(element as u32 / block.group_count), block.group_channels());
+    let first = block.first_of(element as u32);
     // Nearer to the mean than 0 is, wherever the group lies.
     let mut mean = inputs.fetch(first as usize);
     let mut deviations = 0.0;
@@ -122,14 +151,13 @@ pub fn group_norm_statistics(
 #[inline]
 pub fn group_norm_element(
     inputs: &(impl Fetch<f32> + ?Sized),
-    statistics: &(impl Fetch<[f32; 2]> + ?Sized),
+    [mean, factor]: [f32; 2],
     weights: &(impl Fetch<f32> + ?Sized),
     bias: &(impl Fetch<f32> + ?Sized),
     block: &GroupNormBlock,
     element: usize,
 ) -> f32 {
     let (pixel, channel) = (element as u32 / block.channels, element as u32 % block.channels);
-    let [mean, factor] = statistics.fetch((channel / block.group_channels()) as usize);
     let input = inputs.fetch((block.in_first + pixel * block.in_pitch + channel) as usize);
     let value = (input - mean) * (factor * weights.fetch(channel as usize)) + bias.fetch(channel as usize);
     if block.silu_outputs != 0 { silu(value) } else { value }

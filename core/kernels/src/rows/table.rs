@@ -138,22 +138,15 @@ macro_rules! for_each_kernel {
             /// Group-norm statistics of parts of an image, mean and squared deviations: `partials[part][group]`. An
             /// element is a group of channels in a part.
             GroupNormPartials group_norm_partials(block: GroupNormBlock)
-            for group in [0..block.part_count() * block.group_count], twin {
+            for group in [0..block.part_count() * block.group_count], together, twin {
                 filled inputs: f32,
                 write partials: [f32; 2],
             }
-            /// Group-norm statistics of an image from those of its parts, mean and factor: `statistics[group]`. An
-            /// element is a group of channels.
-            GroupNormStatistics group_norm_statistics(block: GroupNormBlock)
-            for group in [0..block.group_count; 4096 a core] {
-                read partials: [f32; 2],
-                write statistics: [f32; 2],
-            }
-            /// Group norm: `outputs[pixel][channel]`, with `weights[channel]` and `bias[channel]`. An element is a
-            /// channel of a pixel.
-            GroupNorm group_norm(block: GroupNormBlock) for channel in [0..block.pixel_count * block.channels], twin {
+            /// Group norm from the statistics of an image's parts: `outputs[pixel][channel]`, with `weights[channel]`
+            /// and `bias[channel]`. An element is a run of 4096 outputs (`group_norm::RUN`).
+            GroupNorm group_norm(block: GroupNormBlock) for run in [0..block.run_count()], together, twin {
                 filled inputs: f32,
-                read statistics: [f32; 2],
+                filled partials: [f32; 2],
                 filled weights: f32,
                 filled bias: f32,
                 write outputs: f32,
@@ -167,8 +160,8 @@ macro_rules! for_each_kernel {
                 write outputs: f32,
             }
             /// Softmax over rows: `weights[row][column]` from `scores[row][column]`. An element is a row.
-            SoftmaxRows softmax_rows(column_count: u32; row_count) for row in [0..row_count], looped {
-                read scores: f32,
+            SoftmaxRows softmax_rows(column_count: u32; row_count) for row in [0..row_count], together, looped {
+                filled scores: f32,
                 write weights: f32,
             }
             /// Weighted sums over views: `fused[element]` from the weights of the element's point and
@@ -255,8 +248,8 @@ macro_rules! for_each_kernel {
                 write list: u32,
             }
             /// Where numbers are not finite: `firsts[run]` is the index of the first infinite or NaN number of a run of
-            /// 1024 (`finite::FINITE_RUN`), or `u32::MAX`. An element is a run.
-            FindNonFinite find_non_finite(value_count: u32) for run in [0..value_count.div_ceil(FINITE_RUN); 64 a core] {
+            /// 256 (`finite::FINITE_RUN`), or `u32::MAX`. An element is a run.
+            FindNonFinite find_non_finite(value_count: u32) for run in [0..value_count.div_ceil(FINITE_RUN); 256 a core] {
                 read values: f32,
                 write firsts: u32,
             }

@@ -3,7 +3,7 @@
 use super::scratch::with_scratch;
 use crate::parallel::{for_each_row, for_each_rows};
 use pulp::{Arch, Simd, WithSimd};
-use viewfuse_kernels::network::group_norm::{GroupNormBlock, MeanBlock, PART, silu};
+use viewfuse_kernels::network::group_norm::{GroupNormBlock, MeanBlock, PART, group_norm_statistics, silu};
 
 pub(super) fn channel_means(block: &MeanBlock, inputs: &[f32], means: &mut [f32]) {
     let means = &mut means[..block.channels as usize];
@@ -28,12 +28,14 @@ pub(super) fn group_norm_partials(block: &GroupNormBlock, inputs: &[f32], partia
 pub(super) fn group_norm(
     block: &GroupNormBlock,
     inputs: &[f32],
-    statistics: &[[f32; 2]],
+    partials: &[[f32; 2]],
     weights: &[f32],
     bias: &[f32],
     outputs: &mut [f32],
 ) {
     let (channels, pixel_count) = (block.channels as usize, block.pixel_count as usize);
+    let groups = 0..block.group_count as usize;
+    let statistics: Vec<[f32; 2]> = groups.map(|group| group_norm_statistics(partials, block, group)).collect();
     let of_channel = |channel: usize| statistics[channel / block.group_channels() as usize];
     let mean: Vec<f32> = (0..channels).map(|channel| of_channel(channel)[0]).collect();
     let factor: Vec<f32> = (0..channels).map(|channel| of_channel(channel)[1] * weights[channel]).collect();
