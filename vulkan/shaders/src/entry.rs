@@ -120,7 +120,7 @@ macro_rules! entry {
             #[spirv(global_invocation_id)] id: UVec3,
             #[spirv(push_constant)] push: &Push<$Block>,
             $($parameters)*
-            #[spirv(workgroup)] shared: &mut [f32; shared_numbers!($method)],
+            #[spirv(workgroup)] shared: &mut [u32; shared_words!($method)],
         ) {
             bodies::together::$method(&push.parameters, $($arguments)* Together(shared), push.piece.first + id.x);
         }
@@ -326,10 +326,25 @@ macro_rules! entry {
     };
 }
 
-/// Numbers of the workgroup's memory that a kernel takes whose elements are computed together.
-macro_rules! shared_numbers {
+/// Words of the workgroup's memory that a kernel takes whose elements are computed together.
+macro_rules! shared_words {
     (blend_gradient) => {
         bodies::together::BLEND_GRADIENT_SHARED
+    };
+    (blend_splats) => {
+        bodies::together::BLEND_SPLATS_SHARED
+    };
+    (count_entries) => {
+        bodies::together::ENTRIES_SHARED
+    };
+    (list_entries) => {
+        bodies::together::ENTRIES_SHARED
+    };
+    (sum_entries) => {
+        bodies::together::SUM_ENTRIES_SHARED
+    };
+    (start_tiles) => {
+        bodies::together::START_TILES_SHARED
     };
 }
 
@@ -337,6 +352,9 @@ macro_rules! shared_numbers {
 macro_rules! unchecked {
     (write $array:ident, vectors) => {
         &mut VectorsMut(&mut Unchecked($array))
+    };
+    (write $array:ident) => {
+        &mut Unchecked($array)
     };
     ($kind:ident $array:ident, vectors) => {
         &Vectors(&Endless($array))

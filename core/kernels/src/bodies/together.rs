@@ -2,6 +2,12 @@
 //! Its results are those of the body of that name, which is the definition. It must not panic: others wait for it.
 //! Arrays hold at least one element and may be read beyond their end.
 
+mod blend;
+mod entries;
+
+pub use blend::*;
+pub use entries::*;
+
 use crate::gaussians::blend_gradient::{GradientLanes, GradientSums, NUMBERS, SplatGradient};
 use crate::gaussians::lanes::sum;
 use crate::gaussians::{MIN_TRANSMITTANCE, SPLAT_TILE, TileBlock};
