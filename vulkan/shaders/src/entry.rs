@@ -343,6 +343,12 @@ macro_rules! shared_words {
     (sum_entries) => {
         bodies::together::SUM_ENTRIES_SHARED
     };
+    (follow_paths) => {
+        bodies::together::FOLLOW_PATHS_SHARED
+    };
+    (sum_shares) => {
+        bodies::together::SUM_SHARES_SHARED
+    };
     (start_tiles) => {
         bodies::together::START_TILES_SHARED
     };

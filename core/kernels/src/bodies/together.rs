@@ -4,9 +4,13 @@
 
 mod blend;
 mod entries;
+mod paths;
+mod shares;
 
 pub use blend::*;
 pub use entries::*;
+pub use paths::*;
+pub use shares::*;
 
 use crate::gaussians::blend_gradient::{GradientLanes, GradientSums, NUMBERS, SplatGradient};
 use crate::gaussians::lanes::sum;

@@ -388,11 +388,12 @@ macro_rules! for_each_kernel {
                 read means: Planes as vectors,
                 write costs[block.group_count * pixel]: Planes as vectors,
             }
-            /// Costs joined along lines in four directions: `paths[direction][line][step][group]`. An element is a
-            /// line.
-            FollowPaths follow_paths(block: CostBlock) for line in [0..block.line_count(); 1 a core], wide {
-                read means: Planes as vectors,
-                write paths[block.first_of_line(line)]: Planes as vectors,
+            /// Costs joined along lines in four directions: `paths[direction][line][step][group]`. An element are
+            /// 8 lines.
+            FollowPaths follow_paths(block: CostBlock)
+            for lines in [0..block.line_count().div_ceil(8); 1 a core], together, wide {
+                filled means: Planes as vectors,
+                write paths[block.first_of_line(8 * lines)]: Planes as vectors,
             }
             /// The mean of the four directions' costs: `costs[row][column][group]`. An element is a group of planes of
             /// a pixel.
@@ -575,8 +576,9 @@ macro_rules! for_each_kernel {
                 write next_terms: HarmonicTerm as vectors,
             }
             /// What runs of 256 pixels add to the derivative by a gain: `sums[run]`. An element is a run.
-            SumShares sum_shares(pixel_count: u32) for run in [0..pixel_count.div_ceil(SHARE_RUN); 64 a core] {
-                read shares: [f32; 4] as vectors,
+            SumShares sum_shares(pixel_count: u32)
+            for run in [0..pixel_count.div_ceil(SHARE_RUN); 64 a core], together {
+                filled shares: [f32; 4] as vectors,
                 write sums: [f32; 4] as vectors,
             }
             /// The photographs' gains after a step of one of them; their mean is 1. An element is a photograph.

@@ -190,7 +190,7 @@ impl Case for SumEntries {
     /// Of a picture with many runs of tiles.
     fn inputs(seed: u64, size: u32) -> Vec<SumEntries> {
         let numbers = &mut Numbers::new(seed);
-        let block = ListBlock { width: 331 + size % 7, height: 201, splat_count: 64 + 4 * size, capacity: 0 };
+        let block = ListBlock { width: 331 + size % 7, height: 201, splat_count: 64 + size, capacity: 0 };
         let count = block.piece_count() * TILES_OF_BIN;
         let counts: Vec<u32> = (0..count).map(|_| numbers.between(0.0, 9.0) as u32).collect();
         let before = Output::Zeros((block.run_count() * block.part_count() * TILE_RUN) as usize);
