@@ -12,9 +12,10 @@ use viewfuse::job::progress::Silent;
 use viewfuse::scene::photographs::to_rgb8;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::metrics::psnr;
+use viewfuse_core::random::uniform;
 use viewfuse_kernels::gaussians::lists::ListStatus;
 use viewfuse_kernels::gaussians::{SplatBlock, TileBlock};
-use viewfuse_kernels::rows::{GaussianBlock, LIST_PARTS, ListBlock, ProjectedGaussian};
+use viewfuse_kernels::rows::{GaussianBlock, ListBlock, ProjectedGaussian, TILE_RUN, WORKGROUP};
 use viewfuse_tests::cloud::toy_cloud;
 use viewfuse_vulkan::GpuOptions;
 
@@ -22,6 +23,7 @@ tests!(
     derivatives_of_a_scene_are_the_cpus,
     a_scene_is_as_good_as_the_cpus,
     lists_of_tiles_are_the_hosts,
+    lists_of_a_large_picture_are_the_hosts,
     iterations_of_a_device_are_the_hosts,
     a_devices_scene_depends_on_no_capacity_and_no_run,
     an_iteration_needs_no_transfer,
@@ -144,15 +146,16 @@ fn lists_on<D: Device>(device: &D, block: ListBlock, splats: &[ProjectedGaussian
     let zeros = |count: u32| device.zeros(count as usize).expect("memory");
     let splats = device.upload(splats).expect("splats");
     let mut masks = zeros(block.bin_count() * block.mask_count());
-    let (mut counts, mut sums) = (zeros(block.tile_count() * LIST_PARTS), zeros(block.run_count()));
+    let (mut counts, mut before) = (zeros(block.most_counts()), zeros(block.most_counts()));
+    let mut sums = zeros(block.run_count() * TILE_RUN);
     let (mut starts, status, mut after) = (zeros(block.tile_count() + 1), zeros(3), zeros(3));
     let (mut keys, mut entries) = (device.zeros(block.capacity as usize).expect("memory"), zeros(block.capacity));
     let mut run = || {
         device.mark_bins(&block, &splats, &mut masks)?;
         device.count_entries(&block, &splats, &masks, &mut counts)?;
-        device.sum_entries(&block, &counts, &mut sums)?;
-        device.start_tiles(&block, &counts, &sums, &status, &mut starts, &mut after)?;
-        device.list_entries(&block, &splats, &masks, &starts, &counts, &mut keys)?;
+        device.sum_entries(&block, &counts, &mut before, &mut sums)?;
+        device.start_tiles(&block, &sums, &status, &mut starts, &mut after)?;
+        device.list_entries(&block, &splats, &masks, &starts, &before, &mut keys)?;
         device.sort_entries(&block, &starts, &keys, &mut entries)?;
         let status = device.download(&after)?;
         Ok::<_, viewfuse::device::DeviceError>((device.download(&starts)?, device.download(&entries)?, status))
@@ -188,6 +191,33 @@ fn lists_of_tiles_are_the_hosts(candidate: &Candidate) -> Result<(), Failed> {
             }
         }
     }
+    Ok(())
+}
+
+/// Of so many splats on so large a picture that a part of them has more masks than a workgroup has invocations.
+fn lists_of_a_large_picture_are_the_hosts(candidate: &Candidate) -> Result<(), Failed> {
+    const COUNT: u32 = 60_000;
+    let device = candidate.vulkan(&GpuOptions::default())?;
+    let (width, height) = (1021, 643);
+    let splat = |index: u32| {
+        let [x, y, depth, size] = [0, 1, 2, 3].map(|stream| uniform(7, index, stream));
+        let (right, down) = (0.5 + 3.0 * size, 3.5 - 3.0 * size);
+        ProjectedGaussian {
+            mean: [x * width as f32, y * height as f32],
+            // Many of the same depth.
+            depth: 1.0 + (depth * 500.0).floor(),
+            opacity: 0.1 + 0.8 * depth,
+            conic: [1.0 / (right * right), 0.0, 1.0 / (down * down)],
+            extent: [3.4 * right, 3.4 * down],
+            ..ProjectedGaussian::default()
+        }
+    };
+    let splats: Vec<ProjectedGaussian> = (0..COUNT).map(splat).collect();
+    let expected = Tiles::of(&TileBlock::new(width, height, [0.0; 3]), &splats);
+    let block = ListBlock { width, height, splat_count: COUNT, capacity: expected.entries.len() as u32 };
+    assert!(block.mask_count() / block.part_count() > WORKGROUP, "parts of few masks");
+    let (starts, entries, _) = lists_on(&device, block, &splats);
+    assert!(starts == expected.starts && entries == expected.entries);
     Ok(())
 }
 

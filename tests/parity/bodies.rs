@@ -136,12 +136,12 @@ struct Group<'a> {
 }
 
 impl Workgroup for Group<'_> {
-    fn put(&mut self, index: usize, value: f32) {
-        self.memory[index].store(value.to_bits(), Ordering::Relaxed);
+    fn put_word(&mut self, index: usize, word: u32) {
+        self.memory[index].store(word, Ordering::Relaxed);
     }
 
-    fn get(&self, index: usize) -> f32 {
-        f32::from_bits(self.memory[index].load(Ordering::Relaxed))
+    fn word(&self, index: usize) -> u32 {
+        self.memory[index].load(Ordering::Relaxed)
     }
 
     fn wait(&mut self) {

@@ -15,8 +15,9 @@ use viewfuse_tests::places::repository;
 
 /// Kernels with loops that keep rust-gpu's shape, and how many: a `break` or an early `return` in the body ends them,
 /// so that what decides at their end is known in the body alone.
-const LEFT_BY_THEIR_BODY: [(&str, usize); 9] = [
+const LEFT_BY_THEIR_BODY: [(&str, usize); 10] = [
     ("blend_gradient", 2),
+    ("blend_splats", 1),
     ("find_non_finite", 1),
     ("fine_depths", 1),
     ("gather_latents", 1),
@@ -29,7 +30,7 @@ const LEFT_BY_THEIR_BODY: [(&str, usize); 9] = [
 
 /// Kernels with arrays of an invocation's own that a loop's counter indexes. rust-gpu unrolls nothing: until a driver
 /// does, these arrays are memory and not registers.
-const INDEXED_BY_A_COUNTER: [&str; 30] = [
+const INDEXED_BY_A_COUNTER: [&str; 32] = [
     "add_noise",
     "blend_gradient",
     "blend_planes",
@@ -40,12 +41,14 @@ const INDEXED_BY_A_COUNTER: [&str; 30] = [
     "compare_views",
     "compare_windows",
     "composite",
+    "count_entries",
     "embed_points",
     "follow_paths",
     "front_cost",
     "gather_gradients",
     "hull_entry",
     "join_paths",
+    "list_entries",
     "look_up_texels",
     "march_rays",
     "match_cost",

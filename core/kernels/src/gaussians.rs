@@ -99,20 +99,13 @@ impl TileBlock {
         [tile % self.tile_columns * SPLAT_TILE as u32, tile / self.tile_columns * SPLAT_TILE as u32]
     }
 
-    /// Column and row of a pixel that is counted tile by tile, row by row in each, whole tiles at the borders, too;
-    /// `None` outside of the picture.
+    /// Column and row of a pixel of a tile, row by row, whole tiles at the borders, too; `None` outside of the picture.
     #[inline]
-    pub fn pixel_of_tiles(&self, pixel: u32) -> Option<[u32; 2]> {
+    pub fn pixel_of_tile(&self, tile: u32, pixel: u32) -> Option<[u32; 2]> {
         const SIDE: u32 = SPLAT_TILE as u32;
-        let ([column, row], pixel_of_tile) = (self.first_of(pixel / (SIDE * SIDE)), pixel % (SIDE * SIDE));
-        let (column, row) = (column + pixel_of_tile % SIDE, row + pixel_of_tile / SIDE);
+        let [column, row] = self.first_of(tile);
+        let (column, row) = (column + pixel % SIDE, row + pixel / SIDE);
         if column < self.width && row < self.height { Some([column, row]) } else { None }
-    }
-
-    /// How many pixels its tiles have, whole ones at the borders, too.
-    #[inline]
-    pub fn pixels_of_tiles(&self) -> u32 {
-        self.tile_count() * (SPLAT_TILE * SPLAT_TILE) as u32
     }
 
     /// How many parts of rows: each is a tile's part of a row of pixels.

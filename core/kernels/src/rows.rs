@@ -63,7 +63,7 @@ pub use kernel::{Access, Array, Form, Kernel, Layout, Piece, SHARED_BYTES, WORKG
 pub use crate::compact::RUN;
 pub use crate::finite::FINITE_RUN;
 pub use crate::gaussians::blend_gradient::SplatGradient;
-pub use crate::gaussians::lists::{LIST_PARTS, ListBlock, STATUS_NUMBERS};
+pub use crate::gaussians::lists::{ListBlock, STATUS_NUMBERS, TILE_RUN};
 pub use crate::gaussians::steps::{GainStepBlock, HarmonicTerm, ParticleBlock, ParticleState, StepBlock};
 pub use crate::gaussians::windows::{GainBlock, LossBlock, SHARE_RUN};
 pub use crate::gaussians::{SplatBlock, TileBlock};

@@ -9,6 +9,7 @@ use crate::DepthMap;
 use crate::render::{RenderError, Stage};
 use viewfuse_core::Vec3;
 use viewfuse_core::lookup::bilinear;
+use viewfuse_device::parallel::map;
 use viewfuse_job::progress::{Interrupted, Progress};
 use viewfuse_scene::photographs::{SourceImage, SourceImages};
 use viewfuse_weighting::Weighting;
@@ -24,6 +25,8 @@ const SURFACE_TOLERANCE: f32 = 0.05;
 const MIN_CONFIDENCE: f32 = 0.5;
 /// Opacity of a photograph from which on a pixel belongs to the object.
 const MIN_OPACITY: f32 = 0.5;
+/// Pixels that are enough work for a thread.
+const MIN_PIXELS: usize = 128;
 
 /// A point on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,16 +112,18 @@ impl Fusion<'_> {
         let mut is_used: Vec<Vec<bool>> = self.maps.iter().map(|map| vec![false; map.depths.len()]).collect();
         let mut points = Vec::new();
         progress.expect(self.maps.len());
-        for (view, map) in self.maps.iter().enumerate() {
+        for view in 0..self.maps.len() {
             progress.check()?;
-            for pixel in 0..map.depths.len() {
-                if is_used[view][pixel] {
-                    continue;
-                }
-                if let Some(parts) = self.parts(view, pixel) {
-                    parts.iter().for_each(|part| is_used[part.view][part.pixel] = true);
-                    points.extend(self.fused(&parts));
-                }
+            let unused: Vec<usize> = (0..is_used[view].len()).filter(|pixel| !is_used[view][*pixel]).collect();
+            // No point has two pixels of this view: none of these uses another.
+            let found = map(unused.len(), MIN_PIXELS, |index| {
+                let parts = self.parts(view, unused[index])?;
+                let fused = self.fused(&parts);
+                Some((parts, fused))
+            });
+            for (parts, fused) in found.into_iter().flatten() {
+                parts.iter().for_each(|part| is_used[part.view][part.pixel] = true);
+                points.extend(fused);
             }
             progress.step();
         }

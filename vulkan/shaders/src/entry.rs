@@ -120,7 +120,7 @@ macro_rules! entry {
             #[spirv(global_invocation_id)] id: UVec3,
             #[spirv(push_constant)] push: &Push<$Block>,
             $($parameters)*
-            #[spirv(workgroup)] shared: &mut [f32; shared_numbers!($method)],
+            #[spirv(workgroup)] shared: &mut [u32; shared_words!($method)],
         ) {
             bodies::together::$method(&push.parameters, $($arguments)* Together(shared), push.piece.first + id.x);
         }
@@ -325,11 +325,12 @@ macro_rules! entries_in_fours {
     };
 }
 
-/// Numbers of the workgroup's memory that a kernel takes whose elements are computed together.
-macro_rules! shared_numbers {
+/// Words of the workgroup's memory that a kernel takes whose elements are computed together.
+macro_rules! shared_words {
     (blend_gradient) => {
         bodies::together::BLEND_GRADIENT_SHARED
     };
+<<<<<<< HEAD
     (group_norm_partials) => {
         bodies::together::GROUP_NORM_PARTIALS_SHARED
     };
@@ -338,6 +339,28 @@ macro_rules! shared_numbers {
     };
     (group_norm) => {
         bodies::together::GROUP_NORM_SHARED
+=======
+    (blend_splats) => {
+        bodies::together::BLEND_SPLATS_SHARED
+    };
+    (count_entries) => {
+        bodies::together::ENTRIES_SHARED
+    };
+    (list_entries) => {
+        bodies::together::ENTRIES_SHARED
+    };
+    (sum_entries) => {
+        bodies::together::SUM_ENTRIES_SHARED
+    };
+    (follow_paths) => {
+        bodies::together::FOLLOW_PATHS_SHARED
+    };
+    (sum_shares) => {
+        bodies::together::SUM_SHARES_SHARED
+    };
+    (start_tiles) => {
+        bodies::together::START_TILES_SHARED
+>>>>>>> 915a3f2319d8bb8658c8b9480e83fe37719aee94
     };
 }
 
@@ -345,6 +368,9 @@ macro_rules! shared_numbers {
 macro_rules! unchecked {
     (write $array:ident, vectors) => {
         &mut VectorsMut(&mut Unchecked($array))
+    };
+    (write $array:ident) => {
+        &mut Unchecked($array)
     };
     ($kind:ident $array:ident, vectors) => {
         &Vectors(&Endless($array))

@@ -75,17 +75,17 @@ impl StoreFours for UncheckedFours<'_> {
 }
 
 /// The memory of a workgroup that computes an element together.
-pub(crate) struct Together<'a, const N: usize>(pub(crate) &'a mut [f32; N]);
+pub(crate) struct Together<'a, const N: usize>(pub(crate) &'a mut [u32; N]);
 
 impl<const N: usize> Workgroup for Together<'_, N> {
     #[inline(always)]
-    fn put(&mut self, index: usize, value: f32) {
+    fn put_word(&mut self, index: usize, word: u32) {
         // SAFETY: within the array for all indices.
-        unsafe { *self.0.index_unchecked_mut(index.min(N - 1)) = value };
+        unsafe { *self.0.index_unchecked_mut(index.min(N - 1)) = word };
     }
 
     #[inline(always)]
-    fn get(&self, index: usize) -> f32 {
+    fn word(&self, index: usize) -> u32 {
         // SAFETY: within the array for all indices.
         unsafe { *self.0.index_unchecked(index.min(N - 1)) }
     }

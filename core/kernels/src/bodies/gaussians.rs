@@ -21,7 +21,7 @@ pub fn project_gaussians(
     splats.store(at, project(&gaussians.fetch(at), &block.camera, block.near));
 }
 
-/// A pixel, counted tile by tile.
+/// The pixels of a tile.
 #[inline(always)]
 pub fn blend_splats(
     block: &TileBlock,
@@ -30,13 +30,17 @@ pub fn blend_splats(
     splats: &(impl Fetch<ProjectedGaussian> + ?Sized),
     colours: &mut (impl Store<[f32; 4]> + ?Sized),
     depths: &mut (impl Store<f32> + ?Sized),
-    pixel: u32,
+    tile: u32,
 ) {
-    if let Some([column, row]) = block.pixel_of_tiles(pixel) {
-        let blended = BlendedLanes::<1>::of(block, starts, entries, splats, [column, row]);
-        let at = (row * block.width + column) as usize;
-        colours.store(at, blended.pixel(0));
-        depths.store(at, blended.depth[0]);
+    let mut pixel = 0;
+    while pixel < (SPLAT_TILE * SPLAT_TILE) as u32 {
+        if let Some([column, row]) = block.pixel_of_tile(tile, pixel) {
+            let blended = BlendedLanes::<1>::of(block, starts, entries, splats, [column, row]);
+            let at = (row * block.width + column) as usize;
+            colours.store(at, blended.pixel(0));
+            depths.store(at, blended.depth[0]);
+        }
+        pixel += 1;
     }
 }
 

@@ -2,7 +2,9 @@
 //! too long ([`ListStatus`](crate::gaussians::lists::ListStatus)), steps leave everything as it is.
 
 use crate::gaussians::blend_gradient::SplatGradient;
-use crate::gaussians::lists::{LIST_PARTS, ListBlock, TILE_RUN, entry_of, is_reached, rank};
+use crate::gaussians::lists::{
+    self, ListBlock, RUNS_TOGETHER, TILE_RUN, TILES_OF_BIN, entry_of, is_reached, rank, saturating,
+};
 use crate::gaussians::project_gradient;
 use crate::gaussians::steps::{
     GainStepBlock, HarmonicTerm, ParticleBlock, ParticleState, StepBlock, by_colour, colour_along, corrections,
@@ -46,84 +48,110 @@ pub fn mark_bins(
     masks.store(mask as usize, block.mask(splats, mask));
 }
 
-/// How many splats of a part a tile shows.
+/// How many splats of a piece each tile of its bin shows.
 #[inline(always)]
 pub fn count_entries(
     block: &ListBlock,
     splats: &(impl Fetch<ProjectedGaussian> + ?Sized),
     masks: &[u32],
     counts: &mut (impl Store<u32> + ?Sized),
-    part: u32,
+    piece: u32,
 ) {
-    counts.store(part as usize, block.fold_entries(splats, masks, part, 0, |count, _, _| count + 1));
+    let mut tile = 0;
+    while tile < TILES_OF_BIN {
+        let count = block.fold_entries(splats, masks, piece, tile, 0, |count, _, _| count + 1);
+        counts.store((piece * TILES_OF_BIN + tile) as usize, count);
+        tile += 1;
+    }
 }
 
-/// The entries of a run of tiles.
+/// The entries of a run of tiles, before each part and up to each tile.
 #[inline(always)]
-pub fn sum_entries(block: &ListBlock, counts: &[u32], sums: &mut (impl Store<u32> + ?Sized), run: u32) {
-    let end = if (run + 1) * TILE_RUN < block.tile_count() { (run + 1) * TILE_RUN } else { block.tile_count() };
-    sums.store(run as usize, ListBlock::sum(counts, run * TILE_RUN * LIST_PARTS, end * LIST_PARTS));
+pub fn sum_entries(
+    block: &ListBlock,
+    counts: &[u32],
+    before: &mut (impl Store<u32> + ?Sized),
+    sums: &mut (impl Store<u32> + ?Sized),
+    run: u32,
+) {
+    let (mut tile, mut all) = (0, 0);
+    while tile < TILE_RUN {
+        let (mut part, mut sum) = (0, 0);
+        while part < block.part_count() {
+            before.store(block.before_at(run, part, tile) as usize, sum);
+            sum += counts[block.count_at(run, part, tile) as usize];
+            part += 1;
+        }
+        all += sum;
+        sums.store((run * TILE_RUN + tile) as usize, all);
+        tile += 1;
+    }
 }
 
-/// Where a tile's list begins; behind the last one, where it ends, and then the numbers of the status.
+/// Where the lists of some runs' tiles begin; the last element writes where the last list ends, and the status.
 #[inline(always)]
 pub fn start_tiles(
     block: &ListBlock,
-    counts: &[u32],
     sums: &[u32],
     status: &[u32],
     starts: &mut (impl Store<u32> + ?Sized),
     next_status: &mut (impl Store<u32> + ?Sized),
     element: u32,
 ) {
-    let tile_count = block.tile_count();
-    let tile = if element < tile_count { element } else { tile_count };
-    let [before, all] = block.of_runs(sums, tile);
-    let is_over = all > block.capacity || status[0] != 0;
-    if element <= tile_count {
-        let first = tile / TILE_RUN * TILE_RUN * LIST_PARTS;
-        let start = before + ListBlock::sum(counts, first, tile * LIST_PARTS);
-        starts.store(element as usize, if is_over { 0 } else { start });
-        return;
+    let (first, run_count) = (element * RUNS_TOGETHER, block.run_count());
+    let (mut before, mut all, mut run) = (0, 0, 0);
+    while run < run_count {
+        before = if run == first { all } else { before };
+        all = saturating(all, sums[(run * TILE_RUN + TILE_RUN - 1) as usize]);
+        run += 1;
     }
-    let number = element - tile_count - 1;
-    let value = match number {
-        0 => u32::from(is_over),
-        1 => status[1] + u32::from(!is_over),
-        _ => {
-            if status[2] > all {
-                status[2]
-            } else {
-                all
-            }
+    let is_over = all > block.capacity || status[0] != 0;
+    run = first;
+    while run < first + RUNS_TOGETHER && run < run_count {
+        let mut tile = 0;
+        while tile < block.tiles_of_run(run) {
+            let start = ListBlock::start_of(sums, before, first, run, tile);
+            starts.store((block.first_of_run(run) + tile) as usize, if is_over { 0 } else { start });
+            tile += 1;
         }
-    };
-    next_status.store(number as usize, value);
+        run += 1;
+    }
+    if run == run_count {
+        starts.store(block.tile_count() as usize, if is_over { 0 } else { all });
+        let numbers = lists::next_status([status[0], status[1], status[2]], all, is_over);
+        next_status.store(0, numbers[0]);
+        next_status.store(1, numbers[1]);
+        next_status.store(2, numbers[2]);
+    }
 }
 
-/// The keys of the splats of a part that a tile shows: the bits of their depths and their indices.
+/// The keys of the splats of a piece that the tiles of its bin show: the bits of their depths and their indices.
 #[inline(always)]
 pub fn list_entries(
     block: &ListBlock,
     splats: &(impl Fetch<ProjectedGaussian> + ?Sized),
     masks: &[u32],
     starts: &[u32],
-    counts: &[u32],
+    before: &[u32],
     keys: &mut (impl Store<[u32; 2]> + ?Sized),
-    part: u32,
+    piece: u32,
 ) {
-    let tile = (part / LIST_PARTS) as usize;
-    if starts[tile] == starts[tile + 1] {
-        return;
-    }
-    let first = ListBlock::first_of_part(starts, counts, part);
-    let end = first + counts[part as usize];
-    block.fold_entries(splats, masks, part, first, move |place, depth, index| {
-        if place < end {
-            keys.store(place as usize, [depth.to_bits(), index]);
+    let mut tile = 0;
+    while tile < TILES_OF_BIN {
+        let place = block.tile_of_bin(block.bin_of_piece(piece), tile);
+        if block.has_tile(place) {
+            let list = (place[1] * block.tile_columns() + place[0]) as usize;
+            let (part, end) = (piece % block.part_count(), starts[list + 1]);
+            let first = starts[list] + before[block.before_at(block.run_of(place), part, tile % TILE_RUN) as usize];
+            block.fold_entries(splats, masks, piece, tile, first, |place, depth, index| {
+                if place < end {
+                    keys.store(place as usize, [depth.to_bits(), index]);
+                }
+                place + 1
+            });
         }
-        place + 1
-    });
+        tile += 1;
+    }
 }
 
 /// Puts the splat of a key where it belongs in the list of its tile.

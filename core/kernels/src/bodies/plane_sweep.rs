@@ -8,7 +8,7 @@ use crate::plane_sweep::disparity;
 use crate::plane_sweep::evidence::{self, ViewPair};
 use crate::plane_sweep::front::{self, Front, FrontBlock};
 use crate::plane_sweep::frustum::{FrustumBlock, SweptView};
-use crate::plane_sweep::path::{self, CostBlock, Line};
+use crate::plane_sweep::path::{self, CostBlock, LINES_TOGETHER, Line};
 use crate::plane_sweep::window::{self, WindowBlock};
 use crate::store::Store;
 use viewfuse_core::fetch::Fetch;
@@ -110,9 +110,24 @@ pub fn front_cost(
     }
 }
 
-/// The joined costs of a line.
+/// The joined costs of some lines.
 #[inline(always)]
 pub fn follow_paths(
+    block: &CostBlock,
+    means: &(impl Fetch<Planes> + ?Sized),
+    paths: &mut (impl Store<Planes> + ?Sized),
+    lines: u32,
+) {
+    let (mut line, end) = (lines * LINES_TOGETHER, (lines + 1) * LINES_TOGETHER);
+    while line < end && line < block.line_count() {
+        follow_path(block, means, paths, line);
+        line += 1;
+    }
+}
+
+/// The joined costs of a line.
+#[inline(always)]
+fn follow_path(
     block: &CostBlock,
     means: &(impl Fetch<Planes> + ?Sized),
     paths: &mut (impl Store<Planes> + ?Sized),

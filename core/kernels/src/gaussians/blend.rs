@@ -21,6 +21,9 @@ pub struct BlendedLanes<const N: usize> {
 }
 
 impl<const N: usize> BlendedLanes<N> {
+    /// Before the first splat.
+    pub const BEGUN: BlendedLanes<N> = BlendedLanes { colour: [[0.0; N]; 3], depth: [0.0; N], transmittance: [1.0; N] };
+
     /// Composites the splats of a tile, `entries[starts[tile]..starts[tile + 1]]`, front to back, at pixels of it: the
     /// first one's column and row. A pixel behind whose splats less than [`MIN_TRANSMITTANCE`] is seen takes no more.
     #[inline(always)]
@@ -33,15 +36,14 @@ impl<const N: usize> BlendedLanes<N> {
     ) -> BlendedLanes<N> {
         let tile = block.tile_of(column, row) as usize;
         let (x, y) = (column as f32 + 0.5, row as f32 + 0.5);
-        let mut blended = BlendedLanes { colour: [[0.0; N]; 3], depth: [0.0; N], transmittance: [1.0; N] };
+        let mut blended = BlendedLanes::BEGUN;
         let end = starts[tile + 1];
         let mut entry = starts[tile];
         let mut seen = 0;
         while entry < end {
             let splat = splats.fetch(entries[entry as usize] as usize);
             entry += 1;
-            if abs(y - splat.mean[1]) <= splat.extent[1] {
-                blended.add(&splat, x, y);
+            if blended.add(&splat, x, y) {
                 seen += 1;
                 if seen == CHECK {
                     seen = 0;
@@ -51,16 +53,22 @@ impl<const N: usize> BlendedLanes<N> {
                 }
             }
         }
+        blended.finish(block);
+        blended
+    }
+
+    /// Adds the background.
+    #[inline(always)]
+    pub fn finish(&mut self, block: &TileBlock) {
         let mut channel = 0;
         while channel < 3 {
             let mut lane = 0;
             while lane < N {
-                blended.colour[channel][lane] += blended.transmittance[lane] * block.background[channel];
+                self.colour[channel][lane] += self.transmittance[lane] * block.background[channel];
                 lane += 1;
             }
             channel += 1;
         }
-        blended
     }
 
     /// A pixel's colour and opacity.
@@ -69,8 +77,13 @@ impl<const N: usize> BlendedLanes<N> {
         [self.colour[0][lane], self.colour[1][lane], self.colour[2][lane], 1.0 - self.transmittance[lane]]
     }
 
+    /// Puts the next splat behind what is there, at pixels the first of which has its centre at image coordinates `x`
+    /// and `y`; `false` if it covers nothing of their row.
     #[inline(always)]
-    fn add(&mut self, splat: &ProjectedGaussian, x: f32, y: f32) {
+    pub fn add(&mut self, splat: &ProjectedGaussian, x: f32, y: f32) -> bool {
+        if !(abs(y - splat.mean[1]) <= splat.extent[1]) {
+            return false;
+        }
         let seen = SplatLanes::<N>::of(splat, x, y);
         let mut lane = 0;
         while lane < N {
@@ -83,5 +96,6 @@ impl<const N: usize> BlendedLanes<N> {
             self.transmittance[lane] = before - weight;
             lane += 1;
         }
+        true
     }
 }

@@ -3,8 +3,9 @@
 //!
 //! ```text
 //! masks     which splats' boxes reach a bin of 8 by 8 tiles, a bit each      ListBlock::mask
-//! counts    how many of them a tile shows, in 32 parts of the splats         ListBlock::fold_entries
-//! starts    sums of the counts before a tile                                 ListBlock::before
+//! counts    how many of them a tile shows, in parts of the splats            ListBlock::fold_entries
+//! before    sums of a tile's counts before a part, and of a run of tiles     ListBlock::count_at
+//! starts    sums of the counts before a tile                                 ListBlock::start_of
 //! keys      a tile's splats with their depths, by index                      ListBlock::fold_entries
 //! entries   the same by depth, and of one depth by index                     rank
 //! ```
@@ -27,10 +28,15 @@ pub const BIN_TILES: u32 = 8;
 const BIN: u32 = BIN_TILES * SPLAT_TILE as u32;
 /// Splats of a mask.
 pub const MASK_SPLATS: u32 = 32;
-/// Parts of the splats: those of a tile are counted and listed by so many invocations.
-pub const LIST_PARTS: u32 = 32;
-/// Tiles whose counts are summed together.
-pub const TILE_RUN: u32 = 8;
+/// Tiles of a bin.
+pub const TILES_OF_BIN: u32 = BIN_TILES * BIN_TILES;
+/// A piece of a picture is a part of the splats in a bin. There are at most this many, and one a bin: enough to fill a
+/// GPU with workgroups.
+const PIECES: u32 = 4096;
+/// Tiles of a run, whose counts are summed together: those of a bin in a row of tiles.
+pub const TILE_RUN: u32 = BIN_TILES;
+/// Runs whose lists' starts are found together.
+pub const RUNS_TOGETHER: u32 = TILES_OF_BIN / TILE_RUN;
 /// Numbers of a [`ListStatus`].
 pub const STATUS_NUMBERS: u32 = 3;
 
@@ -68,6 +74,25 @@ pub struct ListBlock {
 
 const _: () = assert!(size_of::<ListBlock>() == 16);
 
+/// A sum; the greatest number where it is beyond that. Its order does not matter.
+#[inline(always)]
+pub fn saturating(a: u32, b: u32) -> u32 {
+    if b > u32::MAX - a { u32::MAX } else { a + b }
+}
+
+/// The number of the lowest bit that is set, of one with such a bit: so many are below it.
+#[inline(always)]
+pub fn lowest_bit(bits: u32) -> u32 {
+    (bits & bits.wrapping_neg()).wrapping_sub(1).count_ones()
+}
+
+/// The numbers of the status after a picture with so many entries, `all`.
+#[inline(always)]
+pub fn next_status(status: [u32; STATUS_NUMBERS as usize], all: u32, is_over: bool) -> [u32; STATUS_NUMBERS as usize] {
+    let [_, done, most] = status;
+    [u32::from(is_over), done + u32::from(!is_over), if most > all { most } else { all }]
+}
+
 #[inline(always)]
 fn lesser(a: u32, b: u32) -> u32 {
     if a < b { a } else { b }
@@ -98,38 +123,124 @@ impl ListBlock {
         self.splat_count.div_ceil(MASK_SPLATS)
     }
 
-    /// Masks of a part.
+    /// Columns of bins.
+    #[inline(always)]
+    pub fn bin_columns(&self) -> u32 {
+        self.width.div_ceil(BIN)
+    }
+
+    /// Masks of a part of the splats.
     #[inline(always)]
     fn masks_of_part(&self) -> u32 {
-        self.mask_count().div_ceil(LIST_PARTS)
+        let all = self.bin_count() * self.mask_count();
+        if all > PIECES { all.div_ceil(PIECES) } else { 1 }
     }
 
-    /// Runs of tiles.
+    /// Parts of the splats.
+    #[inline(always)]
+    pub fn part_count(&self) -> u32 {
+        self.mask_count().div_ceil(self.masks_of_part())
+    }
+
+    /// Pieces of the picture: the parts of the splats in the first bin, then those in the next.
+    #[inline(always)]
+    pub fn piece_count(&self) -> u32 {
+        self.bin_count() * self.part_count()
+    }
+
+    /// Most counts of all tiles' parts, whatever the number of splats.
+    pub fn most_counts(&self) -> u32 {
+        (PIECES + self.bin_count()) * TILES_OF_BIN
+    }
+
+    /// The bin of a piece.
+    #[inline(always)]
+    pub fn bin_of_piece(&self, piece: u32) -> u32 {
+        piece / self.part_count()
+    }
+
+    /// The first mask of a piece, and the one behind its last.
+    #[inline(always)]
+    pub fn masks_of_piece(&self, piece: u32) -> [u32; 2] {
+        let first = piece % self.part_count() * self.masks_of_part();
+        [first, lesser(first + self.masks_of_part(), self.mask_count())]
+    }
+
+    /// Column and row of a tile of a bin, by its number in it; they may be beyond the picture.
+    #[inline(always)]
+    pub fn tile_of_bin(&self, bin: u32, tile: u32) -> [u32; 2] {
+        let (column, row) = (bin % self.bin_columns(), bin / self.bin_columns());
+        [column * BIN_TILES + tile % BIN_TILES, row * BIN_TILES + tile / BIN_TILES]
+    }
+
+    /// Whether the picture has a tile at a column and row.
+    #[inline(always)]
+    pub fn has_tile(&self, [column, row]: [u32; 2]) -> bool {
+        column < self.tile_columns() && row < self.height.div_ceil(SPLAT_TILE as u32)
+    }
+
+    /// Runs of tiles, row by row.
     #[inline(always)]
     pub fn run_count(&self) -> u32 {
-        self.tile_count().div_ceil(TILE_RUN)
+        self.height.div_ceil(SPLAT_TILE as u32) * self.bin_columns()
     }
 
-    /// The place of `starts` that element `element` of `start_tiles` writes: behind the last one are those of the
-    /// status.
+    /// The place of the count of a part of a tile of a run, by its number in it.
+    #[inline(always)]
+    pub fn count_at(&self, run: u32, part: u32, tile: u32) -> u32 {
+        let (row, bin_column) = (run / self.bin_columns(), run % self.bin_columns());
+        let bin = row / BIN_TILES * self.bin_columns() + bin_column;
+        (bin * self.part_count() + part) * TILES_OF_BIN + row % BIN_TILES * BIN_TILES + tile
+    }
+
+    /// The place of the sum of the counts before a part, of a tile of a run.
+    #[inline(always)]
+    pub fn before_at(&self, run: u32, part: u32, tile: u32) -> u32 {
+        (run * self.part_count() + part) * TILE_RUN + tile
+    }
+
+    /// The run of a tile at a column and row.
+    #[inline(always)]
+    pub fn run_of(&self, [column, row]: [u32; 2]) -> u32 {
+        row * self.bin_columns() + column / BIN_TILES
+    }
+
+    /// The first tile of a run.
+    #[inline(always)]
+    pub fn first_of_run(&self, run: u32) -> u32 {
+        run / self.bin_columns() * self.tile_columns() + run % self.bin_columns() * BIN_TILES
+    }
+
+    /// Tiles of a run: fewer at the right edge.
+    #[inline(always)]
+    pub fn tiles_of_run(&self, run: u32) -> u32 {
+        lesser(TILE_RUN, self.tile_columns() - run % self.bin_columns() * BIN_TILES)
+    }
+
+    /// Elements of `start_tiles`.
+    #[inline(always)]
+    pub fn start_count(&self) -> u32 {
+        self.run_count().div_ceil(RUNS_TOGETHER)
+    }
+
+    /// The first place of `starts` that element `element` of `start_tiles` writes.
     #[inline(always)]
     pub fn place_of_start(&self, element: u32) -> u32 {
-        lesser(element, self.tile_count() + 1)
+        if element < self.start_count() { self.first_of_run(element * RUNS_TOGETHER) } else { self.tile_count() + 1 }
     }
 
-    /// The place of the status that element `element` of `start_tiles` writes.
+    /// The first place of the status that it writes: the last element does.
     #[inline(always)]
     pub fn place_of_status(&self, element: u32) -> u32 {
-        element - lesser(element, self.tile_count() + 1)
+        if element < self.start_count() { 0 } else { STATUS_NUMBERS }
     }
 
-    /// Which of 32 splats have pixels of their box in a bin: `element` is `bin * mask_count + mask`, and bit `i` is
-    /// splat `32 * mask + i`.
+    /// Which of 32 splats have pixels of their box in a bin: `element` is `mask * bin_count + bin`, and bit `i` is splat
+    /// `32 * mask + i`. Neighbouring elements look at the same splats.
     #[inline(always)]
     pub fn mask(&self, splats: &(impl Fetch<ProjectedGaussian> + ?Sized), element: u32) -> u32 {
-        let (bin, first) = (element / self.mask_count(), element % self.mask_count() * MASK_SPLATS);
-        let bin_columns = self.width.div_ceil(BIN);
-        let (column, row) = (bin % bin_columns * BIN, bin / bin_columns * BIN);
+        let (bin, first) = (element % self.bin_count(), element / self.bin_count() * MASK_SPLATS);
+        let (column, row) = (bin % self.bin_columns() * BIN, bin / self.bin_columns() * BIN);
         let (mut mask, mut bit) = (0, 0);
         while bit < MASK_SPLATS {
             if first + bit < self.splat_count {
@@ -144,34 +255,29 @@ impl ListBlock {
         mask
     }
 
-    /// Goes through the splats of a part that may be seen in a tile, in the order of their indices: what begins as
-    /// `state` becomes `next(state, depth, index)` with each. `element` is `tile * LIST_PARTS + part`, `masks` those of
-    /// all bins.
+    /// Goes through the splats of a piece that may be seen in a tile of its bin, in the order of their indices: what
+    /// begins as `state` becomes `next(state, depth, index)` with each. `masks` are those of all bins.
     #[inline(always)]
     pub fn fold_entries(
         &self,
         splats: &(impl Fetch<ProjectedGaussian> + ?Sized),
         masks: &[u32],
-        element: u32,
+        piece: u32,
+        tile: u32,
         mut state: u32,
         mut next: impl FnMut(u32, f32, u32) -> u32,
     ) -> u32 {
-        let (tile, part) = (element / LIST_PARTS, element % LIST_PARTS);
-        let (tile_column, tile_row) = (tile % self.tile_columns(), tile / self.tile_columns());
-        let bin = tile_row / BIN_TILES * self.width.div_ceil(BIN) + tile_column / BIN_TILES;
-        let (count, of_bin) = (self.mask_count(), bin * self.mask_count());
-        let mut mask = lesser(part * self.masks_of_part(), count);
-        let end = lesser(mask + self.masks_of_part(), count);
-        while mask < end {
-            let mut rest = masks[(of_bin + mask) as usize];
+        let bin = self.bin_of_piece(piece);
+        let [column, row] = self.tile_of_bin(bin, tile);
+        let [mut mask, end] = self.masks_of_piece(piece);
+        while mask < end && self.has_tile([column, row]) {
+            let mut rest = masks[(mask * self.bin_count() + bin) as usize];
             while rest != 0 {
-                // The lowest bit that is set has as many below it as its number.
-                let below = (rest & rest.wrapping_neg()).wrapping_sub(1);
-                let index = mask * MASK_SPLATS + below.count_ones();
+                let index = mask * MASK_SPLATS + lowest_bit(rest);
                 rest &= rest.wrapping_sub(1);
                 let splat = splats.fetch(index as usize);
                 let pixels = splat.pixels(self.width, self.height);
-                if is_reached(&splat, pixels, tile_column, tile_row) {
+                if is_reached(&splat, pixels, column, row) {
                     state = next(state, splat.depth, index);
                 }
             }
@@ -180,42 +286,16 @@ impl ListBlock {
         state
     }
 
-    /// All entries of the runs of tiles before that of `tile`, and of all runs: `sums[run]`. A number that is too great
-    /// is the greatest.
+    /// Where the list of a tile of a run begins, by its number in the run: behind `before` entries of the runs before
+    /// the run `first`, and those from there on. `sums[run][tile]` are the entries up to a tile and with it.
     #[inline(always)]
-    pub fn of_runs(&self, sums: &[u32], tile: u32) -> [u32; 2] {
-        let (mut before, mut all, mut run) = (0, 0, 0);
-        while run < self.run_count() {
-            let sum = sums[run as usize];
-            all = if sum > u32::MAX - all { u32::MAX } else { all + sum };
-            before = if run < tile / TILE_RUN { all } else { before };
-            run += 1;
+    pub fn start_of(sums: &(impl Fetch<u32> + ?Sized), before: u32, first: u32, run: u32, tile: u32) -> u32 {
+        let (mut start, mut earlier) = (before, first);
+        while earlier < run {
+            start = saturating(start, sums.fetch((earlier * TILE_RUN + TILE_RUN - 1) as usize));
+            earlier += 1;
         }
-        [before, all]
-    }
-
-    /// Entries of a tile's earlier parts, and of those of the tiles before it in its run: `counts[tile][part]` before
-    /// `element`, from `first` on.
-    #[inline(always)]
-    pub fn sum(counts: &[u32], first: u32, element: u32) -> u32 {
-        let (mut sum, mut at) = (0, first);
-        while at < element {
-            sum += counts[at as usize];
-            at += 1;
-        }
-        sum
-    }
-
-    /// Where the keys of a part begin, `element` as in [`ListBlock::fold_entries`]: in the place of the number behind
-    /// the last part it is the number of keys. If the capacity is exceeded, all begin at 0, and there are none.
-    #[inline(always)]
-    pub fn first_of_part(starts: &[u32], counts: &[u32], element: u32) -> u32 {
-        let (tile, part) = (element / LIST_PARTS, element % LIST_PARTS);
-        let start = starts[tile as usize];
-        if part == 0 || starts[tile as usize + 1] == start {
-            return start;
-        }
-        start + ListBlock::sum(counts, tile * LIST_PARTS, element)
+        if tile > 0 { saturating(start, sums.fetch((run * TILE_RUN + tile - 1) as usize)) } else { start }
     }
 
     /// The tile in whose list an entry is, which is in one.
@@ -268,10 +348,19 @@ pub fn is_reached(
 #[inline(always)]
 pub fn rank(keys: &(impl Fetch<[u32; 2]> + ?Sized), start: u32, end: u32, entry: u32) -> u32 {
     let [depth, index] = keys.fetch(entry as usize);
+    let is_before = |[other_depth, other_index]: [u32; 2]| {
+        u32::from(other_depth < depth || (other_depth == depth && other_index < index))
+    };
     let (mut rank, mut at) = (0, start);
+    // Four at a time, so that none is waited for alone.
+    while end - at >= 4 {
+        let [a, b] = [keys.fetch(at as usize), keys.fetch(at as usize + 1)];
+        let [c, d] = [keys.fetch(at as usize + 2), keys.fetch(at as usize + 3)];
+        rank += is_before(a) + is_before(b) + is_before(c) + is_before(d);
+        at += 4;
+    }
     while at < end {
-        let [other_depth, other_index] = keys.fetch(at as usize);
-        rank += u32::from(other_depth < depth || (other_depth == depth && other_index < index));
+        rank += is_before(keys.fetch(at as usize));
         at += 1;
     }
     rank

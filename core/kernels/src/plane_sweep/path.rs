@@ -12,6 +12,8 @@ pub const STEP_COST: f32 = 0.003;
 pub const JUMP_COST: f32 = 0.03;
 /// Lines run right, left, down and up.
 pub const DIRECTIONS: u32 = 4;
+/// Lines that are followed together.
+pub const LINES_TOGETHER: u32 = 8;
 
 /// A volume of costs, as plain data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
@@ -80,6 +82,29 @@ impl CostBlock {
     }
 }
 
+/// The costs of a group of planes at a pixel, aggregated: `before` are the group's at the pixel before, `[left, right]` those
+/// of the planes beside the group there (the greatest number where there is none), and `least` the least of all planes.
+#[inline(always)]
+pub fn advanced(before: &Planes, cost: &Planes, [left, right]: [f32; 2], least: f32) -> Planes {
+    let jump = least + JUMP_COST;
+    let mut beside = [0.0; PLANES];
+    beside[0] = min(left, before[1]);
+    beside[PLANES - 1] = min(before[PLANES - 2], right);
+    let mut plane = 1;
+    while plane < PLANES - 1 {
+        beside[plane] = min(before[plane - 1], before[plane + 1]);
+        plane += 1;
+    }
+    let mut joined = [0.0; PLANES];
+    plane = 0;
+    while plane < PLANES {
+        let reached = min(min(before[plane], beside[plane] + STEP_COST), jump);
+        joined[plane] = cost[plane] + (reached - least);
+        plane += 1;
+    }
+    joined
+}
+
 /// The state of a line: costs of the pixel before, and the least of them.
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
@@ -94,7 +119,6 @@ impl Line {
     /// Advances to a pixel with these costs, `costs[first..][group]`; the aggregated ones are [`Line::costs`].
     #[inline(always)]
     pub fn advance(&mut self, costs: &(impl Fetch<Planes> + ?Sized), first: usize, group_count: usize) {
-        let jump = self.least + JUMP_COST;
         let mut least = [f32::MAX; PLANES];
         // The last cost before this group's, of the pixel before.
         let mut left = f32::MAX;
@@ -102,21 +126,7 @@ impl Line {
         while group < group_count {
             let before = self.costs[group];
             let right = if group + 1 < group_count { self.costs[group + 1][0] } else { f32::MAX };
-            let cost = costs.fetch(first + group);
-            let mut beside = [0.0; PLANES];
-            beside[0] = min(left, before[1]);
-            beside[PLANES - 1] = min(before[PLANES - 2], right);
-            let mut plane = 1;
-            while plane < PLANES - 1 {
-                beside[plane] = min(before[plane - 1], before[plane + 1]);
-                plane += 1;
-            }
-            let mut plane = 0;
-            while plane < PLANES {
-                let reached = min(min(before[plane], beside[plane] + STEP_COST), jump);
-                self.costs[group][plane] = cost[plane] + (reached - self.least);
-                plane += 1;
-            }
+            self.costs[group] = advanced(&before, &costs.fetch(first + group), [left, right], self.least);
             lessen(&mut least, &self.costs[group]);
             left = before[PLANES - 1];
             group += 1;

@@ -381,11 +381,12 @@ macro_rules! for_each_kernel {
                 read means: Planes as vectors,
                 write costs[block.group_count * pixel]: Planes as vectors,
             }
-            /// Costs joined along lines in four directions: `paths[direction][line][step][group]`. An element is a
-            /// line.
-            FollowPaths follow_paths(block: CostBlock) for line in [0..block.line_count(); 1 a core], wide {
-                read means: Planes as vectors,
-                write paths[block.first_of_line(line)]: Planes as vectors,
+            /// Costs joined along lines in four directions: `paths[direction][line][step][group]`. An element are
+            /// 8 lines.
+            FollowPaths follow_paths(block: CostBlock)
+            for lines in [0..block.line_count().div_ceil(8); 1 a core], together, wide {
+                filled means: Planes as vectors,
+                write paths[block.first_of_line(8 * lines)]: Planes as vectors,
             }
             /// The mean of the four directions' costs: `costs[row][column][group]`. An element is a group of planes of
             /// a pixel.
@@ -421,12 +422,11 @@ macro_rules! for_each_kernel {
             }
             /// Pixels from the splats of their tile, which the list `entries[starts[tile]..starts[tile + 1]]` numbers
             /// front to back: `colours[row][column]` (red, green, blue over the background, opacity) and
-            /// `depths[row][column]`, weighted sums. An element is a pixel, counted tile by tile; outside of the
-            /// picture nothing is written.
-            BlendSplats blend_splats(block: TileBlock) for pixel in [0..block.pixels_of_tiles(); 128 a core], twin {
-                read starts: u32,
-                read entries: u32,
-                read splats: ProjectedGaussian as vectors,
+            /// `depths[row][column]`, weighted sums. An element is a tile.
+            BlendSplats blend_splats(block: TileBlock) for tile in [0..block.tile_count(); 1 a core], together, twin {
+                filled starts: u32,
+                filled entries: u32,
+                filled splats: ProjectedGaussian as vectors,
                 write colours: [f32; 4] as vectors,
                 write depths: f32,
             }
@@ -475,37 +475,36 @@ macro_rules! for_each_kernel {
                 read splats: ProjectedGaussian as vectors,
                 write masks: u32,
             }
-            /// How many splats each tile shows, in 32 parts of the splats: `counts[tile][part]`. An element is a part of
-            /// a tile.
-            CountEntries count_entries(block: ListBlock) for part in [0..block.tile_count() * LIST_PARTS; 64 a core] {
-                read splats: ProjectedGaussian as vectors,
-                read masks: u32,
-                write counts: u32,
+            /// How many splats each tile shows, in parts of the splats: `counts[bin][part][tile]`, 64 tiles a bin. An
+            /// element is a part of a bin.
+            CountEntries count_entries(block: ListBlock) for piece in [0..block.piece_count(); 1 a core], together {
+                filled splats: ProjectedGaussian as vectors,
+                filled masks: u32,
+                write counts[64 * piece]: u32,
             }
-            /// Entries of runs of 8 tiles: `sums[run]`. An element is a run.
-            SumEntries sum_entries(block: ListBlock) for run in [0..block.run_count(); 64 a core] {
-                read counts: u32,
-                write sums: u32,
+            /// Entries of a tile before each part, `before[run][part][tile]`, and of a run up to each tile and with it,
+            /// `sums[run][tile]`: a run are the 8 tiles of a bin in a row. An element is a run.
+            SumEntries sum_entries(block: ListBlock) for run in [0..block.run_count(); 16 a core], together {
+                filled counts: u32,
+                write before[block.before_at(run, 0, 0)]: u32,
+                write sums[8 * run]: u32,
             }
             /// Where each tile's list begins, `starts[tile]`, with one tile more, and the status after this picture. If
-            /// there are more entries than the capacity, or were before, all lists are empty. An element is a tile, or a
-            /// number of the status.
-            StartTiles start_tiles(block: ListBlock)
-            for element in [0..block.tile_count() + 1 + STATUS_NUMBERS; 64 a core] {
-                read counts: u32,
-                read sums: u32,
-                read status: u32,
+            /// there are more entries than the capacity, or were before, all lists are empty. An element are 8 runs.
+            StartTiles start_tiles(block: ListBlock) for element in [0..block.start_count(); 16 a core], together {
+                filled sums: u32,
+                filled status: u32,
                 write starts[block.place_of_start(element)]: u32,
                 write next_status[block.place_of_status(element)]: u32,
             }
             /// The splats that each tile shows, in the order of their indices: `keys[starts[tile]..starts[tile + 1]]`,
-            /// the bits of their depths and their indices. An element is a part of a tile.
-            ListEntries list_entries(block: ListBlock) for part in [0..block.tile_count() * LIST_PARTS; 64 a core] {
-                read splats: ProjectedGaussian as vectors,
-                read masks: u32,
-                read starts: u32,
-                read counts: u32,
-                write keys[ListBlock::first_of_part(starts, counts, part)]: [u32; 2],
+            /// the bits of their depths and their indices. An element is a part of a bin.
+            ListEntries list_entries(block: ListBlock) for piece in [0..block.piece_count()], together, serial {
+                filled splats: ProjectedGaussian as vectors,
+                filled masks: u32,
+                filled starts: u32,
+                filled before: u32,
+                write keys: [u32; 2],
             }
             /// The lists that `blend_splats` takes: each tile's keys by depth, and of one depth by index,
             /// `entries[starts[tile]..starts[tile + 1]]`. An element is an entry; behind the last one nothing is written.
@@ -570,8 +569,9 @@ macro_rules! for_each_kernel {
                 write next_terms: HarmonicTerm as vectors,
             }
             /// What runs of 256 pixels add to the derivative by a gain: `sums[run]`. An element is a run.
-            SumShares sum_shares(pixel_count: u32) for run in [0..pixel_count.div_ceil(SHARE_RUN); 64 a core] {
-                read shares: [f32; 4] as vectors,
+            SumShares sum_shares(pixel_count: u32)
+            for run in [0..pixel_count.div_ceil(SHARE_RUN); 64 a core], together {
+                filled shares: [f32; 4] as vectors,
                 write sums: [f32; 4] as vectors,
             }
             /// The photographs' gains after a step of one of them; their mean is 1. An element is a photograph.

@@ -8,7 +8,7 @@ use crate::list_oracle::{is_reached, pixels};
 use crate::world::Numbers;
 use viewfuse_device::Memory;
 use viewfuse_kernels::gaussians::SPLAT_TILE;
-use viewfuse_kernels::gaussians::lists::{BIN_TILES, MASK_SPLATS, TILE_RUN};
+use viewfuse_kernels::gaussians::lists::{BIN_TILES, MASK_SPLATS, TILES_OF_BIN};
 
 const EXACT: Limits = Limits { tolerance: 0.0, least: 0.5 };
 const REASON: &str = "whole numbers: exact; undecided where it depends on rounding which pixels a splat's box has, or whether the \
@@ -19,7 +19,8 @@ struct Lists {
     block: ListBlock,
     splats: Vec<ProjectedGaussian>,
     masks: Vec<u32>,
-    counts: Vec<u32>,
+    before: Vec<u32>,
+    sums: Vec<u32>,
     starts: Vec<u32>,
 }
 
@@ -39,27 +40,57 @@ impl Lists {
         let mut block = ListBlock { width, height, splat_count, capacity: 0 };
         let masks: Vec<u32> =
             (0..block.bin_count() * block.mask_count()).map(|mask| block.mask(&splats[..], mask)).collect();
-        let part_count = block.tile_count() * LIST_PARTS;
-        let count = |part: u32| block.fold_entries(&splats[..], &masks, part, 0, |count, _, _| count + 1);
-        let counts: Vec<u32> = (0..part_count).map(count).collect();
+        let count = |slot: u32| {
+            let (piece, tile) = (slot / TILES_OF_BIN, slot % TILES_OF_BIN);
+            block.fold_entries(&splats[..], &masks, piece, tile, 0, |count, _, _| count + 1)
+        };
+        let counts: Vec<u32> = (0..block.piece_count() * TILES_OF_BIN).map(count).collect();
+        let (before, sums) = summed(&block, &counts);
         let mut starts = vec![0];
-        for of_tile in counts.chunks(LIST_PARTS as usize) {
-            starts.push(starts[starts.len() - 1] + of_tile.iter().sum::<u32>());
+        for run in sums.chunks(TILE_RUN as usize).zip(0..) {
+            let (first, tiles) = (starts[starts.len() - 1], block.tiles_of_run(run.1) as usize);
+            starts.extend(run.0[..tiles].iter().map(|sum| first + sum));
         }
         block.capacity = starts[starts.len() - 1] + 5;
-        Lists { block, splats, masks, counts, starts }
+        Lists { block, splats, masks, before, sums, starts }
     }
 }
 
+/// The outputs of `sum_entries`.
+fn summed(block: &ListBlock, counts: &[u32]) -> (Vec<u32>, Vec<u32>) {
+    let (mut before, mut sums) = (vec![0; (block.run_count() * block.part_count() * TILE_RUN) as usize], Vec::new());
+    let bin_columns = block.width.div_ceil(BIN_TILES * SPLAT_TILE as u32);
+    for run in 0..block.run_count() {
+        let (row, bin_column) = (run / bin_columns, run % bin_columns);
+        let bin = row / BIN_TILES * bin_columns + bin_column;
+        let mut all = 0;
+        for tile in 0..TILE_RUN {
+            let mut of_tile = 0;
+            for part in 0..block.part_count() {
+                before[((run * block.part_count() + part) * TILE_RUN + tile) as usize] = of_tile;
+                let of_piece = &counts[((bin * block.part_count() + part) * TILES_OF_BIN) as usize..];
+                of_tile += of_piece[(row % BIN_TILES * BIN_TILES + tile) as usize];
+            }
+            all += of_tile;
+            sums.push(all);
+        }
+    }
+    (before, sums)
+}
+
 /// The splats of a part that a tile shows, by the masks; `None` where that depends on rounding.
-fn shown(block: &ListBlock, splats: &[ProjectedGaussian], masks: &[u32], element: u32) -> Option<Vec<u32>> {
-    let (tile, part) = (element / LIST_PARTS, element % LIST_PARTS);
-    let (column, row) = (tile % block.tile_columns(), tile / block.tile_columns());
+fn shown(
+    block: &ListBlock,
+    splats: &[ProjectedGaussian],
+    masks: &[u32],
+    [column, row]: [u32; 2],
+    part: u32,
+) -> Option<Vec<u32>> {
     let bin_columns = block.width.div_ceil(BIN_TILES * SPLAT_TILE as u32);
     let bin = row / BIN_TILES * bin_columns + column / BIN_TILES;
-    let of_part = block.mask_count().div_ceil(LIST_PARTS) * MASK_SPLATS;
+    let of_part = block.mask_count().div_ceil(block.part_count()) * MASK_SPLATS;
     let listed = (part * of_part..((part + 1) * of_part).min(block.splat_count)).filter(|index| {
-        let mask = masks[(bin * block.mask_count() + index / MASK_SPLATS) as usize];
+        let mask = masks[(index / MASK_SPLATS * block.bin_count() + bin) as usize];
         mask >> (index % MASK_SPLATS) & 1 != 0
     });
     let reached = |index: u32| is_reached(&splats[index as usize], [block.width, block.height], column, row);
@@ -95,7 +126,7 @@ impl Case for MarkBins {
         let columns = block.width.div_ceil(side);
         let half = |half: u32| {
             let (mask, first) = (half / 2, half % 2 * 16);
-            let (bin, of_bin) = (mask / block.mask_count(), mask % block.mask_count());
+            let (bin, of_bin) = (mask % block.bin_count(), mask / block.bin_count());
             let (column, row) = (bin % columns * side, bin / columns * side);
             let reaches = |splat: &ProjectedGaussian| {
                 let [left, right, top, bottom] = pixels(splat, block.width, block.height)?;
@@ -126,14 +157,26 @@ impl Case for CountEntries {
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<CountEntries> {
-        let Lists { block, splats, masks, counts, .. } = Lists::new(seed, size);
-        vec![CountEntries { block, splats, masks, counts: Output::Zeros(counts.len()) }]
+        let Lists { block, splats, masks, .. } = Lists::new(seed, size);
+        let counts = Output::Zeros((block.piece_count() * TILES_OF_BIN) as usize);
+        vec![CountEntries { block, splats, masks, counts }]
     }
 
     fn expected(&self) -> Vec<Option<Bounded>> {
         let CountEntries { block, splats, masks, .. } = self;
-        let count = |part: usize| shown(block, splats, masks, part as u32).map(|list| Bounded::from(list.len() as u32));
-        map((block.tile_count() * LIST_PARTS) as usize, 16, count)
+        let bin_columns = block.width.div_ceil(BIN_TILES * SPLAT_TILE as u32);
+        let [columns, rows] = [block.width, block.height].map(|side| side.div_ceil(SPLAT_TILE as u32));
+        let count = |slot: usize| {
+            let (piece, tile) = (slot as u32 / TILES_OF_BIN, slot as u32 % TILES_OF_BIN);
+            let (bin, part) = (piece / block.part_count(), piece % block.part_count());
+            let column = bin % bin_columns * BIN_TILES + tile % BIN_TILES;
+            let row = bin / bin_columns * BIN_TILES + tile / BIN_TILES;
+            if column >= columns || row >= rows {
+                return Some(Bounded::ZERO);
+            }
+            shown(block, splats, masks, [column, row], part).map(|list| Bounded::from(list.len() as u32))
+        };
+        map((block.piece_count() * TILES_OF_BIN) as usize, 16, count)
     }
 }
 
@@ -147,14 +190,16 @@ impl Case for SumEntries {
     /// Of a picture with many runs of tiles.
     fn inputs(seed: u64, size: u32) -> Vec<SumEntries> {
         let numbers = &mut Numbers::new(seed);
-        let block = ListBlock { width: 1251 + size % 7, height: 701, splat_count: 64, capacity: 0 };
-        let counts = (0..block.tile_count() * LIST_PARTS).map(|_| numbers.between(0.0, 9.0) as u32).collect();
-        vec![SumEntries { block, counts, sums: Output::Zeros(block.run_count() as usize) }]
+        let block = ListBlock { width: 331 + size % 7, height: 201, splat_count: 64 + size, capacity: 0 };
+        let count = block.piece_count() * TILES_OF_BIN;
+        let counts: Vec<u32> = (0..count).map(|_| numbers.between(0.0, 9.0) as u32).collect();
+        let before = Output::Zeros((block.run_count() * block.part_count() * TILE_RUN) as usize);
+        vec![SumEntries { block, counts, before, sums: Output::Zeros((block.run_count() * TILE_RUN) as usize) }]
     }
 
     fn expected(&self) -> Vec<Option<Bounded>> {
-        let runs = self.counts.chunks((TILE_RUN * LIST_PARTS) as usize);
-        decided(runs.map(|run| Bounded::from(run.iter().sum::<u32>())), 0)
+        let (before, sums) = summed(&self.block, &self.counts);
+        decided(before.into_iter().chain(sums).map(Bounded::from), 0)
     }
 }
 
@@ -162,20 +207,15 @@ impl Case for StartTiles {
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = EXACT;
     const REASON: &'static str = REASON;
-    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
-        ("counts", |case| case.counts.iter_mut().for_each(|count| *count += 1)),
-        ("sums", |case| case.sums.iter_mut().for_each(|sum| *sum += 1)),
-        ("status", |case| case.status[1] += 1),
-    ];
+    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] =
+        &[("sums", |case| case.sums.iter_mut().for_each(|sum| *sum += 1)), ("status", |case| case.status[1] += 1)];
 
     /// With room for all entries, for one too few, and after a picture that had too few.
     fn inputs(seed: u64, size: u32) -> Vec<StartTiles> {
-        let Lists { block, counts, starts, .. } = Lists::new(seed, size);
-        let sums: Vec<u32> = counts.chunks((TILE_RUN * LIST_PARTS) as usize).map(|run| run.iter().sum()).collect();
+        let Lists { block, sums, starts, .. } = Lists::new(seed, size);
         let total = starts[starts.len() - 1];
         let dispatch = |(capacity, status): (u32, [u32; 3])| StartTiles {
             block: ListBlock { capacity, ..block },
-            counts: counts.clone(),
             sums: sums.clone(),
             status: status.to_vec(),
             starts: Output::Zeros(starts.len() + 1),
@@ -185,9 +225,11 @@ impl Case for StartTiles {
     }
 
     fn expected(&self) -> Vec<Option<Bounded>> {
+        let StartTiles { block, sums, .. } = self;
         let mut starts = vec![0];
-        for of_tile in self.counts.chunks(LIST_PARTS as usize) {
-            starts.push(starts[starts.len() - 1] + of_tile.iter().sum::<u32>());
+        for (run, of_run) in (0..).zip(sums.chunks(TILE_RUN as usize)) {
+            let (first, tiles) = (starts[starts.len() - 1], block.tiles_of_run(run) as usize);
+            starts.extend(of_run[..tiles - 1].iter().chain(of_run.last()).map(|sum| first + sum));
         }
         let total = starts[starts.len() - 1];
         let is_over = total > self.block.capacity || self.status[0] != 0;
@@ -205,23 +247,31 @@ impl Case for ListEntries {
         ("splats", |case| increase(case.splats.iter_mut().map(|splat| &mut splat.depth))),
         ("masks", |case| unmark(&mut case.masks)),
         ("starts", |case| case.starts.fill(0)),
-        ("counts", |case| case.counts.fill(0)),
+        ("before", |case| case.before.fill(0)),
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<ListEntries> {
-        let Lists { block, splats, masks, counts, starts } = Lists::new(seed, size);
+        let Lists { block, splats, masks, before, starts, .. } = Lists::new(seed, size);
         let keys = Output::Zeros(block.capacity as usize);
-        vec![ListEntries { block, splats, masks, starts, counts, keys }]
+        vec![ListEntries { block, splats, masks, starts, before, keys }]
     }
 
     fn expected(&self) -> Vec<Option<Bounded>> {
-        let ListEntries { block, splats, masks, counts, .. } = self;
-        let keys = map(counts.len(), 16, |part| {
-            let count = counts[part] as usize;
-            // Where a decision depends on rounding the counts may have the other one.
-            let list = shown(block, splats, masks, part as u32).filter(|list| list.len() == count);
-            let key = |index: u32| [Some(splats[index as usize].depth.into()), Some(Bounded::from(index))];
-            list.map_or_else(|| vec![[None; 2]; count], |list| list.into_iter().map(key).collect())
+        let ListEntries { block, splats, masks, starts, before, .. } = self;
+        let columns = block.width.div_ceil(SPLAT_TILE as u32);
+        let keys = map(block.tile_count() as usize, 16, |tile| {
+            let place = [tile as u32 % columns, tile as u32 / columns];
+            let at = |part: u32| block.before_at(block.run_of(place), part, place[0] % TILE_RUN) as usize;
+            let parts = (0..block.part_count()).map(|part| before[at(part)]);
+            let ends = (1..block.part_count()).map(|part| before[at(part)]).chain([starts[tile + 1] - starts[tile]]);
+            let list = |(part, (first, end)): (u32, (u32, u32))| {
+                let count = (end - first) as usize;
+                // Where a decision depends on rounding the counts may have the other one.
+                let list = shown(block, splats, masks, place, part).filter(|list| list.len() == count);
+                let key = |index: u32| [Some(splats[index as usize].depth.into()), Some(Bounded::from(index))];
+                list.map_or_else(|| vec![[None; 2]; count], |list| list.into_iter().map(key).collect())
+            };
+            (0..).zip(parts.zip(ends)).flat_map(list).collect::<Vec<[Option<Bounded>; 2]>>()
         });
         let mut keys: Vec<[Option<Bounded>; 2]> = keys.into_iter().flatten().collect();
         keys.resize(block.capacity as usize, [Some(Bounded::ZERO); 2]);

@@ -2,6 +2,7 @@
 
 use super::loss::Structure;
 use viewfuse_core::camera::{CameraBlock, PinholeError};
+use viewfuse_device::parallel::try_map;
 use viewfuse_scene::photographs::{SourceImage, SourceImages};
 
 /// A source view at a level.
@@ -21,7 +22,7 @@ pub(super) struct LevelView {
 /// All source views at a level: `1 / 2^level` of the finest one's size.
 pub(super) fn level(images: &SourceImages, finest_side: u32, level: u32) -> Result<Vec<LevelView>, PinholeError> {
     let side = (finest_side >> level).max(8);
-    images.images.iter().map(|image| Ok(LevelView::of(&image.reduced(side)?, images))).collect()
+    try_map(images.images.len(), |view| Ok(LevelView::of(&images.images[view].reduced(side)?, images)))
 }
 
 impl LevelView {

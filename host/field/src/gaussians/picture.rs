@@ -6,7 +6,7 @@ use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::{Device, DeviceError};
 use viewfuse_kernels::gaussians::shown::bytes_of_pixel;
 use viewfuse_kernels::gaussians::{SplatBlock, TileBlock};
-use viewfuse_kernels::rows::{GaussianBlock, LIST_PARTS, ListBlock, ProjectedGaussian, STATUS_NUMBERS};
+use viewfuse_kernels::rows::{GaussianBlock, ListBlock, ProjectedGaussian, STATUS_NUMBERS, TILE_RUN};
 
 /// Makes pictures of Gaussians on a device.
 #[derive(Debug)]
@@ -110,17 +110,17 @@ impl<'d, D: Device> Splatter<'d, D> {
         let block = ListBlock { width, height, splat_count: gaussian_count, capacity: u32::MAX };
         let zeros = |count: u32| device.zeros(count.max(1) as usize);
         let mut masks = zeros(block.bin_count() * block.mask_count())?;
-        let (mut counts, mut sums) = (zeros(block.tile_count() * LIST_PARTS)?, zeros(block.run_count())?);
-        let (mut starts, before, mut status) =
-            (zeros(block.tile_count() + 1)?, zeros(STATUS_NUMBERS)?, zeros(STATUS_NUMBERS)?);
+        let (mut counts, mut before) = (zeros(block.most_counts())?, zeros(block.most_counts())?);
+        let (mut sums, mut starts) = (zeros(block.run_count() * TILE_RUN)?, zeros(block.tile_count() + 1)?);
+        let (earlier, mut status) = (zeros(STATUS_NUMBERS)?, zeros(STATUS_NUMBERS)?);
         device.mark_bins(&block, &splats, &mut masks)?;
         device.count_entries(&block, &splats, &masks, &mut counts)?;
-        device.sum_entries(&block, &counts, &mut sums)?;
-        device.start_tiles(&block, &counts, &sums, &before, &mut starts, &mut status)?;
+        device.sum_entries(&block, &counts, &mut before, &mut sums)?;
+        device.start_tiles(&block, &sums, &earlier, &mut starts, &mut status)?;
         let entry_count = device.download(&status)?.last().copied().unwrap_or(0);
         let block = ListBlock { capacity: entry_count, ..block };
         let (mut keys, mut entries) = (device.zeros(entry_count.max(1) as usize)?, zeros(entry_count)?);
-        device.list_entries(&block, &splats, &masks, &starts, &counts, &mut keys)?;
+        device.list_entries(&block, &splats, &masks, &starts, &before, &mut keys)?;
         device.sort_entries(&block, &starts, &keys, &mut entries)?;
 
         let pixel_count = (width * height) as usize;

@@ -91,13 +91,13 @@ impl<'d, D: Device> Resident<'d, D> {
         device.project_particles(&projected, &gaussians.now, &states.now, &terms.now, splats)?;
 
         let lists = list_block(&camera, gaussian_count, entries.capacity as u32);
-        let (counts, starts) = (&mut level.counts, &mut level.starts);
+        let (counts, before, starts) = (&mut level.counts, &mut level.before, &mut level.starts);
         device.mark_bins(&lists, splats, masks)?;
         device.count_entries(&lists, splats, masks, counts)?;
-        device.sum_entries(&lists, counts, &mut level.sums)?;
-        device.start_tiles(&lists, counts, &level.sums, &status.now, starts, &mut status.next)?;
+        device.sum_entries(&lists, counts, before, &mut level.sums)?;
+        device.start_tiles(&lists, &level.sums, &status.now, starts, &mut status.next)?;
         status.swap();
-        device.list_entries(&lists, splats, masks, starts, counts, &mut entries.keys)?;
+        device.list_entries(&lists, splats, masks, starts, before, &mut entries.keys)?;
         device.sort_entries(&lists, starts, &entries.keys, &mut entries.sorted)?;
 
         let tiles = lists.tiles(background);

@@ -441,7 +441,10 @@ impl From<Rendered> for Pixels {
 
 impl From<Rounded> for Pixels {
     fn from(Rounded { pixels, depths, width, height }: Rounded) -> Pixels {
-        let bytes = pixels.iter().flat_map(|[red, green, blue, _]| [*red, *green, *blue]).collect();
+        let mut bytes = vec![0; 3 * pixels.len()];
+        for (colour, pixel) in bytes.as_chunks_mut::<3>().0.iter_mut().zip(&pixels) {
+            *colour = [pixel[0], pixel[1], pixel[2]];
+        }
         let picture = RgbImage::from_raw(width, height, bytes).unwrap_or_default();
         let confidences = pixels.iter().map(|[.., confidence]| f32::from(*confidence) / 255.0).collect();
         Pixels { colours: Vec::new(), picture, depths, confidences }

@@ -1,6 +1,7 @@
 //! Exposure: a gain for each source and channel, that equalise the exposure of photographs of the same surfaces.
 
 use viewfuse_core::camera::CameraBlock;
+use viewfuse_device::parallel::map;
 
 /// Confidence from which on a pixel's disparity counts.
 const MIN_CONFIDENCE: f32 = 0.6;
@@ -76,47 +77,58 @@ pub(super) fn common(gains: &[[f32; 4]], weights: &[(usize, f32)]) -> [f32; 4] {
 
 /// The medians of all pairs with enough common points.
 fn ratios(cameras: &[CameraBlock], texels: &[[f32; 4]], maps: &[[f32; 2]], steps: &[f32]) -> Vec<Ratio> {
-    let mut ratios = Vec::new();
-    for (first, camera) in cameras.iter().enumerate().filter(|(view, _)| steps[*view] > 0.0) {
-        let mut logarithms: Vec<[Vec<f64>; 3]> = cameras.iter().map(|_| Default::default()).collect();
-        for (row, column) in grid(camera) {
-            let texel = (camera.first_texel + row * camera.width + column) as usize;
-            let [disparity, confidence] = maps[texel];
-            if confidence < MIN_CONFIDENCE || disparity < 0.5 * steps[first] {
+    let of =
+        |first: usize| if steps[first] > 0.0 { ratios_of(first, cameras, texels, maps, steps) } else { Vec::new() };
+    map(cameras.len(), 1, of).into_iter().flatten().collect()
+}
+
+/// Those of a view and each other.
+fn ratios_of(
+    first: usize,
+    cameras: &[CameraBlock],
+    texels: &[[f32; 4]],
+    maps: &[[f32; 2]],
+    steps: &[f32],
+) -> Vec<Ratio> {
+    let (camera, mut ratios) = (&cameras[first], Vec::new());
+    let mut logarithms: Vec<[Vec<f64>; 3]> = cameras.iter().map(|_| Default::default()).collect();
+    for (row, column) in grid(camera) {
+        let texel = (camera.first_texel + row * camera.width + column) as usize;
+        let [disparity, confidence] = maps[texel];
+        if confidence < MIN_CONFIDENCE || disparity < 0.5 * steps[first] {
+            continue;
+        }
+        let point = camera.centre_world() + camera.towards(column as f32 + 0.5, row as f32 + 0.5) / disparity;
+        for (second, other) in cameras.iter().enumerate().filter(|(view, _)| *view != first && steps[*view] > 0.0) {
+            let seen = other.project(point);
+            if !seen.in_image {
                 continue;
             }
-            let point = camera.centre_world() + camera.towards(column as f32 + 0.5, row as f32 + 0.5) / disparity;
-            for (second, other) in cameras.iter().enumerate().filter(|(view, _)| *view != first && steps[*view] > 0.0) {
-                let seen = other.project(point);
-                if !seen.in_image {
-                    continue;
-                }
-                let at = other.texel_at(seen.x, seen.y);
-                if (maps[at][0] - 1.0 / seen.depth).abs() > 1.5 * steps[second] {
-                    continue;
-                }
-                let (here, there) = (texels[texel], texels[at]);
-                for channel in 0..3 {
-                    if COMPARABLE.contains(&here[channel]) && COMPARABLE.contains(&there[channel]) {
-                        logarithms[second][channel].push(f64::from(there[channel] / here[channel]).ln());
-                    }
+            let at = other.texel_at(seen.x, seen.y);
+            if (maps[at][0] - 1.0 / seen.depth).abs() > 1.5 * steps[second] {
+                continue;
+            }
+            let (here, there) = (texels[texel], texels[at]);
+            for channel in 0..3 {
+                if COMPARABLE.contains(&here[channel]) && COMPARABLE.contains(&there[channel]) {
+                    logarithms[second][channel].push(f64::from(there[channel] / here[channel]).ln());
                 }
             }
         }
-        for (second, mut channels) in logarithms.into_iter().enumerate() {
-            let count = channels.iter().map(Vec::len).min().unwrap_or(0);
-            if count >= MIN_POINTS {
-                let medians = [0, 1, 2].map(|channel| median(&mut channels[channel]));
-                let spreads = [0, 1, 2].map(|channel| {
-                    channels[channel].iter_mut().for_each(|value| *value = (*value - medians[channel]).abs());
-                    median(&mut channels[channel])
-                });
-                // Exposure changes all surfaces alike; light that depends on the direction does not.
-                if spreads.iter().any(|spread| *spread > MAX_SPREAD) {
-                    continue;
-                }
-                ratios.push(Ratio { first, second, logarithms: medians, count: count as f64 });
+    }
+    for (second, mut channels) in logarithms.into_iter().enumerate() {
+        let count = channels.iter().map(Vec::len).min().unwrap_or(0);
+        if count >= MIN_POINTS {
+            let medians = [0, 1, 2].map(|channel| median(&mut channels[channel]));
+            let spreads = [0, 1, 2].map(|channel| {
+                channels[channel].iter_mut().for_each(|value| *value = (*value - medians[channel]).abs());
+                median(&mut channels[channel])
+            });
+            // Exposure changes all surfaces alike; light that depends on the direction does not.
+            if spreads.iter().any(|spread| *spread > MAX_SPREAD) {
+                continue;
             }
+            ratios.push(Ratio { first, second, logarithms: medians, count: count as f64 });
         }
     }
     ratios

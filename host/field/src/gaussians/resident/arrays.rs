@@ -11,7 +11,7 @@ use viewfuse_core::gaussian::REST_COUNTS;
 use viewfuse_device::{Device, DeviceError, Element};
 use viewfuse_kernels::gaussians::blend_gradient::SplatGradient;
 use viewfuse_kernels::rows::{
-    GainBlock, GaussianBlock, HarmonicTerm, LIST_PARTS, ListBlock, ParticleState, ProjectedGaussian, SHARE_RUN,
+    GainBlock, GaussianBlock, HarmonicTerm, ListBlock, ParticleState, ProjectedGaussian, SHARE_RUN, TILE_RUN,
 };
 
 /// Gaussians must be fewer: their number has 24 bits.
@@ -63,6 +63,7 @@ pub(super) struct Level<D: Device> {
     pub(super) means: D::Buffer<[f32; 4]>,
     pub(super) variances: D::Buffer<[f32; 4]>,
     pub(super) counts: D::Buffer<u32>,
+    pub(super) before: D::Buffer<u32>,
     pub(super) sums: D::Buffer<u32>,
     pub(super) starts: D::Buffer<u32>,
     pub(super) colours: D::Buffer<[f32; 4]>,
@@ -96,6 +97,7 @@ impl<D: Device> Level<D> {
             blocks.map(|block| of(&block)).max().unwrap_or(0).max(1) as usize
         };
         let (tile_count, run_count) = (most(ListBlock::tile_count), most(ListBlock::run_count));
+        let count_count = most(ListBlock::most_counts);
         let pixels = views.iter().map(pixel_count).max().unwrap_or(0).max(1);
         Ok(Level {
             number,
@@ -103,8 +105,9 @@ impl<D: Device> Level<D> {
             photographs: device.upload_owned(photographs)?,
             means: device.upload_owned(means)?,
             variances: device.upload_owned(variances)?,
-            counts: device.zeros(tile_count * LIST_PARTS as usize)?,
-            sums: device.zeros(run_count)?,
+            counts: device.zeros(count_count)?,
+            before: device.zeros(count_count)?,
+            sums: device.zeros(run_count * TILE_RUN as usize)?,
             starts: device.zeros(tile_count + 1)?,
             colours: device.zeros(pixels)?,
             depths: device.zeros(pixels)?,

@@ -8,6 +8,7 @@
 use super::views::Views;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::Device;
+use viewfuse_device::parallel::map;
 use viewfuse_kernels::plane_sweep::evidence::planes_behind;
 use viewfuse_kernels::plane_sweep::frustum::Track;
 use viewfuse_kernels::visual_hull::fade;
@@ -19,6 +20,8 @@ const OTHERS: usize = 2;
 const ONE_CONFIRMS: f32 = 0.65;
 /// Width of the bell of what confirms, in planes of the confirming view's sweep.
 const WIDTH: f32 = 2.0;
+/// Pixels that are enough work for a thread.
+const MIN_PIXELS: usize = 512;
 
 impl<D: Device> Views<'_, D> {
     /// Confidences of these views by what they say of one another, in `maps[view][row][column]`: of a view with at
@@ -36,11 +39,13 @@ impl<D: Device> Views<'_, D> {
                 continue;
             }
             let camera = self.matched.images.cameras[view];
-            for pixel in 0..camera.width * camera.height {
-                let at = (camera.first_texel + pixel) as usize;
-                let [disparity, confidence] = maps[at];
-                maps[at][1] = confidence + share * (consistency(&camera, pixel, disparity, &others, maps) - confidence);
-            }
+            let (first, count) = (camera.first_texel as usize, (camera.width * camera.height) as usize);
+            // Of the maps only disparities are read, which stay.
+            let confidences = map(count, MIN_PIXELS, |pixel| {
+                let [disparity, confidence] = maps[first + pixel];
+                confidence + share * (consistency(&camera, pixel as u32, disparity, &others, maps) - confidence)
+            });
+            maps[first..].iter_mut().zip(confidences).for_each(|(pixel, confidence)| pixel[1] = confidence);
         }
     }
 }

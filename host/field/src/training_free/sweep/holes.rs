@@ -6,6 +6,10 @@
 
 use crate::{DepthMap, Rendered};
 use viewfuse_core::camera::CameraBlock;
+use viewfuse_device::parallel::map;
+
+/// Pixels that are enough work for a thread.
+const MIN_PIXELS: usize = 256;
 
 /// Colours times their weights, and weights in `[0, 1]`; row-major.
 struct Level {
@@ -18,12 +22,13 @@ struct Level {
 /// the picture's camera. Without any pixel that a view shows nothing changes.
 pub(super) fn fill(picture: &mut Rendered, target: &CameraBlock, maps: &[DepthMap]) {
     let width = picture.width as usize;
-    let shown = |(pixel, depth): (usize, &f32)| {
+    let shown = |pixel: usize| {
+        let depth = picture.depths[pixel];
         let [x, y] = [(pixel % width) as f32 + 0.5, (pixel / width) as f32 + 0.5];
-        let point = target.centre_world() + target.towards(x, y) * *depth;
-        *depth <= 0.0 || maps.iter().any(|map| map.shows(point))
+        let point = target.centre_world() + target.towards(x, y) * depth;
+        depth <= 0.0 || maps.iter().any(|map| map.shows(point))
     };
-    let shown: Vec<bool> = picture.depths.iter().enumerate().map(shown).collect();
+    let shown: Vec<bool> = map(picture.depths.len(), MIN_PIXELS, shown);
     if shown.iter().all(|shown| *shown) || !shown.iter().any(|shown| *shown) {
         return;
     }

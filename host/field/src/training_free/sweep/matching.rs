@@ -19,8 +19,10 @@ use viewfuse_scene::photographs::object_box::joined;
 
 /// Most pairs that are compared, for each view.
 const PAIRS_PER_VIEW: usize = 3;
-/// Rows that are compared at once, which bounds the memory of colours and evidence.
+/// Rows that are compared at once on a processor, whose caches hold what they need.
 const BAND_ROWS: u32 = 32;
+/// Bytes of colours and evidence of the rows that are compared at once on a GPU, which rows fill.
+const BAND_BYTES: usize = 256 << 20;
 
 /// The sources at one size, on a device.
 pub(super) struct Images<D: Device> {
@@ -126,7 +128,7 @@ impl<D: Device> Matching<'_, D> {
         let matched = &swept[..whole.view_count as usize];
         let row_len = (width * group_count) as usize;
         let (views, pairs) = (device.upload(matched)?, device.upload(&pairs(swept))?);
-        let band_rows = BAND_ROWS.min(height);
+        let band_rows = self.band_rows(row_len * matched.len().max(4)).min(height);
         let rows = (band_rows + REACH).min(height) as usize;
         let grey = scratch.grey.of_len(device, rows * row_len * matched.len())?;
         let evidence = scratch.evidence.of_len(device, 4 * rows * row_len)?;
@@ -139,6 +141,16 @@ impl<D: Device> Matching<'_, D> {
             device.census_cost(&band, halo, kept, &pairs, grey, evidence, costs)?;
         }
         Ok(())
+    }
+
+    /// Rows that are compared at once, of which each takes so many numbers of planes for colours.
+    fn band_rows(&self, row_len: usize) -> u32 {
+        if self.device.is_software() {
+            return BAND_ROWS;
+        }
+        // Evidence takes at most as much again.
+        let most = (BAND_BYTES / size_of::<Planes>() / 2).min(self.device.most_elements::<Planes>());
+        (most / row_len.max(1)).saturating_sub(REACH as usize).max(BAND_ROWS as usize) as u32
     }
 
     /// The means over windows of what [`Matching::compared`] finds, which is not kept: `means[row][column][group]`.
