@@ -330,7 +330,6 @@ macro_rules! shared_words {
     (blend_gradient) => {
         bodies::together::BLEND_GRADIENT_SHARED
     };
-<<<<<<< HEAD
     (group_norm_partials) => {
         bodies::together::GROUP_NORM_PARTIALS_SHARED
     };
@@ -339,7 +338,7 @@ macro_rules! shared_words {
     };
     (group_norm) => {
         bodies::together::GROUP_NORM_SHARED
-=======
+    };
     (blend_splats) => {
         bodies::together::BLEND_SPLATS_SHARED
     };
@@ -360,7 +359,6 @@ macro_rules! shared_words {
     };
     (start_tiles) => {
         bodies::together::START_TILES_SHARED
->>>>>>> 915a3f2319d8bb8658c8b9480e83fe37719aee94
     };
 }
 

@@ -2,23 +2,17 @@
 //! Its results are those of the body of that name, which is the definition. It must not panic: others wait for it.
 //! Arrays hold at least one element and may be read beyond their end.
 
-<<<<<<< HEAD
-mod norms;
-
-pub use norms::{
-    GROUP_NORM_PARTIALS_SHARED, GROUP_NORM_SHARED, SOFTMAX_ROWS_SHARED, group_norm, group_norm_partials, softmax_rows,
-};
-=======
 mod blend;
 mod entries;
+mod norms;
 mod paths;
 mod shares;
 
 pub use blend::*;
 pub use entries::*;
+pub use norms::*;
 pub use paths::*;
 pub use shares::*;
->>>>>>> 915a3f2319d8bb8658c8b9480e83fe37719aee94
 
 use crate::gaussians::blend_gradient::{GradientLanes, GradientSums, NUMBERS, SplatGradient};
 use crate::gaussians::lanes::sum;
