@@ -49,6 +49,7 @@ pub(crate) fn rounded<O: Clone>(
         typical_error: rounding.typical_error,
         typical_share: rounding.typical_share,
         rounds_as_f32: is_as_f32(rounding.precision),
+        omits_nothing: true,
     }));
     efforts.push(exact);
     efforts

@@ -25,6 +25,8 @@ pub struct Variant<O> {
     /// Whether it omits nothing, and rounds about as much as `f32` does in another order of its sums: the exact
     /// pictures of two devices differ as much.
     pub rounds_as_f32: bool,
+    /// Whether nothing is omitted, so that what omissions cost in a scene says nothing of its error.
+    pub omits_nothing: bool,
 }
 
 /// Label of the variant that omits nothing.
@@ -33,12 +35,19 @@ pub const EXACT: &str = "exact";
 impl<O> Variant<O> {
     /// One that omits something.
     pub fn new(label: impl Into<String>, options: O, typical_error: f32, typical_share: f32) -> Variant<O> {
-        Variant { label: label.into(), options, typical_error, typical_share, rounds_as_f32: false }
+        Variant {
+            label: label.into(),
+            options,
+            typical_error,
+            typical_share,
+            rounds_as_f32: false,
+            omits_nothing: false,
+        }
     }
 
     /// The one that omits nothing.
     pub fn exact(options: O) -> Variant<O> {
-        Variant { rounds_as_f32: true, ..Variant::new(EXACT, options, 0.0, 1.0) }
+        Variant { rounds_as_f32: true, omits_nothing: true, ..Variant::new(EXACT, options, 0.0, 1.0) }
     }
 
     /// One whose error and time are to be measured.
@@ -48,8 +57,8 @@ impl<O> Variant<O> {
 
     /// With other options.
     pub fn map<P>(self, to: impl FnOnce(O) -> P) -> Variant<P> {
-        let Variant { label, options, typical_error, typical_share, rounds_as_f32 } = self;
-        Variant { label, options: to(options), typical_error, typical_share, rounds_as_f32 }
+        let Variant { label, options, typical_error, typical_share, rounds_as_f32, omits_nothing } = self;
+        Variant { label, options: to(options), typical_error, typical_share, rounds_as_f32, omits_nothing }
     }
 }
 

@@ -21,8 +21,8 @@ pub(super) struct Expected {
     pub(super) efforts: Vec<Variant<AnyOptions>>,
     /// Factor on all errors.
     margin: f64,
-    /// Estimated over typical errors in this scene.
-    scale: Option<f64>,
+    /// Estimated over typical errors in this scene: of efforts that omit something, and of those that only round.
+    scales: [Option<f64>; 2],
     /// Seconds of each effort's last picture, without encoding.
     pub(super) seconds: Vec<Option<f64>>,
 }
@@ -34,7 +34,7 @@ impl Expected {
             efforts.push(Variant::exact(AnyOptions::new(())));
         }
         let seconds = vec![None; efforts.len()];
-        Expected { efforts, margin: MARGIN * safety, scale: None, seconds }
+        Expected { efforts, margin: MARGIN * safety, scales: [None; 2], seconds }
     }
 
     /// Whether an effort is the exact one.
@@ -44,8 +44,10 @@ impl Expected {
 
     /// The cheapest effort whose error is expected to be below the bound.
     pub(super) fn cheapest_within(&self, most: f64) -> usize {
-        let scale = self.margin * self.scale.unwrap_or(1.0);
-        let is_within = |effort: &Variant<AnyOptions>| scale * f64::from(effort.typical_error) <= most;
+        let is_within = |effort: &Variant<AnyOptions>| {
+            let scale = self.margin * self.scales[usize::from(effort.omits_nothing)].unwrap_or(1.0);
+            scale * f64::from(effort.typical_error) <= most
+        };
         self.efforts.iter().position(is_within).unwrap_or(self.efforts.len() - 1)
     }
 
@@ -85,12 +87,13 @@ impl Expected {
         (0..self.efforts.len()).rev().find(|effort| expected(*effort) <= TIME_SHARE * left)
     }
 
-    /// Updates the scale of errors by half, in logarithms: single estimates are uncertain.
+    /// Updates the scale of the errors of an effort's kind by half, in logarithms: single estimates are uncertain.
     pub(super) fn learn(&mut self, effort: usize, estimate: Estimate) {
         let found = estimate.value / f64::from(self.efforts[effort].typical_error);
         if found.is_finite() && found > 0.0 {
-            let scale = self.scale.map_or(found, |scale| (scale * found).sqrt());
-            self.scale = Some(scale.max(MIN_SCALE));
+            let kept = &mut self.scales[usize::from(self.efforts[effort].omits_nothing)];
+            let scale = kept.map_or(found, |scale| (scale * found).sqrt());
+            *kept = Some(scale.max(MIN_SCALE));
         }
     }
 }
@@ -123,9 +126,15 @@ mod tests {
     fn tight_bounds_are_kept_as_f32_does() {
         let expected = efforts();
         assert_eq!((expected.cheapest_within(0.05), expected.cheapest_as_f32(0.05)), (0, 4));
+        // What omissions cost here says nothing of rounding.
         let mut rounding = efforts();
         rounding.efforts.insert(4, Variant { rounds_as_f32: true, ..Variant::new("", AnyOptions::new(()), 1e-4, 0.4) });
         assert_eq!([0.05, 1e-3, 1e-5].map(|most| rounding.cheapest_as_f32(most)), [4, 4, 5]);
+        rounding.efforts[4].omits_nothing = true;
+        rounding.learn(3, found(0.1));
+        assert_eq!(rounding.after(3, 1e-3), 4);
+        rounding.learn(4, found(2e-3));
+        assert_eq!(rounding.cheapest_within(1e-3), 5);
     }
 
     #[test]
@@ -134,10 +143,10 @@ mod tests {
         expected.learn(0, found(0.16));
         expected.learn(0, found(0.04));
         // 4, then its geometric mean with 1.
-        assert!(expected.scale.is_some_and(|scale| (scale - 2.0).abs() < 1.0e-6));
+        assert!(expected.scales[0].is_some_and(|scale| (scale - 2.0).abs() < 1.0e-6));
         (0..20).for_each(|_| expected.learn(0, found(0.0004)));
-        assert_eq!(expected.scale, Some(MIN_SCALE));
+        assert_eq!(expected.scales, [Some(MIN_SCALE), None]);
         expected.learn(0, found(f64::NAN));
-        assert_eq!(expected.scale, Some(MIN_SCALE));
+        assert_eq!(expected.scales, [Some(MIN_SCALE), None]);
     }
 }
