@@ -28,15 +28,15 @@ pub(crate) struct Class {
     key: Key,
 }
 
-/// The kernel's name and the logarithms of rows, inner indices and columns.
-type Key = (String, [u32; 3]);
+/// The kernel and the logarithms of rows, inner indices and columns.
+type Key = (Kernel, [u32; 3]);
 
 impl Class {
     pub(crate) fn new(kernel: Kernel, shape: Shape) -> Class {
         let logarithm = |count: u32| u32::BITS - count.saturating_sub(1).leading_zeros();
         let Shape { row_count, inner_count, column_count } = shape;
         let sizes = [logarithm(row_count).min(MAX_ROWS), logarithm(inner_count), logarithm(column_count)];
-        Class { shape, key: (kernel.name().to_owned(), sizes) }
+        Class { shape, key: (kernel, sizes) }
     }
 
     /// The forms that come into question, [`Form::Single`] first: one for little work. Sizes of tiles are a matter of
@@ -77,13 +77,13 @@ impl Choices {
     }
 
     pub(crate) fn set(&mut self, class: &Class, form: Form) {
-        self.forms.insert(class.key.clone(), form);
+        self.forms.insert(class.key, form);
         self.has_new = true;
     }
 
     /// The forms that were chosen for any class of a kernel.
     pub(crate) fn forms_of(&self, kernel: Kernel) -> Vec<Form> {
-        let of_kernel = |((name, _), form): (&Key, &Form)| (name == kernel.name()).then_some(*form);
+        let of_kernel = |((of, _), form): (&Key, &Form)| (*of == kernel).then_some(*form);
         Form::ALL.into_iter().filter(|form| self.forms.iter().filter_map(of_kernel).any(|of| of == *form)).collect()
     }
 
@@ -102,7 +102,7 @@ impl Choices {
     /// A line a class: kernel, logarithms of the sizes, form.
     pub(crate) fn text(&self) -> String {
         let line = |((kernel, [rows, inner, columns]), form): (&Key, &Form)| {
-            format!("{kernel} {rows} {inner} {columns} {}\n", form.name())
+            format!("{} {rows} {inner} {columns} {}\n", kernel.name(), form.name())
         };
         self.forms.iter().map(line).collect()
     }
@@ -120,7 +120,7 @@ fn parse_line(line: &str) -> Option<(Key, Form)> {
     let kernel = Kernel::ALL.into_iter().find(|known| known.is_tiled() && known.name() == kernel)?;
     let form = Form::ALL.into_iter().find(|known| known.name() == form)?;
     let sizes = [rows.parse().ok()?, inner.parse().ok()?, columns.parse().ok()?];
-    Some(((kernel.name().to_owned(), sizes), form))
+    Some(((kernel, sizes), form))
 }
 
 #[cfg(test)]
