@@ -84,21 +84,19 @@ pub(crate) struct Range {
 }
 
 /// The bound ranges of an array: itself, or its pages; the first page takes the place of missing ones.
-pub(crate) fn ranges(array: &Array, layout: Layout, page_shift: u32) -> Vec<Range> {
+pub(crate) fn ranges(array: &Array, layout: Layout, page_shift: u32) -> impl Iterator<Item = Range> {
     let page_len = match (layout, page_shift) {
         (Layout::Whole | Layout::One, _) | (_, 0) => array.len,
         (Layout::Pages, shift) => 1 << shift,
     };
     let binding_count = if layout == Layout::Pages { MAX_PAGES } else { 1 };
-    (0..binding_count)
-        .map(|page| {
-            let first = if page * page_len < array.len { page * page_len } else { 0 };
-            let (memory, offset, there) = array.place(first);
-            // An empty array still binds something.
-            let len = page_len.min(there).max(1);
-            Range { buffer: memory.buffer, offset, bytes: (len * array.stride) as u64 }
-        })
-        .collect()
+    (0..binding_count).map(move |page| {
+        let first = if page * page_len < array.len { page * page_len } else { 0 };
+        let (memory, offset, there) = array.place(first);
+        // An empty array still binds something.
+        let len = page_len.min(there).max(1);
+        Range { buffer: memory.buffer, offset, bytes: (len * array.stride) as u64 }
+    })
 }
 
 /// The number of an interval of commands between two barriers; 0 is none.

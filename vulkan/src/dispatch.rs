@@ -1,6 +1,6 @@
 //! Dispatches of kernels: arguments checked, split to fit the device, in the fastest form of their tiles.
 
-use crate::buffer::{Array, Bound, ranges};
+use crate::buffer::{self, Array, Bound, ranges};
 use crate::error::VulkanError;
 use crate::forms::Class;
 use crate::gpu::{Gpu, State, WIDEST_PAGED, barrier};
@@ -15,6 +15,18 @@ use viewfuse_kernels::pages::MAX_PAGES;
 
 /// The time that a dispatch of an unknown kernel is expected to take.
 const UNKNOWN: Duration = Duration::from_millis(20);
+
+/// The most bindings of a kernel, and bytes of push constants: the latter are those that every device has.
+const MAX_BINDINGS: usize = 24;
+const MAX_CONSTANTS: usize = 128;
+const _: () = {
+    let mut index = 0;
+    while index < Kernel::ALL.len() {
+        let kernel = Kernel::ALL[index];
+        assert!(kernel.binding_count() <= MAX_BINDINGS && kernel.push_bytes() <= MAX_CONSTANTS);
+        index += 1;
+    }
+};
 
 /// A dispatch whose arguments are right.
 pub(crate) struct DispatchJob<'a> {
@@ -107,8 +119,15 @@ impl Gpu {
         let DispatchJob { kernel, parameters, arrays, page_shift } = *job;
         let elements = self.faults.done(form, elements);
         let listed = kernel.arrays().iter().zip(arrays);
+        let mut constants = [0; MAX_CONSTANTS];
+        let constants = &mut constants[..kernel.push_bytes()];
+        constants[..parameters.len()].copy_from_slice(parameters);
         let uses: Vec<_> = listed.clone().map(|(array, bound)| (bound.0, array.access)).collect();
-        let pipeline = self.pipelines.get((kernel, form, page_shift))?;
+        let key = (kernel, form, page_shift);
+        let pipeline = match state.used.get(&key) {
+            Some(pipeline) => *pipeline,
+            None => *state.used.entry(key).or_insert(self.pipelines.get(key)?),
+        };
         let per_piece = self.handle.limits.workgroup_count.saturating_mul(form.invocations());
         let expected = state.rates[kernel as usize].time_of(counted).unwrap_or(UNKNOWN);
         let mut dispatches = 0;
@@ -122,14 +141,14 @@ impl Gpu {
                 device.cmd_bind_descriptor_sets(commands, compute, pipeline.layout, 0, &[set], &[]);
                 for first in elements.clone().step_by(per_piece as usize) {
                     let piece = Piece { first, count: per_piece.min(elements.end - first) };
-                    let constants = [parameters, bytemuck::bytes_of(&piece)].concat();
+                    constants[parameters.len()..].copy_from_slice(bytemuck::bytes_of(&piece));
                     let stage = vk::ShaderStageFlags::COMPUTE;
                     // Pieces write different elements, but the validation layers only see whole arrays. Pieces are
                     // large, so a barrier between them costs nothing.
                     if dispatches > 0 && self.barriers {
                         barrier(device, commands);
                     }
-                    device.cmd_push_constants(commands, pipeline.layout, stage, 0, &constants);
+                    device.cmd_push_constants(commands, pipeline.layout, stage, 0, constants);
                     device.cmd_dispatch(commands, piece.count.div_ceil(form.invocations()), 1, 1);
                     dispatches += 1;
                 }
@@ -153,22 +172,23 @@ impl Gpu {
         // SAFETY: the pool has room for a largest set of each of a submission's dispatches, and is reset with it.
         let set = unsafe { self.handle.device.allocate_descriptor_sets(&info) }
             .map_err(|result| self.handle.failure("vkAllocateDescriptorSets", result))?[0];
-        let infos: Vec<[vk::DescriptorBufferInfo; 1]> = arrays
-            .flat_map(|(array, bound)| ranges(bound.0, array.layout, page_shift))
-            .map(|range| [vk::DescriptorBufferInfo { buffer: range.buffer, offset: range.offset, range: range.bytes }])
-            .collect();
-        let writes: Vec<_> = (0..)
-            .zip(&infos)
-            .map(|(binding, info)| {
-                vk::WriteDescriptorSet::default()
-                    .dst_set(set)
-                    .dst_binding(binding)
-                    .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
-                    .buffer_info(info)
-            })
-            .collect();
+        let mut infos = [[vk::DescriptorBufferInfo::default()]; MAX_BINDINGS];
+        let all = arrays.flat_map(|(array, bound)| ranges(bound.0, array.layout, page_shift));
+        let mut count = 0;
+        for (info, buffer::Range { buffer, offset, bytes }) in infos.iter_mut().zip(all) {
+            *info = [vk::DescriptorBufferInfo { buffer, offset, range: bytes }];
+            count += 1;
+        }
+        let mut writes = [vk::WriteDescriptorSet::default(); MAX_BINDINGS];
+        for ((binding, info), write) in (0..).zip(&infos[..count]).zip(&mut writes) {
+            *write = vk::WriteDescriptorSet::default()
+                .dst_set(set)
+                .dst_binding(binding)
+                .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
+                .buffer_info(info);
+        }
         // SAFETY: the ranges lie in their buffers, which the submission holds.
-        unsafe { self.handle.device.update_descriptor_sets(&writes, &[]) };
+        unsafe { self.handle.device.update_descriptor_sets(&writes[..count], &[]) };
         Ok(set)
     }
 

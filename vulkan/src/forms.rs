@@ -23,15 +23,14 @@ const MAX_ROWS: u32 = 14;
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Class {
     shape: Shape,
-    is_in_fours: bool,
     key: Key,
 }
 
 /// What a class of products whose arrays lie in fours has behind its kernel's name.
 const IN_FOURS: &str = "::in_fours";
 
-/// The kernel's name and the logarithms of rows, inner indices and columns.
-type Key = (String, [u32; 3]);
+/// The kernel, whether its arrays lie in fours, and the logarithms of rows, inner indices and columns.
+type Key = (Kernel, bool, [u32; 3]);
 
 impl Class {
     /// Whether the arrays lie in fours belongs to it.
@@ -39,13 +38,12 @@ impl Class {
         let logarithm = |count: u32| u32::BITS - count.saturating_sub(1).leading_zeros();
         let Shape { row_count, inner_count, column_count } = shape;
         let sizes = [logarithm(row_count).min(MAX_ROWS), logarithm(inner_count), logarithm(column_count)];
-        let name = kernel.name().to_owned() + if is_in_fours { IN_FOURS } else { "" };
-        Class { shape, is_in_fours, key: (name, sizes) }
+        Class { shape, key: (kernel, is_in_fours, sizes) }
     }
 
     /// Whether its arrays lie in fours.
     pub(crate) fn is_in_fours(&self) -> bool {
-        self.is_in_fours
+        self.key.1
     }
 
     /// The forms that come into question, [`Form::Single`] first: one for little work. Sizes of tiles are a matter of
@@ -57,7 +55,7 @@ impl Class {
         // Of those in fours one: measured in a process that has just compiled them, GPUs are not what they are later.
         let mut sizes = [Form::Large, Form::Small, Form::Tiny].into_iter();
         let in_fours = sizes.find(|form| tiles(*form) >= ENOUGH_TILES).unwrap_or(Form::Tiny);
-        let has_fours = self.is_in_fours && !is_software;
+        let has_fours = self.is_in_fours() && !is_software;
         let fits = move |form: &Form| match form {
             Form::Single => true,
             Form::Subgroup => !has_fours,
@@ -88,13 +86,13 @@ impl Choices {
     }
 
     pub(crate) fn set(&mut self, class: &Class, form: Form) {
-        self.forms.insert(class.key.clone(), form);
+        self.forms.insert(class.key, form);
         self.has_new = true;
     }
 
     /// The forms that were chosen for any class of a kernel.
     pub(crate) fn forms_of(&self, kernel: Kernel) -> Vec<Form> {
-        let of_kernel = |((name, _), form): (&Key, &Form)| (name == kernel.name()).then_some(*form);
+        let of_kernel = |((of, ..), form): (&Key, &Form)| (*of == kernel).then_some(*form);
         Form::ALL.into_iter().filter(|form| self.forms.iter().filter_map(of_kernel).any(|of| of == *form)).collect()
     }
 
@@ -112,8 +110,9 @@ impl Choices {
 
     /// A line a class: kernel, logarithms of the sizes, form.
     pub(crate) fn text(&self) -> String {
-        let line = |((kernel, [rows, inner, columns]), form): (&Key, &Form)| {
-            format!("{kernel} {rows} {inner} {columns} {}\n", form.name())
+        let line = |((kernel, is_in_fours, [rows, inner, columns]), form): (&Key, &Form)| {
+            let fours = if *is_in_fours { IN_FOURS } else { "" };
+            format!("{}{fours} {rows} {inner} {columns} {}\n", kernel.name(), form.name())
         };
         self.forms.iter().map(line).collect()
     }
@@ -127,12 +126,12 @@ impl Choices {
 
 fn parse_line(line: &str) -> Option<(Key, Form)> {
     let words: Vec<&str> = line.split(' ').collect();
-    let &[kernel, rows, inner, columns, form] = &words[..] else { return None };
-    let name = kernel.strip_suffix(IN_FOURS).unwrap_or(kernel);
-    Kernel::ALL.into_iter().find(|known| known.is_tiled() && known.name() == name)?;
+    let &[name, rows, inner, columns, form] = &words[..] else { return None };
+    let plain = name.strip_suffix(IN_FOURS).unwrap_or(name);
+    let kernel = Kernel::ALL.into_iter().find(|known| known.is_tiled() && known.name() == plain)?;
     let form = Form::ALL.into_iter().find(|known| known.name() == form)?;
     let sizes = [rows.parse().ok()?, inner.parse().ok()?, columns.parse().ok()?];
-    Some(((kernel.to_owned(), sizes), form))
+    Some(((kernel, name.ends_with(IN_FOURS), sizes), form))
 }
 
 #[cfg(test)]

@@ -8,11 +8,12 @@ use crate::forms::Choices;
 use crate::handle::{Handle, Memory};
 use crate::instance::Instance;
 use crate::kernel::{Access, Form, Kernel};
-use crate::pipelines::Pipelines;
+use crate::pipelines::{Key, Pipeline, Pipelines};
 use crate::staging::Ring;
 use crate::submissions::{Done, Submission, Submissions};
 use crate::trust::Verdicts;
 use ash::vk;
+use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -139,6 +140,8 @@ pub struct Gpu {
 
 pub(crate) struct State {
     pub(crate) submissions: Submissions,
+    /// Pipelines that were used, at hand without the lock of those that are made.
+    pub(crate) used: HashMap<Key, Pipeline>,
     /// Forms of tiled kernels, as far as they are known.
     pub(crate) choices: Choices,
     /// Forms that are not used, because their results or their subgroups were others.
@@ -196,6 +199,7 @@ impl Gpu {
             (limits.buffer_range.min(limits.allocation) / WIDEST_PAGED).max(adapter.offset_alignment).max(64);
         let state = State {
             submissions,
+            used: HashMap::new(),
             choices: Choices::default(),
             refused: Vec::new(),
             verdicts: Verdicts::default(),

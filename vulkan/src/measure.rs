@@ -33,13 +33,14 @@ impl Gpu {
                 }
             };
         }
-        let candidates: Vec<Form> = class.candidates(self.is_software).filter(|form| self.handle.runs(*form)).collect();
-        if candidates.len() == 1 {
-            return Ok(candidates[0]);
+        let candidates = || class.candidates(self.is_software).filter(|form| self.handle.runs(*form));
+        if candidates().nth(1).is_none() {
+            return Ok(Form::Single);
         }
-        if let Some(form) = state.choices.get(class).filter(|form| candidates.contains(form)) {
+        if let Some(form) = state.choices.get(class).filter(|form| candidates().any(|candidate| candidate == *form)) {
             return Ok(form);
         }
+        let candidates: Vec<Form> = candidates().collect();
         let outputs = job.outputs();
         if outputs.iter().any(|array| self.start_bytes(array) == 0) {
             return Ok(Form::Single);

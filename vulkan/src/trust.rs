@@ -55,14 +55,12 @@ impl Gpu {
         if !kernel.rounded_forms().contains(&form) || !self.runs(form) {
             return Ok(false);
         }
-        let known = self.lock().verdicts.get(kernel, form);
-        // A driver that does not compile it is only not trusted.
-        let known = known.or_else(|| self.pipelines.get((kernel, form, 0)).is_err().then_some(false));
-        if let Some(is_trusted) = known {
-            self.lock().verdicts.set(kernel, form, is_trusted);
+        if let Some(is_trusted) = self.lock().verdicts.get(kernel, form) {
             return Ok(is_trusted);
         }
-        let is_trusted = Probe::new(kernel).is_kept_by(self, form)?;
+        // A driver that does not compile it is only not trusted.
+        let is_compiled = self.pipelines.get((kernel, form, 0)).is_ok();
+        let is_trusted = is_compiled && Probe::new(kernel).is_kept_by(self, form)?;
         self.lock().verdicts.set(kernel, form, is_trusted);
         Ok(is_trusted)
     }
