@@ -240,6 +240,8 @@ macro_rules! form {
         }
 
         impl<U: Units> Tiles for $Form<'_, U> {
+            // Some forms have one subgroup beside or behind another.
+            #[allow(clippy::modulo_one)]
             #[inline(always)]
             fn multiply<L: Left>(
                 self,
