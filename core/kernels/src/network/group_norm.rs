@@ -9,7 +9,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use viewfuse_core::fetch::Fetch;
-use viewfuse_core::math::{exp, has_finite_bits, max, sqrt};
+use viewfuse_core::math::{exp, has_finite_bits, has_nan_bits, max, sqrt};
 
 /// Pixels whose statistics are taken together.
 pub const PART: u32 = 64;
@@ -125,25 +125,50 @@ pub fn group_norm_statistics(
     block: &GroupNormBlock,
     group: usize,
 ) -> [f32; 2] {
-    // The first part changes nothing of the mean, however a device divides.
-    let [mut mean, _] = partials.fetch(group);
-    let (mut count, mut deviations) = (0.0, 0.0);
+    let mut merged = MergedParts::before(partials.fetch(group));
     let mut part = 0;
     while part < block.part_count() {
-        let [own_mean, own_deviations] = partials.fetch(part as usize * block.group_count as usize + group);
-        let part_count = (block.pixels_of(part) * block.group_channels()) as f32;
-        let all = count + part_count;
-        let difference = own_mean - mean;
-        mean += difference * (part_count / all);
-        deviations += own_deviations + difference * difference * (count * (part_count / all));
-        count = all;
+        merged.add(block, part, partials.fetch(part as usize * block.group_count as usize + group));
         part += 1;
     }
-    let spread = deviations / count + block.variance_floor;
-    if !has_finite_bits(spread) {
-        return [mean, f32::NAN];
+    merged.statistics(block)
+}
+
+/// The statistics of a group's parts so far.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MergedParts {
+    mean: f32,
+    deviations: f32,
+    count: f32,
+}
+
+impl MergedParts {
+    /// Before the first part, which is given: it changes nothing of the mean then, however a device divides.
+    #[inline(always)]
+    pub(crate) fn before([mean, _]: [f32; 2]) -> MergedParts {
+        MergedParts { mean, deviations: 0.0, count: 0.0 }
     }
-    [mean, if spread > 0.0 { 1.0 / sqrt(spread) } else { 0.0 }]
+
+    /// Adds the next part, its mean and squared deviations.
+    #[inline(always)]
+    pub(crate) fn add(&mut self, block: &GroupNormBlock, part: u32, [mean, deviations]: [f32; 2]) {
+        let count = (block.pixels_of(part) * block.group_channels()) as f32;
+        let all = self.count + count;
+        let difference = mean - self.mean;
+        self.mean += difference * (count / all);
+        self.deviations += deviations + difference * difference * (self.count * (count / all));
+        self.count = all;
+    }
+
+    /// Mean and factor, as [`group_norm_statistics`].
+    #[inline(always)]
+    pub(crate) fn statistics(self, block: &GroupNormBlock) -> [f32; 2] {
+        let spread = self.deviations / self.count + block.variance_floor;
+        if !has_finite_bits(spread) {
+            return [self.mean, f32::NAN];
+        }
+        [self.mean, if spread > 0.0 { 1.0 / sqrt(spread) } else { 0.0 }]
+    }
 }
 
 /// Output number `element` of `[pixel][channel]`: the input less its group's mean, times its group's factor, times
@@ -166,7 +191,11 @@ pub fn group_norm_element(
 /// `x / (1 + e^-x)`: NaN for NaN. Below -87, where the result is no normal number, it is that of -87, -1.4e-36.
 #[inline]
 pub fn silu(x: f32) -> f32 {
-    // Beyond it the exponential ends, and divisors are too large for a device to divide by. NaN is not below.
+    // Told by its bits: of NaN and a number a device's larger one is the number.
+    if has_nan_bits(x) {
+        return x;
+    }
+    // Beyond it the exponential ends, and divisors are too large for a device to divide by.
     let x = max(-87.0, x);
     x / (1.0 + exp(-x))
 }

@@ -2,7 +2,7 @@
 //! statistics lie in the workgroup's memory. And softmax, a row by a workgroup.
 
 use crate::network::attend::{softmax_factor, softmax_summand, softmax_value};
-use crate::network::group_norm::{GroupNormBlock, PART, RUN, group_norm_element, group_norm_statistics};
+use crate::network::group_norm::{GroupNormBlock, MergedParts, PART, RUN, group_norm_element};
 use crate::rows::{SHARED_BYTES, WORKGROUP};
 use crate::store::Store;
 use crate::workgroup::Workgroup;
@@ -17,10 +17,14 @@ const SUM_SHARED: usize = (WORKGROUP + SUM_PARTS) as usize;
 pub const GROUP_NORM_PARTIALS_SHARED: usize = 2 * SUM_SHARED;
 /// Numbers of the workgroup's memory that [`softmax_rows`] takes: those of a maximum and of a sum.
 pub const SOFTMAX_ROWS_SHARED: usize = 2 * SUM_SHARED;
-/// Groups whose statistics are in the workgroup's memory at a time.
-const GROUPS: u32 = 256;
+/// Groups whose statistics are in the workgroup's memory at a time, one an invocation.
+const GROUPS: u32 = WORKGROUP;
+/// Parts that are in the workgroup's memory at a time: merging is serial, and must not wait for each of them.
+const STAGED: u32 = 16;
+/// Where they begin, `[part][group]`, mean and squared deviations.
+const PARTIALS: usize = 2 * GROUPS as usize;
 /// Numbers of the workgroup's memory that [`group_norm`] takes.
-pub const GROUP_NORM_SHARED: usize = 2 * GROUPS as usize;
+pub const GROUP_NORM_SHARED: usize = PARTIALS + 2 * (STAGED * GROUPS) as usize;
 
 const _: () = assert!(PART <= WORKGROUP && WORKGROUP.is_multiple_of(SUM_PARTS));
 const _: () = assert!(4 * GROUP_NORM_PARTIALS_SHARED <= SHARED_BYTES && 4 * GROUP_NORM_SHARED <= SHARED_BYTES);
@@ -104,7 +108,7 @@ fn joined(
 }
 
 /// A run of outputs, invocation `invocation % 64` of the run `invocation / 64`. The statistics are the body's, bit for
-/// bit: an invocation merges the parts of a group in their order.
+/// bit: an invocation merges the parts of a group in their order, from the workgroup's memory.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
 pub fn group_norm(
@@ -124,12 +128,34 @@ pub fn group_norm(
     let mut first = 0;
     while first < block.group_count {
         let count = if block.group_count - first < GROUPS { block.group_count - first } else { GROUPS };
-        let mut own = thread;
-        while own < count {
-            let [mean, factor] = group_norm_statistics(partials, block, (first + own) as usize);
-            group.put(2 * own as usize, mean);
-            group.put(2 * own as usize + 1, factor);
-            own += WORKGROUP;
+        // An invocation without a group goes along with the last one.
+        let own = if thread < count { thread } else { count - 1 };
+        let mut merged = MergedParts::before(partials.fetch((first + own) as usize));
+        let mut part = 0;
+        while part < block.part_count() {
+            let parts = if block.part_count() - part < STAGED { block.part_count() - part } else { STAGED };
+            let mut index = thread;
+            while index < parts * count {
+                let [staged, of] = [index / count, index % count];
+                let [mean, deviations] = partials.fetch(((part + staged) * block.group_count + first + of) as usize);
+                group.put(PARTIALS + 2 * index as usize, mean);
+                group.put(PARTIALS + 2 * index as usize + 1, deviations);
+                index += WORKGROUP;
+            }
+            group.wait();
+            let mut staged = 0;
+            while staged < parts {
+                let place = PARTIALS + 2 * (staged * count + own) as usize;
+                merged.add(block, part + staged, [group.get(place), group.get(place + 1)]);
+                staged += 1;
+            }
+            group.wait();
+            part += parts;
+        }
+        if thread < count {
+            let [mean, factor] = merged.statistics(block);
+            group.put(2 * thread as usize, mean);
+            group.put(2 * thread as usize + 1, factor);
         }
         group.wait();
         let mut element = start + thread;
