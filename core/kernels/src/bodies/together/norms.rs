@@ -134,13 +134,21 @@ pub fn group_norm(
         let mut part = 0;
         while part < block.part_count() {
             let parts = if block.part_count() - part < STAGED { block.part_count() - part } else { STAGED };
+            let total = parts * count;
             let mut index = thread;
-            while index < parts * count {
-                let [staged, of] = [index / count, index % count];
-                let [mean, deviations] = partials.fetch(((part + staged) * block.group_count + first + of) as usize);
-                group.put(PARTIALS + 2 * index as usize, mean);
-                group.put(PARTIALS + 2 * index as usize + 1, deviations);
-                index += WORKGROUP;
+            while index < total {
+                let own = |more: u32| if index + more < total { index + more } else { total - 1 };
+                let fetch = |more: u32| {
+                    let index = own(more * WORKGROUP);
+                    partials.fetch(((part + index / count) * block.group_count + first + index % count) as usize)
+                };
+                // Four at a time: none is waited for alone. The last one may be put several times.
+                let [a, b, c, d] = [fetch(0), fetch(1), fetch(2), fetch(3)];
+                put(&mut group, own(0), a);
+                put(&mut group, own(WORKGROUP), b);
+                put(&mut group, own(2 * WORKGROUP), c);
+                put(&mut group, own(3 * WORKGROUP), d);
+                index += 4 * WORKGROUP;
             }
             group.wait();
             let mut staged = 0;
@@ -160,17 +168,38 @@ pub fn group_norm(
         group.wait();
         let mut element = start + thread;
         while element < end {
-            let place = block.group_of(element).wrapping_sub(first);
-            if place < count {
-                let statistics = [group.get(2 * place as usize), group.get(2 * place as usize + 1)];
-                let value = group_norm_element(inputs, statistics, weights, bias, block, element as usize);
-                outputs.store(element as usize, value);
-            }
-            element += WORKGROUP;
+            let own = |more: u32| element + more * WORKGROUP;
+            let value = |more: u32| {
+                let element = if own(more) < end { own(more) } else { end - 1 };
+                let place = block.group_of(element).wrapping_sub(first);
+                let place = 2 * (if place < count { place } else { 0 }) as usize;
+                let statistics = [group.get(place), group.get(place + 1)];
+                group_norm_element(inputs, statistics, weights, bias, block, element as usize)
+            };
+            // Four at a time, too, and only then stored.
+            let [a, b, c, d] = [value(0), value(1), value(2), value(3)];
+            let mut store = |more: u32, value: f32| {
+                if own(more) < end && block.group_of(own(more)).wrapping_sub(first) < count {
+                    outputs.store(own(more) as usize, value);
+                }
+            };
+            store(0, a);
+            store(1, b);
+            store(2, c);
+            store(3, d);
+            element += 4 * WORKGROUP;
         }
         group.wait();
         first += GROUPS;
     }
+}
+
+/// Puts a part's statistics into the workgroup's memory.
+#[inline(always)]
+fn put(group: &mut impl Workgroup, index: u32, [mean, deviations]: [f32; 2]) {
+    let place = PARTIALS + 2 * index as usize;
+    group.put(place, mean);
+    group.put(place + 1, deviations);
 }
 
 /// A row of softmax, invocation `invocation % 64` of the row `invocation / 64`, which takes every 64th column.
