@@ -28,8 +28,8 @@ pub fn stand_ins() -> &'static [u8] {
     &MODULE
 }
 
-/// The same as a driver that compiles linear layers wrongly: in tiles of the smallest size where the largest are asked
-/// for, and the other way round.
+/// The same as a driver that compiles linear layers wrongly: in tiles of the next smaller size than are asked for, and
+/// in the largest where the smallest are.
 ///
 /// # Panics
 /// If the module is none.
@@ -38,10 +38,12 @@ pub fn exchanged_stand_ins() -> &'static [u8] {
         let mut module = rspirv::dr::load_bytes(stand_ins()).expect("SPIR-V");
         for entry in &mut module.entry_points {
             let renamed = match entry.operands[2].unwrap_literal_string() {
+                "linear::half_small_stand_in" => "linear::half_stand_in",
+                "linear::half_tiny_stand_in" => "linear::half_small_stand_in",
                 "linear::half_stand_in" => "linear::half_tiny_stand_in",
-                "linear::half_tiny_stand_in" => "linear::half_stand_in",
+                "linear::two_halves_small_stand_in" => "linear::two_halves_stand_in",
+                "linear::two_halves_tiny_stand_in" => "linear::two_halves_small_stand_in",
                 "linear::two_halves_stand_in" => "linear::two_halves_tiny_stand_in",
-                "linear::two_halves_tiny_stand_in" => "linear::two_halves_stand_in",
                 other => other,
             };
             entry.operands[2] = rspirv::dr::Operand::LiteralString(renamed.to_owned());

@@ -220,11 +220,15 @@ impl Adapter {
 
     /// Whether it has what a form of tiled kernels needs.
     pub fn runs(&self, form: Form) -> bool {
-        let [invocations, shared_bytes] = self.workgroup;
         (!form.needs_subgroups() || self.subgroup_size.is_some())
             && (!form.needs_matrices() || self.has_matrices)
-            && invocations >= form.invocations()
-            && shared_bytes as usize >= form.shared_bytes()
+            && self.has_room_for(form)
+    }
+
+    /// Whether its workgroups have the invocations and the memory of a form.
+    pub fn has_room_for(&self, form: Form) -> bool {
+        let [invocations, shared_bytes] = self.workgroup;
+        invocations >= form.invocations() && shared_bytes as usize >= form.shared_bytes()
     }
 
     /// A name for what the device remembers: letters, digits and hyphens. Another driver has another one.

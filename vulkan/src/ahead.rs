@@ -1,8 +1,6 @@
 //! Pipelines that are compiled before their first use, on all cores, while the host reads files: a driver takes up to
 //! seconds for each of them in a first process.
 
-use crate::gpu::Gpu;
-use crate::kernel::{Form, Kernel};
 use crate::pipelines::{Key, Pipelines};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -17,7 +15,7 @@ pub(crate) struct Ahead {
 
 impl Ahead {
     /// Compiles in this order what is not there. What fails is told at its first use.
-    fn start(&self, pipelines: &Arc<Pipelines>, keys: Vec<Key>) {
+    pub(crate) fn start(&self, pipelines: &Arc<Pipelines>, keys: Vec<Key>) {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let (next, keys) = (Arc::new(AtomicUsize::new(0)), Arc::new(keys));
         for _ in 0..cores.min(keys.len()) {
@@ -51,24 +49,5 @@ impl Ahead {
 impl Drop for Ahead {
     fn drop(&mut self) {
         self.stop();
-    }
-}
-
-impl Gpu {
-    /// Begins to compile these kernels, in the order of their first use, and returns at once. Of tiled kernels it takes
-    /// the forms that were chosen in earlier processes, and where none is known, those that come into question.
-    pub fn compile_ahead(&self, kernels: &[Kernel]) {
-        let known = self.lock().choices.clone();
-        let is_run = |form: &Form| self.form.map_or_else(|| self.handle.runs(*form), |only| only == *form);
-        let candidates = |kernel: &Kernel| -> Vec<Form> {
-            let chosen = known.forms_of(*kernel);
-            let forms = if chosen.is_empty() { kernel.forms().to_vec() } else { chosen };
-            forms.into_iter().filter(|form| *form != Form::Single && is_run(form)).collect()
-        };
-        // All need the plain form: for little work, or to compare with.
-        let single = kernels.iter().map(|kernel| (*kernel, Form::Single, 0));
-        let others = kernels.iter().flat_map(|kernel| candidates(kernel).into_iter().map(|form| (*kernel, form, 0)));
-        let keys: Vec<Key> = single.chain(others).filter(|key| !self.pipelines.has(*key)).collect();
-        self.ahead.start(&self.pipelines, keys);
     }
 }

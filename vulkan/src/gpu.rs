@@ -11,7 +11,7 @@ use crate::kernel::{Access, Form, Kernel};
 use crate::pipelines::{Key, Pipeline, Pipelines};
 use crate::staging::Ring;
 use crate::submissions::{Done, Submission, Submissions};
-use crate::trust::Verdicts;
+use crate::verdicts::Verdicts;
 use ash::vk;
 use std::collections::HashMap;
 use std::ops::Range;
@@ -233,7 +233,7 @@ impl Gpu {
 
     /// Whether it has what a form of tiled kernels needs, or what stands in for it.
     pub(crate) fn runs(&self, form: Form) -> bool {
-        self.handle.runs(form) || form.needs_matrices() && self.has_stand_ins
+        self.handle.runs(form) || form.needs_matrices() && self.has_stand_ins && self.handle.has_room_for(form)
     }
 
     /// [`GpuOptions::min_rounded_work`].

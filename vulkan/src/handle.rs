@@ -107,6 +107,11 @@ impl Handle {
         self.adapter.runs(form)
     }
 
+    /// Whether its workgroups have the invocations and the memory of a form.
+    pub(crate) fn has_room_for(&self, form: Form) -> bool {
+        self.adapter.has_room_for(form)
+    }
+
     /// Invocations of a subgroup, where kernels may use them.
     pub(crate) fn subgroup_size(&self) -> Option<u32> {
         self.adapter.subgroup_size

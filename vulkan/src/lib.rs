@@ -9,12 +9,12 @@
 //! messages, instance             the loader and its drivers
 //! subgroups, matrices, adapter   devices, what they can do, and missing requirements
 //! handle, buffer                 an opened device, memory in it
-//! forms                          forms of tiles: what is measured, what is chosen
+//! forms, verdicts                forms of tiles: what is measured, what is chosen, what is trusted
 //! excerpt, pipelines             the part of a module that a kernel needs, pipelines of kernels
+//! ahead                          pipelines that are compiled before their first use
 //! submissions                    submitted commands
 //! staging                        the memory that uploads pass through
 //! gpu                            an opened device: its state, recorded commands
-//! ahead                          pipelines that are compiled before their first use
 //! remembered                     pipelines and forms from one process to the next
 //! dispatch, pieces               dispatches, split to fit the device and its watchdog
 //! measure                        forms compared and timed
@@ -46,6 +46,7 @@ mod subgroups;
 mod submissions;
 mod transfers;
 mod trust;
+mod verdicts;
 
 pub use adapter::{Adapter, AdapterKind, Limits};
 pub use buffer::{Bound, Buffer};

@@ -12,11 +12,31 @@ use crate::error::{Missing, VulkanError};
 use crate::forms::{self, Class};
 use crate::gpu::{Gpu, State};
 use crate::kernel::{Form, Kernel};
+use crate::pipelines::Key;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// What outputs are overwritten with: a NaN that no arithmetic gives.
 const SPOILT: u32 = u32::MAX;
+
+impl Gpu {
+    /// Begins to compile these kernels, in the order of their first use, and returns at once. Of tiled kernels it takes
+    /// the forms that were chosen in earlier processes, and where none is known, those that come into question.
+    pub fn compile_ahead(&self, kernels: &[Kernel]) {
+        let known = self.lock().choices.clone();
+        let is_run = |form: &Form| self.form.map_or_else(|| self.handle.runs(*form), |only| only == *form);
+        let candidates = |kernel: &Kernel| -> Vec<Form> {
+            let chosen = known.forms_of(*kernel);
+            let forms = if chosen.is_empty() { kernel.forms().to_vec() } else { chosen };
+            forms.into_iter().filter(|form| *form != Form::Single && is_run(form)).collect()
+        };
+        // All need the plain form: for little work, or to compare with.
+        let single = kernels.iter().map(|kernel| (*kernel, Form::Single, 0));
+        let others = kernels.iter().flat_map(|kernel| candidates(kernel).into_iter().map(|form| (*kernel, form, 0)));
+        let keys: Vec<Key> = single.chain(others).filter(|key| !self.pipelines.has(*key)).collect();
+        self.ahead.start(&self.pipelines, keys);
+    }
+}
 
 impl Gpu {
     /// The form for a class of products.

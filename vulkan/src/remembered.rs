@@ -17,7 +17,7 @@ use crate::adapter::Identity;
 use crate::forms::Choices;
 use crate::gpu::Gpu;
 use crate::pipelines::{MATRICES, MODULE, SUBGROUPS};
-use crate::trust::Verdicts;
+use crate::verdicts::Verdicts;
 
 const MAGIC: &[u8; 16] = b"viewfuse device\x03";
 /// Bytes of the head, of the lengths and of a checksum.

@@ -6,7 +6,6 @@ use crate::forms::ENOUGH_TILES;
 use crate::gpu::Gpu;
 use crate::kernel::{Form, Kernel};
 use bytemuck::bytes_of;
-use std::collections::BTreeMap;
 use std::ops::Range;
 use viewfuse_kernels::network::convolve::{ConvolveBlock, patch_value};
 use viewfuse_kernels::network::linear::LinearBlock;
@@ -32,14 +31,32 @@ impl Gpu {
         arrays: &[Bound<'_>],
     ) -> Result<(), VulkanError> {
         let form = match kernel.shape(parameters) {
-            Some(shape) if form.needs_matrices() && kernel.is_in_fours(parameters) => Some(sized(form, shape)),
+            Some(shape) if form.needs_matrices() && kernel.is_in_fours(parameters) => Some(self.sized(form, shape)),
             _ => None,
         };
         let form = match form {
-            Some(form) if self.trusts(kernel, form.sizes()[0])? && self.trusts(kernel, form)? => Some(form),
+            Some(form) if self.trusts(kernel, self.largest(form))? && self.trusts(kernel, form)? => Some(form),
             _ => None,
         };
         self.dispatch_in(kernel, form, parameters, elements, arrays)
+    }
+
+    /// The largest of a form's [sizes](Form::sizes) for which the device's workgroups have room: whether it is
+    /// [trusted](Gpu::trusts) decides for all.
+    pub fn largest(&self, form: Form) -> Form {
+        form.sizes().iter().find(|form| self.runs(**form)).copied().unwrap_or(form)
+    }
+
+    /// A form in the largest tiles of which a product has enough, or in its smallest. A matter of the product and of
+    /// the room in a workgroup: another form has its sums in another order.
+    fn sized(&self, form: Form, shape: Shape) -> Form {
+        let sizes = form.sizes();
+        let has_enough = |form: &&Form| {
+            // Large tiles are worth more the more there is to round.
+            let enough = if **form == Form::TwoHalves { ENOUGH_TILES / 2 } else { ENOUGH_TILES };
+            self.runs(**form) && form.tiles(shape.row_count, shape.column_count) >= enough
+        };
+        sizes.iter().find(has_enough).copied().unwrap_or(sizes[sizes.len() - 1])
     }
 
     /// Whether this device is trusted with a form of rounded factors of a kernel: it has the units, and a product of
@@ -81,59 +98,6 @@ impl Gpu {
     /// the driver does not compile them. On a device without faults there are none.
     pub fn distrusted_forms(&self) -> Vec<(Kernel, Form)> {
         self.lock().verdicts.distrusted()
-    }
-}
-
-/// Whether forms of rounded factors are used, as far as they were tried by this process or by earlier ones.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Verdicts {
-    forms: BTreeMap<(Kernel, Form), bool>,
-    has_new: bool,
-}
-
-impl Verdicts {
-    fn get(&self, kernel: Kernel, form: Form) -> Option<bool> {
-        self.forms.get(&(kernel, form)).copied()
-    }
-
-    fn set(&mut self, kernel: Kernel, form: Form, is_trusted: bool) {
-        self.has_new |= self.forms.insert((kernel, form), is_trusted) != Some(is_trusted);
-    }
-
-    fn distrusted(&self) -> Vec<(Kernel, Form)> {
-        self.forms.iter().filter(|(_, is_trusted)| !**is_trusted).map(|(form, _)| *form).collect()
-    }
-
-    /// Adds another process's verdicts on forms without one.
-    pub(crate) fn merge(&mut self, others: Verdicts) {
-        for (form, is_trusted) in others.forms {
-            self.forms.entry(form).or_insert(is_trusted);
-        }
-    }
-
-    /// Whether one was found since they were read.
-    pub(crate) fn has_new(&self) -> bool {
-        self.has_new
-    }
-
-    /// A line a form: kernel, form, whether it is used.
-    pub(crate) fn text(&self) -> String {
-        let line = |((kernel, form), is_trusted): (&(Kernel, Form), &bool)| {
-            format!("{} {} {is_trusted}\n", kernel.name(), form.name())
-        };
-        self.forms.iter().map(line).collect()
-    }
-
-    /// Verdicts from their text; `None` if it is not one.
-    pub(crate) fn parse(text: &str) -> Option<Verdicts> {
-        let parse_line = |line: &str| {
-            let words: Vec<&str> = line.split(' ').collect();
-            let &[kernel, form, is_trusted] = &words[..] else { return None };
-            let kernel = Kernel::ALL.into_iter().find(|known| known.name() == kernel)?;
-            let form = Form::ROUNDED.into_iter().find(|known| known.name() == form)?;
-            Some(((kernel, form), is_trusted.parse().ok()?))
-        };
-        Some(Verdicts { forms: text.lines().map(parse_line).collect::<Option<_>>()?, has_new: false })
     }
 }
 
@@ -236,18 +200,6 @@ impl Probe {
     }
 }
 
-/// A form in the largest tiles of which a product has enough, or in its smallest. A matter of the product alone: another
-/// form has its sums in another order.
-fn sized(form: Form, shape: Shape) -> Form {
-    let sizes = form.sizes();
-    let has_enough = |form: &&Form| {
-        // Large tiles are worth more the more there is to round.
-        let enough = if **form == Form::TwoHalves { ENOUGH_TILES / 2 } else { ENOUGH_TILES };
-        form.tiles(shape.row_count, shape.column_count) >= enough
-    };
-    sizes.iter().find(has_enough).copied().unwrap_or(sizes[sizes.len() - 1])
-}
-
 /// The most that rounded factors change of a product.
 fn product_bound(form: Form, left: f64, right: f64) -> f64 {
     let (relative, absolute) = match form {
@@ -292,25 +244,6 @@ mod tests {
     /// To this many bits less, by cutting.
     fn cut(bits: u32) -> impl Fn(f32) -> f32 {
         move |number| f32::from_bits(number.to_bits() >> bits << bits)
-    }
-
-    #[test]
-    fn verdicts_are_kept() {
-        let mut verdicts = Verdicts::default();
-        verdicts.set(Kernel::Linear, Form::Half, true);
-        verdicts.set(Kernel::Convolve, Form::TwoHalves, false);
-        let parsed = Verdicts::parse(&verdicts.text()).expect("verdicts");
-        assert_eq!((&parsed.forms, parsed.has_new(), verdicts.has_new()), (&verdicts.forms, false, true));
-        assert_eq!(parsed.distrusted(), [(Kernel::Convolve, Form::TwoHalves)]);
-        let mut merged = Verdicts::parse("linear half false\n").expect("a verdict");
-        merged.merge(parsed);
-        assert_eq!(merged.get(Kernel::Linear, Form::Half), Some(false), "what was tried here");
-        assert_eq!(merged.get(Kernel::Convolve, Form::TwoHalves), Some(false), "what was tried elsewhere");
-        merged.set(Kernel::Linear, Form::Half, false);
-        assert!(!merged.has_new(), "the same again");
-        for broken in ["linear half", "lines half true", "linear single true", "linear half yes", "\n"] {
-            assert_eq!(Verdicts::parse(broken), None, "{broken}");
-        }
     }
 
     #[test]

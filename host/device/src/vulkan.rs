@@ -220,14 +220,14 @@ macro_rules! dispatches {
 
             fn rounds(&self, precision: Precision) -> bool {
                 // A device that fails says so at its next kernel.
-                let is_trusted = |kernel, form| self.gpu.trusts(kernel, form).unwrap_or(false);
+                let is_trusted = |kernel, form| self.gpu.trusts(kernel, self.gpu.largest(form)).unwrap_or(false);
                 precision.form().is_some_and(|form| {
                     ROUNDED_KERNELS.into_iter().fold(true, |all, kernel| is_trusted(kernel, form) && all)
                 })
             }
 
             fn precisions(&self) -> Vec<Precision> {
-                let forms = || Precision::ROUNDED.into_iter().filter_map(Precision::form);
+                let forms = || Precision::ROUNDED.into_iter().filter_map(Precision::form).map(|form| self.gpu.largest(form));
                 let trials = ROUNDED_KERNELS.into_iter().flat_map(|kernel| forms().map(move |form| (kernel, form)));
                 self.gpu.compile_trials(&trials.collect::<Vec<_>>());
                 Precision::ROUNDED.into_iter().filter(|precision| self.rounds(*precision)).collect()
