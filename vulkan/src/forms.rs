@@ -191,7 +191,7 @@ mod tests {
         assert_eq!(choices.get(&class(2000, 64, 128)), None);
         let parsed = Choices::parse(&choices.text()).expect("choices");
         assert_eq!((parsed.get(&class(600, 60, 100)), parsed.has_new()), (Some(Form::Subgroup), false));
-        let mut merged = Choices::parse("linear 10 6 7 single\nlinear 2 3 4 subgroup\n").expect("choices");
+        let mut merged = Choices::parse("linear::in_fours 10 6 7 single\nlinear 2 3 4 subgroup\n").expect("choices");
         merged.merge(parsed);
         assert_eq!(merged.get(&class(600, 60, 100)), Some(Form::Single), "what was measured here");
         assert_eq!(merged.get(&class(600, 512, 512)), Some(Form::Single), "what was measured elsewhere");
