@@ -149,17 +149,22 @@ impl Workgroup for Group<'_> {
     }
 }
 
-/// A workgroup for each element, with a thread for each of its invocations.
+/// A workgroup for one element after the other, with a thread for each of its invocations. Its memory holds what the
+/// element before left there.
 fn in_workgroups(elements: Range<u32>, run: impl Fn(Group, u32) + Sync) {
-    for element in elements {
-        let memory: Vec<AtomicU32> = (0..SHARED_BYTES / 4).map(|_| AtomicU32::new(0)).collect();
-        let (run, memory, barrier) = (&run, &memory[..], &Barrier::new(WORKGROUP as usize));
-        std::thread::scope(|scope| {
-            for invocation in 0..WORKGROUP {
-                scope.spawn(move || run(Group { memory, barrier }, element * WORKGROUP + invocation));
-            }
-        });
-    }
+    let memory: Vec<AtomicU32> = (0..SHARED_BYTES / 4).map(|_| AtomicU32::new(0)).collect();
+    let (run, memory, barrier) = (&run, &memory[..], &Barrier::new(WORKGROUP as usize));
+    std::thread::scope(|scope| {
+        for invocation in 0..WORKGROUP {
+            let elements = elements.clone();
+            scope.spawn(move || {
+                for element in elements {
+                    run(Group { memory, barrier }, element * WORKGROUP + invocation);
+                    barrier.wait();
+                }
+            });
+        }
+    });
 }
 
 /// Binary logarithm of the pages' length by which an array takes all four.

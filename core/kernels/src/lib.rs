@@ -12,7 +12,7 @@
 //! finite            where the first NaN or infinity is             first_non_finite
 //! sample_mask       which samples can be left out                  is_sampled
 //! network           layers                                         linear, convolve, group_norm, attend, resample
-//! pixelnerf         point embedding, latents, radiance             embedded_value, gathered_value, radiance
+//! pixelnerf         point embedding, latents, radiance             embedded_value, GridPlace, radiance
 //! genvs             volumes of features become a feature image     VolumePlace, weigh_features, denoiser_input
 //! visual_hull       the training-free field inside silhouettes     matched depth, signed distance, density and colour
 //! plane_sweep       the training-free field for any scene          evidence, census, paths, disparity, blend

@@ -8,7 +8,6 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::fetch::Fetch;
-use viewfuse_core::half_precision::Halves;
 use viewfuse_core::lookup::split;
 use viewfuse_core::math::{exact_power_of_two, exp, max, sin_cos};
 use viewfuse_core::rays::RayPoint;
@@ -110,7 +109,8 @@ pub fn is_in_front(camera: &CameraBlock, position: Vec3) -> bool {
 /// As in [`CameraBlock::project`].
 const MIN_DEPTH: f32 = 1.0e-20;
 
-/// A dispatch of [`gathered_value`] or [`gathered_value_f16`], as plain data.
+/// Latents where points appear in a view, as plain data: `[point][channel]`, the view's grid `[row][column][channel]`
+/// there ([`GridPlace`]), plus the residual.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct GatherBlock {
@@ -185,38 +185,6 @@ impl GridPlace {
         let lower = left + (right - left) * self.share_x;
         upper + (lower - upper) * self.share_y
     }
-}
-
-/// Value number `element` of a view's `[point][channel]`: its grid `[row][column][channel]` where the point appears,
-/// plus `residual[element]`.
-#[inline]
-pub fn gathered_value(
-    views: &(impl Fetch<CameraBlock> + ?Sized),
-    points: &(impl Fetch<RayPoint> + ?Sized),
-    grid: &(impl Fetch<f32> + ?Sized),
-    residual: &(impl Fetch<f32> + ?Sized),
-    block: &GatherBlock,
-    element: usize,
-) -> f32 {
-    let channels = block.channel_count as usize;
-    let (point, channel) = (element / channels, element % channels);
-    let camera = views.fetch(block.view as usize);
-    let value = GridPlace::of(&camera, &points.fetch(point), block).value(grid, channel);
-    if block.has_residual != 0 { residual.fetch(element) + value } else { value }
-}
-
-/// As [`gathered_value`], from a grid of numbers in half precision, two in a word: they are read exactly, and sums are
-/// in `f32`.
-#[inline]
-pub fn gathered_value_f16(
-    views: &(impl Fetch<CameraBlock> + ?Sized),
-    points: &(impl Fetch<RayPoint> + ?Sized),
-    grid: &(impl Fetch<u32> + ?Sized),
-    residual: &(impl Fetch<f32> + ?Sized),
-    block: &GatherBlock,
-    element: usize,
-) -> f32 {
-    gathered_value(views, points, &Halves(grid), residual, block, element)
 }
 
 /// Radiance from the network's four outputs `raw[channel]` at a point: red, green, blue in `[0, 1]` (logistic function,

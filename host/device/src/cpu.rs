@@ -6,7 +6,6 @@
 
 mod blend;
 mod census;
-mod fusion;
 mod group_norm;
 mod limits;
 mod linear;
@@ -29,7 +28,6 @@ use crate::argument;
 use crate::parallel::{Rest, for_each_piece};
 use blend::*;
 use census::*;
-use fusion::*;
 use group_norm::*;
 use limits::*;
 use looped::*;

@@ -1,23 +1,19 @@
-//! Is every body of a kernel proven? Each value in a body (a constant, the result of an operator, an index) is changed
-//! by a hundredth (an index by one), one after the other, and the tests that reach it are asked whether they notice.
+//! Is every body of a kernel proven? The values of a body (constants, results of operators, indices) are changed by a
+//! hundredth (an index by one), one after the other, until a test that reaches the place notices.
 //!
 //! ```text
-//! cargo run --manifest-path tests/mutants/Cargo.toml -- make                  compiles, lists what each test reaches
-//! cargo run --manifest-path tests/mutants/Cargo.toml -- list BINARY...         lists those of some binaries alone, in less time
-//! cargo run --manifest-path tests/mutants/Cargo.toml -- ask NAME [MINUTES]    asks; goes on where it was left
-//! cargo run --manifest-path tests/mutants/Cargo.toml -- table NAME NAME       the answers of two runs side by side
+//! cargo run --manifest-path tests/mutants/Cargo.toml -- make            compiles, lists what each test reaches
+//! cargo run --manifest-path tests/mutants/Cargo.toml -- ask [MINUTES]   asks; goes on where it was left
+//! cargo run --manifest-path tests/mutants/Cargo.toml -- table           which bodies nothing notices
 //! ```
 //!
 //! The changes are compiled once: in a copy of the repository in `target/mutants` each value passes through a function
-//! that changes it where an environment variable has the value's number. Of a body at most [`MAX_CHANGES`] places of a
-//! kind are changed, spread evenly.
+//! that changes it where an environment variable has the value's number.
 
 mod copy;
 mod places;
 mod runs;
-mod table;
 
-use copy::Binary;
 use places::Place;
 use runs::{Outcome, Test};
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,21 +24,17 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-/// Changes of a body and kind.
-const MAX_CHANGES: usize = 2;
-/// Groups of tests, which are asked one after the other: the cases on the CPU, those of the bodies themselves, and
-/// others.
-const GROUPS: [&str; 4] = ["case", "bodies", "numerics", "removed"];
+/// Changes of a body that are asked for at the most.
+const MAX_CHANGES: usize = 12;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     match &arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["make"] => make(),
-        ["list", names @ ..] => list(names),
-        ["ask", name] => ask(name, 24 * 60),
-        ["ask", name, minutes] => ask(name, minutes.parse().expect("minutes")),
-        ["table", name] => print!("{}", table::table(name)),
-        _ => eprintln!("make, list BINARY..., ask NAME [MINUTES], or table NAME"),
+        ["ask"] => ask(24 * 60),
+        ["ask", minutes] => ask(minutes.parse().expect("minutes")),
+        ["table"] => table(),
+        _ => eprintln!("make, ask [MINUTES], or table"),
     }
 }
 
@@ -55,51 +47,37 @@ fn make() {
     let places = copy::make();
     let lines = places.iter().map(|Place { body, kind, text }| format!("{body}\t{kind}\t{text}\n"));
     fs::write(file("places"), lines.collect::<String>()).expect("a list of places");
-    let binaries = copy::build();
-    let lines = binaries.iter().map(|Binary { name, path }| format!("{name}\t{}\n", path.display()));
-    fs::write(file("binaries"), lines.collect::<String>()).expect("a list of binaries");
-    list(&copy::BINARIES);
+    fs::write(file("tests"), runs::list(&copy::build())).expect("a list of tests");
 }
 
-/// Lists what the tests of some binaries reach.
-fn list(names: &[&str]) {
-    let text = fs::read_to_string(file("binaries")).expect("binaries: make comes first");
-    let binary = |line: &str| {
-        let (name, path) = line.split_once('\t').expect("a binary");
-        Binary { name: name.to_owned(), path: PathBuf::from(path) }
-    };
-    let binaries: Vec<Binary> =
-        text.lines().map(binary).filter(|binary| names.contains(&binary.name.as_str())).collect();
-    fs::write(file("tests"), runs::list(&binaries)).expect("a list of tests");
-}
-
-/// Places that are changed: some of each kind in a body, of the kernels' crate and of what cases reach in core.
-fn chosen(places: &[Place], tests: &[Test]) -> Vec<u32> {
-    let cases = tests.iter().filter(|test| ["case", "bodies"].contains(&test.group.as_str()));
-    let in_cases = cases.flat_map(|test| &test.reached);
-    let of_kernels: BTreeSet<&str> = in_cases.map(|place| places[*place as usize].body.as_str()).collect();
-    let mut of_bodies: BTreeMap<(&str, &str), Vec<u32>> = BTreeMap::new();
+/// The bodies, of the kernels' crate and those of core that a case reaches, each with its changes: kinds in turn,
+/// spread evenly over the body.
+fn bodies<'a>(places: &'a [Place], tests: &[Test]) -> BTreeMap<&'a str, Vec<u32>> {
+    let in_cases = tests.iter().filter(|test| test.is_case).flat_map(|test| &test.reached);
+    let in_cases: BTreeSet<&str> = in_cases.map(|place| places[*place as usize].body.as_str()).collect();
+    let mut kinds: BTreeMap<&str, BTreeMap<&str, Vec<u32>>> = BTreeMap::new();
     for (number, Place { body, kind, .. }) in (0..).zip(places) {
-        if body.starts_with("kernels/") || of_kernels.contains(body.as_str()) {
-            of_bodies.entry((body, kind)).or_default().push(number);
+        if body.starts_with("kernels/") || in_cases.contains(body.as_str()) {
+            kinds.entry(body).or_default().entry(kind).or_default().push(number);
         }
     }
-    // Some of each body come first, then more of each.
-    let mut rounds: Vec<Vec<u32>> = vec![Vec::new(); 3 * MAX_CHANGES];
-    let mut of_body: BTreeMap<&str, usize> = BTreeMap::new();
-    for ((body, _), numbers) in of_bodies {
-        let count = numbers.len().min(MAX_CHANGES);
-        for index in 0..count {
-            let round = of_body.entry(body).or_default();
-            rounds[*round].push(numbers[index * numbers.len() / count]);
-            *round += 1;
-        }
-    }
-    rounds.concat()
+    let spread = |kinds: BTreeMap<&str, Vec<u32>>| {
+        let of_kind = MAX_CHANGES / kinds.len();
+        let nth = |index| {
+            let chosen = move |numbers: &Vec<u32>| {
+                let count = numbers.len().min(of_kind);
+                (index < count).then(|| numbers[index * numbers.len() / count])
+            };
+            kinds.values().filter_map(chosen).collect::<Vec<_>>()
+        };
+        (0..of_kind).flat_map(nth).collect()
+    };
+    kinds.into_iter().map(|(body, kinds)| (body, spread(kinds))).collect()
 }
 
-/// Asks until the time is over, and keeps each answer in the journal of the run: place, then an answer of each group.
-fn ask(name: &str, minutes: u64) {
+/// Asks until the time is over, and keeps a line for each body in the journal: how many changes were asked for, the
+/// last one, and the test that noticed it, or `none`.
+fn ask(minutes: u64) {
     let start = Instant::now();
     let text = fs::read_to_string(file("places")).expect("places: make comes first");
     let place = |line: &str| {
@@ -108,39 +86,49 @@ fn ask(name: &str, minutes: u64) {
     };
     let places: Vec<Place> = text.lines().map(place).collect();
     let tests = runs::read(&fs::read_to_string(file("tests")).expect("tests: make comes first"));
-    let known = fs::read_to_string(file(name)).unwrap_or_default();
-    let known: BTreeSet<&str> = known.lines().filter_map(|line| line.rsplitn(GROUPS.len() + 1, '\t').last()).collect();
-    let key = |number: u32| {
-        let Place { body, kind, text } = &places[number as usize];
-        format!("{body} {kind} {text}")
-    };
-    let mut work = chosen(&places, &tests);
-    work.retain(|number| !known.contains(key(*number).as_str()));
-    println!("{} places, {} tests, {} changes to ask for", places.len(), tests.len(), work.len());
-    let journal = fs::OpenOptions::new().create(true).append(true).open(file(name)).expect("a journal");
+    let known = fs::read_to_string(file("journal")).unwrap_or_default();
+    let known: BTreeSet<&str> = known.lines().filter_map(|line| line.split('\t').next()).collect();
+    let mut work = bodies(&places, &tests);
+    work.retain(|body, _| !known.contains(body));
+    println!("{} places, {} tests, {} bodies to ask for", places.len(), tests.len(), work.len());
+    let work: Vec<(&str, Vec<u32>)> = work.into_iter().collect();
+    let journal = fs::OpenOptions::new().create(true).append(true).open(file("journal")).expect("a journal");
     let (journal, next) = (Mutex::new(journal), AtomicUsize::new(0));
     let ask = || {
         while start.elapsed() < Duration::from_secs(60 * minutes) {
-            let Some(number) = work.get(next.fetch_add(1, Ordering::Relaxed)) else { return };
-            let answers = GROUPS.map(|group| noticed(&tests, group, *number));
-            let line = format!("{}\t{}\n", key(*number), answers.join("\t"));
+            let Some((body, changes)) = work.get(next.fetch_add(1, Ordering::Relaxed)) else { return };
+            let answers = changes.iter().map(|change| noticed(&tests, *change));
+            let found = (1..).zip(changes).zip(answers).find(|(_, answer)| answer.is_some());
+            let ((asked, change), answer) =
+                found.unwrap_or(((changes.len(), &changes[changes.len() - 1]), Some("none".to_owned())));
+            let Place { kind, text, .. } = &places[*change as usize];
+            let line = format!("{body}\t{asked}\t{kind} {text}\t{}\n", answer.unwrap_or_default());
             journal.lock().expect("a journal").write_all(line.as_bytes()).expect("a line");
         }
     };
     std::thread::scope(|scope| (0..2).for_each(|_| drop(scope.spawn(ask))));
-    let done = next.into_inner().min(work.len());
-    println!("asked for {done} of {} in {:.0} s", work.len(), start.elapsed().as_secs_f64());
+    println!("{:.0} s", start.elapsed().as_secs_f64());
 }
 
-/// The first test of a group that notices a change; `none` of those that reach it, or `not reached`.
-fn noticed(tests: &[Test], group: &str, change: u32) -> String {
-    let mut answer = "not reached";
-    for test in tests.iter().filter(|test| test.group == group && test.reached.contains(&change)) {
+/// The first test that notices a change.
+fn noticed(tests: &[Test], change: u32) -> Option<String> {
+    let mut reaching = tests.iter().filter(|test| test.reached.contains(&change));
+    let notices = |test: &&Test| {
         let limit = Duration::from_secs_f64(5.0 + 5.0 * test.seconds);
-        match runs::run(&test.binary, &test.name, change, None, limit) {
-            Outcome::Passes => answer = "none",
-            Outcome::Fails | Outcome::Hangs => return test.name.clone(),
-        }
-    }
-    answer.to_owned()
+        runs::run(&test.binary, &test.name, change, None, limit) != Outcome::Passes
+    };
+    reaching.find(notices).map(|test| test.name.clone())
+}
+
+/// What was found, and the bodies of which no change is noticed.
+fn table() {
+    let journal = fs::read_to_string(file("journal")).expect("a journal: ask comes first");
+    let lines: Vec<Vec<&str>> = journal.lines().map(|line| line.split('\t').collect()).collect();
+    let unnoticed: Vec<_> = lines.iter().filter(|line| line[3] == "none").collect();
+    println!(
+        "{} bodies, {} noticed\n\n| body | changes | the last one |\n|---|---|---|",
+        lines.len(),
+        lines.len() - unnoticed.len()
+    );
+    unnoticed.iter().for_each(|line| println!("| `{}` | {} | {} |", line[0], line[1], line[2].replace('|', "\\|")));
 }

@@ -11,8 +11,9 @@ const NO_DRIVER: &str = "/nowhere.json";
 
 /// A test, what it reaches and how long it takes.
 pub struct Test {
-    pub group: String,
     pub name: String,
+    /// Whether it is a kernel's case, on the CPU or of the body itself.
+    pub is_case: bool,
     pub binary: PathBuf,
     pub seconds: f64,
     pub reached: Vec<u32>,
@@ -27,13 +28,11 @@ pub enum Outcome {
     Hangs,
 }
 
-/// The group of a test that is asked, by its binary and name.
-fn group(binary: &str, name: &str) -> Option<&'static str> {
+/// Whether a test is a kernel's case, by its binary and name; none for a test that is not asked.
+fn is_case(binary: &str, name: &str) -> Option<bool> {
     match binary {
-        "parity" if name.starts_with("cpu::") => Some("case"),
-        "parity" if name.starts_with("bodies::") || name.starts_with("workgroups::") => Some("bodies"),
-        "numerics" => Some("numerics"),
-        "shaders" if name.starts_with("entry_points::") => Some("removed"),
+        "parity" => ["cpu::", "bodies::", "workgroups::"].iter().any(|part| name.starts_with(part)).then_some(true),
+        "numerics" => Some(false),
         _ => None,
     }
 }
@@ -65,8 +64,8 @@ pub fn run(binary: &Path, name: &str, change: u32, list: Option<&Path>, limit: D
     }
 }
 
-/// Runs each test of these binaries that is asked once, and keeps a line for it: its group, its name, the binary,
-/// seconds, and the places that it reaches.
+/// Runs each test of these binaries that is asked once, and keeps a line for it: whether it is a case, its name, the
+/// binary, seconds, and the places that it reaches.
 pub fn list(binaries: &[Binary]) -> String {
     binaries.iter().map(listed).collect()
 }
@@ -79,7 +78,7 @@ fn listed(binary: &Binary) -> String {
     let mut lines = String::new();
     for line in String::from_utf8_lossy(&output.stdout).lines() {
         let Some(name) = line.strip_suffix(": test") else { continue };
-        let Some(group) = group(binary, name) else { continue };
+        let Some(is_case) = is_case(binary, name) else { continue };
         let list = copy().join("reached.txt");
         let _ = fs::remove_file(&list);
         let start = Instant::now();
@@ -89,7 +88,7 @@ fn listed(binary: &Binary) -> String {
         }
         let seconds = start.elapsed().as_secs_f64();
         let reached = fs::read_to_string(&list).unwrap_or_default().replace('\n', " ");
-        lines += &format!("{group}\t{name}\t{}\t{seconds:.3}\t{reached}\n", path.display());
+        lines += &format!("{is_case}\t{name}\t{}\t{seconds:.3}\t{reached}\n", path.display());
     }
     lines
 }
@@ -97,12 +96,12 @@ fn listed(binary: &Binary) -> String {
 /// The tests of a list, the quickest first.
 pub fn read(list: &str) -> Vec<Test> {
     let test = |line: &str| {
-        let [group, name, binary, seconds, reached] = line.split('\t').collect::<Vec<_>>()[..] else {
+        let [is_case, name, binary, seconds, reached] = line.split('\t').collect::<Vec<_>>()[..] else {
             panic!("no test: {line}")
         };
         Test {
-            group: group.to_owned(),
             name: name.to_owned(),
+            is_case: is_case == "true",
             binary: PathBuf::from(binary),
             seconds: seconds.parse().expect("seconds"),
             reached: reached.split_whitespace().map(|place| place.parse().expect("a place")).collect(),

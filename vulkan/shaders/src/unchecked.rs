@@ -62,9 +62,19 @@ impl StoreFours for Unchecked<'_, f32> {}
 pub(crate) struct UncheckedFours<'a>(pub(crate) &'a mut [Vec4]);
 
 impl Store<f32> for UncheckedFours<'_> {
-    /// Of an array in fours, whole fours are written.
     #[inline(always)]
-    fn store(&mut self, _index: usize, _value: f32) {}
+    fn store(&mut self, index: usize, value: f32) {
+        if index / 4 < self.0.len() {
+            // SAFETY: just looked.
+            let four = unsafe { self.0.index_unchecked_mut(index / 4) };
+            match index % 4 {
+                0 => four.x = value,
+                1 => four.y = value,
+                2 => four.z = value,
+                _ => four.w = value,
+            }
+        }
+    }
 }
 
 impl StoreFours for UncheckedFours<'_> {

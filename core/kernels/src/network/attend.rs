@@ -7,7 +7,8 @@ use bytemuck::{Pod, Zeroable};
 use viewfuse_core::fetch::Fetch;
 use viewfuse_core::math::{exp, has_nan_bits, max};
 
-/// A dispatch of [`matrix_element`], as plain data.
+/// A product of two matrices, as plain data: `outputs[row][column]` are the products along the inner index, summed in its
+/// order, times the scale.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct MatrixBlock {
@@ -44,25 +45,6 @@ impl MatrixBlock {
     pub fn right(&self, matrix: &(impl Fetch<f32> + ?Sized), inner: u32, column: u32) -> f32 {
         matrix.fetch((self.right_first + inner * self.right_row_pitch + column * self.right_column_pitch) as usize)
     }
-}
-
-/// Output number `element` of `[row][column]`: the products along the inner index, summed in its order, times the
-/// scale.
-#[inline]
-pub fn matrix_element(
-    left: &(impl Fetch<f32> + ?Sized),
-    right: &(impl Fetch<f32> + ?Sized),
-    block: &MatrixBlock,
-    element: usize,
-) -> f32 {
-    let (row, column) = (element as u32 / block.column_count, element as u32 % block.column_count);
-    let mut sum = 0.0;
-    let mut inner = 0;
-    while inner < block.inner_count {
-        sum += block.left(left, row, inner) * block.right(right, inner, column);
-        inner += 1;
-    }
-    sum * block.scale
 }
 
 /// The largest number of a row `scores[column]`, and the reciprocal of the sum of `e^(score - largest)`, at most 1:

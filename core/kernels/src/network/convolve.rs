@@ -12,7 +12,9 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
 use viewfuse_core::fetch::Fetch;
 
-/// A dispatch of [`convolve_element`], as plain data. The yes-or-no fields are 0 or 1.
+/// A convolution, as plain data: a channel of an output pixel is its patch ([`patch_value`]) times
+/// `weights[row of the window][column of the window][input channel][output channel]`, summed in the order of the patch,
+/// then [`convolved`]. The yes-or-no fields are 0 or 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct ConvolveBlock {
@@ -246,27 +248,4 @@ pub fn convolved_four(
     let element = block.residual_first + pixel * block.residual_pitch + channel;
     let first = first_of_sums(bias, residual, block.has_residual, element, channel);
     rectified_four((first + sums) * block.scale, block.relu_outputs)
-}
-
-/// Channel `channel` of output pixel `pixel`: the patch times
-/// `weights[row of the window][column of the window][input channel][output channel]` in the order of the patch, then
-/// [`convolved`].
-#[inline]
-pub fn convolve_element(
-    inputs: &(impl Fetch<f32> + ?Sized),
-    weights: &(impl Fetch<f32> + ?Sized),
-    bias: &(impl Fetch<f32> + ?Sized),
-    residual: &(impl Fetch<f32> + ?Sized),
-    block: &ConvolveBlock,
-    pixel: u32,
-    channel: u32,
-) -> f32 {
-    let mut sum = 0.0;
-    let mut inner = 0;
-    while inner < block.patch_len() {
-        let weight = weights.fetch((inner * block.out_channels + channel) as usize);
-        sum += patch_value(inputs, block, pixel, inner) * weight;
-        inner += 1;
-    }
-    convolved(bias, residual, block, pixel, channel, sum)
 }

@@ -75,6 +75,16 @@ impl GroupNormBlock {
         PART.min(self.pixel_count - part * PART)
     }
 
+    /// What a part weighs when it is merged with those before it: its share of all their numbers, and that times the
+    /// numbers before it. The same for all groups.
+    #[inline]
+    pub fn share_of(&self, part: u32) -> [f32; 2] {
+        let before = (part * PART * self.group_channels()) as f32;
+        let count = (self.pixels_of(part) * self.group_channels()) as f32;
+        let share = count / (before + count);
+        [share, before * share]
+    }
+
     /// The first input of element `element` of `[part][group]`.
     #[inline]
     pub fn first_of(&self, element: u32) -> u32 {
@@ -128,7 +138,7 @@ pub fn group_norm_statistics(
     let mut merged = MergedParts::before(partials.fetch(group));
     let mut part = 0;
     while part < block.part_count() {
-        merged.add(block, part, partials.fetch(part as usize * block.group_count as usize + group));
+        merged.add(block.share_of(part), partials.fetch(part as usize * block.group_count as usize + group));
         part += 1;
     }
     merged.statistics(block)
@@ -139,31 +149,28 @@ pub fn group_norm_statistics(
 pub(crate) struct MergedParts {
     mean: f32,
     deviations: f32,
-    count: f32,
 }
 
 impl MergedParts {
     /// Before the first part, which is given: it changes nothing of the mean then, however a device divides.
     #[inline(always)]
     pub(crate) fn before([mean, _]: [f32; 2]) -> MergedParts {
-        MergedParts { mean, deviations: 0.0, count: 0.0 }
+        MergedParts { mean, deviations: 0.0 }
     }
 
-    /// Adds the next part, its mean and squared deviations.
+    /// Adds the next part, its [share](GroupNormBlock::share_of), mean and squared deviations.
     #[inline(always)]
-    pub(crate) fn add(&mut self, block: &GroupNormBlock, part: u32, [mean, deviations]: [f32; 2]) {
-        let count = (block.pixels_of(part) * block.group_channels()) as f32;
-        let all = self.count + count;
+    pub(crate) fn add(&mut self, [share, weight]: [f32; 2], [mean, deviations]: [f32; 2]) {
         let difference = mean - self.mean;
-        self.mean += difference * (count / all);
-        self.deviations += deviations + difference * difference * (self.count * (count / all));
-        self.count = all;
+        self.mean += difference * share;
+        self.deviations += deviations + difference * difference * weight;
     }
 
     /// Mean and factor, as [`group_norm_statistics`].
     #[inline(always)]
     pub(crate) fn statistics(self, block: &GroupNormBlock) -> [f32; 2] {
-        let spread = self.deviations / self.count + block.variance_floor;
+        let count = (block.pixel_count * block.group_channels()) as f32;
+        let spread = self.deviations / count + block.variance_floor;
         if !has_finite_bits(spread) {
             return [self.mean, f32::NAN];
         }

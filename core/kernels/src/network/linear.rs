@@ -5,7 +5,9 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
 use viewfuse_core::fetch::Fetch;
 
-/// A dispatch of [`linear_element`], as plain data. The yes-or-no fields are 0 or 1.
+/// A linear layer, as plain data: `outputs[row][column]` is `inputs[row][inner]` times `weights[inner][column]` plus
+/// `bias[column]` plus `residual[row][column]`; bias and residual first, then the products in the order of the inner
+/// index. The yes-or-no fields are 0 or 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct LinearBlock {
@@ -28,34 +30,6 @@ impl LinearBlock {
     pub const fn is_in_fours(&self) -> bool {
         self.inner_count.is_multiple_of(4) && self.column_count.is_multiple_of(4)
     }
-}
-
-/// Output number `element` of `inputs[row][inner]` times `weights[inner][column]` plus `bias[column]` plus
-/// `residual[row][column]`: bias and residual first, then the products in the order of the inner index.
-#[inline]
-pub fn linear_element(
-    inputs: &(impl Fetch<f32> + ?Sized),
-    weights: &(impl Fetch<f32> + ?Sized),
-    bias: &(impl Fetch<f32> + ?Sized),
-    residual: &(impl Fetch<f32> + ?Sized),
-    block: &LinearBlock,
-    element: usize,
-) -> f32 {
-    let (inner_count, column_count) = (block.inner_count as usize, block.column_count as usize);
-    let (row, column) = (element / column_count, element % column_count);
-    let mut sum = first_of_sum(bias, residual, block.has_residual, element, column);
-    let mut inner = 0;
-    while inner < inner_count {
-        sum += input_value(inputs, block, row, inner) * weights.fetch(inner * column_count + column);
-        inner += 1;
-    }
-    rectified(sum, block.relu_outputs)
-}
-
-/// Number `inner` of a row of the inputs, rectified if the block says so.
-#[inline]
-pub fn input_value(inputs: &(impl Fetch<f32> + ?Sized), block: &LinearBlock, row: usize, inner: usize) -> f32 {
-    rectified(inputs.fetch(row * block.inner_count as usize + inner), block.relu_inputs)
 }
 
 /// The start of the sum for output number `element`: `bias[column]` plus `residual[element]`, if there is a residual.

@@ -7,7 +7,8 @@ use super::linear::rectified;
 use bytemuck::{Pod, Zeroable};
 use viewfuse_core::fetch::Fetch;
 
-/// A dispatch of [`transposed_element`], as plain data. The yes-or-no field is 0 or 1.
+/// A transposed convolution, as plain data: column `column` of an input pixel is its channels times
+/// `weights[input channel][column]`, summed in their order, plus `bias[output channel]`. The yes-or-no field is 0 or 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct TransposedBlock {
@@ -68,25 +69,4 @@ impl TransposedBlock {
     pub fn output(&self, bias: &(impl Fetch<f32> + ?Sized), column: u32, sum: f32) -> f32 {
         rectified(bias.fetch((column % self.out_channels) as usize) + sum, self.relu_outputs)
     }
-}
-
-/// Column `column` of input pixel `pixel`: its channels times `weights[input channel][column]` in their order, plus
-/// `bias[output channel]`.
-#[inline]
-pub fn transposed_element(
-    inputs: &(impl Fetch<f32> + ?Sized),
-    weights: &(impl Fetch<f32> + ?Sized),
-    bias: &(impl Fetch<f32> + ?Sized),
-    block: &TransposedBlock,
-    pixel: u32,
-    column: u32,
-) -> f32 {
-    let mut sum = 0.0;
-    let mut inner = 0;
-    while inner < block.in_channels {
-        let weight = weights.fetch((inner * block.column_count() + column) as usize);
-        sum += block.input(inputs, pixel, inner) * weight;
-        inner += 1;
-    }
-    block.output(bias, column, sum)
 }

@@ -94,7 +94,7 @@ macro_rules! for_each_kernel {
             /// Convolutions of every channel by itself, with `weights[place of the window][channel]`. An element is a
             /// channel of an output pixel.
             ConvolveDepthwise convolve_depthwise(block: DepthwiseBlock)
-            for channel in [0..block.pixel_count() * block.channels], twin {
+            for channel in [0..block.pixel_count() * block.channels; 2048 a core] {
                 filled inputs: f32,
                 filled weights: f32,
                 write outputs: f32,
@@ -131,7 +131,7 @@ macro_rules! for_each_kernel {
                 write outputs: f32,
             }
             /// Means of an image's channels, from `inputs[pixel][channel]`. An element is a channel.
-            ChannelMeans channel_means(block: MeanBlock) for channel in [0..block.channels], twin {
+            ChannelMeans channel_means(block: MeanBlock) for channel in [0..block.channels; 16 a core] {
                 filled inputs: f32,
                 write means: f32,
             }
@@ -166,7 +166,7 @@ macro_rules! for_each_kernel {
             }
             /// Weighted sums over views: `fused[element]` from the weights of the element's point and
             /// `latents[view][element]`. An element is a channel of a point.
-            FuseViews fuse_views(block: FuseBlock; element_count) for channel in [0..element_count], twin {
+            FuseViews fuse_views(block: FuseBlock; element_count) for channel in [0..element_count; 16384 a core] {
                 read weights: f32,
                 read latents: f32,
                 write fused: f32,

@@ -1,19 +1,9 @@
-//! Channel means and group norm of images, all channels of a pixel together.
+//! Group norm of images, all channels of a pixel together.
 
 use super::scratch::with_scratch;
 use crate::parallel::{for_each_row, for_each_rows};
 use pulp::{Arch, Simd, WithSimd};
-use viewfuse_kernels::network::group_norm::{GroupNormBlock, MeanBlock, PART, group_norm_statistics, silu};
-
-pub(super) fn channel_means(block: &MeanBlock, inputs: &[f32], means: &mut [f32]) {
-    let means = &mut means[..block.channels as usize];
-    means.fill(0.0);
-    // The same sums, all channels of a pixel at once.
-    for row in inputs.chunks_exact(means.len()).take(block.pixel_count as usize) {
-        means.iter_mut().zip(row).for_each(|(sum, input)| *sum += input);
-    }
-    means.iter_mut().for_each(|mean| *mean /= block.pixel_count as f32);
-}
+use viewfuse_kernels::network::group_norm::{GroupNormBlock, PART, group_norm_statistics, silu};
 
 pub(super) fn group_norm_partials(block: &GroupNormBlock, inputs: &[f32], partials: &mut [[f32; 2]]) {
     let groups = block.group_count as usize;

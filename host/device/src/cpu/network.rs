@@ -5,10 +5,8 @@ use super::linear::{Ending, Panels, Rows};
 use super::scratch::with_scratch;
 use super::winograd::Winograd;
 use crate::kernels::LayerShape;
-use crate::parallel::{for_each_part, for_each_row};
-use pulp::Arch;
+use crate::parallel::for_each_part;
 use viewfuse_kernels::network::convolve::{ConvolveBlock, window_pixel};
-use viewfuse_kernels::network::depthwise::DepthwiseBlock;
 use viewfuse_kernels::network::linear::LinearBlock;
 use viewfuse_kernels::network::transpose::TransposedBlock;
 
@@ -90,17 +88,6 @@ pub(super) fn convolve(
     let len = if is_plain { 0 } else { rows * patch_len };
     for_each_part(outputs, rows * out_pitch, &|chunk, outputs| {
         with_scratch(len, |patches| run(patches, chunk, outputs));
-    });
-}
-
-pub(super) fn convolve_depthwise(block: &DepthwiseBlock, inputs: &[f32], weights: &[f32], outputs: &mut [f32]) {
-    let channels = block.channels as usize;
-    let outputs = &mut outputs[..block.pixel_count() as usize * channels];
-    for_each_row(outputs, channels, 2048, |pixel, outputs| {
-        Arch::new().dispatch(
-            #[inline(always)]
-            || filter_pixel(block, inputs, weights, pixel as u32, outputs),
-        );
     });
 }
 
@@ -203,32 +190,6 @@ fn read_patch(block: &ConvolveBlock, inputs: &[f32], pixel: u32, patch: &mut [f3
                 let first = (block.in_first + seen * block.in_pitch) as usize;
                 values.copy_from_slice(&inputs[first..first + values.len()]);
             }
-        }
-    }
-}
-
-/// All channels of an output pixel, as [`viewfuse_kernels::network::depthwise::depthwise_element`] defines them.
-#[inline(always)]
-fn filter_pixel(block: &DepthwiseBlock, inputs: &[f32], weights: &[f32], pixel: u32, outputs: &mut [f32]) {
-    let channels = outputs.len();
-    outputs.fill(0.0);
-    let (out_row, out_column) = (pixel / block.out_width, pixel % block.out_width);
-    for place in 0..block.size * block.size {
-        let row = out_row * block.stride + place / block.size * block.dilation;
-        let column = out_column * block.stride + place % block.size * block.dilation;
-        let seen = window_pixel([block.in_height, block.in_width], 1, block.padding, row, column);
-        if seen == u32::MAX {
-            continue;
-        }
-        let first = (block.in_first + seen * block.in_pitch) as usize;
-        let inputs = &inputs[first..first + channels];
-        if block.is_shared != 0 {
-            let weight = weights[place as usize];
-            outputs.iter_mut().zip(inputs).for_each(|(output, input)| *output += input * weight);
-        } else {
-            let weights = &weights[place as usize * channels..][..channels];
-            let pairs = inputs.iter().zip(weights);
-            outputs.iter_mut().zip(pairs).for_each(|(output, (input, weight))| *output += input * weight);
         }
     }
 }

@@ -88,8 +88,8 @@ fn fold_entries(
     let [mut mask, end] = block.masks_of_piece(piece);
     // All invocations of a workgroup see the same numbers of masks and splats, so all come to the barriers.
     while mask < end {
-        let own = mask + thread;
-        let mut rest = if own < end { masks.fetch((own * block.bin_count() + bin) as usize) } else { 0 };
+        let word = mask + thread;
+        let mut rest = if word < end { masks.fetch((word * block.bin_count() + bin) as usize) } else { 0 };
         group.put_word(thread as usize, rest.count_ones());
         group.wait();
         let (mut place, mut found, mut other) = (0, 0, 0);
@@ -99,7 +99,7 @@ fn fold_entries(
             other += 1;
         }
         while rest != 0 {
-            group.put_word(LISTED + place as usize, own * MASK_SPLATS + lowest_bit(rest));
+            group.put_word(LISTED + place as usize, word * MASK_SPLATS + lowest_bit(rest));
             rest &= rest.wrapping_sub(1);
             place += 1;
         }
@@ -247,10 +247,10 @@ pub fn start_tiles(
         other += 1;
     }
     let is_over = all > block.capacity || status.fetch(0) != 0;
-    let (own, tile) = (first + thread / TILE_RUN, thread % TILE_RUN);
-    if own < run_count && tile < block.tiles_of_run(own) {
-        let start = ListBlock::start_of(sums, before, first, own, tile);
-        starts.store((block.first_of_run(own) + tile) as usize, if is_over { 0 } else { start });
+    let (run, tile) = (first + thread / TILE_RUN, thread % TILE_RUN);
+    if run < run_count && tile < block.tiles_of_run(run) {
+        let start = ListBlock::start_of(sums, before, first, run, tile);
+        starts.store((block.first_of_run(run) + tile) as usize, if is_over { 0 } else { start });
     }
     if thread == 0 && first + RUNS_TOGETHER >= run_count {
         starts.store(block.tile_count() as usize, if is_over { 0 } else { all });

@@ -21,8 +21,10 @@ pub const SOFTMAX_ROWS_SHARED: usize = 2 * SUM_SHARED;
 const GROUPS: u32 = WORKGROUP;
 /// Parts that are in the workgroup's memory at a time: merging is serial, and must not wait for each of them.
 const STAGED: u32 = 16;
+/// Where their shares begin, two numbers a part.
+const SHARES: usize = 2 * GROUPS as usize;
 /// Where they begin, `[part][group]`, mean and squared deviations.
-const PARTIALS: usize = 2 * GROUPS as usize;
+const PARTIALS: usize = SHARES + 2 * STAGED as usize;
 /// Numbers of the workgroup's memory that [`group_norm`] takes.
 pub const GROUP_NORM_SHARED: usize = PARTIALS + 2 * (STAGED * GROUPS) as usize;
 
@@ -43,21 +45,21 @@ pub fn group_norm_partials(
     let (pixels, channels) = (block.pixels_of(element / block.group_count), block.group_channels());
     let first = block.first_of(element);
     // An invocation without a pixel has no channels.
-    let own_channels = if thread < pixels { channels } else { 0 };
-    let own = first + thread * block.in_pitch;
+    let count = if thread < pixels { channels } else { 0 };
+    let pixel = first + thread * block.in_pitch;
     // Nearer to the mean than 0 is, wherever the group lies.
     let value = inputs.fetch(first as usize);
     let mut sum = 0.0;
     let mut channel = 0;
-    while channel < own_channels {
-        sum += inputs.fetch((own + channel) as usize) - value;
+    while channel < count {
+        sum += inputs.fetch((pixel + channel) as usize) - value;
         channel += 1;
     }
     let mean = value + sum_of_all(&mut group, 0, thread, sum) / (pixels * channels) as f32;
     let mut squares = 0.0;
     let mut channel = 0;
-    while channel < own_channels {
-        let difference = inputs.fetch((own + channel) as usize) - mean;
+    while channel < count {
+        let difference = inputs.fetch((pixel + channel) as usize) - mean;
         squares += difference * difference;
         channel += 1;
     }
@@ -122,65 +124,28 @@ pub fn group_norm(
     invocation: u32,
 ) {
     let (run, thread) = (invocation / WORKGROUP, invocation % WORKGROUP);
-    let (start, all) = (run * RUN, block.output_count());
-    let end = if all - start < RUN { all } else { start + RUN };
+    let start = run * RUN;
+    let end = (start + RUN).min(block.output_count());
     // Nearly always all groups at once. All invocations see the same here, so all come to the barriers.
     let mut first = 0;
     while first < block.group_count {
-        let count = if block.group_count - first < GROUPS { block.group_count - first } else { GROUPS };
-        // An invocation without a group goes along with the last one.
-        let own = if thread < count { thread } else { count - 1 };
-        let mut merged = MergedParts::before(partials.fetch((first + own) as usize));
-        let mut part = 0;
-        while part < block.part_count() {
-            let parts = if block.part_count() - part < STAGED { block.part_count() - part } else { STAGED };
-            let total = parts * count;
-            let mut index = thread;
-            while index < total {
-                let own = |more: u32| if index + more < total { index + more } else { total - 1 };
-                let fetch = |more: u32| {
-                    let index = own(more * WORKGROUP);
-                    partials.fetch(((part + index / count) * block.group_count + first + index % count) as usize)
-                };
-                // Four at a time: none is waited for alone. The last one may be put several times.
-                let [a, b, c, d] = [fetch(0), fetch(1), fetch(2), fetch(3)];
-                put(&mut group, own(0), a);
-                put(&mut group, own(WORKGROUP), b);
-                put(&mut group, own(2 * WORKGROUP), c);
-                put(&mut group, own(3 * WORKGROUP), d);
-                index += 4 * WORKGROUP;
-            }
-            group.wait();
-            let mut staged = 0;
-            while staged < parts {
-                let place = PARTIALS + 2 * (staged * count + own) as usize;
-                merged.add(block, part + staged, [group.get(place), group.get(place + 1)]);
-                staged += 1;
-            }
-            group.wait();
-            part += parts;
-        }
-        if thread < count {
-            let [mean, factor] = merged.statistics(block);
-            group.put(2 * thread as usize, mean);
-            group.put(2 * thread as usize + 1, factor);
-        }
+        let count = GROUPS.min(block.group_count - first);
+        merge_parts(block, partials, &mut group, thread, [first, count]);
         group.wait();
         let mut element = start + thread;
         while element < end {
-            let own = |more: u32| element + more * WORKGROUP;
             let value = |more: u32| {
-                let element = if own(more) < end { own(more) } else { end - 1 };
+                let element = (element + more * WORKGROUP).min(end - 1);
                 let place = block.group_of(element).wrapping_sub(first);
-                let place = 2 * (if place < count { place } else { 0 }) as usize;
-                let statistics = [group.get(place), group.get(place + 1)];
+                let statistics = get_pair(&group, 2 * (if place < count { place } else { 0 }) as usize);
                 group_norm_element(inputs, statistics, weights, bias, block, element as usize)
             };
-            // Four at a time, too, and only then stored.
+            // Four at a time, so that none is waited for alone, and only then stored.
             let [a, b, c, d] = [value(0), value(1), value(2), value(3)];
             let mut store = |more: u32, value: f32| {
-                if own(more) < end && block.group_of(own(more)).wrapping_sub(first) < count {
-                    outputs.store(own(more) as usize, value);
+                let element = element + more * WORKGROUP;
+                if element < end && block.group_of(element).wrapping_sub(first) < count {
+                    outputs.store(element as usize, value);
                 }
             };
             store(0, a);
@@ -194,12 +159,77 @@ pub fn group_norm(
     }
 }
 
-/// Puts a part's statistics into the workgroup's memory.
+/// Merges the parts of `count` groups from `first` on, and leaves mean and factor of each in the workgroup's memory.
+/// What a part weighs is computed for all groups at once: a division for each part would be most of the time.
 #[inline(always)]
-fn put(group: &mut impl Workgroup, index: u32, [mean, deviations]: [f32; 2]) {
-    let place = PARTIALS + 2 * index as usize;
-    group.put(place, mean);
-    group.put(place + 1, deviations);
+fn merge_parts(
+    block: &GroupNormBlock,
+    partials: &impl Fetch<[f32; 2]>,
+    group: &mut impl Workgroup,
+    thread: u32,
+    [first, count]: [u32; 2],
+) {
+    // An invocation without a group goes along with the last one.
+    let member = thread.min(count - 1);
+    let mut merged = MergedParts::before(partials.fetch((first + member) as usize));
+    let mut part = 0;
+    while part < block.part_count() {
+        let parts = STAGED.min(block.part_count() - part);
+        if thread < parts {
+            put_pair(group, SHARES + 2 * thread as usize, block.share_of(part + thread));
+        }
+        let total = parts * count;
+        let mut index = thread;
+        while index < total {
+            let fetch = |more: u32| {
+                let index = (index + more * WORKGROUP).min(total - 1);
+                partials.fetch(((part + index / count) * block.group_count + first + index % count) as usize)
+            };
+            // Eight at a time: none is waited for alone.
+            let [a, b, c, d] = [fetch(0), fetch(1), fetch(2), fetch(3)];
+            let [e, f, g, h] = [fetch(4), fetch(5), fetch(6), fetch(7)];
+            let mut put = |more: u32, statistics: [f32; 2]| {
+                let index = index + more * WORKGROUP;
+                if index < total {
+                    put_pair(group, PARTIALS + 2 * index as usize, statistics);
+                }
+            };
+            put(0, a);
+            put(1, b);
+            put(2, c);
+            put(3, d);
+            put(4, e);
+            put(5, f);
+            put(6, g);
+            put(7, h);
+            index += 8 * WORKGROUP;
+        }
+        group.wait();
+        let mut staged = 0;
+        while staged < parts {
+            let share = get_pair(group, SHARES + 2 * staged as usize);
+            merged.add(share, get_pair(group, PARTIALS + 2 * (staged * count + member) as usize));
+            staged += 1;
+        }
+        group.wait();
+        part += parts;
+    }
+    if thread < count {
+        put_pair(group, 2 * thread as usize, merged.statistics(block));
+    }
+}
+
+/// Puts two numbers into the workgroup's memory.
+#[inline(always)]
+fn put_pair(group: &mut impl Workgroup, place: usize, [first, second]: [f32; 2]) {
+    group.put(place, first);
+    group.put(place + 1, second);
+}
+
+/// Two numbers of the workgroup's memory.
+#[inline(always)]
+fn get_pair(group: &impl Workgroup, place: usize) -> [f32; 2] {
+    [group.get(place), group.get(place + 1)]
 }
 
 /// A row of softmax, invocation `invocation % 64` of the row `invocation / 64`, which takes every 64th column.

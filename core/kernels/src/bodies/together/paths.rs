@@ -30,14 +30,14 @@ pub fn follow_paths(
     invocation: u32,
 ) {
     let (element, thread) = (invocation / WORKGROUP, invocation % WORKGROUP);
-    let (line, own) = (element * LINES_TOGETHER + thread / GROUPS, thread % GROUPS);
-    let is_there = own < block.group_count && line < block.line_count();
+    let (line, planes) = (element * LINES_TOGETHER + thread / GROUPS, thread % GROUPS);
+    let is_there = planes < block.group_count && line < block.line_count();
     let (mut direction, mut number, mut step_count, mut first) = (0, 0, 0, 0);
     if is_there {
         (direction, number, step_count) = block.line(line);
-        first = block.first_of_line(line) + own as usize;
+        first = block.first_of_line(line) + planes as usize;
     }
-    let at = |step: u32| (block.pixel(direction, number, step) * block.group_count + own) as usize;
+    let at = |step: u32| (block.pixel(direction, number, step) * block.group_count + planes) as usize;
     let mut before = [0.0; PLANES];
     let mut cost = if step_count > 0 { means.fetch(at(0)) } else { [0.0; PLANES] };
     let longest = if block.width > block.height { block.width } else { block.height };
@@ -51,10 +51,10 @@ pub fn follow_paths(
         let next = if step + 1 < step_count { means.fetch(at(step + 1)) } else { cost };
         group.wait();
         if step < step_count {
-            let left = if own > 0 { group.get(thread as usize - 1) } else { f32::MAX };
-            let right = if own + 1 < block.group_count { group.get(FIRSTS + thread as usize + 1) } else { f32::MAX };
-            let (mut least, mut other) = (f32::MAX, thread - own);
-            while other < thread - own + GROUPS {
+            let left = if planes > 0 { group.get(thread as usize - 1) } else { f32::MAX };
+            let right = if planes + 1 < block.group_count { group.get(FIRSTS + thread as usize + 1) } else { f32::MAX };
+            let (mut least, mut other) = (f32::MAX, thread - planes);
+            while other < thread - planes + GROUPS {
                 least = min(group.get(LEAST + other as usize), least);
                 other += 1;
             }
