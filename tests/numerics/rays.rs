@@ -43,6 +43,7 @@ fn fine_depths_stay_within_the_ray() {
         };
         let depth = [1.0, 0.0, -7.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1.0e30][random.below(7)];
         let opacity = [0.0, 0.5, 1.0, f32::NAN][random.below(4)];
+        assert_eq!(block.fine_count(), 16);
         for index in 0..block.fine_count() {
             let draws = [random_draw(7, index, &block), [0.0; 2], [1.0; 2], [f32::NAN; 2], [2.0, -1.0]];
             for draw in draws {

@@ -34,12 +34,6 @@ pub struct MatrixBlock {
 }
 
 impl MatrixBlock {
-    /// Number `inner` of a row of the left matrix.
-    #[inline]
-    pub fn left(&self, matrix: &(impl Fetch<f32> + ?Sized), row: u32, inner: u32) -> f32 {
-        matrix.fetch((self.left_first + row * self.left_pitch + inner) as usize)
-    }
-
     /// Number `inner` of a column of the right matrix.
     #[inline]
     pub fn right(&self, matrix: &(impl Fetch<f32> + ?Sized), inner: u32, column: u32) -> f32 {

@@ -48,12 +48,6 @@ impl TransposedBlock {
         self.size * self.size * self.out_channels
     }
 
-    /// Channel `inner` of input pixel `pixel`.
-    #[inline]
-    pub fn input(&self, inputs: &(impl Fetch<f32> + ?Sized), pixel: u32, inner: u32) -> f32 {
-        inputs.fetch((self.in_first + pixel * self.in_pitch + inner) as usize)
-    }
-
     /// Where column `column` of input pixel `pixel` belongs in the output.
     #[inline]
     pub fn place(&self, pixel: u32, column: u32) -> usize {

@@ -240,7 +240,7 @@ impl Source<'_> {
             self.is_encoded = true;
         }
         stage.vary(Some(options), None, progress)?;
-        let frame = stage.frame(weighting, &self.target, quiet)?;
+        let frame = stage.trial(weighting, &self.target, quiet)?;
         let (width, height) = frame.picture.dimensions();
         Ok(Rendered { colours: frame.colours, depths: frame.depths, confidences: frame.confidences, width, height })
     }

@@ -287,15 +287,29 @@ impl<'a> Stage<'a> {
         target: &Target,
         progress: &dyn Progress,
     ) -> Result<Frame, RenderError> {
-        let camera = self.at_working_size(&target.camera)?;
-        let mut frame = self.frame_at(weighting, target, &camera, progress)?;
+        let mut frame = self.trial(weighting, target, progress)?;
         if !frame.depths.is_empty() {
+            let camera = self.at_working_size(&target.camera)?;
             let maps = self.source_depths()?;
             let is_used = |(source, _): &(usize, DepthMap)| frame.omission.weights.get(*source as u32) > 0.0;
             let used: Vec<DepthMap> = maps.into_iter().enumerate().filter(is_used).map(|(_, map)| map).collect();
             frame.seen = seen(&camera, frame.picture.dimensions().into(), &frame.depths, &used);
         }
         Ok(frame)
+    }
+
+    /// As [`Stage::frame`], without how much of it photographs show: for pictures that are only compared.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub fn trial(
+        &mut self,
+        weighting: &Weighting,
+        target: &Target,
+        progress: &dyn Progress,
+    ) -> Result<Frame, RenderError> {
+        let camera = self.at_working_size(&target.camera)?;
+        self.frame_at(weighting, target, &camera, progress)
     }
 
     /// As [`Stage::frame`] without a truth, with a picture of another size than the options': for coarse pictures.

@@ -20,8 +20,9 @@ pub(super) struct TargetViews<D: Device> {
     by_second: bool,
     /// Gain of each view: red, green, blue, 1.
     gains: Vec<[f32; 4]>,
-    /// `[view][row][column]`: disparity and confidence.
+    /// `[view][row][column]`: disparity and confidence, on the device and on the host.
     pub(super) maps: D::Buffer<[f32; 2]>,
+    pub(super) host_maps: Vec<[f32; 2]>,
     /// Of the last picture, for another one of the same target under other settings.
     compared: Option<Compared<D>>,
 }
@@ -60,14 +61,14 @@ impl<D: Device> Views<'_, D> {
             return Ok(known);
         }
         let device = self.scene.device;
-        let mut maps = device.download(self.found())?;
-        self.confirm(views, &mut maps);
+        let mut host_maps = device.download(self.found())?;
+        self.confirm(views, &mut host_maps);
         let steps = &self.maps.steps;
         let used: Vec<f32> =
             steps.iter().enumerate().map(|(view, step)| if views.contains(&view) { *step } else { 0.0 }).collect();
-        let gains = exposure::gains(&self.matched.images.cameras, &self.matched.texels, &maps, &used);
-        let maps = device.upload_owned(maps)?;
-        Ok(TargetViews { views: views.to_vec(), by_second, gains, maps, compared: None })
+        let gains = exposure::gains(&self.matched.images.cameras, &self.matched.texels, &host_maps, &used);
+        let maps = device.upload(&host_maps)?;
+        Ok(TargetViews { views: views.to_vec(), by_second, gains, maps, host_maps, compared: None })
     }
 
     /// The costs of a target's planes, and what its pixels are blended from.

@@ -156,8 +156,8 @@ impl<D: Device> Prepared for Views<'_, D> {
         let (depths, confidences) = (device.download(&depths)?, device.download(&confidences)?);
         let mut rendered = Rendered { colours, depths, confidences, width, height };
         if !self.scene.has_silhouettes {
-            let maps = device.download(&target.maps)?;
-            let used: Vec<DepthMap> = request.views.iter().map(|view| self.depth_map(*view, &maps)).collect();
+            let used: Vec<DepthMap> =
+                request.views.iter().map(|view| self.depth_map(*view, &target.host_maps)).collect();
             holes::fill(&mut rendered, &block.target, &used);
         }
         self.target = Some(target);
