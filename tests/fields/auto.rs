@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::auto::{self, Chosen, HOLD_OUT, choose, schemes};
 use viewfuse::field::pixelnerf::{Architecture, PixelNerf, PixelNerfOptions, test_networks};
-use viewfuse::field::render::{Frame, RenderError, RenderOptions, RenderRun, Stage, render};
+use viewfuse::field::render::{Frame, RenderError, RenderOptions, RenderRun, Stage, render_all};
 use viewfuse::field::training_free::{Cache, TrainingFree};
 use viewfuse::field::{AnyOptions, Field, On};
 use viewfuse::job::progress::{Interrupted, Progress, Silent};
@@ -86,12 +86,7 @@ fn what_is_chosen_is_what_is_rendered() -> Result<(), Box<dyn Error>> {
     let field = TrainingFree::default();
     let renderer = On { device: &Cpu, field: &field };
     let given = RenderOptions { field: Some(chosen.options.clone()), mixture: chosen.mixture.clone(), ..options() };
-    let (job, mut same) = (middle(scene), Vec::new());
-    let run = RenderRun { scene, job: &job, renderer: &renderer, options: &given, progress: &Silent };
-    render(&run, &chosen.weighting, |_, frame| {
-        same.push(frame);
-        Ok::<(), RenderError>(())
-    })?;
+    let same = render_all(scene, &middle(scene), &chosen.weighting, &renderer, &given)?;
     assert_eq!((frames.len(), same.len()), (1, 1));
     assert_eq!(frames[0].colours, same[0].colours);
     assert_eq!(frames[0].confidences, same[0].confidences);
@@ -151,14 +146,11 @@ fn pictures_are_mixed_where_that_is_not_worse() -> Result<(), Box<dyn Error>> {
             // What is mixed is the pictures under the settings of the parts.
             let field = TrainingFree::default();
             let renderer = On { device: &Cpu, field: &field };
-            let (job, mut levels) = (middle(scene), vec![Vec::new(); mixture.parts.len()]);
-            for (part, levels) in mixture.parts.iter().zip(&mut levels) {
+            let mut levels: Vec<Vec<f32>> = Vec::new();
+            for part in &mixture.parts {
                 let given = RenderOptions { field: Some(part.clone()), ..options() };
-                let run = RenderRun { scene, job: &job, renderer: &renderer, options: &given, progress: &Silent };
-                render(&run, &chosen.weighting, |_, frame| {
-                    levels.extend(frame.colours.iter().map(|colour| colour[1]));
-                    Ok::<(), RenderError>(())
-                })?;
+                let frames = render_all(scene, &middle(scene), &chosen.weighting, &renderer, &given)?;
+                levels.push(frames[0].colours.iter().map(|colour| colour[1]).collect());
             }
             for (pixel, colour) in frames[0].colours.iter().enumerate() {
                 let (low, high) = levels
