@@ -1,15 +1,9 @@
 //! Files that PyTorch wrote, and everything that a good file may have.
 
-use super::{pair, read};
+use super::{data, pair, read};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use viewfuse::nn::checkpoint::{Checkpoint, Element};
 use viewfuse_tests::checkpoints::{Claim, Pickle, archive, file, legacy, safetensors, state_dict};
-
-/// A file of `tests/data/checkpoints`.
-fn data(name: &str) -> PathBuf {
-    viewfuse_tests::places::data("checkpoints").join(name)
-}
 
 /// What the program in `tests/data/checkpoints.md` put into each of its files.
 fn truth() -> BTreeMap<&'static str, (Element, Vec<usize>, Vec<f32>)> {

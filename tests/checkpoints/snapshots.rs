@@ -1,14 +1,8 @@
 //! Networks that Python's pickle wrote as objects.
 
-use super::{assert_refused, pair, read};
-use std::path::PathBuf;
+use super::{assert_refused, data, pair, read};
 use viewfuse::nn::checkpoint::Checkpoint;
 use viewfuse_tests::checkpoints::{Claim, Pickle, archive, file, legacy, snapshot, state_dict};
-
-/// A file of `tests/data/checkpoints`.
-fn data(name: &str) -> PathBuf {
-    viewfuse_tests::places::data("checkpoints").join(name)
-}
 
 /// The only module of a file, under the key that snapshots have.
 fn holding(module: Pickle) -> Vec<u8> {
