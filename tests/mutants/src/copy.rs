@@ -78,7 +78,7 @@ pub struct Binary {
 }
 
 /// Test binaries that prove kernels.
-pub const BINARIES: [&str; 3] = ["numerics", "parity", "shaders"];
+pub const BINARIES: [&str; 2] = ["numerics", "parity"];
 
 /// Compiles them in the copy. The libraries of others are shared with the repository's own target folder.
 pub fn build() -> Vec<Binary> {

@@ -5,7 +5,7 @@
 //! cargo run --manifest-path tests/mutants/Cargo.toml -- make                  compiles, lists what each test reaches
 //! cargo run --manifest-path tests/mutants/Cargo.toml -- list BINARY...         lists those of some binaries alone, in less time
 //! cargo run --manifest-path tests/mutants/Cargo.toml -- ask NAME [MINUTES]    asks; goes on where it was left
-//! cargo run --manifest-path tests/mutants/Cargo.toml -- table NAME NAME       the answers of two runs side by side
+//! cargo run --manifest-path tests/mutants/Cargo.toml -- table NAME            the answers of a run
 //! ```
 //!
 //! The changes are compiled once: in a copy of the repository in `target/mutants` each value passes through a function
@@ -32,7 +32,7 @@ use std::time::{Duration, Instant};
 const MAX_CHANGES: usize = 2;
 /// Groups of tests, which are asked one after the other: the cases on the CPU, those of the bodies themselves, and
 /// others.
-const GROUPS: [&str; 4] = ["case", "bodies", "numerics", "removed"];
+const GROUPS: [&str; 3] = ["case", "bodies", "numerics"];
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

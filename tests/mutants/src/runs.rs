@@ -33,7 +33,6 @@ fn group(binary: &str, name: &str) -> Option<&'static str> {
         "parity" if name.starts_with("cpu::") => Some("case"),
         "parity" if name.starts_with("bodies::") || name.starts_with("workgroups::") => Some("bodies"),
         "numerics" => Some("numerics"),
-        "shaders" if name.starts_with("entry_points::") => Some("removed"),
         _ => None,
     }
 }
