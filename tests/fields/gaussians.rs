@@ -6,7 +6,7 @@ use viewfuse::device::cpu::Cpu;
 use viewfuse::field::auto;
 use viewfuse::field::budget::Bound;
 use viewfuse::field::gaussians::Recipe;
-use viewfuse::field::render::{RenderOptions, Stage};
+use viewfuse::field::render::{Frame, RenderOptions, Stage};
 use viewfuse::field::training_free::{Gaussians, TrainingFree};
 use viewfuse::field::{AnyField, Renderer};
 use viewfuse::job::progress::Silent;
@@ -28,11 +28,14 @@ fn with_stage<T>(
     on_scene(&scene, &job, renderer.as_ref(), options, |stage| visit(stage, &job, renderer.as_ref()))
 }
 
-/// With few iterations.
-fn hasty() -> AnyField {
-    AnyField::new(Gaussians {
-        recipe: Recipe { iterations: [0, 24, 16, 16], ..Recipe::default() },
-        ..Gaussians::default()
+/// So many frames of one target under a bound.
+fn bounded(field: Gaussians, bound: Bound, count: usize) -> Vec<Frame> {
+    let weighting = Weighting::open("distance:power=2").expect("a scheme");
+    let options = RenderOptions { bound: Some(bound), ..RenderOptions::default() };
+    with_stage(AnyField::new(field), "0..19/2", &options, |stage, job, _| {
+        stage.weigh(&weighting, &Silent).expect("weights");
+        let frame = |_| stage.frame(&weighting, &job.targets[0], &Silent).expect("a frame");
+        (0..count).map(frame).collect()
     })
 }
 
@@ -56,24 +59,17 @@ fn cheaper_efforts_are_farther_from_the_exact_picture() {
         assert!(errors[0] > errors[last - 1], "the cheapest is no farther than the dearest: {errors:?}");
         assert_eq!(frame(stage, last).colours, exact.colours, "the exact picture after others");
         // Efforts are listed with what they do.
-        assert!(
-            efforts[0].label.contains("100 iterations") && efforts[0].label.contains("32 pixels"),
-            "{}",
-            efforts[0].label
-        );
+        let label = &efforts[0].label;
+        assert!(label.contains("100 iterations") && label.contains("32 pixels"), "{label}");
     });
 }
 
 #[test]
 fn a_bound_chooses_an_effort_and_says_so() {
-    let weighting = Weighting::open("distance:power=2").expect("a scheme");
     let kept = |bound: Bound| {
-        let options = RenderOptions { bound: Some(bound), ..RenderOptions::default() };
-        with_stage(hasty(), "0..19/2", &options, |stage, job, _| {
-            stage.weigh(&weighting, &Silent).expect("weights");
-            let frame = stage.frame(&weighting, &job.targets[0], &Silent).expect("a frame");
-            frame.kept.expect("a record of the bound")
-        })
+        let recipe = Recipe { iterations: [0, 24, 16, 16], ..Recipe::default() };
+        let hasty = Gaussians { recipe, ..Gaussians::default() };
+        bounded(hasty, bound, 1).remove(0).kept.expect("a record of the bound")
     };
     let hurried = kept(Bound::Time(Duration::from_nanos(1)));
     assert!(hurried.effort.contains("iterations") && !hurried.is_kept, "{hurried:?}");
@@ -86,20 +82,9 @@ fn a_bound_chooses_an_effort_and_says_so() {
 /// A cheaper picture is compared with one that goes on from it: neither is made for nothing.
 #[test]
 fn a_bound_on_the_error_is_kept_with_fewer_iterations() {
-    let weighting = Weighting::open("distance:power=2").expect("a scheme");
-    let frame = |most: f32| {
-        let options = RenderOptions { bound: Some(Bound::Error(most)), ..RenderOptions::default() };
-        with_stage(AnyField::new(Gaussians::default()), "0..19/2", &options, |stage, job, _| {
-            stage.weigh(&weighting, &Silent).expect("weights");
-            let first = stage.frame(&weighting, &job.targets[0], &Silent).expect("a frame");
-            let second = stage.frame(&weighting, &job.targets[0], &Silent).expect("a frame");
-            (first, second)
-        })
-    };
-    let (exact, _) = frame(1.0e-5);
+    let exact = bounded(Gaussians::default(), Bound::Error(1.0e-5), 1).remove(0);
     for most in [0.05, 0.15] {
-        let (first, second) = frame(most);
-        for frame in [&first, &second] {
+        for frame in bounded(Gaussians::default(), Bound::Error(most), 2) {
             let kept = frame.kept.as_ref().expect("a record of the bound");
             let error = rms(&frame.colours, &exact.colours);
             assert!(kept.effort.contains("iterations") && kept.is_kept, "{kept:?}");
