@@ -1,4 +1,4 @@
-//! Gaussians of the sample scene on each device: derivatives, and pictures of a scene that is optimised.
+//! Gaussians of the sample scene on each device: lists of tiles, and pictures of a scene that is optimised.
 
 use crate::candidate::{Candidate, tests};
 use libtest_mimic::Failed;
@@ -15,12 +15,11 @@ use viewfuse_core::metrics::psnr;
 use viewfuse_core::random::uniform;
 use viewfuse_kernels::gaussians::lists::ListStatus;
 use viewfuse_kernels::gaussians::{SplatBlock, TileBlock};
-use viewfuse_kernels::rows::{GaussianBlock, ListBlock, ProjectedGaussian, TILE_RUN, WORKGROUP};
+use viewfuse_kernels::rows::{ListBlock, ProjectedGaussian, TILE_RUN, WORKGROUP};
 use viewfuse_tests::cloud::toy_cloud;
 use viewfuse_vulkan::GpuOptions;
 
 tests!(
-    derivatives_of_a_scene_are_the_cpus,
     a_scene_is_as_good_as_the_cpus,
     lists_of_tiles_are_the_hosts,
     lists_of_a_large_picture_are_the_hosts,
@@ -30,11 +29,6 @@ tests!(
     a_picture_has_the_same_bits_with_lists_of_the_device,
 );
 
-/// Most splats of a tile: fewer than those whose loops Mesa's llvmpipe ends (`viewfuse_field::gaussians::optimised`).
-const MAX_LISTED: u32 = 100;
-/// Largest difference of derivatives, as a share of the norm of all: sums of at most 64 pixels and some 50 splats, in
-/// another order and with other last digits of the exponential, differ by some 1e-5.
-const MAX_DIFFERENCE: f64 = 1.0e-3;
 /// Largest difference of scores, decibels: on another device the last digits differ, and the steps make them grow.
 const MAX_LOSS: f64 = 0.5;
 
@@ -58,63 +52,6 @@ fn cpus_scene() -> &'static Optimised {
 /// The first source's camera.
 fn camera() -> CameraBlock {
     toy_cloud().0.images[0].camera.block(0)
-}
-
-/// The longest list of splats of a tile.
-fn longest_list(made: &Optimised) -> u32 {
-    let (camera, gaussian_count) = (camera(), made.gaussians.len() as u32);
-    let block = SplatBlock { camera, near: made.near, gaussian_count, padding: [0; 2] };
-    let mut splats = Cpu.zeros(made.gaussians.len()).expect("memory");
-    Cpu.project_gaussians(&block, &made.gaussians, &mut splats).expect("splats");
-    let lists = Tiles::of(&TileBlock::new(camera.width, camera.height, made.background), &splats);
-    lists.starts.windows(2).map(|part| part[1] - part[0]).max().unwrap_or(0)
-}
-
-/// Every so many Gaussians of the CPU's scene, so that no list is too long.
-fn thinned() -> Optimised {
-    let all = cpus_scene();
-    let every =
-        |step: usize| Optimised { gaussians: all.gaussians.iter().copied().step_by(step).collect(), ..all.clone() };
-    (1..all.gaussians.len()).map(every).find(|cloud| longest_list(cloud) <= MAX_LISTED).expect("a step")
-}
-
-/// Derivatives by the Gaussians of a loss whose derivatives by the first source's pixels have all signs.
-fn derivatives<D: Device>(device: &D, made: &Optimised) -> Vec<GaussianBlock> {
-    let splatter = Splatter { device, near: made.near, background: made.background };
-    let camera = camera();
-    let uploaded = device.upload(&made.gaussians).expect("Gaussians");
-    let picture = splatter.picture(&uploaded, made.gaussians.len(), &camera).expect("a picture");
-    let by = |index: usize| [0, 1, 2, 3].map(|channel| ((index * 7 + channel * 5) % 11) as f32 / 5.0 - 1.0);
-    let by_pixels: Vec<[f32; 4]> = (0..(camera.width * camera.height) as usize).map(by).collect();
-    splatter.gradients(&uploaded, &picture, &by_pixels).expect("derivatives")
-}
-
-/// Some of a Gaussian's parameters.
-type Part = fn(&GaussianBlock) -> Vec<f32>;
-
-fn derivatives_of_a_scene_are_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
-    let device = candidate.vulkan(&GpuOptions::default())?;
-    let made = thinned();
-    let (cpu, ours) = (derivatives(&Cpu, &made), derivatives(&device, &made));
-    let groups: [(&str, Part); 5] = [
-        ("position", |gaussian| gaussian.position.to_vec()),
-        ("opacity", |gaussian| vec![gaussian.opacity]),
-        ("scales", |gaussian| gaussian.log_scales.to_vec()),
-        ("rotation", |gaussian| gaussian.rotation.to_vec()),
-        ("colour", |gaussian| gaussian.colour.to_vec()),
-    ];
-    let norm = |values: &[f32]| values.iter().map(|value| f64::from(*value).powi(2)).sum::<f64>().sqrt();
-    for (name, part) in groups {
-        let [a, b] = [&cpu, &ours].map(|all| all.iter().flat_map(part).collect::<Vec<f32>>());
-        let apart: Vec<f32> = a.iter().zip(&b).map(|(a, b)| a - b).collect();
-        let (difference, all) = (norm(&apart), norm(&a));
-        assert!(
-            all > 0.0 && difference <= MAX_DIFFERENCE * all,
-            "{name}: {difference:e} of {all:e}, {} Gaussians",
-            made.gaussians.len()
-        );
-    }
-    Ok(())
 }
 
 /// The PSNR of the Gaussians at the sources, decibels.
