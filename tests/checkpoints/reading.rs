@@ -64,15 +64,6 @@ fn what_pytorch_wrote() {
 }
 
 #[test]
-fn the_same_by_hand() {
-    let expected =
-        [("a.bias".to_owned(), vec![-1.5, 0.25]), ("a.weight".to_owned(), vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0])];
-    let claims = pair();
-    assert_eq!(read(&archive(&state_dict(&claims), &claims)).expect("an archive"), expected);
-    assert_eq!(read(&legacy(&state_dict(&claims), &claims)).expect("an old file"), expected);
-}
-
-#[test]
 fn every_place_of_the_state_dict() {
     for place in ["state_dict", "model", "model_state_dict", "net", "ema"] {
         let root = Pickle::new().raw(b"}(").text("epoch").int(3).text(place).state_dict(&pair()).raw(b"u");
