@@ -123,11 +123,8 @@ fn the_choice_is_the_best_that_was_tried_or_the_default() -> Result<(), Box<dyn 
 fn pictures_are_mixed_where_that_is_not_worse() -> Result<(), Box<dyn Error>> {
     let Six { scene, frames, chosen } = &*SIX;
     let tried = chosen.candidates.last().ok_or("candidates")?;
-    assert_eq!(
-        tried.options.settings().last().map(|setting| setting.name),
-        Some("mixed pictures"),
-        "a mixture is tried last"
-    );
+    let last = tried.options.settings().last().map(|setting| setting.name);
+    assert_eq!(last, Some("mixed pictures"), "a mixture is tried last");
     let mixed = tried.psnr.ok_or("a mixture is not given up")?;
     let best = |candidates: &[auto::Candidate]| candidates.iter().filter_map(|one| one.psnr).fold(f64::MIN, f64::max);
     let single = best(&chosen.candidates[..chosen.candidates.len() - 1]);
@@ -156,10 +153,8 @@ fn pictures_are_mixed_where_that_is_not_worse() -> Result<(), Box<dyn Error>> {
                 let (low, high) = levels
                     .iter()
                     .fold((f32::MAX, f32::MIN), |(low, high), part| (low.min(part[pixel]), high.max(part[pixel])));
-                assert!(
-                    colour[1] > low - 1.0e-5 && colour[1] < high + 1.0e-5,
-                    "{pixel}: {colour:?} in {low} to {high}"
-                );
+                let is_between = (low - 1.0e-5..high + 1.0e-5).contains(&colour[1]);
+                assert!(is_between, "{pixel}: {colour:?} in {low} to {high}");
             }
         }
     }
@@ -225,10 +220,8 @@ fn a_choice_is_kept_for_the_same_sources_and_options_alone() -> Result<(), Box<d
     let is_first = |other: &Chosen| {
         assert_eq!((&other.candidates, &other.held_out), (&first.candidates, &first.held_out));
         assert_eq!((&other.mixture, &other.options, other.basis), (&first.mixture, &first.options, first.basis));
-        assert_eq!(
-            (other.weighting.to_string(), &other.calibration),
-            (first.weighting.to_string(), &first.calibration)
-        );
+        assert_eq!(other.weighting.to_string(), first.weighting.to_string());
+        assert_eq!(other.calibration, first.calibration);
     };
     let (second, [less, _]) = choose(&sources, SMALL, 0.01)?;
     is_first(&second);

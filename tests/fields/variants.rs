@@ -75,10 +75,8 @@ fn assert_encodings_serve(
     let mut right = weighed(other);
     right.encode_all(&Silent).expect("encoded");
     let right = right.picture(&camera, &weights, 0.0, &Silent).expect("a picture");
-    assert!(
-        stale.map_or(true, |stale| stale.colours != right.colours),
-        "{folder}: {other:?} could say that it is alike"
-    );
+    let is_wrong = stale.map_or(true, |stale| stale.colours != right.colours);
+    assert!(is_wrong, "{folder}: {other:?} could say that it is alike");
 }
 
 #[test]
