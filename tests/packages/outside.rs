@@ -7,9 +7,9 @@ use std::sync::Arc;
 use tempfile::TempDir;
 use viewfuse::device::choice::AnyDevice;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::field::render::{Finished, Frame, RenderError, RenderOptions, RenderRun, Stage, render};
+use viewfuse::field::render::{Frame, RenderOptions, RenderRun, Stage, render, render_all};
 use viewfuse::field::training_free::TrainingFree;
-use viewfuse::field::{AnyField, On, Renderer};
+use viewfuse::field::{AnyField, On};
 use viewfuse::job::progress::Silent;
 use viewfuse::output::run::{Circumstances, RunWriter};
 use viewfuse::scene::few_shot::{FewShot, Selection};
@@ -59,21 +59,10 @@ fn small() -> RenderOptions {
     RenderOptions { size: Some([32, 32]), ..RenderOptions::default() }
 }
 
-/// The third view from the others, at 32x32.
-fn frame(renderer: &dyn Renderer, scene: &Scene, weighting: &Weighting) -> (Frame, Finished) {
-    let (job, options, mut frames) = (third(scene), small(), Vec::new());
-    let run = RenderRun { scene, job: &job, renderer, options: &options, progress: &Silent };
-    let finished = render(&run, weighting, |_, frame| {
-        frames.push(frame);
-        Ok::<_, RenderError>(())
-    })
-    .expect("a picture");
-    (frames.remove(0), finished)
-}
-
 /// With the training-free field on the CPU.
 fn training_free(scene: &Scene, weighting: &Weighting) -> Frame {
-    frame(&On { device: &Cpu, field: &TrainingFree::default() }, scene, weighting).0
+    let renderer = On { device: &Cpu, field: &TrainingFree::default() };
+    render_all(scene, &third(scene), weighting, &renderer, &small()).expect("a picture").remove(0)
 }
 
 #[test]
@@ -84,23 +73,22 @@ fn field_layout_and_weighting_of_ones_own_render_together() {
     let field = AnyField::new(PLANE);
     let renderer = field.on(&device);
     let nearest = Weighting::custom(Nearest);
-    let (frame, finished) = frame(renderer.as_ref(), &scene, &nearest);
-    let psnr = frame.truth.as_ref().expect("a truth").psnr;
+    let output = tempfile::tempdir().expect("a folder");
+    let (job, options, mut frames) = (third(&scene), small(), Vec::new());
+    let mut writer = RunWriter::new(output.path(), &scene, "lines".to_owned(), &job, &nearest);
+    let run = RenderRun { scene: &scene, job: &job, renderer: renderer.as_ref(), options: &options, progress: &Silent };
+    let finished = render(&run, &nearest, |sources, frame| {
+        frames.push((frame.truth.as_ref().expect("a truth").psnr, frame.depths.clone()));
+        writer.write(sources, frame).map_err(Box::<dyn std::error::Error>::from)
+    })
+    .expect("a picture");
+    let (psnr, depths) = &frames[0];
     println!("a plane from the nearest of seven views: {psnr:.1} dB");
-    assert!(psnr > 10.0);
-    assert!(frame.depths.contains(&PLANE.depth) && frame.depths.contains(&0.0));
+    assert!(*psnr > 10.0 && depths.contains(&PLANE.depth) && depths.contains(&0.0));
     let line = finished.record.left_out.first().expect("a line about views");
     assert_eq!((line.what, line.left_out, line.of), ("encoded views", 6, 7), "only the nearest one is used");
 
     // What a run writes.
-    let output = tempfile::tempdir().expect("a folder");
-    let (job, options) = (third(&scene), small());
-    let mut writer = RunWriter::new(output.path(), &scene, "lines".to_owned(), &job, &nearest);
-    let run = RenderRun { scene: &scene, job: &job, renderer: renderer.as_ref(), options: &options, progress: &Silent };
-    let finished = render(&run, &nearest, |sources, frame| {
-        writer.write(sources, frame).map_err(Box::<dyn std::error::Error>::from)
-    })
-    .expect("a picture");
     let record = writer.finish(renderer.as_ref(), &options, finished, Circumstances::default()).expect("a record");
     assert_eq!((record.field, record.weighting.as_str(), record.frames.len()), ("plane", "nearest", 1));
     let mut names: Vec<_> =
