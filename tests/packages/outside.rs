@@ -3,34 +3,25 @@
 
 use std::fmt::Write;
 use std::fs;
-use std::sync::Arc;
 use tempfile::TempDir;
 use viewfuse::device::choice::AnyDevice;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::field::render::{Frame, RenderOptions, RenderRun, Stage, render, render_all};
-use viewfuse::field::training_free::TrainingFree;
-use viewfuse::field::{AnyField, On};
+use viewfuse::field::AnyField;
+use viewfuse::field::render::{RenderOptions, RenderRun, render};
 use viewfuse::job::progress::Silent;
 use viewfuse::output::run::{Circumstances, RunWriter};
-use viewfuse::scene::few_shot::{FewShot, Selection};
-use viewfuse::scene::photographs::{Album, BackgroundChoice};
+use viewfuse::scene::few_shot::Selection;
 use viewfuse::scene::{FileFault, FilePlace, READERS, Scene, SceneError, SceneFault};
 use viewfuse::weighting::Weighting;
-use viewfuse::weighting::sources::{MAX_SOURCES, SourceWeights};
 use viewfuse_outside::{LIST, Lines, Nearest, Plane};
-use viewfuse_tests::places::data;
+use viewfuse_tests::fields::sample;
 
 /// The sample's cameras are as far from its object.
 const PLANE: Plane = Plane { depth: 1.3 };
 
-/// The sample scene.
-fn sample() -> Scene {
-    Scene::open(data("toy")).expect("the sample")
-}
-
 /// The sample scene in a layout of one's own, with every third of its views.
 fn in_lines() -> (Scene, TempDir) {
-    let (sample, folder) = (sample(), tempfile::tempdir().expect("a folder"));
+    let (sample, folder) = (sample("toy"), tempfile::tempdir().expect("a folder"));
     let mut list = String::new();
     for (index, view) in sample.views.iter().filter(|view| view.image.is_some()).step_by(3).enumerate() {
         let camera = view.camera;
@@ -49,22 +40,6 @@ fn open(folder: &TempDir) -> Result<Scene, SceneError> {
     Scene::open_with(folder.path(), &[READERS.as_slice(), &[&Lines]].concat())
 }
 
-/// The third view from the others.
-fn third(scene: &Scene) -> FewShot {
-    let targets = Some(scene.views[2].name.clone());
-    Selection { targets, ..Selection::default() }.resolve(scene, 2).expect("a job")
-}
-
-fn small() -> RenderOptions {
-    RenderOptions { size: Some([32, 32]), ..RenderOptions::default() }
-}
-
-/// With the training-free field on the CPU.
-fn training_free(scene: &Scene, weighting: &Weighting) -> Frame {
-    let renderer = On { device: &Cpu, field: &TrainingFree::default() };
-    render_all(scene, &third(scene), weighting, &renderer, &small()).expect("a picture").remove(0)
-}
-
 #[test]
 fn field_layout_and_weighting_of_ones_own_render_together() {
     let (_, folder) = in_lines();
@@ -74,7 +49,11 @@ fn field_layout_and_weighting_of_ones_own_render_together() {
     let renderer = field.on(&device);
     let nearest = Weighting::custom(Nearest);
     let output = tempfile::tempdir().expect("a folder");
-    let (job, options, mut frames) = (third(&scene), small(), Vec::new());
+    // The third view from the others.
+    let targets = Some(scene.views[2].name.clone());
+    let job = Selection { targets, ..Selection::default() }.resolve(&scene, 2).expect("a job");
+    let options = RenderOptions { size: Some([32, 32]), ..RenderOptions::default() };
+    let mut frames = Vec::new();
     let mut writer = RunWriter::new(output.path(), &scene, "lines".to_owned(), &job, &nearest);
     let run = RenderRun { scene: &scene, job: &job, renderer: renderer.as_ref(), options: &options, progress: &Silent };
     let finished = render(&run, &nearest, |sources, frame| {
@@ -98,36 +77,13 @@ fn field_layout_and_weighting_of_ones_own_render_together() {
 }
 
 #[test]
-fn a_plane_seen_from_a_source_is_its_photograph() {
-    let scene = sample();
-    let sources: Vec<usize> = (0..4).collect();
-    let album = Album::open(&scene, sources.iter().copied(), &Silent).expect("photographs");
-    let images = album.sources(&sources, 32, BackgroundChoice::Auto, &Silent).expect("sources");
-    let renderer = On { device: &Cpu, field: &PLANE };
-    let options = RenderOptions::default();
-    let mut stage = Stage::of_sources(Arc::new(images.clone()), &renderer, &options, &Silent).expect("a stage");
-    for (view, image) in images.images.iter().enumerate() {
-        let mut scores = [0.0; MAX_SOURCES];
-        scores[view] = 1.0;
-        let weights = SourceWeights::from_scores(&scores, 4);
-        let picture = stage.picture(&image.camera, &weights, 0.0, &Silent).expect("a picture");
-        let opacities = picture.colours.iter().zip(&image.texels).filter(|(colour, texel)| colour[3] == texel[3]);
-        // Rounding may take a point on a border into the next texel.
-        let same = opacities.count() as f64 / image.texels.len() as f64;
-        assert!(same > 0.99, "view {view}: {same} of the pixels");
-    }
-}
-
-#[test]
-fn a_layout_of_ones_own_is_opened_and_rendered() {
+fn a_layout_of_ones_own_is_opened_as_any_other() {
     let (sample, folder) = in_lines();
     let scene = open(&folder).expect("a scene");
     assert_eq!((scene.layout, scene.views.len()), ("lines", 8));
     for (view, original) in scene.views.iter().zip(sample.views.iter().step_by(3)) {
         assert_eq!(view.camera, original.camera, "{}", view.name);
     }
-    let frame = training_free(&scene, &Weighting::default_scheme());
-    assert!(frame.truth.is_some_and(|truth| truth.psnr > 15.0));
     // The readers of the crate know nothing of it, and see photographs alone.
     let error = Scene::open(folder.path()).expect_err("an unknown layout").to_string();
     assert!(error.contains("8 photographs, and nothing that gives their poses"), "{error}");
@@ -158,16 +114,4 @@ fn what_a_reader_gives_is_checked() {
     assert!(matches!(*fault_of_line(with(0, "-1")), SceneFault::Intrinsics(_)));
     assert!(matches!(*fault_of_line(with(4, "NaN")), SceneFault::File(FileFault::NotFinite(_))));
     assert!(matches!(*refused(String::new()).fault, SceneFault::NoViews(_)));
-}
-
-#[test]
-fn a_weighting_of_ones_own_is_rendered_with() {
-    let scene = sample();
-    let nearest = Weighting::custom(Nearest);
-    assert_eq!(nearest.to_string(), "nearest");
-    let frame = training_free(&scene, &nearest);
-    let weights = frame.weights.values();
-    assert_eq!(weights.iter().filter(|weight| **weight > 0.0).count(), 1);
-    assert!(weights.contains(&1.0));
-    assert_ne!(frame.picture, training_free(&scene, &Weighting::default_scheme()).picture);
 }
