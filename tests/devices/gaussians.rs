@@ -4,7 +4,8 @@ use crate::candidate::{Candidate, tests};
 use libtest_mimic::Failed;
 use std::sync::OnceLock;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::device::{Device, Memory};
+use viewfuse::device::vulkan::Vulkan;
+use viewfuse::device::{Device, DeviceError, Memory};
 use viewfuse::field::gaussians::{
     Drawn, Optimised, Recipe, Splatter, Tiles, optimisation_by_host, optimisation_on_device, optimised,
 };
@@ -13,15 +14,13 @@ use viewfuse::scene::photographs::to_rgb8;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::metrics::psnr;
 use viewfuse_core::random::uniform;
-use viewfuse_kernels::gaussians::lists::ListStatus;
-use viewfuse_kernels::gaussians::{SplatBlock, TileBlock};
+use viewfuse_kernels::gaussians::TileBlock;
 use viewfuse_kernels::rows::{ListBlock, ProjectedGaussian, TILE_RUN, WORKGROUP};
 use viewfuse_tests::cloud::toy_cloud;
 use viewfuse_vulkan::GpuOptions;
 
 tests!(
     a_scene_is_as_good_as_the_cpus,
-    lists_of_tiles_are_the_hosts,
     lists_of_a_large_picture_are_the_hosts,
     iterations_of_a_device_are_the_hosts,
     a_devices_scene_depends_on_no_capacity_and_no_run,
@@ -78,57 +77,22 @@ fn a_scene_is_as_good_as_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
     Ok(())
 }
 
-/// A device's lists of a picture's tiles.
-fn lists_on<D: Device>(device: &D, block: ListBlock, splats: &[ProjectedGaussian]) -> (Vec<u32>, Vec<u32>, ListStatus) {
-    let zeros = |count: u32| device.zeros(count as usize).expect("memory");
-    let splats = device.upload(splats).expect("splats");
-    let mut masks = zeros(block.bin_count() * block.mask_count());
-    let (mut counts, mut before) = (zeros(block.most_counts()), zeros(block.most_counts()));
-    let mut sums = zeros(block.run_count() * TILE_RUN);
-    let (mut starts, status, mut after) = (zeros(block.tile_count() + 1), zeros(3), zeros(3));
-    let (mut keys, mut entries) = (device.zeros(block.capacity as usize).expect("memory"), zeros(block.capacity));
-    let mut run = || {
-        device.mark_bins(&block, &splats, &mut masks)?;
-        device.count_entries(&block, &splats, &masks, &mut counts)?;
-        device.sum_entries(&block, &counts, &mut before, &mut sums)?;
-        device.start_tiles(&block, &sums, &status, &mut starts, &mut after)?;
-        device.list_entries(&block, &splats, &masks, &starts, &before, &mut keys)?;
-        device.sort_entries(&block, &starts, &keys, &mut entries)?;
-        let status = device.download(&after)?;
-        Ok::<_, viewfuse::device::DeviceError>((device.download(&starts)?, device.download(&entries)?, status))
-    };
-    let (starts, mut entries, status) = run().expect("lists");
-    entries.truncate(starts[starts.len() - 1] as usize);
-    (starts, entries, ListStatus::of([status[0], status[1], status[2]]))
-}
-
-/// Of all Gaussians of the CPU's scene from several places, and of none of them.
-fn lists_of_tiles_are_the_hosts(candidate: &Candidate) -> Result<(), Failed> {
-    let device = candidate.vulkan(&GpuOptions::default())?;
-    let made = cpus_scene();
-    for image in toy_cloud().0.images.iter().step_by(3) {
-        let camera = image.camera.block(0);
-        for gaussians in [&made.gaussians[..], &made.gaussians[..1]] {
-            let gaussian_count = gaussians.len() as u32;
-            let block = SplatBlock { camera, near: made.near, gaussian_count, padding: [0; 2] };
-            let mut splats = Cpu.zeros(gaussians.len())?;
-            Cpu.project_gaussians(&block, &gaussians.to_vec(), &mut splats)?;
-            let expected = Tiles::of(&TileBlock::new(camera.width, camera.height, made.background), &splats);
-            let total = expected.entries.len() as u32;
-            let CameraBlock { width, height, .. } = camera;
-            let block = ListBlock { width, height, splat_count: gaussian_count, capacity: total.max(1) };
-            let on_cpu = lists_on(&Cpu, block, &splats);
-            let status = ListStatus { is_over: false, done: 1, most: total };
-            assert_eq!(on_cpu, (expected.starts.clone(), expected.entries.clone(), status), "on the CPU");
-            assert!(lists_on(&device, block, &splats) == on_cpu, "{gaussian_count} Gaussians");
-            if total > 1 {
-                let (starts, entries, status) = lists_on(&device, ListBlock { capacity: total - 1, ..block }, &splats);
-                assert!(starts.iter().all(|start| *start == 0) && entries.is_empty());
-                assert_eq!(status, ListStatus { is_over: true, done: 0, most: total });
-            }
-        }
-    }
-    Ok(())
+/// A device's lists of a picture's tiles: where each begins, and the entries of all.
+fn lists_on(device: &Vulkan, block: ListBlock, splats: &[ProjectedGaussian]) -> Result<[Vec<u32>; 2], DeviceError> {
+    let zeros = |count: u32| device.zeros(count as usize);
+    let splats = device.upload(splats)?;
+    let mut masks = zeros(block.bin_count() * block.mask_count())?;
+    let (mut counts, mut before) = (zeros(block.most_counts())?, zeros(block.most_counts())?);
+    let mut sums = zeros(block.run_count() * TILE_RUN)?;
+    let (mut starts, status, mut after) = (zeros(block.tile_count() + 1)?, zeros(3)?, zeros(3)?);
+    let (mut keys, mut entries) = (device.zeros(block.capacity as usize)?, zeros(block.capacity)?);
+    device.mark_bins(&block, &splats, &mut masks)?;
+    device.count_entries(&block, &splats, &masks, &mut counts)?;
+    device.sum_entries(&block, &counts, &mut before, &mut sums)?;
+    device.start_tiles(&block, &sums, &status, &mut starts, &mut after)?;
+    device.list_entries(&block, &splats, &masks, &starts, &before, &mut keys)?;
+    device.sort_entries(&block, &starts, &keys, &mut entries)?;
+    Ok([device.download(&starts)?, device.download(&entries)?])
 }
 
 /// Of so many splats on so large a picture that a part of them has more masks than a workgroup has invocations.
@@ -153,7 +117,7 @@ fn lists_of_a_large_picture_are_the_hosts(candidate: &Candidate) -> Result<(), F
     let expected = Tiles::of(&TileBlock::new(width, height, [0.0; 3]), &splats);
     let block = ListBlock { width, height, splat_count: COUNT, capacity: expected.entries.len() as u32 };
     assert!(block.mask_count() / block.part_count() > WORKGROUP, "parts of few masks");
-    let (starts, entries, _) = lists_on(&device, block, &splats);
+    let [starts, entries] = lists_on(&device, block, &splats)?;
     assert!(starts == expected.starts && entries == expected.entries);
     Ok(())
 }
@@ -224,9 +188,7 @@ fn an_iteration_needs_no_transfer(candidate: &Candidate) -> Result<(), Failed> {
         let mut optimisation = optimisation.expect("enough points");
         // From here on there are harmonics, if there are any at all.
         optimisation.run_to(64, &Silent)?;
-        let dispatches = |device: &viewfuse::device::vulkan::Vulkan| {
-            device.kernel_times().iter().map(|time| time.dispatches).sum::<u64>()
-        };
+        let dispatches = |device: &Vulkan| device.kernel_times().iter().map(|time| time.dispatches).sum::<u64>();
         let (before, dispatched) = (device.transfers(), dispatches(&device));
         optimisation.run_to(64 + 31, &Silent)?;
         assert_eq!(device.transfers(), before, "no transfer in 31 iterations");
