@@ -43,8 +43,7 @@ pub fn table(name: &str) -> String {
         if row[4] == 0 {
             lost.push(body.as_str());
         }
-        for (change, answers) in
-            changes.iter().filter(|(_, answers)| !answers.iter().any(|answer| is_noticed(answer)))
+        for (change, answers) in changes.iter().filter(|(_, answers)| !answers.iter().any(|answer| is_noticed(answer)))
         {
             let reach = match answers.iter().all(|answer| answer == "not reached") {
                 true => "reached by none",
