@@ -4,10 +4,10 @@ use image::{Rgba, RgbaImage};
 use std::fs;
 use std::path::{Path, PathBuf};
 use viewfuse::device::cpu::Cpu;
+use viewfuse::evaluate::Evaluator;
 use viewfuse::evaluate::baseline::Baseline;
 use viewfuse::evaluate::metrics::Metrics;
 use viewfuse::evaluate::summary::{Observation, Table, table};
-use viewfuse::evaluate::{Evaluator, PSNR, SSIM};
 use viewfuse::field::On;
 use viewfuse::field::render::{Frame, RenderOptions};
 use viewfuse::field::training_free::TrainingFree;
@@ -35,24 +35,14 @@ fn scores(folder: &Path, schemes: &[&str]) -> Table {
     let scene = Scene::open(folder).expect("the sample");
     let selection = Selection { sources: Some(TRAINING.to_owned()), ..Selection::default() };
     let weightings: Vec<OpenedChoice> = schemes.iter().map(|name| scheme(name).into()).collect();
-    let (field, options, quiet) = (TrainingFree::default(), RenderOptions::default(), Silent);
     let evaluator = Evaluator {
         weightings: &weightings,
-        renderer: &On { device: &Cpu, field: &field },
-        options: &options,
+        renderer: &On { device: &Cpu, field: &TrainingFree::default() },
+        options: &RenderOptions::default(),
         scorer: &Metrics::plain(&Cpu),
-        progress: &quiet,
+        progress: &Silent,
     };
     let scores = evaluator.score_all(&scene, &selection).expect("scores");
-    for score in &scores {
-        println!(
-            "{:>16} at {}: {:.2} dB, SSIM {:.4}",
-            score.scheme,
-            score.target,
-            score.value(PSNR).unwrap_or(0.0),
-            score.value(SSIM).unwrap_or(0.0)
-        );
-    }
     table(&scores.iter().map(|score| Observation { scene: 0, job: 0, score }).collect::<Vec<_>>())
 }
 
