@@ -14,14 +14,14 @@
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;
 use std::path::Path;
-use viewfuse::device::Device;
+use viewfuse::device::choice::AnyDevice;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::vulkan::Vulkan;
-use viewfuse::field::On;
-use viewfuse::field::render::{Frame, RenderOptions, Stage};
+use viewfuse::field::render::{RenderOptions, Stage};
 use viewfuse::field::training_free::TrainingFree;
+use viewfuse::field::{AnyField, On};
 use viewfuse::job::progress::Silent;
-use viewfuse::scene::few_shot::{Target, target_of};
+use viewfuse::scene::few_shot::target_of;
 use viewfuse::scene::gaussians::{Gaussian, GaussianScene};
 use viewfuse::scene::photographs::Album;
 use viewfuse::scene::photographs::object_box::find_object;
@@ -143,39 +143,28 @@ fn own_scene(criterion: &mut Criterion) {
     let pinhole = scene.views[0].camera.pinhole;
     let size = [160, (160.0 * pinhole.height() as f32 / pinhole.width() as f32).round() as u32];
     let options = RenderOptions { size: Some(size), ..RenderOptions::default() };
-    let (field, target) = (TrainingFree::default(), target_of(&scene, 0));
-    let mut group = criterion.benchmark_group(format!("own scene, {} sources, {}x{}", sources.len(), size[0], size[1]));
-    group.sample_size(10);
-    let rendering = Rendering { scene: &scene, album: &album, sources: &sources, options: &options, field: &field };
-    group.bench_function("cpu", |bencher| bencher.iter(|| rendering.picture(&Cpu, &target)));
+    let mut devices = vec![("cpu".to_owned(), AnyDevice::Cpu(Cpu))];
     if let Ok((instance, adapters)) = vulkan_devices() {
         for adapter in adapters.iter().filter(|adapter| adapter.missing.is_empty()) {
             let device = Vulkan::open(&instance, adapter, &GpuOptions::default()).expect("a device that lacks nothing");
-            group.bench_function(&adapter.name, |bencher| bencher.iter(|| rendering.picture(&device, &target)));
+            devices.push((adapter.name.clone(), AnyDevice::Vulkan(Box::new(device))));
         }
     }
-    group.finish();
-}
-
-/// A scene with its photographs in memory.
-struct Rendering<'a> {
-    scene: &'a Scene,
-    album: &'a Album<'a>,
-    sources: &'a [usize],
-    options: &'a RenderOptions,
-    field: &'a TrainingFree,
-}
-
-impl Rendering<'_> {
-    /// From photographs to a picture.
-    fn picture<D: Device + Sync>(&self, device: &D, target: &Target) -> Frame {
-        let Rendering { scene, album, sources, options, field } = self;
-        let (weighting, progress) = (Weighting::default_scheme(), Silent);
-        let renderer = On { device, field: *field };
-        let mut stage = Stage::prepare(scene, album, sources, &renderer, options, &progress).expect("prepared");
-        stage.weigh(&weighting, &progress).expect("encoded");
-        black_box(stage.frame(&weighting, target, &progress).expect("rendered"))
+    let (field, target, weighting) = (AnyField::default(), target_of(&scene, 0), Weighting::default_scheme());
+    let mut group = criterion.benchmark_group(format!("own scene, {} sources, {}x{}", sources.len(), size[0], size[1]));
+    group.sample_size(10);
+    for (name, device) in &devices {
+        let renderer = field.on(device);
+        // From photographs to a picture.
+        let picture = || {
+            let stage = Stage::prepare(&scene, &album, &sources, renderer.as_ref(), &options, &progress);
+            let mut stage = stage.expect("prepared");
+            stage.weigh(&weighting, &progress).expect("encoded");
+            black_box(stage.frame(&weighting, &target, &progress).expect("rendered"))
+        };
+        group.bench_function(name, |bencher| bencher.iter(picture));
     }
+    group.finish();
 }
 
 /// Opening a file of 40 thousand Gaussians, of degree 0 and of degree 3.

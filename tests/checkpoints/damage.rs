@@ -15,7 +15,6 @@ fn cut_off_at_every_byte() {
             assert!(read(&bytes[..length]).is_err(), "{length} of {} bytes", bytes.len());
         }
     }
-    let header = r#"{"a":{"dtype":"F32","shape":[2],"data_offsets":[0,8]}}"#;
     assert_refused(&safetensors(header, &[0; 7]), &["the file has 69 bytes; it is cut off or damaged"]);
     let whole = legacy(&state_dict(&claims), &claims);
     assert_refused(&whole[..whole.len() - 1], &["storage 'a.bias': 2 elements of 4 bytes", "it is cut off or damaged"]);

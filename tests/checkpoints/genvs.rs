@@ -216,40 +216,30 @@ fn what_is_no_member_is_refused() {
     let nothing = Tensors { shapes: BTreeMap::new(), values: BTreeMap::new(), metadata: BTreeMap::new() };
     nothing.refused("is no GeNVS: it has no tensor pixel_nerf_net.mlp.layers.0.weight");
     let small = Tensors::small;
-    small()
-        .without("pixel_nerf_net.encoder.encoder.layer4")
-        .refused("has no tensor pixel_nerf_net.encoder.encoder.layer4.0.conv1.weight");
-    small().without("pixel_nerf_net.encoder.decoder.modified_up.upconv2").refused(
-        "missing: pixel_nerf_net.encoder.decoder.modified_up.upconv2.0.weight, \
-         pixel_nerf_net.encoder.decoder.modified_up.upconv2.0.bias",
-    );
-    small()
-        .with("pixel_nerf_net.encoder.encoder.layer5.0.conv1.weight", &[8, 8, 3, 3])
-        .refused("unexpected: pixel_nerf_net.encoder.encoder.layer5");
-    small()
-        .with("pixel_nerf_net.mlp.layers.1.weight", &[32, 31])
-        .refused("pixel_nerf_net.mlp.layers.1.weight is [32, 31], not [32, 32]");
-    small().with("pixel_nerf_net.mlp.layers.0.weight", &[32]).refused("has the shape [32] instead of 2 dimensions");
-    small()
-        .with("pixel_nerf_net.mlp.layers.0.weight", &[32, 0])
-        .refused("has the size 0 on axis 1; sizes from 1 to 16384 are supported");
-    small()
-        .with("pixel_nerf_net.mlp.layers.0.weight", &[32, 7])
-        .refused("has 512 output channels, not whole voxels of 7 features");
-    small()
-        .with("pixel_nerf_net.mlp.layers.0.weight", &[32, 8])
-        .refused("the denoiser takes 19 channels, not 3 colours and the 8 features");
-    small().without("denoiser.model.dec.16x16_in1").refused("missing: denoiser.model.dec.16x16_in1.norm0.weight");
-    small()
-        .without("denoiser.model.enc.32x32_aux_residual")
-        .refused("missing: denoiser.model.enc.32x32_aux_residual.weight");
-    small().without("denoiser.model.enc.64x64_block0").refused("the denoiser has 0 levels and 0 blocks in the first");
-    small()
-        .with("denoiser.model.map_layer0.weight", &[128, 31])
-        .refused("noise levels as 31 numbers, which are not as many cosines as sines");
-    small()
-        .with("denoiser.model.enc.32x32_block0.conv0.weight", &[45, 32, 3, 3])
-        .refused("a norm of denoiser.model.enc.32x32_block0 is to take 45 channels in 11 groups of one size");
+    for (beginning, said) in [
+        ("pixel_nerf_net.encoder.encoder.layer4", "has no tensor pixel_nerf_net.encoder.encoder.layer4.0.conv1.weight"),
+        (
+            "pixel_nerf_net.encoder.decoder.modified_up.upconv2",
+            "missing: pixel_nerf_net.encoder.decoder.modified_up.upconv2.0.weight, \
+             pixel_nerf_net.encoder.decoder.modified_up.upconv2.0.bias",
+        ),
+        ("denoiser.model.enc.64x64_block0", "the denoiser has 0 levels and 0 blocks in the first"),
+    ] {
+        small().without(beginning).refused(said);
+    }
+    let first = "pixel_nerf_net.mlp.layers.0.weight";
+    let [noise, block] = ["denoiser.model.map_layer0.weight", "denoiser.model.enc.32x32_block0.conv0.weight"];
+    let in_groups = "a norm of denoiser.model.enc.32x32_block0 is to take 45 channels in 11 groups of one size";
+    for (name, shape, said) in [
+        (first, &[32][..], "has the shape [32] instead of 2 dimensions"),
+        (first, &[32, 0], "has the size 0 on axis 1; sizes from 1 to 16384 are supported"),
+        (first, &[32, 7], "has 512 output channels, not whole voxels of 7 features"),
+        (first, &[32, 8], "the denoiser takes 19 channels, not 3 colours and the 8 features"),
+        (noise, &[128, 31], "noise levels as 31 numbers, which are not as many cosines as sines"),
+        (block, &[45, 32, 3, 3], in_groups),
+    ] {
+        small().with(name, shape).refused(said);
+    }
     let many = (0..80).fold(small(), |tensors, block| {
         tensors.with(&format!("denoiser.model.enc.64x64_block{block}.conv0.weight"), &[32, 32, 3, 3])
     });

@@ -11,12 +11,18 @@ mod tensors;
 mod writing;
 
 use peak_alloc::PeakAlloc;
+use std::path::PathBuf;
 use viewfuse::nn::checkpoint::{Checkpoint, CheckpointError};
 use viewfuse_tests::checkpoints::{Claim, archive, file, legacy, state_dict};
 
 /// Counts the memory of the whole process: only a test that is alone in its process learns something from it.
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
+
+/// A file of `tests/data/checkpoints`.
+fn data(name: &str) -> PathBuf {
+    viewfuse_tests::places::data("checkpoints").join(name)
+}
 
 /// Two tensors.
 fn pair() -> [Claim; 2] {

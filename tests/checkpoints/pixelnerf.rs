@@ -1,6 +1,5 @@
 //! PixelNeRF's family of networks: what its metadata say.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 use viewfuse::field::pixelnerf::Architecture;
 use viewfuse::job::progress::Silent;
@@ -9,25 +8,25 @@ use viewfuse::nn::initialisation;
 use viewfuse_tests::places::repository;
 
 /// A small network with this in its metadata.
-fn saying(key: &str, value: &str) -> Result<Architecture, String> {
-    let small = Architecture::small(16);
-    let metadata: BTreeMap<String, String> = [(key.to_owned(), value.to_owned())].into();
-    let checkpoint = Checkpoint::computed("it", small.tensors(), metadata, |tensor| {
+fn network(metadata: &[(&str, &str)]) -> Checkpoint {
+    let metadata = metadata.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+    Checkpoint::computed("it", Architecture::small(16).tensors(), metadata, |tensor| {
         initialisation::tensor(&tensor.name, &tensor.shape)
-    });
-    Architecture::of(&checkpoint).map_err(|error| error.to_string())
+    })
+}
+
+fn saying(key: &str, value: &str) -> Result<Architecture, String> {
+    Architecture::of(&network(&[(key, value)])).map_err(|error| error.to_string())
 }
 
 /// A small network in a file that says this of itself.
 fn written(folder: &Path, place: &str, metadata: &[(&str, &str)]) -> Checkpoint {
-    let mut checkpoint = Checkpoint::computed("it", Architecture::small(16).tensors(), BTreeMap::new(), |tensor| {
-        initialisation::tensor(&tensor.name, &tensor.shape)
-    });
-    metadata.iter().for_each(|(key, value)| checkpoint.set(key, value));
     let path = folder.join(place);
     std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
     // The content decides what kind of file it is, not the name.
-    checkpoint.write_safetensors(&path.with_extension("safetensors"), Precision::Kept, &Silent).expect("written");
+    network(metadata)
+        .write_safetensors(&path.with_extension("safetensors"), Precision::Kept, &Silent)
+        .expect("written");
     std::fs::rename(path.with_extension("safetensors"), &path).expect("renamed");
     Checkpoint::open(&path).expect("a checkpoint")
 }

@@ -1,15 +1,9 @@
 //! Files that PyTorch wrote, and everything that a good file may have.
 
-use super::{pair, read};
+use super::{data, pair, read};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use viewfuse::nn::checkpoint::{Checkpoint, Element};
 use viewfuse_tests::checkpoints::{Claim, Pickle, archive, file, legacy, safetensors, state_dict};
-
-/// A file of `tests/data/checkpoints`.
-fn data(name: &str) -> PathBuf {
-    viewfuse_tests::places::data("checkpoints").join(name)
-}
 
 /// What the program in `tests/data/checkpoints.md` put into each of its files.
 fn truth() -> BTreeMap<&'static str, (Element, Vec<usize>, Vec<f32>)> {
@@ -67,15 +61,6 @@ fn what_pytorch_wrote() {
     let training = Checkpoint::open(&data("training.pth")).expect("training.pth");
     let settings = BTreeMap::from([("epoch", "12"), ("note", "a note")].map(|(k, v)| (k.to_owned(), v.to_owned())));
     assert_eq!(training.metadata(), &settings);
-}
-
-#[test]
-fn the_same_by_hand() {
-    let expected =
-        [("a.bias".to_owned(), vec![-1.5, 0.25]), ("a.weight".to_owned(), vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0])];
-    let claims = pair();
-    assert_eq!(read(&archive(&state_dict(&claims), &claims)).expect("an archive"), expected);
-    assert_eq!(read(&legacy(&state_dict(&claims), &claims)).expect("an old file"), expected);
 }
 
 #[test]

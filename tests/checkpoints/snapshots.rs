@@ -1,14 +1,8 @@
 //! Networks that Python's pickle wrote as objects.
 
-use super::{assert_refused, pair, read};
-use std::path::PathBuf;
+use super::{assert_refused, data, pair, read};
 use viewfuse::nn::checkpoint::Checkpoint;
-use viewfuse_tests::checkpoints::{Claim, Pickle, archive, file, legacy, snapshot, state_dict};
-
-/// A file of `tests/data/checkpoints`.
-fn data(name: &str) -> PathBuf {
-    viewfuse_tests::places::data("checkpoints").join(name)
-}
+use viewfuse_tests::checkpoints::{Claim, Pickle, archive, legacy, snapshot};
 
 /// The only module of a file, under the key that snapshots have.
 fn holding(module: Pickle) -> Vec<u8> {
@@ -149,12 +143,4 @@ fn one_tensor_of_two_modules() {
     let module = Pickle::default().module(&[], &[("a", inner), ("b", Pickle::default().raw(b"h\x00"))]);
     let names: Vec<String> = read(&holding(module)).expect("a snapshot").into_iter().map(|(name, _)| name).collect();
     assert_eq!(names, ["a.weight", "b.weight"]);
-}
-
-#[test]
-fn the_kinds_are_told_apart() {
-    let (_folder, path) = file(&legacy(&state_dict(&pair()), &pair()));
-    assert_eq!(Checkpoint::open(&path).expect("an old file").origin(), "PyTorch, before 1.6");
-    let (_folder, path) = file(&snapshot(&pair()));
-    assert_eq!(Checkpoint::open(&path).expect("a snapshot").origin(), "pickled network; under 'ema'");
 }

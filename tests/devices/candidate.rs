@@ -2,6 +2,7 @@
 
 use crate::picture::Rendering;
 use libtest_mimic::Failed;
+use std::error::Error;
 use std::sync::{Arc, OnceLock};
 use viewfuse::device::vulkan::Vulkan;
 use viewfuse_vulkan::{Adapter, Gpu, GpuOptions, Instance, Missing, VulkanError};
@@ -71,4 +72,12 @@ pub(crate) fn assert_works(gpu: &Gpu) -> Result<(), VulkanError> {
     let values: Vec<u32> = (0..1000).map(|index| index * 7919).collect();
     assert_eq!(gpu.download(&gpu.upload(&values)?)?, values);
     Ok(())
+}
+
+/// An error with its cause.
+pub(crate) fn said(error: impl Error) -> Failed {
+    match error.source() {
+        Some(cause) => format!("{error}: {cause}").into(),
+        None => error.to_string().into(),
+    }
 }

@@ -2,9 +2,8 @@
 //! values take minutes on a software driver: the CPU has them (`fields/genvs/values.rs`), and these pictures are the
 //! CPU's.
 
-use crate::candidate::{Candidate, tests};
+use crate::candidate::{Candidate, said, tests};
 use libtest_mimic::Failed;
-use std::error::Error;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::{Device, Memory};
 use viewfuse::field::FieldError;
@@ -12,7 +11,6 @@ use viewfuse::field::genvs::sampling::{Plan, Steps};
 use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, Omissions, test_networks};
 use viewfuse::job::progress::Silent;
 use viewfuse_core::sampler::Sampler;
-use viewfuse_core::weights::Weights;
 use viewfuse_tests::fields;
 use viewfuse_tests::lorry::{photographs, target};
 use viewfuse_vulkan::GpuOptions;
@@ -37,27 +35,15 @@ fn picture<D: Device + Sync>(
     omissions: Omissions,
     has_denoiser: bool,
 ) -> Result<Vec<[f32; 4]>, FieldError> {
-    let mut architecture = Architecture::small();
-    if !has_denoiser {
-        architecture.denoiser = None;
-    }
+    let small = Architecture::small();
+    let architecture = Architecture { denoiser: small.denoiser.clone().filter(|_| has_denoiser), ..small };
     let steps = Steps::Fixed { sampler: Sampler::Ipndm, level_count: 3 };
     let plan = Plan { steps, ..Plan::published(0) };
     let options = GenvsOptions { plan, omissions, ..GenvsOptions::default() };
     let field = Genvs::new(test_networks::deterministic(&architecture), options)?;
-    let mut scores = [0.0; viewfuse::weighting::sources::MAX_SOURCES];
-    (scores[0], scores[2]) = (0.7, 0.3);
-    let weights = Weights::from_scores(&scores, 3);
+    let weights = fields::weights([0.7, 0.0, 0.3], 3);
     let sources = photographs(3, 30);
     Ok(fields::picture(device, &field, &sources, &weights, &target(22), 0.0, &Silent)?.0.colours)
-}
-
-/// An error with its cause.
-fn said(error: impl Error) -> Failed {
-    match error.source() {
-        Some(cause) => format!("{error}: {cause}").into(),
-        None => error.to_string().into(),
-    }
 }
 
 fn compare(ours: &[[f32; 4]], reference: &[[f32; 4]]) -> Result<(), Failed> {

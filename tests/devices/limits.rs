@@ -40,6 +40,14 @@ fn all_lowered() -> Limits {
     Limits { buffer_range: BYTES, allocation: BYTES, workgroup_count: WORKGROUP_COUNT, ..own() }
 }
 
+/// Each limit in bytes lowered alone, with its name in Vulkan.
+fn lowered(bytes: u64) -> [(Limits, &'static str); 2] {
+    [
+        (Limits { buffer_range: bytes, ..own() }, "maxStorageBufferRange"),
+        (Limits { allocation: bytes, ..own() }, "maxMemoryAllocationSize"),
+    ]
+}
+
 fn under(limits: Limits) -> GpuOptions {
     GpuOptions { limits, ..GpuOptions::default() }
 }
@@ -62,18 +70,16 @@ fn same_picture(candidate: &Candidate, limits: Limits, in_pieces: &[Kernel]) -> 
 }
 
 /// The texels of all sources take all four pages of this length, and fit.
-fn assert_pages_are_needed() {
-    let bytes = u64::from(SIDE * SIDE) * SOURCE_COUNT as u64 * 16;
-    assert!(bytes > 3 * PAGE_BYTES && bytes <= 4 * PAGE_BYTES, "{bytes}");
-}
+const _: () = {
+    let bytes = (SIDE * SIDE) as u64 * SOURCE_COUNT as u64 * 16;
+    assert!(bytes > 3 * PAGE_BYTES && bytes <= 4 * PAGE_BYTES);
+};
 
 fn a_lower_buffer_range_gives_the_same_picture(candidate: &Candidate) -> Result<(), Failed> {
-    assert_pages_are_needed();
     same_picture(candidate, Limits { buffer_range: BYTES, ..own() }, &IN_BANDS)
 }
 
 fn a_lower_allocation_gives_the_same_picture(candidate: &Candidate) -> Result<(), Failed> {
-    assert_pages_are_needed();
     same_picture(candidate, Limits { allocation: BYTES, ..own() }, &IN_BANDS)
 }
 
@@ -99,10 +105,7 @@ fn refused(outcome: Result<(), VulkanError>, name: &str, lowered: u64) -> Result
 
 fn what_cannot_be_cut_names_the_limit(candidate: &Candidate) -> Result<(), Failed> {
     // An array that a kernel needs in one piece.
-    for (limits, name) in [
-        (Limits { buffer_range: 1024, ..own() }, "maxStorageBufferRange"),
-        (Limits { allocation: 1024, ..own() }, "maxMemoryAllocationSize"),
-    ] {
+    for (limits, name) in lowered(1024) {
         let gpu = candidate.gpu(&under(limits))?;
         let (few, many) = (gpu.upload(&[1.0_f32; 256])?, gpu.upload(&[1.0_f32; 257])?);
         let fused = gpu.zeros::<f32>(256)?;
@@ -129,10 +132,7 @@ fn what_cannot_be_cut_names_the_limit(candidate: &Candidate) -> Result<(), Faile
 fn a_picture_that_cannot_be_cut_names_the_limit(candidate: &Candidate) -> Result<(), Failed> {
     // Too short for a row of a sweep with its halo, for the scene in four pages, and for the shortest page.
     for (bytes, array) in [(64 << 10, "row_sums"), (32 << 10, "texels"), (512, "texels")] {
-        for (limits, name) in [
-            (Limits { buffer_range: bytes, ..own() }, "maxStorageBufferRange"),
-            (Limits { allocation: bytes, ..own() }, "maxMemoryAllocationSize"),
-        ] {
+        for (limits, name) in lowered(bytes) {
             let device = candidate.vulkan(&under(limits))?;
             let outcome = match Rendering::on_vulkan(&device) {
                 Err(RenderError::Field(FieldError::Device(DeviceError::Vulkan(error)))) => Err(error),

@@ -46,7 +46,7 @@ fn main() -> ExitCode {
     };
     let drivers: BTreeSet<String> = candidates.iter().map(|candidate| candidate.adapter.driver.clone()).collect();
     let mut trials = vec![timed("so_many_drivers_as_required", move || enough_drivers(&drivers))];
-    trials.extend(loader::TESTS.iter().map(|(name, test)| timed(*name, test)));
+    trials.extend(loader::trials());
     let tests: Vec<Test> = [
         arguments::TESTS,
         transfers::TESTS,

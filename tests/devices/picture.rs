@@ -9,9 +9,8 @@ use viewfuse::device::Device;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::vulkan::Vulkan;
 use viewfuse::field::On;
-use viewfuse::field::render::{Frame, RenderError, RenderOptions, RenderRun, render};
+use viewfuse::field::render::{RenderError, RenderOptions, render_all};
 use viewfuse::field::training_free::TrainingFree;
-use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::Selection;
 use viewfuse::weighting::Weighting;
@@ -49,16 +48,10 @@ impl Rendering {
         let job = Selection { targets, view_count, ..Selection::default() }.resolve(&scene, 2).expect("views of it");
         let options = RenderOptions { size: Some([SIDE, SIDE]), ..RenderOptions::default() };
         let weighting = Weighting::open("error:alpha=1").expect("a scheme");
-        let mut rendering = Rendering { pictures: Vec::new(), depths: Vec::new(), tallies: Vec::new() };
-        let keep = |_: &_, frame: Frame| -> Result<(), RenderError> {
-            rendering.pictures.push(frame.picture);
-            rendering.depths.push(frame.depths);
-            Ok(())
-        };
         let renderer = On { device, field: &TrainingFree::default() };
-        let run = RenderRun { scene: &scene, job: &job, renderer: &renderer, options: &options, progress: &Silent };
-        render(&run, &weighting, keep)?;
-        Ok(rendering)
+        let frames = render_all(&scene, &job, &weighting, &renderer, &options)?;
+        let (pictures, depths) = frames.into_iter().map(|frame| (frame.picture, frame.depths)).unzip();
+        Ok(Rendering { pictures, depths, tallies: Vec::new() })
     }
 
     /// What a kernel did for it.

@@ -8,13 +8,11 @@ use viewfuse::device::cpu::Cpu;
 use viewfuse::device::{Device, Memory, Transfers};
 use viewfuse::field::On;
 use viewfuse::field::pixelnerf::{Architecture, Omissions, PixelNerf, PixelNerfOptions, Sampling, test_networks};
-use viewfuse::field::render::{Frame, RenderError, RenderOptions, RenderRun, render};
+use viewfuse::field::render::{RenderError, RenderOptions, render_all};
 use viewfuse::job::progress::Silent;
-use viewfuse::scene::Scene;
-use viewfuse::scene::few_shot::Selection;
 use viewfuse::weighting::Weighting;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_tests::fields::largest_difference;
+use viewfuse_tests::fields::{job, largest_difference, sample};
 use viewfuse_tests::places::data;
 use viewfuse_vulkan::{GpuOptions, Limits};
 
@@ -42,25 +40,16 @@ fn pixelnerf_has_the_reference_values(candidate: &Candidate) -> Result<(), Faile
 
 /// The colours of the last of some targets.
 fn picture<D: Device + Sync>(device: &D, omissions: Omissions, targets: &str) -> Result<Vec<[f32; 4]>, RenderError> {
-    let scene = Scene::open(data("toy"))?;
-    let selection =
-        Selection { targets: Some(targets.to_owned()), sources: Some("1,7,13".to_owned()), ..Selection::default() };
-    let job = selection.resolve(&scene, 1).expect("views of it");
+    let scene = sample("toy");
+    let job = job(&scene, "1,7,13", targets);
     let options = RenderOptions { size: Some([SIDE, SIDE]), ..RenderOptions::default() };
     let sampling = Sampling { coarse_count: COARSE_COUNT, importance_count: 8, depth_count: 8, ..Sampling::default() };
     let body = test_networks::body(&Architecture::small(16));
     let of_field = PixelNerfOptions { sampling, omissions, ..PixelNerfOptions::default() };
     let field = PixelNerf::new(&body, of_field).expect("a made network");
-    let mut colours = Vec::new();
-    let keep = |_: &_, frame: Frame| -> Result<(), RenderError> {
-        colours = frame.colours;
-        Ok(())
-    };
     let weighting = Weighting::open("error:alpha=1").expect("a scheme");
-    let renderer = On { device, field: &field };
-    let run = RenderRun { scene: &scene, job: &job, renderer: &renderer, options: &options, progress: &Silent };
-    render(&run, &weighting, keep)?;
-    Ok(colours)
+    let mut frames = render_all(&scene, &job, &weighting, &On { device, field: &field }, &options)?;
+    Ok(frames.pop().expect("a target").colours)
 }
 
 fn pixelnerfs_pictures_are_the_cpus(candidate: &Candidate) -> Result<(), Failed> {

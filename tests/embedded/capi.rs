@@ -9,7 +9,7 @@ use expected::Inputs;
 use std::ffi::OsStr;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 use tempfile::TempDir;
 use viewfuse::weighting::attention::{AttentionModel, c_header};
@@ -139,10 +139,8 @@ fn learned_attention_gives_the_same_bits() {
     let program = compile(&source, &folder, &["-I".as_ref(), folder.path().as_os_str()]);
     let inputs = Inputs::new();
     let (poses, expected) = inputs.attended(&embedding);
-    let output = run(&program, &poses);
-    assert!(output.status.success(), "{output:?}");
-    let printed = String::from_utf8(output.stdout).expect("text");
-    let bits: Vec<u32> = printed.lines().map(|line| u32::from_str_radix(line, 16).expect("bits")).collect();
+    let bits: Vec<u32> =
+        run(&program, &poses).lines().map(|line| u32::from_str_radix(line, 16).expect("bits")).collect();
     assert_eq!(bits, expected);
     // Not what equal weights would be.
     assert!(expected.iter().any(|bits| (f32::from_bits(*bits) - 1.0 / 3.0).abs() > 1.0e-3), "{expected:?}");
@@ -152,7 +150,9 @@ fn compile_ours(name: &str, folder: &TempDir) -> PathBuf {
     compile(&sources().join(name), folder, &[])
 }
 
-fn run(program: &Path, input: &str) -> Output {
+/// What a program prints, which must succeed.
+#[track_caller]
+fn run(program: &Path, input: &str) -> String {
     let mut child = Command::new(program)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
@@ -161,19 +161,19 @@ fn run(program: &Path, input: &str) -> Output {
         .expect("the program starts");
     // The programs read everything before they print.
     child.stdin.take().expect("a pipe").write_all(input.as_bytes()).expect("the input");
-    child.wait_with_output().expect("the program ends")
+    let output = child.wait_with_output().expect("the program ends");
+    assert!(output.status.success(), "{output:?}");
+    String::from_utf8(output.stdout).expect("text")
 }
 
 /// What the program prints for these inputs: name and bits.
 fn printed(program: &Path, inputs: &Inputs) -> Vec<(String, Vec<u32>)> {
-    let output = run(program, &inputs.hexadecimal());
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let bits = |word: &str| u32::from_str_radix(word, 16).expect("bits");
     let line = |line: &str| {
         let mut words = line.split(' ');
         (words.next().unwrap_or_default().to_owned(), words.map(bits).collect())
     };
-    String::from_utf8(output.stdout).expect("text").lines().map(line).collect()
+    run(program, &inputs.hexadecimal()).lines().map(line).collect()
 }
 
 fn a_c_program_gets_the_same_bits_as_core() {
@@ -198,8 +198,7 @@ fn a_c_program_gets_the_same_bits_as_core() {
 
 fn every_mistake_has_its_status() {
     let folder = tempfile::tempdir().expect("a folder");
-    let output = run(&compile_ours("errors.c", &folder), "");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
+    run(&compile_ours("errors.c", &folder), "");
 }
 
 fn nothing_that_is_linked_can_panic() {
@@ -230,7 +229,5 @@ fn the_example_of_the_readme_runs() {
     let folder = tempfile::tempdir().expect("a folder");
     let source = folder.path().join("sensors.c");
     std::fs::write(&source, program).expect("the program");
-    let output = run(&compile(&source, &folder, &[]), "");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    assert_eq!(String::from_utf8(output.stdout).expect("text"), prints);
+    assert_eq!(run(&compile(&source, &folder, &[]), ""), prints);
 }

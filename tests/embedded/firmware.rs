@@ -137,11 +137,8 @@ fn both_workspaces_lock_the_same_mathematics() -> Result<(), Failed> {
 fn bits_equal_the_hosts(firmware: &Firmware, profile: &'static str, program: &str) -> Result<(), Failed> {
     let path = firmware.folder(profile)?.join(program);
     let printed = parsed(&firmware.emulator()?.run(&path)?)?;
-    let expected = host_list(program, Inputs::STANDARD);
-    compare(&printed, &expected, MIN_DIFFERENT).map_err(|difference| format!("{difference:?}"))?;
-    let changed = Inputs { phase: 1.01 * Inputs::STANDARD.phase, ..Inputs::STANDARD };
-    assert!(compare(&printed, &host_list(program, changed), MIN_DIFFERENT).is_err());
-    Ok(())
+    compare(&printed, &host_list(program, Inputs::STANDARD), MIN_DIFFERENT)
+        .map_err(|difference| format!("{difference:?}").into())
 }
 
 fn a_program_that_panics_is_noticed(firmware: &Firmware) -> Result<(), Failed> {

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::auto::{self, Chosen, HOLD_OUT, choose, schemes};
 use viewfuse::field::pixelnerf::{Architecture, PixelNerf, PixelNerfOptions, test_networks};
-use viewfuse::field::render::{Frame, RenderError, RenderOptions, RenderRun, Stage, render};
+use viewfuse::field::render::{Frame, RenderError, RenderOptions, RenderRun, Stage, render_all};
 use viewfuse::field::training_free::{Cache, TrainingFree};
 use viewfuse::field::{AnyOptions, Field, On};
 use viewfuse::job::progress::{Interrupted, Progress, Silent};
@@ -86,12 +86,7 @@ fn what_is_chosen_is_what_is_rendered() -> Result<(), Box<dyn Error>> {
     let field = TrainingFree::default();
     let renderer = On { device: &Cpu, field: &field };
     let given = RenderOptions { field: Some(chosen.options.clone()), mixture: chosen.mixture.clone(), ..options() };
-    let (job, mut same) = (middle(scene), Vec::new());
-    let run = RenderRun { scene, job: &job, renderer: &renderer, options: &given, progress: &Silent };
-    render(&run, &chosen.weighting, |_, frame| {
-        same.push(frame);
-        Ok::<(), RenderError>(())
-    })?;
+    let same = render_all(scene, &middle(scene), &chosen.weighting, &renderer, &given)?;
     assert_eq!((frames.len(), same.len()), (1, 1));
     assert_eq!(frames[0].colours, same[0].colours);
     assert_eq!(frames[0].confidences, same[0].confidences);
@@ -128,11 +123,8 @@ fn the_choice_is_the_best_that_was_tried_or_the_default() -> Result<(), Box<dyn 
 fn pictures_are_mixed_where_that_is_not_worse() -> Result<(), Box<dyn Error>> {
     let Six { scene, frames, chosen } = &*SIX;
     let tried = chosen.candidates.last().ok_or("candidates")?;
-    assert_eq!(
-        tried.options.settings().last().map(|setting| setting.name),
-        Some("mixed pictures"),
-        "a mixture is tried last"
-    );
+    let last = tried.options.settings().last().map(|setting| setting.name);
+    assert_eq!(last, Some("mixed pictures"), "a mixture is tried last");
     let mixed = tried.psnr.ok_or("a mixture is not given up")?;
     let best = |candidates: &[auto::Candidate]| candidates.iter().filter_map(|one| one.psnr).fold(f64::MIN, f64::max);
     let single = best(&chosen.candidates[..chosen.candidates.len() - 1]);
@@ -151,23 +143,18 @@ fn pictures_are_mixed_where_that_is_not_worse() -> Result<(), Box<dyn Error>> {
             // What is mixed is the pictures under the settings of the parts.
             let field = TrainingFree::default();
             let renderer = On { device: &Cpu, field: &field };
-            let (job, mut levels) = (middle(scene), vec![Vec::new(); mixture.parts.len()]);
-            for (part, levels) in mixture.parts.iter().zip(&mut levels) {
+            let mut levels: Vec<Vec<f32>> = Vec::new();
+            for part in &mixture.parts {
                 let given = RenderOptions { field: Some(part.clone()), ..options() };
-                let run = RenderRun { scene, job: &job, renderer: &renderer, options: &given, progress: &Silent };
-                render(&run, &chosen.weighting, |_, frame| {
-                    levels.extend(frame.colours.iter().map(|colour| colour[1]));
-                    Ok::<(), RenderError>(())
-                })?;
+                let frames = render_all(scene, &middle(scene), &chosen.weighting, &renderer, &given)?;
+                levels.push(frames[0].colours.iter().map(|colour| colour[1]).collect());
             }
             for (pixel, colour) in frames[0].colours.iter().enumerate() {
                 let (low, high) = levels
                     .iter()
                     .fold((f32::MAX, f32::MIN), |(low, high), part| (low.min(part[pixel]), high.max(part[pixel])));
-                assert!(
-                    colour[1] > low - 1.0e-5 && colour[1] < high + 1.0e-5,
-                    "{pixel}: {colour:?} in {low} to {high}"
-                );
+                let is_between = (low - 1.0e-5..high + 1.0e-5).contains(&colour[1]);
+                assert!(is_between, "{pixel}: {colour:?} in {low} to {high}");
             }
         }
     }
@@ -233,10 +220,8 @@ fn a_choice_is_kept_for_the_same_sources_and_options_alone() -> Result<(), Box<d
     let is_first = |other: &Chosen| {
         assert_eq!((&other.candidates, &other.held_out), (&first.candidates, &first.held_out));
         assert_eq!((&other.mixture, &other.options, other.basis), (&first.mixture, &first.options, first.basis));
-        assert_eq!(
-            (other.weighting.to_string(), &other.calibration),
-            (first.weighting.to_string(), &first.calibration)
-        );
+        assert_eq!(other.weighting.to_string(), first.weighting.to_string());
+        assert_eq!(other.calibration, first.calibration);
     };
     let (second, [less, _]) = choose(&sources, SMALL, 0.01)?;
     is_first(&second);

@@ -9,12 +9,10 @@ use viewfuse::field::render::{Frame, RenderOptions};
 use viewfuse::field::rows::{self, ROWS};
 use viewfuse::field::{AnyField, Renderer};
 use viewfuse::job::progress::Silent;
-use viewfuse::nn::checkpoint::Checkpoint;
 use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::FewShot;
 use viewfuse::weighting::Weighting;
-use viewfuse_tests::fields::{job, on_scene, rms, sample};
-use viewfuse_tests::places;
+use viewfuse_tests::fields::{job, model, on_scene, rms, sample};
 
 /// The most pictures whose error exceeds its bound, as a share.
 const MAX_MISSED: f64 = 0.05;
@@ -22,19 +20,11 @@ const MAX_MISSED: f64 = 0.05;
 /// lost.
 const MAX_EXCESS: f64 = 1.25;
 
-fn network(name: &str, seed: u64) -> AnyField {
-    let checkpoint = match name.split_once(':') {
-        Some((name, width)) => {
-            let network = ROWS
-                .into_iter()
-                .flat_map(|row| row.test_networks())
-                .find(|network| network.name == name)
-                .expect("a test network");
-            (network.checkpoint)(Some(width.parse().expect("a width")))
-        }
-        None => Checkpoint::open(&places::data("../../host/models").join(name)).expect("a checkpoint"),
-    };
-    rows::open(checkpoint, &Given { seed, ..Given::default() }).expect("a network")
+/// A test network of width 16.
+fn small(name: &str, seed: u64) -> AnyField {
+    let networks = ROWS.into_iter().flat_map(|row| row.test_networks());
+    let network = networks.into_iter().find(|network| network.name == name).expect("a test network");
+    rows::open((network.checkpoint)(Some(16)), &Given { seed, ..Given::default() }).expect("a network")
 }
 
 /// A field with its subject.
@@ -57,14 +47,14 @@ fn cases() -> Vec<Case> {
     };
     for (seed, sources, targets) in [(1, "16,72,136", "48,104,160,200"), (2, "48,160,200", "16,88,136")] {
         let (car, bounds) = ("car", &[30.0, 35.0, 40.0, 45.0][..]);
-        case("pixelnerf, cars", network("pixelnerf_cars.safetensors", seed), car, sources, targets, 48, bounds);
-        case("pixelnerf, body", network("body:16", seed), car, sources, targets, 32, bounds);
-        case("pixelnerf, mist", network("formula:16", seed), car, sources, targets, 24, bounds);
+        case("pixelnerf, cars", model("pixelnerf_cars.safetensors", seed), car, sources, targets, 48, bounds);
+        case("pixelnerf, body", small("body", seed), car, sources, targets, 32, bounds);
+        case("pixelnerf, mist", small("formula", seed), car, sources, targets, 24, bounds);
         let bounds = &[28.0, 34.0, 40.0];
-        case("genvs, cars", network("genvs_cars.safetensors", seed), car, "16,72,136", "48,160", 32, bounds);
+        case("genvs, cars", model("genvs_cars.safetensors", seed), car, "16,72,136", "48,160", 32, bounds);
     }
     // A single pixel may have all of such an error.
-    case("pixelnerf, tight", network("body:16", 1), "toy", "0..19/7", "20,21", 32, &[48.0, 50.0]);
+    case("pixelnerf, tight", small("body", 1), "toy", "0..19/7", "20,21", 32, &[48.0, 50.0]);
     let bounds = &[22.0, 25.0, 28.0, 31.0];
     case("sweep", AnyField::default(), "room", "all/2", "1,3,5,7", 96, bounds);
     case("sweep", AnyField::default(), "room", "0,2,3,5", "1,4", 96, bounds);
@@ -130,7 +120,7 @@ fn no_corner_of_a_small_picture_is_lost() {
     let device = AnyDevice::Cpu(Cpu);
     let (scene, bound) = (sample("car"), 1.0e-2);
     let job = job(&scene, "16,72,136", "8,24,32,40,48,56,64,80,88,96,104,112,120,128");
-    let field = network("pixelnerf_cars.safetensors", 1);
+    let field = model("pixelnerf_cars.safetensors", 1);
     let case = Case { name: "pixelnerf, cars".to_owned(), field, scene, job, side: 24, bounds: &[] };
     let renderer = case.field.on(&device);
     let exact = frames(&case, renderer.as_ref(), None);

@@ -66,11 +66,16 @@ fn filling(counted: &Counted) -> (f64, Vec<String>) {
     (work[1] / (work[0] + work[1]), small)
 }
 
-fn print(name: &str, counted: &Counted) {
-    println!("{name}: {} dispatches, {:?}", counted.all(), counted.transfers);
-    for (kernel, count) in Kernel::ALL.into_iter().zip(&counted.dispatches).filter(|(_, count)| **count > 0) {
+/// A line for each kernel that is dispatched.
+fn list(dispatches: impl IntoIterator<Item = u64>) {
+    for (kernel, count) in Kernel::ALL.into_iter().zip(dispatches).filter(|(_, count)| *count > 0) {
         println!("  {count} {}", kernel.name());
     }
+}
+
+fn print(name: &str, counted: &Counted) {
+    println!("{name}: {} dispatches, {:?}", counted.all(), counted.transfers);
+    list(counted.dispatches.iter().copied());
     let (share, small) = filling(counted);
     println!("  {:.1} % of the multiply-adds in products with {ENOUGH_WORKGROUPS} workgroups or more", 100.0 * share);
     small.iter().for_each(|line| println!("  below: {line}"));
@@ -91,10 +96,7 @@ fn a_call_of_the_denoiser_is_few_dispatches() {
     print("GeNVS, 128x128, three views, two calls", &short);
     let call = long.all() - short.all();
     println!("a call: {call} dispatches");
-    let more = long.dispatches.iter().zip(&short.dispatches).map(|(long, short)| long - short);
-    for (kernel, count) in Kernel::ALL.into_iter().zip(more).filter(|(_, count)| *count > 0) {
-        println!("  {count} {}", kernel.name());
-    }
+    list(long.dispatches.iter().zip(&short.dispatches).map(|(long, short)| long - short));
     // A group norm takes two of them, and 117 of its layers are group norms.
     assert!(call <= 423, "{call} dispatches");
     assert!(long.transfers.downloads - short.transfers.downloads <= 1, "a call waits more than once");

@@ -1,9 +1,11 @@
 //! What holds for every field, on the CPU.
 
 use super::{genvs, pixelnerf, plane_sweep};
+use viewfuse::check::verify;
 use viewfuse::field::genvs::GenvsOptions;
 use viewfuse::field::genvs::sampling::Plan;
 use viewfuse::field::pixelnerf::PixelNerfOptions;
+use viewfuse::field::rows::ROWS;
 use viewfuse::field::{AnyField, FieldError, Rendered};
 use viewfuse::scene::photographs::{SourceImage, SourceImages};
 use viewfuse_core::Vec3;
@@ -137,4 +139,10 @@ fn learned_fields_stand_any_sources_and_targets() {
             picture(&sources, Camera { pinhole, ..target(32) });
         }
     }
+}
+
+#[test]
+fn every_learned_field_has_reference_values() {
+    let learned: Vec<&str> = ROWS.iter().filter(|row| row.prefix().is_some()).map(|row| row.name).collect();
+    assert_eq!(verify::fields(), learned);
 }

@@ -1,12 +1,10 @@
 //! The field of Gaussians alone and as a part of other pictures, on the CPU.
 
-use std::time::Duration;
 use viewfuse::device::choice::AnyDevice;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::auto;
 use viewfuse::field::budget::Bound;
-use viewfuse::field::gaussians::Recipe;
-use viewfuse::field::render::{RenderOptions, Stage};
+use viewfuse::field::render::{Frame, RenderOptions, Stage};
 use viewfuse::field::training_free::{Gaussians, TrainingFree};
 use viewfuse::field::{AnyField, Renderer};
 use viewfuse::job::progress::Silent;
@@ -28,11 +26,13 @@ fn with_stage<T>(
     on_scene(&scene, &job, renderer.as_ref(), options, |stage| visit(stage, &job, renderer.as_ref()))
 }
 
-/// With few iterations.
-fn hasty() -> AnyField {
-    AnyField::new(Gaussians {
-        recipe: Recipe { iterations: [0, 24, 16, 16], ..Recipe::default() },
-        ..Gaussians::default()
+/// Two frames of one target under a bound on the error.
+fn bounded(most: f32) -> [Frame; 2] {
+    let weighting = Weighting::open("distance:power=2").expect("a scheme");
+    let options = RenderOptions { bound: Some(Bound::Error(most)), ..RenderOptions::default() };
+    with_stage(AnyField::new(Gaussians::default()), "0..19/2", &options, |stage, job, _| {
+        stage.weigh(&weighting, &Silent).expect("weights");
+        [(); 2].map(|()| stage.frame(&weighting, &job.targets[0], &Silent).expect("a frame"))
     })
 }
 
@@ -56,50 +56,18 @@ fn cheaper_efforts_are_farther_from_the_exact_picture() {
         assert!(errors[0] > errors[last - 1], "the cheapest is no farther than the dearest: {errors:?}");
         assert_eq!(frame(stage, last).colours, exact.colours, "the exact picture after others");
         // Efforts are listed with what they do.
-        assert!(
-            efforts[0].label.contains("100 iterations") && efforts[0].label.contains("32 pixels"),
-            "{}",
-            efforts[0].label
-        );
+        let label = &efforts[0].label;
+        assert!(label.contains("100 iterations") && label.contains("32 pixels"), "{label}");
     });
-}
-
-#[test]
-fn a_bound_chooses_an_effort_and_says_so() {
-    let weighting = Weighting::open("distance:power=2").expect("a scheme");
-    let kept = |bound: Bound| {
-        let options = RenderOptions { bound: Some(bound), ..RenderOptions::default() };
-        with_stage(hasty(), "0..19/2", &options, |stage, job, _| {
-            stage.weigh(&weighting, &Silent).expect("weights");
-            let frame = stage.frame(&weighting, &job.targets[0], &Silent).expect("a frame");
-            frame.kept.expect("a record of the bound")
-        })
-    };
-    let hurried = kept(Bound::Time(Duration::from_nanos(1)));
-    assert!(hurried.effort.contains("iterations") && !hurried.is_kept, "{hurried:?}");
-    let patient = kept(Bound::Time(Duration::from_secs(86_400)));
-    assert!(patient.effort == "exact" && patient.is_kept, "{patient:?}");
-    let sharp = kept(Bound::Error(1.0e-5));
-    assert!(sharp.effort == "exact" && sharp.is_kept, "{sharp:?}");
 }
 
 /// A cheaper picture is compared with one that goes on from it: neither is made for nothing.
 #[test]
 fn a_bound_on_the_error_is_kept_with_fewer_iterations() {
-    let weighting = Weighting::open("distance:power=2").expect("a scheme");
-    let frame = |most: f32| {
-        let options = RenderOptions { bound: Some(Bound::Error(most)), ..RenderOptions::default() };
-        with_stage(AnyField::new(Gaussians::default()), "0..19/2", &options, |stage, job, _| {
-            stage.weigh(&weighting, &Silent).expect("weights");
-            let first = stage.frame(&weighting, &job.targets[0], &Silent).expect("a frame");
-            let second = stage.frame(&weighting, &job.targets[0], &Silent).expect("a frame");
-            (first, second)
-        })
-    };
-    let (exact, _) = frame(1.0e-5);
+    let [exact, _] = bounded(1.0e-5);
+    assert_eq!(exact.kept.as_ref().map(|kept| (kept.effort.as_str(), kept.is_kept)), Some(("exact", true)));
     for most in [0.05, 0.15] {
-        let (first, second) = frame(most);
-        for frame in [&first, &second] {
+        for frame in bounded(most) {
             let kept = frame.kept.as_ref().expect("a record of the bound");
             let error = rms(&frame.colours, &exact.colours);
             assert!(kept.effort.contains("iterations") && kept.is_kept, "{kept:?}");

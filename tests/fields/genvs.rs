@@ -2,7 +2,6 @@
 
 mod extremes;
 mod finite;
-mod interrupt;
 mod omissions;
 mod sizes;
 mod values;
@@ -12,13 +11,14 @@ use viewfuse::field::genvs::reference::Reference;
 use viewfuse::field::genvs::sampling::{Plan, Steps};
 use viewfuse::field::genvs::{Architecture, Estimate, Genvs, GenvsOptions, Omissions, test_networks};
 use viewfuse::field::{FieldError, Record, Rendered};
-use viewfuse::job::progress::{Progress, Silent};
+use viewfuse::job::progress::Silent;
 use viewfuse::scene::photographs::SourceImages;
 use viewfuse::weighting::sources::SourceWeights;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::weights::Weights;
 use viewfuse_tests::fields::{self, largest_difference};
+use viewfuse_tests::listener::Listener;
 use viewfuse_tests::lorry::{photographs, target};
 
 /// Everything is computed, in three calls of the denoiser.
@@ -52,17 +52,7 @@ fn try_picture(
     weights: &SourceWeights,
     target: &Camera,
 ) -> Result<Rendered, FieldError> {
-    try_picture_with(field, sources, weights, target, &Silent)
-}
-
-fn try_picture_with(
-    field: &Genvs,
-    sources: &SourceImages,
-    weights: &SourceWeights,
-    target: &Camera,
-    progress: &dyn Progress,
-) -> Result<Rendered, FieldError> {
-    Ok(fields::picture(&Cpu, field, sources, weights, target, 0.0, progress)?.0)
+    Ok(fields::picture(&Cpu, field, sources, weights, target, 0.0, &Silent)?.0)
 }
 
 /// A picture, and what the field says of it.
@@ -126,4 +116,22 @@ fn samples_stray_where_they_may() {
     let difference = largest_difference(&with_jitter(0.0).colours, &with_jitter(1.0).colours);
     assert!(difference > 1.0e-4 && difference < 0.2, "{difference}");
     assert_eq!(with_jitter(1.0), with_jitter(1.0));
+}
+
+/// Of so many calls that the picture would take a minute and more, none follows the wish to stop.
+#[test]
+fn a_person_need_not_wait_for_the_picture() {
+    let plan = Plan {
+        early_termination: None,
+        steps: Steps::Fixed { sampler: Sampler::Ipndm, level_count: 100_000 },
+        ..Plan::published(0)
+    };
+    let field = made(GenvsOptions { plan, ..exact() });
+    for times in [0, 1, 40] {
+        let progress = Listener::stops_after(times);
+        let outcome = fields::picture(&Cpu, &field, &sources(1), &Weights::mean(1), &target(32), 0.0, &progress);
+        assert!(matches!(outcome, Err(FieldError::Interrupted(_))), "{:?}", outcome.map(|_| ()));
+        // The first answer ends it: nothing asks again between further pieces.
+        assert_eq!(progress.asked(), times + 1);
+    }
 }

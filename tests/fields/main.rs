@@ -10,7 +10,6 @@ mod near;
 mod pixelnerf;
 mod plane_sweep;
 mod posed;
-mod rows;
 mod sampling;
 mod scales;
 mod variants;

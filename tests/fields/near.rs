@@ -55,20 +55,16 @@ fn frame(stage: &mut Stage<'_>, weighting: &Weighting, camera: Camera) -> Frame 
 
 #[test]
 fn pictures_become_the_photograph_as_the_camera_comes_nearer() {
-    for (leave_out, count) in DROPPED {
-        nearer_is_better(leave_out, &SCHEMES[..count]);
-    }
-}
-
-fn nearer_is_better(leave_out: f32, schemes: &[(&str, bool)]) {
     let scene = sample("room");
     let sources = (0..scene.views.len()).collect();
     let job = FewShot { sources, targets: Vec::new(), frames_per_second: None };
     let renderer = On { device: &Cpu, field: &TrainingFree::default() };
-    let options = RenderOptions { size: Some([48, 36]), leave_out, ..RenderOptions::default() };
-    on_scene(&scene, &job, &renderer, &options, |stage| {
-        schemes.iter().for_each(|scheme| nearer(stage, &scene, leave_out, *scheme));
-    });
+    for (leave_out, count) in DROPPED {
+        let options = RenderOptions { size: Some([48, 36]), leave_out, ..RenderOptions::default() };
+        on_scene(&scene, &job, &renderer, &options, |stage| {
+            SCHEMES[..count].iter().for_each(|scheme| nearer(stage, &scene, leave_out, *scheme));
+        });
+    }
 }
 
 fn nearer(stage: &mut Stage<'_>, scene: &Scene, leave_out: f32, (scheme, is_all): (&str, bool)) {

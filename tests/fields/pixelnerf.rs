@@ -55,14 +55,8 @@ fn picture_with(
 }
 
 /// Whether there is no picture, because the network's outputs are not finite.
-fn is_not_finite(
-    field: &PixelNerf,
-    sources: &SourceImages,
-    weights: &SourceWeights,
-    target: &Camera,
-    early_termination: f32,
-) -> bool {
-    let outcome = fields::picture(&Cpu, field, sources, weights, target, early_termination, &Silent);
+fn is_not_finite(field: &PixelNerf, sources: &SourceImages, weights: &SourceWeights, target: &Camera) -> bool {
+    let outcome = fields::picture(&Cpu, field, sources, weights, target, 0.0, &Silent);
     matches!(outcome, Err(FieldError::NotFinite(_)))
 }
 

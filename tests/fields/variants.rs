@@ -9,11 +9,10 @@ use viewfuse::field::training_free::hull::Hull;
 use viewfuse::field::training_free::{Sweep, TrainingFree};
 use viewfuse::field::{AnyField, AnyOptions, Purpose, Request, Variant};
 use viewfuse::job::progress::Silent;
-use viewfuse::scene::Scene;
-use viewfuse::scene::few_shot::{Selection, Target};
+use viewfuse::scene::few_shot::Target;
 use viewfuse::weighting::Weighting;
 use viewfuse_core::weights::Weights;
-use viewfuse_tests::places;
+use viewfuse_tests::fields::{job, sample};
 
 /// Renders a target under the field's own options, then under each of its variants and under `others`, and back:
 /// pictures must be those of a stage that was never under anything else. The first of `others` encodes views otherwise:
@@ -25,9 +24,8 @@ fn assert_encodings_serve(
     size: [u32; 2],
     others: Vec<AnyOptions>,
 ) {
-    let scene = Scene::open(places::data(folder)).expect("a scene");
-    let [sources, targets] = [sources, targets].map(|views| Some(views.to_owned()));
-    let job = Selection { targets, sources, ..Selection::default() }.resolve(&scene, 2).expect("views");
+    let scene = sample(folder);
+    let job = job(&scene, sources, targets);
     let (device, weighting) = (AnyDevice::Cpu(Cpu), Weighting::open("error:alpha=1").expect("a scheme"));
     let options = RenderOptions { size: Some(size), leave_out: 0.0, ..RenderOptions::default() };
     let renderer = field.on(&device);
@@ -77,10 +75,8 @@ fn assert_encodings_serve(
     let mut right = weighed(other);
     right.encode_all(&Silent).expect("encoded");
     let right = right.picture(&camera, &weights, 0.0, &Silent).expect("a picture");
-    assert!(
-        stale.map_or(true, |stale| stale.colours != right.colours),
-        "{folder}: {other:?} could say that it is alike"
-    );
+    let is_wrong = stale.map_or(true, |stale| stale.colours != right.colours);
+    assert!(is_wrong, "{folder}: {other:?} could say that it is alike");
 }
 
 #[test]

@@ -1,11 +1,11 @@
-//! The choice front to back: which of two surfaces a ray ends at, and degenerate input.
+//! The choice front to back of degenerate input.
 
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::pose::Pose;
 use viewfuse_kernels::bodies;
+use viewfuse_kernels::plane_sweep::PLANES;
 use viewfuse_kernels::plane_sweep::front::{FrontBlock, plane_opacity};
 use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
-use viewfuse_kernels::plane_sweep::{PLANES, Planes};
 
 const SIDE: u32 = 8;
 const STEP: f32 = 1.0 / 32.0;
@@ -42,44 +42,6 @@ fn looking_at(surfaces: &[f32]) -> (FrustumBlock, Vec<SweptView>, Vec<[f32; 2]>)
     (frustum, (0..surfaces.len()).map(view).collect(), maps)
 }
 
-fn opacity(surfaces: &[f32]) -> Planes {
-    let (frustum, views, maps) = looking_at(surfaces);
-    plane_opacity(&frustum, &views[..], &maps[..], 27, 0)
-}
-
-/// The costs of a pixel's planes with the preference, `[group]`.
-fn front_cost(block: &FrontBlock, opacities: &[Planes], costs: &[Planes], pixel: u32) -> Vec<Planes> {
-    let mut joined = vec![[f32::NAN; PLANES]; costs.len()];
-    bodies::front_cost(block, opacities, costs, &mut joined[..], pixel);
-    joined.drain((pixel * block.group_count) as usize..).take(block.group_count as usize).collect()
-}
-
-/// The plane of least cost at a pixel of costs that are all equal.
-fn chosen(block: &FrontBlock, opacities: &[Planes]) -> usize {
-    let equal = vec![[0.1; PLANES]; opacities.len()];
-    let costs = front_cost(block, opacities, &equal[..], 27);
-    let costs = costs.as_flattened();
-    (0..costs.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b])).expect("planes")
-}
-
-/// Five views see a floor, two a body before it: the floor has the greater support, and the body is chosen. Where no
-/// view sees a body, the floor is.
-#[test]
-fn the_nearer_surface_wins() {
-    let both = opacity(&[3.0, 3.0, 3.0, 3.0, 3.0, 11.0, 11.0]);
-    assert!(both[3] > both[11] && both[11] > 0.35, "{both:?}");
-    let block = FrontBlock { width: SIDE, height: SIDE, group_count: 1, front_share: 0.1 };
-    let filled = |planes: Planes| vec![planes; (SIDE * SIDE) as usize];
-    assert_eq!(chosen(&block, &filled(opacity(&[3.0; 5]))), 3);
-    let hull = |plane: usize, opacity: f32| (0..PLANES).map(move |index| if index == plane { opacity } else { 0.0 });
-    let two = |near: f32| -> Planes {
-        let planes: Vec<f32> = hull(3, 0.9).zip(hull(11, near)).map(|(far, near)| far.max(near)).collect();
-        planes.try_into().expect("planes")
-    };
-    assert_eq!(chosen(&block, &filled(two(0.75))), 11, "an opaque body before a more opaque floor");
-    assert_eq!(chosen(&block, &filled(two(0.3))), 3, "what hides nothing before a floor");
-}
-
 /// Without depth between planes, in a single pixel, with maps of no confidence: finite, and transparent.
 #[test]
 fn degenerate_input_gives_finite_opacities() {
@@ -90,6 +52,7 @@ fn degenerate_input_gives_finite_opacities() {
     maps.iter_mut().for_each(|[_, confidence]| *confidence = 0.0);
     assert_eq!(plane_opacity(&frustum, &views[..], &maps[..], 0, 0), [0.0; PLANES]);
     let block = FrontBlock { width: 1, height: 1, group_count: 1, front_share: 0.1 };
-    let costs = front_cost(&block, &[[0.5; PLANES]][..], &[[0.0; PLANES]][..], 0);
+    let mut costs = [[f32::NAN; PLANES]];
+    bodies::front_cost(&block, &[[0.5; PLANES]][..], &[[0.0; PLANES]][..], &mut costs[..], 0);
     assert!(costs[0].iter().all(|cost| cost.is_finite()));
 }

@@ -1,119 +1,33 @@
 //! Lenses: the formulas by another hand (figures of OpenCV 5.0.0's `projectPoints` and `fisheye::projectPoints`), and
 //! that what is distorted is undistorted, over whole pictures.
 
+use serde::Deserialize;
 use viewfuse_core::lens::{Lens, LensBlock, LensError, MAX_COEFFICIENT, Projection};
 
 /// Points before the camera, at depth 1.
 const POINTS: [[f64; 2]; 5] = [[0.0, 0.0], [0.3, -0.2], [-0.55, 0.4], [0.1, 0.7], [-0.8, -0.6]];
 
-/// A camera model with coefficients `k1 .. k6 p1 p2`, and where OpenCV projects [`POINTS`] with a focal length of 1:
-/// `cv2.projectPoints(points, 0, 0, I, [k1, k2, p1, p2, k3, k4, k5, k6])`, `cv2.fisheye.projectPoints(..., [k1, k2, k3,
-/// k4])`.
+/// A camera model with coefficients `k1 .. k6 p1 p2` and nerfstudio's `k4`, and where OpenCV projects [`POINTS`] with a
+/// focal length of 1: `cv2.projectPoints(points, 0, 0, I, [k1, k2, p1, p2, k3, k4, k5, k6])`,
+/// `cv2.fisheye.projectPoints(..., [k1, k2, k3, k4])`. With nerfstudio's coefficient: fractions of Python's, by its and
+/// Metashape's formula.
+#[derive(Deserialize)]
 struct Case {
-    model: &'static str,
-    projection: Projection,
+    model: String,
+    is_fisheye: bool,
     coefficients: [f64; 9],
     expected: [[f64; 2]; 5],
 }
 
-const CASES: [Case; 8] = [
-    Case {
-        model: "SIMPLE_RADIAL",
-        projection: Projection::Perspective,
-        coefficients: [-0.12, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-        expected: [[0.0, 0.0], [0.29532, -0.19688], [-0.519475, 0.3778], [0.094, 0.658], [-0.704, -0.528]],
-    },
-    Case {
-        model: "RADIAL",
-        projection: Projection::Perspective,
-        coefficients: [-0.21, 0.07, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-        expected: [
-            [0.0, 0.0],
-            [0.2921649, -0.1947766],
-            [-0.504816640625, 0.367139375],
-            [0.09125, 0.63875],
-            [-0.688, -0.516],
-        ],
-    },
-    Case {
-        model: "OPENCV",
-        projection: Projection::Perspective,
-        coefficients: [0.0578421, -0.0805099, 0.0, 0.0, 0.0, 0.0, -0.000980296, 0.00015575, 0.0],
-        expected: [
-            [0.0, 0.0],
-            [0.302013574727, -0.201456323298],
-            [-0.554644126884219, 0.40297654856125],
-            [0.10082310606, 0.70472646942],
-            [-0.78245173416, -0.58793590912],
-        ],
-    },
-    Case {
-        model: "FULL_OPENCV",
-        projection: Projection::Perspective,
-        coefficients: [0.31, -0.18, 0.021, 0.27, -0.11, 0.013, 0.0013, -0.0021, 0.0],
-        expected: [
-            [0.0, 0.0],
-            [0.300364400809319, -0.200255933872879],
-            [-0.554967605352231, 0.403507690256168],
-            [0.0994055640707766, 0.703838948495436],
-            [-0.788535737425405, -0.588526803069054],
-        ],
-    },
-    // Fractions of Python's, by nerfstudio's and Metashape's formula.
-    Case {
-        model: "OPENCV with nerfstudio's k4",
-        projection: Projection::Perspective,
-        coefficients: [-0.12, 0.05, -0.02, 0.0, 0.0, 0.0, 0.0013, -0.0021, 0.03],
-        expected: [
-            [0.0, 0.0],
-            [0.29475588849, -0.19651692566],
-            [-0.5278378959106446, 0.38377699248046876],
-            [0.0942775, 0.6679425],
-            [-0.75554, -0.56378],
-        ],
-    },
-    Case {
-        model: "SIMPLE_RADIAL_FISHEYE",
-        projection: Projection::Fisheye,
-        coefficients: [-0.04, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-        expected: [
-            [0.0, 0.0],
-            [0.286549290946965, -0.19103286063131],
-            [-0.476107928604545, 0.346260311712396],
-            [0.0857230619579857, 0.6000614337059],
-            [-0.612815392377809, -0.459611544283356],
-        ],
-    },
-    Case {
-        model: "RADIAL_FISHEYE",
-        projection: Projection::Fisheye,
-        coefficients: [0.05, -0.013, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-        expected: [
-            [0.0, 0.0],
-            [0.2895987259021, -0.193065817268067],
-            [-0.490813959007523, 0.356955606550926],
-            [0.0885282386624818, 0.619697670637372],
-            [-0.644589441219546, -0.483442080914659],
-        ],
-    },
-    Case {
-        model: "OPENCV_FISHEYE",
-        projection: Projection::Fisheye,
-        coefficients: [0.0621, -0.0187, 0.0093, -0.0021, 0.0, 0.0, 0.0, 0.0, 0.0],
-        expected: [
-            [0.0, 0.0],
-            [0.289996861286025, -0.19333124085735],
-            [-0.492735661444777, 0.358353208323474],
-            [0.0888962535414082, 0.622273774789857],
-            [-0.649096879213847, -0.486822659410385],
-        ],
-    },
-];
-
 impl Case {
     fn lens(&self) -> Lens {
-        Lens::new(self.projection, self.coefficients).expect("a lens")
+        let projection = if self.is_fisheye { Projection::Fisheye } else { Projection::Perspective };
+        Lens::new(projection, self.coefficients).expect("a lens")
     }
+}
+
+fn cases() -> Vec<Case> {
+    serde_json::from_str(include_str!("../data/lens.json")).expect("JSON")
 }
 
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
@@ -130,7 +44,7 @@ fn picture(focal: f64) -> impl Iterator<Item = [f64; 2]> {
 
 #[test]
 fn each_model_is_that_of_opencv() {
-    for case in &CASES {
+    for case in cases() {
         for (point, expected) in POINTS.into_iter().zip(case.expected) {
             let found = case.lens().distort(point);
             assert!(distance(found, expected) < 1e-14, "{}: {found:?} instead of {expected:?}", case.model);
@@ -141,7 +55,7 @@ fn each_model_is_that_of_opencv() {
 #[test]
 fn what_is_distorted_is_undistorted_over_the_whole_picture() {
     let focal = 1100.0;
-    for case in &CASES {
+    for case in cases() {
         let lens = case.lens();
         let mut worst = (0.0_f64, 0.0_f64);
         for point in picture(focal) {
@@ -157,7 +71,7 @@ fn what_is_distorted_is_undistorted_over_the_whole_picture() {
 #[test]
 fn the_same_in_single_precision() {
     let focal = 1100.0;
-    for case in &CASES {
+    for case in cases() {
         let (lens, block) = (case.lens(), case.lens().block());
         let mut worst = (0.0_f64, 0.0_f64);
         for point in picture(focal) {

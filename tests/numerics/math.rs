@@ -19,15 +19,25 @@ fn assert_below(what: &str, (at, error): (f32, f64), bound: f64) {
     assert!(error <= bound, "{what}: {error:e} at {at:e}, stated {bound:e}");
 }
 
+/// How far a function is off at a number, units in the last place.
+fn off(ours: fn(f32) -> f32, exact: fn(f64) -> f64) -> impl Fn(f32) -> (f32, f64) + Copy {
+    move |x| {
+        let expected = exact(f64::from(x));
+        (x, (f64::from(ours(x)) - expected).abs() / unit_in_last_place(expected))
+    }
+}
+
 #[test]
-fn exp_is_within_its_error() {
-    let error = |x: f32| {
-        let expected = f64::from(x).exp();
-        (x, (f64::from(math::exp(x)) - expected).abs() / unit_in_last_place(expected))
-    };
-    let negative = sweep(0.0, 87.3, 97).map(|x| error(-x));
-    let positive = sweep(0.0, 88.7, 97).map(error);
-    assert_below("exp, ULP", worst(negative.chain(positive)), 1.1);
+fn functions_of_one_number_are_within_their_errors() {
+    let exp = off(math::exp, f64::exp);
+    let both = sweep(0.0, 87.3, 97).map(|x| exp(-x)).chain(sweep(0.0, 88.7, 97).map(exp));
+    assert_below("exp, ULP", worst(both), 1.1);
+    let ln = off(math::ln, f64::ln);
+    assert_below("ln, ULP", worst(sweep(f32::MIN_POSITIVE, f32::MAX, 197).map(ln)), 0.9);
+    assert_below("ln around 1, ULP", worst(sweep(0.7, 1.5, 1).map(ln)), 0.9);
+    let root = off(math::seventh_root, |x| x.powf(1.0 / 7.0));
+    assert_below("seventh_root, ULP", worst(sweep(f32::MIN_POSITIVE, f32::MAX, 197).map(root)), 1.3);
+    assert_below("seventh_root around 1, ULP", worst(sweep(0.5, 2.0, 3).map(root)), 1.3);
 }
 
 #[test]
@@ -46,16 +56,6 @@ fn exp_at_its_ends() {
 }
 
 #[test]
-fn ln_is_within_its_error() {
-    let error = |x: f32| {
-        let expected = f64::from(x).ln();
-        (x, (f64::from(math::ln(x)) - expected).abs() / unit_in_last_place(expected))
-    };
-    assert_below("ln, ULP", worst(sweep(f32::MIN_POSITIVE, f32::MAX, 197).map(error)), 0.9);
-    assert_below("ln around 1, ULP", worst(sweep(0.7, 1.5, 1).map(error)), 0.9);
-}
-
-#[test]
 fn ln_at_its_ends() {
     assert_eq!(math::ln(1.0), 0.0);
     let lowest = math::ln(f32::MIN_POSITIVE);
@@ -68,13 +68,7 @@ fn ln_at_its_ends() {
 }
 
 #[test]
-fn seventh_roots_are_within_their_error() {
-    let error = |x: f32| {
-        let expected = f64::from(x).powf(1.0 / 7.0);
-        (x, (f64::from(math::seventh_root(x)) - expected).abs() / unit_in_last_place(expected))
-    };
-    assert_below("seventh_root, ULP", worst(sweep(f32::MIN_POSITIVE, f32::MAX, 197).map(error)), 1.3);
-    assert_below("seventh_root around 1, ULP", worst(sweep(0.5, 2.0, 3).map(error)), 1.3);
+fn seventh_roots_at_their_ends() {
     assert_eq!(math::seventh_root(1.0), 1.0);
     assert_eq!(math::seventh_root(128.0), 2.0);
     for low in [0.0, -0.0, 1.0e-40, -1.0, f32::NEG_INFINITY, f32::NAN] {
@@ -150,14 +144,14 @@ fn norms_neither_overflow_nor_vanish() {
         let expected = wide.iter().map(|c| c * c).sum::<f64>().sqrt();
         (x, (f64::from(math::norm3(x, y, z)) - expected).abs() / unit_in_last_place(expected))
     };
-    let middle = worst((0..1_000_000).map(|_| error(1.0e-6, 1.0e6)));
-    assert_below("norm3, ULP", middle, 2.0);
-    let thresholds = worst((0..300_000).map(|_| error(1.0e-16, 1.0e-14)).collect::<Vec<_>>().into_iter());
-    assert_below("norm3 around 1e-15, ULP", thresholds, 3.0);
-    let small = worst((0..300_000).map(|_| error(1.0e-34, 1.0e-15)).collect::<Vec<_>>().into_iter());
-    assert_below("norm3 of small components, ULP", small, 3.0);
-    let large = worst((0..300_000).map(|_| error(1.0e14, 1.0e37)).collect::<Vec<_>>().into_iter());
-    assert_below("norm3 of large components, ULP", large, 3.0);
+    for (what, count, low, high, bound) in [
+        ("norm3, ULP", 1_000_000, 1.0e-6, 1.0e6, 2.0),
+        ("norm3 around 1e-15, ULP", 300_000, 1.0e-16, 1.0e-14, 3.0),
+        ("norm3 of small components, ULP", 300_000, 1.0e-34, 1.0e-15, 3.0),
+        ("norm3 of large components, ULP", 300_000, 1.0e14, 1.0e37, 3.0),
+    ] {
+        assert_below(what, worst((0..count).map(|_| error(low, high))), bound);
+    }
     assert_eq!(math::norm3(0.0, 0.0, 0.0), 0.0);
     assert_eq!(math::norm3(-3.0, 0.0, 4.0), 5.0);
     assert_eq!(math::norm3(3.0e30, 4.0e30, 0.0), 5.0e30);

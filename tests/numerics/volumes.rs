@@ -94,10 +94,8 @@ fn densities_at_their_ends() {
     }
     let [exclusive, inclusive] = both([2.0 * std::f32::consts::LN_2, 0.0, 1.0]);
     let near = |actual: &[f32], expected: [f32; 3]| {
-        assert!(
-            actual.iter().zip(expected).all(|(actual, expected)| (actual - expected).abs() <= 1.0e-7),
-            "{actual:?}"
-        );
+        let is_near = |(actual, expected): (&f32, f32)| (actual - expected).abs() <= 1.0e-7;
+        assert!(actual.iter().zip(expected).all(is_near), "{actual:?}");
     };
     near(&exclusive, [0.5, 0.0, 0.5]);
     near(&inclusive, [0.25, 0.0, 0.0]);

@@ -3,34 +3,25 @@
 
 use std::fmt::Write;
 use std::fs;
-use std::sync::Arc;
 use tempfile::TempDir;
 use viewfuse::device::choice::AnyDevice;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::field::render::{Finished, Frame, RenderError, RenderOptions, RenderRun, Stage, render};
-use viewfuse::field::training_free::TrainingFree;
-use viewfuse::field::{AnyField, On, Renderer};
+use viewfuse::field::AnyField;
+use viewfuse::field::render::{RenderOptions, RenderRun, render};
 use viewfuse::job::progress::Silent;
 use viewfuse::output::run::{Circumstances, RunWriter};
-use viewfuse::scene::few_shot::{FewShot, Selection};
-use viewfuse::scene::photographs::{Album, BackgroundChoice};
+use viewfuse::scene::few_shot::Selection;
 use viewfuse::scene::{FileFault, FilePlace, READERS, Scene, SceneError, SceneFault};
 use viewfuse::weighting::Weighting;
-use viewfuse::weighting::sources::{MAX_SOURCES, SourceWeights};
 use viewfuse_outside::{LIST, Lines, Nearest, Plane};
-use viewfuse_tests::places::data;
+use viewfuse_tests::fields::sample;
 
 /// The sample's cameras are as far from its object.
 const PLANE: Plane = Plane { depth: 1.3 };
 
-/// The sample scene.
-fn sample() -> Scene {
-    Scene::open(data("toy")).expect("the sample")
-}
-
 /// The sample scene in a layout of one's own, with every third of its views.
 fn in_lines() -> (Scene, TempDir) {
-    let (sample, folder) = (sample(), tempfile::tempdir().expect("a folder"));
+    let (sample, folder) = (sample("toy"), tempfile::tempdir().expect("a folder"));
     let mut list = String::new();
     for (index, view) in sample.views.iter().filter(|view| view.image.is_some()).step_by(3).enumerate() {
         let camera = view.camera;
@@ -49,33 +40,6 @@ fn open(folder: &TempDir) -> Result<Scene, SceneError> {
     Scene::open_with(folder.path(), &[READERS.as_slice(), &[&Lines]].concat())
 }
 
-/// The third view from the others.
-fn third(scene: &Scene) -> FewShot {
-    let targets = Some(scene.views[2].name.clone());
-    Selection { targets, ..Selection::default() }.resolve(scene, 2).expect("a job")
-}
-
-fn small() -> RenderOptions {
-    RenderOptions { size: Some([32, 32]), ..RenderOptions::default() }
-}
-
-/// The third view from the others, at 32x32.
-fn frame(renderer: &dyn Renderer, scene: &Scene, weighting: &Weighting) -> (Frame, Finished) {
-    let (job, options, mut frames) = (third(scene), small(), Vec::new());
-    let run = RenderRun { scene, job: &job, renderer, options: &options, progress: &Silent };
-    let finished = render(&run, weighting, |_, frame| {
-        frames.push(frame);
-        Ok::<_, RenderError>(())
-    })
-    .expect("a picture");
-    (frames.remove(0), finished)
-}
-
-/// With the training-free field on the CPU.
-fn training_free(scene: &Scene, weighting: &Weighting) -> Frame {
-    frame(&On { device: &Cpu, field: &TrainingFree::default() }, scene, weighting).0
-}
-
 #[test]
 fn field_layout_and_weighting_of_ones_own_render_together() {
     let (_, folder) = in_lines();
@@ -84,23 +48,26 @@ fn field_layout_and_weighting_of_ones_own_render_together() {
     let field = AnyField::new(PLANE);
     let renderer = field.on(&device);
     let nearest = Weighting::custom(Nearest);
-    let (frame, finished) = frame(renderer.as_ref(), &scene, &nearest);
-    let psnr = frame.truth.as_ref().expect("a truth").psnr;
+    let output = tempfile::tempdir().expect("a folder");
+    // The third view from the others.
+    let targets = Some(scene.views[2].name.clone());
+    let job = Selection { targets, ..Selection::default() }.resolve(&scene, 2).expect("a job");
+    let options = RenderOptions { size: Some([32, 32]), ..RenderOptions::default() };
+    let mut frames = Vec::new();
+    let mut writer = RunWriter::new(output.path(), &scene, "lines".to_owned(), &job, &nearest);
+    let run = RenderRun { scene: &scene, job: &job, renderer: renderer.as_ref(), options: &options, progress: &Silent };
+    let finished = render(&run, &nearest, |sources, frame| {
+        frames.push((frame.truth.as_ref().expect("a truth").psnr, frame.depths.clone()));
+        writer.write(sources, frame).map_err(Box::<dyn std::error::Error>::from)
+    })
+    .expect("a picture");
+    let (psnr, depths) = &frames[0];
     println!("a plane from the nearest of seven views: {psnr:.1} dB");
-    assert!(psnr > 10.0);
-    assert!(frame.depths.contains(&PLANE.depth) && frame.depths.contains(&0.0));
+    assert!(*psnr > 10.0 && depths.contains(&PLANE.depth) && depths.contains(&0.0));
     let line = finished.record.left_out.first().expect("a line about views");
     assert_eq!((line.what, line.left_out, line.of), ("encoded views", 6, 7), "only the nearest one is used");
 
     // What a run writes.
-    let output = tempfile::tempdir().expect("a folder");
-    let (job, options) = (third(&scene), small());
-    let mut writer = RunWriter::new(output.path(), &scene, "lines".to_owned(), &job, &nearest);
-    let run = RenderRun { scene: &scene, job: &job, renderer: renderer.as_ref(), options: &options, progress: &Silent };
-    let finished = render(&run, &nearest, |sources, frame| {
-        writer.write(sources, frame).map_err(Box::<dyn std::error::Error>::from)
-    })
-    .expect("a picture");
     let record = writer.finish(renderer.as_ref(), &options, finished, Circumstances::default()).expect("a record");
     assert_eq!((record.field, record.weighting.as_str(), record.frames.len()), ("plane", "nearest", 1));
     let mut names: Vec<_> =
@@ -110,36 +77,13 @@ fn field_layout_and_weighting_of_ones_own_render_together() {
 }
 
 #[test]
-fn a_plane_seen_from_a_source_is_its_photograph() {
-    let scene = sample();
-    let sources: Vec<usize> = (0..4).collect();
-    let album = Album::open(&scene, sources.iter().copied(), &Silent).expect("photographs");
-    let images = album.sources(&sources, 32, BackgroundChoice::Auto, &Silent).expect("sources");
-    let renderer = On { device: &Cpu, field: &PLANE };
-    let options = RenderOptions::default();
-    let mut stage = Stage::of_sources(Arc::new(images.clone()), &renderer, &options, &Silent).expect("a stage");
-    for (view, image) in images.images.iter().enumerate() {
-        let mut scores = [0.0; MAX_SOURCES];
-        scores[view] = 1.0;
-        let weights = SourceWeights::from_scores(&scores, 4);
-        let picture = stage.picture(&image.camera, &weights, 0.0, &Silent).expect("a picture");
-        let opacities = picture.colours.iter().zip(&image.texels).filter(|(colour, texel)| colour[3] == texel[3]);
-        // Rounding may take a point on a border into the next texel.
-        let same = opacities.count() as f64 / image.texels.len() as f64;
-        assert!(same > 0.99, "view {view}: {same} of the pixels");
-    }
-}
-
-#[test]
-fn a_layout_of_ones_own_is_opened_and_rendered() {
+fn a_layout_of_ones_own_is_opened_as_any_other() {
     let (sample, folder) = in_lines();
     let scene = open(&folder).expect("a scene");
     assert_eq!((scene.layout, scene.views.len()), ("lines", 8));
     for (view, original) in scene.views.iter().zip(sample.views.iter().step_by(3)) {
         assert_eq!(view.camera, original.camera, "{}", view.name);
     }
-    let frame = training_free(&scene, &Weighting::default_scheme());
-    assert!(frame.truth.is_some_and(|truth| truth.psnr > 15.0));
     // The readers of the crate know nothing of it, and see photographs alone.
     let error = Scene::open(folder.path()).expect_err("an unknown layout").to_string();
     assert!(error.contains("8 photographs, and nothing that gives their poses"), "{error}");
@@ -170,16 +114,4 @@ fn what_a_reader_gives_is_checked() {
     assert!(matches!(*fault_of_line(with(0, "-1")), SceneFault::Intrinsics(_)));
     assert!(matches!(*fault_of_line(with(4, "NaN")), SceneFault::File(FileFault::NotFinite(_))));
     assert!(matches!(*refused(String::new()).fault, SceneFault::NoViews(_)));
-}
-
-#[test]
-fn a_weighting_of_ones_own_is_rendered_with() {
-    let scene = sample();
-    let nearest = Weighting::custom(Nearest);
-    assert_eq!(nearest.to_string(), "nearest");
-    let frame = training_free(&scene, &nearest);
-    let weights = frame.weights.values();
-    assert_eq!(weights.iter().filter(|weight| **weight > 0.0).count(), 1);
-    assert!(weights.contains(&1.0));
-    assert_ne!(frame.picture, training_free(&scene, &Weighting::default_scheme()).picture);
 }

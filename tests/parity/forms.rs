@@ -1,7 +1,7 @@
 //! Every form of every tiled kernel that a device can run: against `f64` as the first form is, with the same bits as
 //! that one and as itself in pieces, and chosen by measuring where none is asked for.
 
-use super::Parity;
+use super::{Parity, trial_on};
 use libtest_mimic::{Failed, Trial};
 use std::ops::RangeInclusive;
 use std::process::Command;
@@ -11,54 +11,40 @@ use viewfuse::check::cases::visit;
 use viewfuse::device::vulkan::Vulkan;
 use viewfuse::device::{Device, Layer, LayerShape, Memory};
 use viewfuse_kernels::network::linear::LinearBlock;
-use viewfuse_tests::trials::{is_required, needing, timed};
 use viewfuse_vulkan::kernel::{Form, Kernel};
-use viewfuse_vulkan::{Adapter, GpuOptions, Instance, Limits, Missing};
+use viewfuse_vulkan::{Adapter, GpuOptions, Instance, Limits};
 
 /// The trials of a device.
 pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> {
-    let missing: Vec<String> = adapter.missing.iter().map(Missing::to_string).collect();
-    let missing = (!missing.is_empty()).then(|| missing.join(", "));
-    let ready = |trial: Trial| needing(missing.clone(), is_required("VIEWFUSE_REQUIRE_VULKAN"), trial);
-    let of_form = |kernel: Kernel, form: Form| {
-        let (instance, adapter) = (instance.clone(), adapter.clone());
-        let name = format!("{}::{}::{}", adapter.name, kernel.name(), form.name());
-        ready(timed(name, move || {
-            let open =
-                |form| Vulkan::open(&instance, &adapter, &GpuOptions { form: Some(form), ..GpuOptions::default() });
-            let device = open(form)?;
-            visit(kernel, Parity { device: &device })?;
-            visit(kernel, SameBits { one: &open(Form::Single)?, other: &device, seeds: 3..=3 })
-        }))
-    };
+    let tiled = || Kernel::ALL.into_iter().filter(|kernel| kernel.is_tiled());
     let in_pieces = |kernel: Kernel| {
-        let (instance, adapter) = (instance.clone(), adapter.clone());
-        let name = format!("{}::{}::in_pieces", adapter.name, kernel.name());
-        ready(timed(name, move || pieces_have_the_same_bits(&instance, &adapter, kernel)))
+        let name = format!("{}::in_pieces", kernel.name());
+        trial_on(instance, adapter, &name, move |instance, own| pieces_have_the_same_bits(instance, own, kernel))
     };
-    let tiled = Kernel::ALL.into_iter().filter(|kernel| kernel.is_tiled());
-    let has_subgroups = adapter.subgroup_size.is_some();
     let is_there = |form: &&Form| **form != Form::Single && adapter.runs(**form);
     let others = |kernel: Kernel| kernel.forms().iter().filter(is_there).map(move |form| (kernel, *form));
-    let mut trials: Vec<Trial> = tiled.clone().map(in_pieces).collect();
-    trials.extend(tiled.flat_map(others).map(|(kernel, form)| of_form(kernel, form)));
-    let (instance, adapter) = (instance.clone(), adapter.clone());
-    if has_subgroups {
-        let name = format!("{}::a_form_is_measured_and_remembered", adapter.name);
-        let measured = (instance.clone(), adapter.clone());
-        trials.push(ready(timed(name, move || measured_and_remembered(&measured.0, &measured.1))));
-        let name = format!("{}::two_at_a_time_remember_both", adapter.name);
-        let both = (instance.clone(), adapter.clone());
-        trials.push(ready(timed(name, move || two_at_a_time_remember_both(&both.0, &both.1))));
+    let other = |(kernel, form): (Kernel, Form)| {
+        let name = format!("{}::{}", kernel.name(), form.name());
+        trial_on(instance, adapter, &name, move |instance, own| is_as_the_first(instance, own, kernel, form))
+    };
+    let mut trials: Vec<Trial> = tiled().map(in_pieces).chain(tiled().flat_map(others).map(other)).collect();
+    if adapter.subgroup_size.is_none() {
+        trials.push(trial_on(instance, adapter, "a_form_that_the_device_lacks_is_refused", refused));
+        return trials;
     }
-    if has_subgroups && adapter.name.starts_with("llvmpipe") {
-        trials.push(ready(timed(format!("{}::of_wider_subgroups", adapter.name), of_wider_subgroups)));
-    }
-    if !has_subgroups {
-        let name = format!("{}::a_form_that_the_device_lacks_is_refused", adapter.name);
-        trials.push(ready(timed(name, move || refused(&instance, &adapter))));
+    trials.push(trial_on(instance, adapter, "a_form_is_measured_and_remembered", measured_and_remembered));
+    trials.push(trial_on(instance, adapter, "two_at_a_time_remember_both", two_at_a_time_remember_both));
+    if adapter.name.starts_with("llvmpipe") {
+        trials.push(trial_on(instance, adapter, "of_wider_subgroups", |_, _| of_wider_subgroups()));
     }
     trials
+}
+
+fn is_as_the_first(instance: &Arc<Instance>, adapter: &Adapter, kernel: Kernel, form: Form) -> Result<(), Failed> {
+    let open = |form| Vulkan::open(instance, adapter, &GpuOptions { form: Some(form), ..GpuOptions::default() });
+    let device = open(form)?;
+    visit(kernel, Parity { device: &device })?;
+    visit(kernel, SameBits { one: &open(Form::Single)?, other: &device, seeds: 3..=3 })
 }
 
 /// Lavapipe's usual subgroups have eight invocations. In another process it has some of sixteen, which take another

@@ -2,6 +2,7 @@
 //! by a device's matrix units where it has them, and on lavapipe by what stands in for them, which has the same places,
 //! barriers and roundings.
 
+use super::trial_on;
 use libtest_mimic::{Failed, Trial};
 use std::sync::Arc;
 use viewfuse::device::vulkan::Vulkan;
@@ -9,15 +10,11 @@ use viewfuse::device::{Device, Layer, LayerShape, Memory};
 use viewfuse_kernels::network::convolve::{ConvolveBlock, patch_value};
 use viewfuse_kernels::network::linear::LinearBlock;
 use viewfuse_tests::devices::{exchanged_stand_ins, stand_ins, takes_stand_ins};
-use viewfuse_tests::trials::{is_required, needing, timed};
 use viewfuse_vulkan::kernel::{Form, Kernel};
-use viewfuse_vulkan::{Adapter, Gpu, GpuOptions, Instance, Missing};
+use viewfuse_vulkan::{Adapter, Gpu, GpuOptions, Instance};
 
 /// The trials of a device.
 pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> {
-    let missing: Vec<String> = adapter.missing.iter().map(Missing::to_string).collect();
-    let missing = (!missing.is_empty()).then(|| missing.join(", "));
-    let ready = |trial: Trial| needing(missing.clone(), is_required("VIEWFUSE_REQUIRE_VULKAN"), trial);
     if !takes_stand_ins(adapter) {
         return Vec::new();
     }
@@ -28,14 +25,12 @@ pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> 
                 continue;
             }
             let options = GpuOptions { form: Some(form), stand_ins, ..GpuOptions::default() };
-            let (instance, adapter) = (instance.clone(), adapter.clone());
-            let name = format!("{}::{}::{what}", adapter.name, form.name());
-            trials.push(ready(timed(name, move || is_within_its_bound(&instance, &adapter, &options, form))));
+            trials.push(trial_on(instance, adapter, &format!("{}::{what}", form.name()), move |instance, own| {
+                is_within_its_bound(instance, own, &options, form)
+            }));
         }
     }
-    let (instance, own) = (instance.clone(), adapter.clone());
-    let name = format!("{}::rounded_forms_are_trusted_after_a_probe", adapter.name);
-    trials.push(ready(timed(name, move || trusted_after_a_probe(&instance, &own))));
+    trials.push(trial_on(instance, adapter, "rounded_forms_are_trusted_after_a_probe", trusted_after_a_probe));
     trials
 }
 

@@ -11,6 +11,7 @@ mod halves;
 use bodies::Bodies;
 use libtest_mimic::{Failed, Trial};
 use std::process::ExitCode;
+use std::sync::Arc;
 use viewfuse::check::agreement::{Disagreement, measure};
 use viewfuse::check::bounded::Bounded;
 use viewfuse::check::case::{Case, Visitor};
@@ -23,54 +24,35 @@ use viewfuse::device::vulkan::Vulkan;
 use viewfuse::job::progress::Silent;
 use viewfuse_tests::devices::vulkan_devices;
 use viewfuse_tests::trials::{is_required, needing, run, timed};
-use viewfuse_vulkan::GpuOptions;
 use viewfuse_vulkan::kernel::{Access, Kernel};
+use viewfuse_vulkan::{Adapter, GpuOptions, Instance, Missing};
 
-/// A device under test. Every trial opens it for itself: its counters then are the trial's own.
-struct Candidate<D, F: Fn() -> Result<D, String>> {
-    name: String,
-    open: F,
-    /// Why there is no such device here, if there is none.
-    missing: Option<String>,
-    /// How often it ran a kernel, if it counts.
-    dispatch_count: fn(&D, Kernel) -> Option<u64>,
-}
+const REQUIRED: &str = "VIEWFUSE_REQUIRE_VULKAN";
 
 fn main() -> ExitCode {
-    let mut trials = Vec::new();
-    // The CPU has no dispatches to count.
-    let cpu = Candidate { name: "cpu".to_owned(), open: || Ok(Cpu), missing: None, dispatch_count: |_, _| None };
-    trials.extend(trials_of(&cpu));
+    let mut trials: Vec<Trial> = Kernel::ALL.map(|kernel| trial_of("cpu", kernel, uncounted, || Ok(Cpu))).into();
     let together: Vec<Kernel> = Kernel::ALL.into_iter().filter(|kernel| kernel.is_together()).collect();
     for (name, in_workgroups, kernels) in [("bodies", false, Kernel::ALL.to_vec()), ("workgroups", true, together)] {
         let open = move || Ok(Bodies { in_workgroups, ..Bodies::PLAIN });
-        let bodies = Candidate { name: name.to_owned(), open, missing: None, dispatch_count: |_, _| None };
-        trials.extend(kernels.into_iter().map(|kernel| trial_of(&bodies, kernel)));
+        trials.extend(kernels.into_iter().map(|kernel| trial_of(name, kernel, uncounted, open)));
     }
     match vulkan_devices() {
         Ok((instance, adapters)) => {
             for adapter in adapters {
                 trials.extend(forms::trials(&instance, &adapter));
                 trials.extend(halves::trials(&instance, &adapter));
-                let (instance, name) = (instance.clone(), adapter.name.clone());
-                trials.extend(trials_of(&Candidate {
-                    open: move || {
-                        Vulkan::open(&instance, &adapter, &GpuOptions::default()).map_err(|error| error.to_string())
-                    },
-                    name,
-                    missing: None,
-                    dispatch_count: vulkan_dispatches,
+                trials.extend(Kernel::ALL.map(|kernel| {
+                    let (instance, own) = (instance.clone(), adapter.clone());
+                    let open = move || Ok(Vulkan::open(&instance, &own, &GpuOptions::default())?);
+                    let count = |device: &Vulkan, kernel| Some(device.tally(kernel).dispatches);
+                    trial_of(&adapter.name, kernel, count, open)
                 }));
             }
         }
-        Err(error) => trials.extend(trials_of(&Candidate {
-            name: "vulkan".to_owned(),
-            open: {
-                let problem = error.to_string();
-                move || Err::<Vulkan, _>(problem.clone())
-            },
-            missing: Some(error.to_string()),
-            dispatch_count: vulkan_dispatches,
+        Err(error) => trials.extend(Kernel::ALL.map(|kernel| {
+            let (problem, said) = (error.to_string(), error.to_string());
+            let trial = timed(format!("vulkan::{}", kernel.name()), move || Err(said.into()));
+            needing(Some(problem), is_required(REQUIRED), trial)
         })),
     }
     for kernel in [Kernel::CompareViews, Kernel::CensusCost, Kernel::WindowCost, Kernel::PlaneOpacity] {
@@ -87,26 +69,32 @@ fn main() -> ExitCode {
     run(trials)
 }
 
-fn vulkan_dispatches(device: &Vulkan, kernel: Kernel) -> Option<u64> {
-    Some(device.tally(kernel).dispatches)
+/// Of a device that does not count its dispatches.
+fn uncounted<D>(_: &D, _: Kernel) -> Option<u64> {
+    None
 }
 
-/// The trials of a device, one for each kernel. Without the device they are ignored, or fail where it is required.
-fn trials_of<D: Device + 'static, F>(candidate: &Candidate<D, F>) -> Vec<Trial>
-where
-    F: Fn() -> Result<D, String> + Clone + Send + 'static,
-{
-    Kernel::ALL.into_iter().map(|kernel| trial_of(candidate, kernel)).collect()
+/// A kernel on a device, which every trial opens for itself: its counters then are the trial's own.
+fn trial_of<D: Device + 'static>(
+    device: &str,
+    kernel: Kernel,
+    count: fn(&D, Kernel) -> Option<u64>,
+    open: impl Fn() -> Result<D, Failed> + Send + 'static,
+) -> Trial {
+    timed(format!("{device}::{}", kernel.name()), move || parity(&open()?, kernel, count))
 }
 
-fn trial_of<D: Device + 'static, F>(candidate: &Candidate<D, F>, kernel: Kernel) -> Trial
-where
-    F: Fn() -> Result<D, String> + Clone + Send + 'static,
-{
-    let Candidate { name, open, missing, dispatch_count } = candidate;
-    let (open, dispatch_count) = (open.clone(), *dispatch_count);
-    let trial = timed(format!("{name}::{}", kernel.name()), move || parity(&open()?, kernel, dispatch_count));
-    needing(missing.clone(), is_required("VIEWFUSE_REQUIRE_VULKAN"), trial)
+/// A trial of a Vulkan device; ignored where that lacks something, unless it is required.
+fn trial_on(
+    instance: &Arc<Instance>,
+    adapter: &Adapter,
+    name: &str,
+    test: impl FnOnce(&Arc<Instance>, &Adapter) -> Result<(), Failed> + Send + 'static,
+) -> Trial {
+    let missing: Vec<String> = adapter.missing.iter().map(Missing::to_string).collect();
+    let (instance, own) = (instance.clone(), adapter.clone());
+    let trial = timed(format!("{}::{name}", adapter.name), move || test(&instance, &own));
+    needing((!missing.is_empty()).then(|| missing.join(", ")), is_required(REQUIRED), trial)
 }
 
 /// Sizes of the trials: one element, an odd number, and several workgroups with a rest.

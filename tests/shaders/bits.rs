@@ -7,29 +7,15 @@ use std::collections::BTreeMap;
 use viewfuse_shader_compiler::refine::read;
 use viewfuse_shader_compiler::split::Modules;
 use viewfuse_shader_compiler::stamp::Inputs;
+use viewfuse_shader_compiler::tokens::tokens;
 use viewfuse_tests::places::repository;
 
 /// Functions of the standard library that a compiler may fold.
 const BY_VALUE: [&str; 4] = ["is_nan", "is_finite", "is_infinite", "is_normal"];
 
-/// Words of a source without its comments and texts.
-fn words(source: &str) -> Vec<String> {
-    fn below(stream: proc_macro2::TokenStream, words: &mut Vec<String>) {
-        for token in stream {
-            match token {
-                proc_macro2::TokenTree::Group(group) => below(group.stream(), words),
-                token => words.push(token.to_string()),
-            }
-        }
-    }
-    let mut found = Vec::new();
-    below(source.parse().expect("Rust"), &mut found);
-    found
-}
-
 /// What tests a value by comparing it: names of the library, and `x != x`.
 fn by_value(source: &str) -> Vec<String> {
-    let words = words(source);
+    let words = tokens(source).expect("Rust");
     let named = words.iter().filter(|word| BY_VALUE.contains(&word.as_str())).cloned();
     // `a != a` is the tokens a, !, =, a.
     let with_itself = words.windows(4).filter(|four| {

@@ -11,24 +11,16 @@ use viewfuse_vulkan::kernel::Kernel;
 
 static COMPILED: LazyLock<Modules> = LazyLock::new(|| Modules::read(&repository()).expect("the compiled kernels"));
 
-fn kernels() -> Module {
-    static KERNELS: LazyLock<Module> = LazyLock::new(|| read(&COMPILED.kernels).expect("SPIR-V"));
-    KERNELS.clone()
-}
-
-fn subgroups() -> Module {
-    static SUBGROUPS: LazyLock<Module> = LazyLock::new(|| read(&COMPILED.subgroups).expect("SPIR-V"));
-    SUBGROUPS.clone()
-}
-
-fn matrices() -> Module {
-    static MATRICES: LazyLock<Module> = LazyLock::new(|| read(&COMPILED.matrices).expect("SPIR-V"));
-    MATRICES.clone()
+/// A compiled module, taken apart.
+fn module(part: Part) -> Module {
+    static MODULES: LazyLock<[Module; 4]> =
+        LazyLock::new(|| COMPILED.named().map(|(_, bytes)| read(bytes).expect("SPIR-V")));
+    MODULES[part as usize].clone()
 }
 
 /// Breaches of the compiled kernels with one change.
 fn breaches_with(change: impl FnOnce(&mut Module)) -> Vec<String> {
-    let mut module = kernels();
+    let mut module = module(Part::Kernels);
     change(&mut module);
     breaches(Part::Kernels, &module)
 }
@@ -42,11 +34,9 @@ fn entry(module: &Module, kernel: Kernel) -> u32 {
 
 #[test]
 fn the_kernels_are_what_the_list_says() {
-    assert_eq!(breaches(Part::Kernels, &kernels()), Vec::<String>::new());
-    assert_eq!(breaches(Part::Subgroups, &subgroups()), Vec::<String>::new());
-    assert_eq!(breaches(Part::Matrices, &matrices()), Vec::<String>::new());
-    let stand_ins = read(&COMPILED.stand_ins).expect("SPIR-V");
-    assert_eq!(breaches(Part::StandIns, &stand_ins), Vec::<String>::new());
+    for part in [Part::Kernels, Part::Subgroups, Part::Matrices, Part::StandIns] {
+        assert_eq!(breaches(part, &module(part)), Vec::<String>::new(), "{part:?}");
+    }
 }
 
 #[test]
@@ -104,7 +94,7 @@ fn an_entry_point_by_another_name_is_seen() {
 #[test]
 fn a_missing_or_moved_binding_is_seen() {
     // Each variable in turn; kernels share those that are declared alike.
-    let annotations = kernels().annotations;
+    let annotations = module(Part::Kernels).annotations;
     let is_binding = |at: &usize| annotations[*at].operands.get(1) == Some(&Operand::Decoration(Decoration::Binding));
     let mut moved = 0;
     for at in (0..annotations.len()).filter(is_binding) {
@@ -268,19 +258,18 @@ const OF_SUBGROUPS: [(Change, &str); 2] = [
 
 #[test]
 fn every_breach_is_seen_and_no_other_is_said() {
-    let of_kernels = OF_KERNELS.map(|(change, what)| (Part::Kernels, kernels(), change, what));
-    let of_subgroups = OF_SUBGROUPS.map(|(change, what)| (Part::Subgroups, subgroups(), change, what));
-    let of_matrices = OF_MATRICES.map(|(change, what)| (Part::Matrices, matrices(), change, what));
-    for (part, mut module, change, what) in of_kernels.into_iter().chain(of_subgroups).chain(of_matrices) {
-        change(&mut module);
-        let said = breaches(part, &module);
+    let all = [(Part::Kernels, &OF_KERNELS[..]), (Part::Subgroups, &OF_SUBGROUPS), (Part::Matrices, &OF_MATRICES)];
+    for (part, (change, what)) in all.into_iter().flat_map(|(part, all)| all.iter().map(move |one| (part, one))) {
+        let mut changed = module(part);
+        change(&mut changed);
+        let said = breaches(part, &changed);
         assert!(!said.is_empty() && said.iter().all(|said| said.contains(what)), "{what}: {said:?}");
     }
     // The other module, and an array that could be written.
-    let said = breaches(Part::Kernels, &subgroups());
+    let said = breaches(Part::Kernels, &module(Part::Subgroups));
     assert!(said.contains(&"linear::subgroup: not a kernel".to_owned()), "{said:?}");
     assert!(said.contains(&"linear: no entry point".to_owned()), "{said:?}");
-    let mut module = kernels();
+    let mut module = module(Part::Kernels);
     without_annotations(&mut module, Decoration::NonWritable);
     let said = breaches(Part::Kernels, &module);
     assert!(said.iter().any(|said| said.contains("Write, not Read")), "{said:?}");
@@ -290,7 +279,7 @@ fn every_breach_is_seen_and_no_other_is_said() {
 /// Making a module anew marks its arithmetic again.
 #[test]
 fn arithmetic_that_could_be_contracted_is_marked() {
-    let mut module = kernels();
+    let mut module = module(Part::Kernels);
     without_annotations(&mut module, Decoration::NoContraction);
     let bytes: Vec<u8> =
         rspirv::binary::Assemble::assemble(&module).iter().flat_map(|word| word.to_le_bytes()).collect();
@@ -300,7 +289,7 @@ fn arithmetic_that_could_be_contracted_is_marked() {
 
 #[test]
 fn more_memory_than_every_device_has_is_seen() {
-    let mut module = kernels();
+    let mut module = module(Part::Kernels);
     let kinds = &mut module.types_global_values;
     let operands_of = |kinds: &[Instruction], id: Option<u32>| {
         let found = kinds.iter().find(|kind| kind.result_id.is_some() && kind.result_id == id);

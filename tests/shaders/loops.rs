@@ -1,12 +1,10 @@
 //! Loops of the compiled kernels have the shape that drivers unroll and pipeline, and the pass that gives it to them
 //! leaves a loop alone that it would make wrong. Small modules are executed before and after.
 
-use rspirv::dr::{Builder, Instruction, Module, Operand};
-use rspirv::spirv::{
-    AddressingModel, Capability, ExecutionModel, FunctionControl, LoopControl, MemoryModel, Op, SelectionControl,
-    StorageClass, Word,
-};
-use std::collections::{BTreeMap, HashMap};
+use crate::execute::{LIMIT, begun, block, execute, finished};
+use rspirv::dr::Module;
+use rspirv::spirv::{LoopControl, Op, SelectionControl, StorageClass, Word};
+use std::collections::BTreeMap;
 use viewfuse_shader_compiler::loops::{Joined, Reason, joined, straighten};
 use viewfuse_shader_compiler::refine::read;
 use viewfuse_shader_compiler::split::Modules;
@@ -30,40 +28,11 @@ const LEFT_BY_THEIR_BODY: [(&str, usize); 10] = [
 
 /// Kernels with arrays of an invocation's own that a loop's counter indexes. rust-gpu unrolls nothing: until a driver
 /// does, these arrays are memory and not registers.
-const INDEXED_BY_A_COUNTER: [&str; 32] = [
-    "add_noise",
-    "blend_gradient",
-    "blend_planes",
-    "blend_splats",
-    "census_cost",
-    "coarse_depths",
-    "compare_pixels",
-    "compare_views",
-    "compare_windows",
-    "composite",
-    "count_entries",
-    "embed_points",
-    "follow_paths",
-    "front_cost",
-    "gather_gradients",
-    "hull_entry",
-    "join_paths",
-    "list_entries",
-    "look_up_texels",
-    "march_rays",
-    "match_cost",
-    "pick_depth",
-    "pick_disparity",
-    "plane_opacity",
-    "project_gradients",
-    "project_particles",
-    "random_draws",
-    "row_sums",
-    "step_gains",
-    "step_harmonics",
-    "step_particles",
-    "window_cost",
-];
+const INDEXED_BY_A_COUNTER: &str = "add_noise blend_gradient blend_planes blend_splats census_cost coarse_depths compare_pixels compare_views \
+    compare_windows composite count_entries embed_points follow_paths front_cost gather_gradients hull_entry \
+    join_paths list_entries look_up_texels march_rays match_cost pick_depth pick_disparity plane_opacity \
+    project_gradients project_particles random_draws row_sums step_gains step_harmonics step_particles \
+    window_cost";
 
 fn compiled() -> [Module; 4] {
     let modules = Modules::read(&repository()).expect("the compiled kernels");
@@ -105,7 +74,7 @@ fn indexed(module: &Module) -> Vec<String> {
 fn arrays_of_an_invocation_are_indexed_by_values_only_in_listed_kernels() {
     let mut found: Vec<String> = compiled().iter().flat_map(indexed).collect();
     found.sort();
-    assert_eq!(found, INDEXED_BY_A_COUNTER);
+    assert_eq!(found, INDEXED_BY_A_COUNTER.split(' ').collect::<Vec<_>>());
 }
 
 /// A loop in rust-gpu's shape and what can make it another.
@@ -121,33 +90,16 @@ struct Shape {
     inverted: bool,
 }
 
-/// Numbers of what the modules compute with.
-const LIMIT: Word = 1;
-const RESULT: Word = 2;
-
 /// `sum = 0; i = 0; while i < limit { sum += i; i += 1 } result = sum + i`, where sum and i are 0 in the join if they
 /// come from the exit, as rust-gpu leaves them.
 fn module(shape: Shape) -> Module {
-    let mut b = Builder::new();
-    // The limit and the result have the first numbers.
-    let [limit, result] = [b.id(), b.id()];
-    assert_eq!([limit, result], [LIMIT, RESULT]);
-    b.capability(Capability::Shader);
-    b.memory_model(AddressingModel::Logical, MemoryModel::GLSL450);
-    let (void, boolean, number) = (b.type_void(), b.type_bool(), b.type_int(32, 0));
-    let kind = b.type_function(void, []);
-    let pointer = b.type_pointer(None, StorageClass::Private, number);
-    b.variable(pointer, Some(limit), StorageClass::Private, None);
-    b.variable(pointer, Some(result), StorageClass::Private, None);
+    let (mut b, boolean, number) = begun("sum");
     let [zero, one, three] = [0, 1, 3].map(|value| b.constant_bit32(number, value));
     let [never, always] = [b.constant_false(boolean), b.constant_true(boolean)];
-    let function = b.begin_function(void, None, FunctionControl::NONE, kind).expect("a function");
-    b.entry_point(ExecutionModel::GLCompute, function, "sum", [limit, result]);
     let [start, header, top, body, leave, join, again, out] = std::array::from_fn(|_| b.id());
     let [next, more, joined_sum, joined_count, joined_condition] = std::array::from_fn(|_| b.id());
-    let block = |b: &mut Builder, label| _ = b.begin_block(Some(label)).expect("a block");
     block(&mut b, start);
-    let bound = b.load(number, None, limit, None, []).expect("the limit");
+    let bound = b.load(number, None, LIMIT, None, []).expect("the limit");
     b.branch(header).expect("a branch");
     block(&mut b, header);
     let count = b.phi(number, None, [(zero, start), (joined_count, again)]).expect("a counter");
@@ -186,66 +138,7 @@ fn module(shape: Shape) -> Module {
     let from_end = b.phi(number, None, [(count, again)]).expect("a counter");
     let total = if shape.used_outside || shape.ended_by_body { joined_sum } else { sum };
     let total = b.i_add(number, None, total, from_end).expect("a sum");
-    b.store(result, total, None, []).expect("a store");
-    b.ret().expect("an end");
-    b.end_function().expect("an end");
-    b.module()
-}
-
-/// What a module of [`module`] stores for a limit.
-fn execute(module: &Module, limit: u32) -> u32 {
-    let mut values = HashMap::new();
-    for constant in &module.types_global_values {
-        let value = match constant.class.opcode {
-            Op::Constant => constant.operands[0].unwrap_literal_bit32(),
-            Op::ConstantTrue => 1,
-            _ => 0,
-        };
-        values.extend(constant.result_id.map(|id| (id, value)));
-    }
-    values.insert(LIMIT, limit);
-    let blocks = &module.functions[0].blocks;
-    let (mut before, mut block) = (0, &blocks[0]);
-    for _ in 0..1000 {
-        let entered = values.clone();
-        let mut next = None;
-        for instruction in &block.instructions {
-            let Instruction { result_id, operands, .. } = instruction;
-            let id = |index: usize| id_of(instruction, index);
-            let value = |index: usize| values[&id(index)];
-            let computed = match instruction.class.opcode {
-                Op::Phi => {
-                    let from = operands.chunks(2).find(|pair| pair[1] == Operand::IdRef(before));
-                    entered[&from.expect("a value from the block before")[0].unwrap_id_ref()]
-                }
-                Op::Load => value(0),
-                Op::IAdd => value(0) + value(1),
-                Op::ULessThan => u32::from(value(0) < value(1)),
-                Op::UGreaterThanEqual => u32::from(value(0) >= value(1)),
-                Op::INotEqual => u32::from(value(0) != value(1)),
-                Op::Store => {
-                    let stored = value(1);
-                    values.insert(id(0), stored);
-                    continue;
-                }
-                Op::Branch => {
-                    next = Some(id(0));
-                    continue;
-                }
-                Op::BranchConditional => {
-                    next = Some(if value(0) == 1 { id(1) } else { id(2) });
-                    continue;
-                }
-                Op::LoopMerge | Op::SelectionMerge => continue,
-                Op::Return => return values[&RESULT],
-                other => panic!("{other:?} is not in these modules"),
-            };
-            values.insert(result_id.expect("a result"), computed);
-        }
-        before = block.label_id().expect("a label");
-        block = blocks.iter().find(|block| block.label_id() == next).expect("the next block");
-    }
-    panic!("the loop does not end")
+    finished(b, total)
 }
 
 /// The loops that join, and the results for some limits.

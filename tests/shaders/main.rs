@@ -2,6 +2,7 @@
 
 mod bits;
 mod contract;
+mod execute;
 mod freshness;
 mod loops;
 mod phis;

@@ -1,22 +1,16 @@
 //! Phis of arrays and structs become phis of their members, and what is computed stays the same. A small module is
 //! executed before and after.
 
+use crate::execute::{LIMIT, begun, block, execute, finished};
 use rspirv::binary::Assemble;
-use rspirv::dr::{Builder, Instruction, Module, Operand};
-use rspirv::spirv::{
-    AddressingModel, Capability, ExecutionModel, FunctionControl, LoopControl, MemoryModel, Op, StorageClass, Word,
-};
+use rspirv::dr::{Instruction, Module, Operand};
+use rspirv::spirv::{LoopControl, Op, Word};
 use std::collections::HashMap;
 use viewfuse_shader_compiler::phis::split_phis;
 use viewfuse_shader_compiler::refine::read;
 use viewfuse_shader_compiler::split::Modules;
 use viewfuse_shader_compiler::unroll::unroll;
-use viewfuse_tests::module::id_of;
 use viewfuse_tests::places::repository;
-
-/// Numbers of what the modules compute with.
-const LIMIT: Word = 1;
-const RESULT: Word = 2;
 
 /// What a loop carries.
 #[derive(Clone, Copy, PartialEq)]
@@ -30,29 +24,16 @@ enum Carried {
 /// `{ [a, b], sum } = { [0, 1], 0 }; i = 0; do { [a, b], sum = [b, a + b], sum + a; i += 1 } while i < limit;
 /// result = 100 sum + a`, in a loop of one block, which is its own predecessor.
 fn module(carried: Carried) -> Module {
-    let mut b = Builder::new();
-    // The limit and the result have the first numbers.
-    let [limit, result] = [b.id(), b.id()];
-    assert_eq!([limit, result], [LIMIT, RESULT]);
-    b.capability(Capability::Shader);
-    b.memory_model(AddressingModel::Logical, MemoryModel::GLSL450);
-    let (void, boolean, number) = (b.type_void(), b.type_bool(), b.type_int(32, 0));
-    let kind = b.type_function(void, []);
-    let pointer = b.type_pointer(None, StorageClass::Private, number);
-    b.variable(pointer, Some(limit), StorageClass::Private, None);
-    b.variable(pointer, Some(result), StorageClass::Private, None);
+    let (mut b, boolean, number) = begun("fibonacci");
     let [zero, one, two, hundred] = [0, 1, 2, 100].map(|value| b.constant_bit32(number, value));
     let pair = b.type_array(number, two);
     let state = b.type_struct([pair, number]);
     let first_pair = b.constant_composite(pair, [zero, one]);
     let first = b.constant_composite(state, [first_pair, zero]);
-    let function = b.begin_function(void, None, FunctionControl::NONE, kind).expect("a function");
-    b.entry_point(ExecutionModel::GLCompute, function, "fibonacci", [limit, result]);
     let [start, again, out] = std::array::from_fn(|_| b.id());
     let [more, next, next_a, next_b, next_sum] = std::array::from_fn(|_| b.id());
-    let block = |b: &mut Builder, label| _ = b.begin_block(Some(label)).expect("a block");
     block(&mut b, start);
-    let bound = b.load(number, None, limit, None, []).expect("the limit");
+    let bound = b.load(number, None, LIMIT, None, []).expect("the limit");
     b.branch(again).expect("a branch");
     block(&mut b, again);
     let (at_a, at_b, at_sum) = match carried {
@@ -98,92 +79,7 @@ fn module(carried: Carried) -> Module {
     };
     let larger = b.i_mul(number, None, sum, hundred).expect("a product");
     let total = b.i_add(number, None, larger, last).expect("a sum");
-    b.store(result, total, None, []).expect("a store");
-    b.ret().expect("an end");
-    b.end_function().expect("an end");
-    b.module()
-}
-
-#[derive(Clone, Debug)]
-enum Value {
-    Number(u32),
-    Members(Vec<Value>),
-}
-
-impl Value {
-    fn number(&self) -> u32 {
-        match self {
-            Value::Number(number) => *number,
-            Value::Members(members) => panic!("{members:?} is no number"),
-        }
-    }
-
-    fn member(&self, path: &[Operand]) -> Value {
-        path.iter().fold(self.clone(), |value, index| match value {
-            Value::Members(members) => members[index.unwrap_literal_bit32() as usize].clone(),
-            Value::Number(_) => panic!("a number has no members"),
-        })
-    }
-}
-
-/// What a module of [`module`] stores for a limit.
-fn execute(module: &Module, limit: u32) -> u32 {
-    let mut values: HashMap<Word, Value> = HashMap::new();
-    let members = |instruction: &Instruction, values: &HashMap<Word, Value>| {
-        Value::Members(instruction.operands.iter().map(|id| values[&id.unwrap_id_ref()].clone()).collect())
-    };
-    for constant in &module.types_global_values {
-        let value = match constant.class.opcode {
-            Op::Constant => Value::Number(constant.operands[0].unwrap_literal_bit32()),
-            Op::ConstantComposite => members(constant, &values),
-            _ => continue,
-        };
-        values.insert(constant.result_id.expect("a result"), value);
-    }
-    values.insert(LIMIT, Value::Number(limit));
-    let blocks = &module.functions[0].blocks;
-    let (mut before, mut block) = (0, &blocks[0]);
-    for _ in 0..1000 {
-        let entered = values.clone();
-        let mut next = None;
-        for instruction in &block.instructions {
-            let operands = &instruction.operands;
-            let id = |index: usize| id_of(instruction, index);
-            let number = |index: usize| values[&id(index)].number();
-            let computed = match instruction.class.opcode {
-                Op::Phi => {
-                    let from = operands.chunks(2).find(|pair| pair[1] == Operand::IdRef(before));
-                    entered[&from.expect("a value from the block before")[0].unwrap_id_ref()].clone()
-                }
-                Op::Load => values[&id(0)].clone(),
-                Op::IAdd => Value::Number(number(0) + number(1)),
-                Op::IMul => Value::Number(number(0) * number(1)),
-                Op::ULessThan => Value::Number(u32::from(number(0) < number(1))),
-                Op::CompositeExtract => values[&id(0)].member(&operands[1..]),
-                Op::CompositeConstruct => members(instruction, &values),
-                Op::Store => {
-                    let stored = values[&id(1)].clone();
-                    values.insert(id(0), stored);
-                    continue;
-                }
-                Op::Branch => {
-                    next = Some(id(0));
-                    continue;
-                }
-                Op::BranchConditional => {
-                    next = Some(if number(0) == 1 { id(1) } else { id(2) });
-                    continue;
-                }
-                Op::LoopMerge => continue,
-                Op::Return => return values[&RESULT].number(),
-                other => panic!("{other:?} is not in these modules"),
-            };
-            values.insert(instruction.result_id.expect("a result"), computed);
-        }
-        before = block.label_id().expect("a label");
-        block = blocks.iter().find(|block| block.label_id() == next).expect("the next block");
-    }
-    panic!("the loop does not end")
+    finished(b, total)
 }
 
 fn bytes(module: &Module) -> Vec<u8> {

@@ -1,12 +1,16 @@
 //! A field from sources to a picture, what it omitted on the way, and comparing pictures.
 
+use crate::places::{data, repository};
 use std::sync::Arc;
 use viewfuse::device::Device;
 use viewfuse::device::choice::AnyDevice;
 use viewfuse::device::cpu::Cpu;
+use viewfuse::field::options::Given;
 use viewfuse::field::render::{RenderOptions, Stage, open_album};
+use viewfuse::field::rows;
 use viewfuse::field::{AnyField, Field, FieldError, LeftOut, On, Record, Rendered, Renderer};
 use viewfuse::job::progress::{Progress, Silent};
+use viewfuse::nn::checkpoint::Checkpoint;
 use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::{FewShot, Selection};
 use viewfuse::scene::photographs::SourceImages;
@@ -17,7 +21,14 @@ use viewfuse_core::weights::Weights;
 
 /// A scene of `tests/data`.
 pub fn sample(name: &str) -> Scene {
-    Scene::open(crate::places::data(name)).expect("a scene")
+    Scene::open(data(name)).expect("a scene")
+}
+
+/// The field of a checkpoint that is included (`host/models`), with a seed.
+pub fn model(name: &str, seed: u64) -> AnyField {
+    let path = repository().join("host/models").join(name);
+    let checkpoint = Checkpoint::open(&path).expect("a checkpoint");
+    rows::open(checkpoint, &Given { seed, ..Given::default() }).expect("a network")
 }
 
 /// Targets from sources, each as an option names them.

@@ -22,39 +22,29 @@ pub unsafe extern "C" fn viewfuse_fuse_views(
     channel_count: u32,
     fused: *mut f32,
 ) -> Status {
-    // SAFETY: the caller's promise is the same.
-    Status::of(unsafe { fuse(weights, latents, view_count, channel_count, fused) })
-}
-
-/// # Safety
-/// As [`viewfuse_fuse_views`].
-unsafe fn fuse(
-    weights: *const f32,
-    latents: *const f32,
-    view_count: u32,
-    channel_count: u32,
-    fused: *mut f32,
-) -> Result<(), Status> {
-    let (views, channels) = (view_count as usize, channel_count as usize);
-    let latent_count = views.saturating_mul(channels);
-    if latent_count == 0 {
-        return Err(Status::Count);
-    }
-    // SAFETY: the caller's promise, for each of the three.
-    let (weights, latents, mut fused) =
-        unsafe { (Input::new(weights, views)?, Input::new(latents, latent_count)?, Output::new(fused, channels)?) };
-    let mut view = 0;
-    while view < views {
-        if !(0.0..=f32::MAX).contains(&weights.fetch(view)) {
-            return Err(Status::Weight);
+    let fuse = || {
+        let (views, channels) = (view_count as usize, channel_count as usize);
+        let latent_count = views.saturating_mul(channels);
+        if latent_count == 0 {
+            return Err(Status::Count);
         }
-        view += 1;
-    }
-    let block = FuseBlock { view_count, stride: channel_count, ..FuseBlock::default() };
-    let mut channel = 0;
-    while channel < channels {
-        fused.store(channel, fuse_element(&weights, &StartingAt { all: &latents, first: channel }, &block));
-        channel += 1;
-    }
-    Ok(())
+        // SAFETY: the caller's promise, for each of the three.
+        let (weights, latents, mut fused) =
+            unsafe { (Input::new(weights, views)?, Input::new(latents, latent_count)?, Output::new(fused, channels)?) };
+        let mut view = 0;
+        while view < views {
+            if !(0.0..=f32::MAX).contains(&weights.fetch(view)) {
+                return Err(Status::Weight);
+            }
+            view += 1;
+        }
+        let block = FuseBlock { view_count, stride: channel_count, ..FuseBlock::default() };
+        let mut channel = 0;
+        while channel < channels {
+            fused.store(channel, fuse_element(&weights, &StartingAt { all: &latents, first: channel }, &block));
+            channel += 1;
+        }
+        Ok(())
+    };
+    Status::of(fuse())
 }

@@ -105,34 +105,26 @@ impl From<WriteSceneError> for Failure {
     }
 }
 
-/// Errors of what the caller gave.
-macro_rules! input {
-    ($($Type:ty),+) => {
-        $(impl From<$Type> for Failure {
+/// Errors that are always failures of one kind.
+macro_rules! failures {
+    ($($Kind:ident: $($Type:ty),+;)+) => {
+        $($(impl From<$Type> for Failure {
             fn from(error: $Type) -> Failure {
-                Failure::Input(text(&error))
+                Failure::$Kind(text(&error))
             }
-        })+
+        })+)+
     };
 }
 
-input!(SceneError, SelectionError, WeightingError, AttentionError, UnknownDevice, CheckpointError, OpenError);
+failures! {
+    Input: SceneError, SelectionError, WeightingError, AttentionError, UnknownDevice, CheckpointError, OpenError;
+    Other: VulkanError;
+    File: WriteError;
+}
 
 impl From<Interrupted> for Failure {
     fn from(_: Interrupted) -> Failure {
         Failure::Interrupted
-    }
-}
-
-impl From<VulkanError> for Failure {
-    fn from(error: VulkanError) -> Failure {
-        Failure::Other(text(&error))
-    }
-}
-
-impl From<WriteError> for Failure {
-    fn from(error: WriteError) -> Failure {
-        Failure::File(text(&error))
     }
 }
 

@@ -80,11 +80,8 @@ fn in_the_denoiser() {
         "dec.64x64_aux_conv",
     ] {
         let error = not_finite(&with_module(&format!("denoiser.model.{name}"), LARGE), &sources(2));
-        assert_eq!(
-            (error.stage.as_str(), error.tensor.as_str()),
-            ("denoising at level 80", "denoised picture"),
-            "{name}"
-        );
+        let said = (error.stage.as_str(), error.tensor.as_str());
+        assert_eq!(said, ("denoising at level 80", "denoised picture"), "{name}");
     }
 }
 

@@ -1,6 +1,6 @@
 //! Depths against the closed form, and what moves with the world.
 
-use super::worlds::{RADIUS, Run, assert_shows_an_object, ball_views, lorry_views};
+use super::worlds::{RADIUS, assert_shows_an_object, ball_views, lorry_views, rendered};
 use viewfuse::field::Rendered;
 use viewfuse::field::training_free::NoObject;
 use viewfuse::scene::photographs::{SourceImage, SourceImages};
@@ -27,7 +27,7 @@ fn closed_form(camera: &Camera, column: u32, row: u32) -> Option<f64> {
 #[test]
 fn a_ball_has_the_depth_and_the_silhouette_of_a_ball() {
     let (sources, camera) = (ball_views(80), target(80));
-    let picture = Run::default().picture(&sources, &camera).expect("a picture");
+    let picture = rendered(&sources, &camera).expect("a picture");
     assert_shows_an_object(&picture);
     let footprint = f64::from(1.3 / camera.pinhole.focal()[0]);
     let (mut squares, mut signed, mut count, mut union) = (0.0, 0.0, 0, 0);
@@ -76,7 +76,7 @@ fn moved_views(sources: &SourceImages, angle: Option<f32>, shift: Vec3, scale: f
 #[test]
 fn moving_and_scaling_the_world_changes_next_to_nothing() {
     let (sources, camera) = (lorry_views(48), target(48));
-    let still = Run::default().picture(&sources, &camera).expect("a picture");
+    let still = rendered(&sources, &camera).expect("a picture");
     assert_shows_an_object(&still);
     let shift = Vec3::new(0.3, -0.7, 0.2);
     let cases = [
@@ -90,7 +90,7 @@ fn moving_and_scaling_the_world_changes_next_to_nothing() {
     let mut failures = Vec::new();
     for (what, angle, shift, scale, least) in cases {
         let there = moved_views(&sources, angle, shift, scale);
-        let picture = Run::default().picture(&there, &moved(&camera, angle, shift, scale)).expect("a picture");
+        let picture = rendered(&there, &moved(&camera, angle, shift, scale)).expect("a picture");
         let (same, largest) = (
             share_within(&still.colours, &picture.colours, 1.0 / 255.0),
             largest_difference(&still.colours, &picture.colours),
@@ -114,13 +114,13 @@ fn moving_and_scaling_the_world_changes_next_to_nothing() {
     let quality = psnr(&still);
     for angle in [0.2, 0.4, 0.8] {
         let there = moved_views(&sources, Some(angle), shift, 1.0);
-        let picture = Run::default().picture(&there, &moved(&camera, Some(angle), shift, 1.0)).expect("a picture");
+        let picture = rendered(&there, &moved(&camera, Some(angle), shift, 1.0)).expect("a picture");
         let (turned, same) = (psnr(&picture), share_within(&still.colours, &picture.colours, 1.0 / 255.0));
         println!("turned by {angle}: {same:.4} of the pixels within 1/255; {turned:.2} dB, {quality:.2} dB still");
         assert!((turned - quality).abs() < 1.0, "turned by {angle}: {turned} dB, {quality} dB still");
     }
     let elsewhere = moved_views(&sources, Some(0.4), shift, 1.0);
-    let wrong = Run::default().picture(&elsewhere, &camera);
+    let wrong = rendered(&elsewhere, &camera);
     assert!(
         wrong.map_or(0.0, |wrong| share_within(&still.colours, &wrong.colours, 1.0 / 255.0)) < 0.95,
         "a still target passes"
@@ -140,7 +140,7 @@ fn silhouettes_that_do_not_meet_are_no_object() {
         SourceImage { camera: image.camera, texels }
     };
     let images = sources.images.iter().step_by(2).enumerate().map(wandering).collect();
-    let outcome = Run::default().picture(&SourceImages { images, ..sources }, &target(32));
+    let outcome = rendered(&SourceImages { images, ..sources }, &target(32));
     assert!(outcome.as_ref().is_err_and(|error| error.is::<NoObject>()), "{:?}", outcome.map(|picture| picture.width));
 }
 
@@ -150,11 +150,11 @@ fn a_target_that_sees_nothing_shows_the_background() {
     let camera = target(32);
     let away = camera.pose.centre_world() * 2.0;
     let pose = Pose::look_at(camera.pose.centre_world(), away, Vec3::Z).expect("a pose");
-    let picture = Run::default().picture(&sources, &Camera { pose, ..camera }).expect("a picture");
+    let picture = rendered(&sources, &Camera { pose, ..camera }).expect("a picture");
     assert!(picture.colours.iter().all(|colour| *colour == [0.25, 0.5, 1.0, 0.0]), "not all background");
     assert!(picture.depths.iter().all(|depth| *depth == 0.0), "background has a depth");
     for centre in [Vec3::ZERO, Vec3::new(0.1, 0.05, 0.0), Vec3::new(200.0, 10.0, 3.0)] {
         let pose = Pose::look_at(centre, Vec3::new(0.3, 0.9, 0.1), Vec3::Z).expect("a pose");
-        assert_sound(&Run::default().picture(&sources, &Camera { pose, ..camera }).expect("a picture"));
+        assert_sound(&rendered(&sources, &Camera { pose, ..camera }).expect("a picture"));
     }
 }

@@ -4,21 +4,22 @@ use image::{Rgba, RgbaImage};
 use std::fs;
 use std::path::{Path, PathBuf};
 use viewfuse::device::cpu::Cpu;
+use viewfuse::evaluate::Evaluator;
 use viewfuse::evaluate::baseline::Baseline;
 use viewfuse::evaluate::metrics::Metrics;
 use viewfuse::evaluate::summary::{Observation, Table, table};
-use viewfuse::evaluate::{Evaluator, PSNR, SSIM};
 use viewfuse::field::On;
-use viewfuse::field::render::{Frame, RenderOptions, Stage};
+use viewfuse::field::render::{Frame, RenderOptions};
 use viewfuse::field::training_free::TrainingFree;
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
-use viewfuse::scene::few_shot::{Selection, target_of};
+use viewfuse::scene::few_shot::Selection;
 use viewfuse::scene::photographs::{Album, BackgroundChoice, PhotographsError, to_rgb8};
 use viewfuse::weighting::{OpenedChoice, Weighting};
+use viewfuse_tests::fields::{job, on_scene, sample};
 use viewfuse_tests::scenes::Folder;
 
-use super::worlds::Run;
+use super::worlds::rendered;
 
 const TRAINING: &str = "000000..000019";
 
@@ -34,24 +35,14 @@ fn scores(folder: &Path, schemes: &[&str]) -> Table {
     let scene = Scene::open(folder).expect("the sample");
     let selection = Selection { sources: Some(TRAINING.to_owned()), ..Selection::default() };
     let weightings: Vec<OpenedChoice> = schemes.iter().map(|name| scheme(name).into()).collect();
-    let (field, options, quiet) = (TrainingFree::default(), RenderOptions::default(), Silent);
     let evaluator = Evaluator {
         weightings: &weightings,
-        renderer: &On { device: &Cpu, field: &field },
-        options: &options,
+        renderer: &On { device: &Cpu, field: &TrainingFree::default() },
+        options: &RenderOptions::default(),
         scorer: &Metrics::plain(&Cpu),
-        progress: &quiet,
+        progress: &Silent,
     };
     let scores = evaluator.score_all(&scene, &selection).expect("scores");
-    for score in &scores {
-        println!(
-            "{:>16} at {}: {:.2} dB, SSIM {:.4}",
-            score.scheme,
-            score.target,
-            score.value(PSNR).unwrap_or(0.0),
-            score.value(SSIM).unwrap_or(0.0)
-        );
-    }
     table(&scores.iter().map(|score| Observation { scene: 0, job: 0, score }).collect::<Vec<_>>())
 }
 
@@ -100,20 +91,18 @@ fn error_weighting_beats_copying_and_the_mean_with_and_without_alpha() {
 
 /// The sample's first held-out view from six small sources.
 fn frame(leave_out: f32) -> (Frame, image::RgbImage) {
-    let scene = Scene::open(sample_folder()).expect("the sample");
-    let sources: Vec<usize> = (0..20).step_by(3).collect();
+    let (scene, field) = (sample("toy"), TrainingFree::default());
+    let job = job(&scene, "0..19/3", "20");
     let options = RenderOptions { size: Some([48, 48]), leave_out, ..RenderOptions::default() };
-    let album = Album::open(&scene, 0..24, &Silent).expect("photographs");
-    let (field, quiet) = (TrainingFree::default(), Silent);
-    let renderer = On { device: &Cpu, field: &field };
-    let mut stage = Stage::prepare(&scene, &album, &sources, &renderer, &options, &quiet).expect("a stage");
     let weighting = scheme("error:alpha=1");
-    stage.weigh(&weighting, &quiet).expect("depths");
-    let frame = stage.frame(&weighting, &target_of(&scene, 20), &quiet).expect("a frame");
-    let mut camera = frame.target.camera;
-    camera.pinhole = camera.pinhole.resized(48, 48).expect("a size");
-    let plain = Run::default().picture(&stage.images, &camera).expect("a picture");
-    (frame, to_rgb8(&plain.colours, [48, 48]))
+    on_scene(&scene, &job, &On { device: &Cpu, field: &field }, &options, |stage| {
+        stage.weigh(&weighting, &Silent).expect("depths");
+        let frame = stage.frame(&weighting, &job.targets[0], &Silent).expect("a frame");
+        let mut camera = frame.target.camera;
+        camera.pinhole = camera.pinhole.resized(48, 48).expect("a size");
+        let plain = rendered(&stage.images, &camera).expect("a picture");
+        (frame, to_rgb8(&plain.colours, [48, 48]))
+    })
 }
 
 #[test]

@@ -1,6 +1,5 @@
 //! Views of synthetic objects in memory, and the field run on them from end to end.
 
-use viewfuse::field::training_free::TrainingFree;
 use viewfuse::field::{AnyField, FieldError, Rendered};
 use viewfuse::scene::photographs::SourceImages;
 use viewfuse_core::Vec3;
@@ -13,26 +12,9 @@ use viewfuse_tests::lorry::orbit;
 /// The sphere's radius, around the origin.
 pub(crate) const RADIUS: f32 = 0.4;
 
-/// Everything about a run that a test may change.
-#[derive(Clone)]
-pub(crate) struct Run {
-    pub(crate) field: TrainingFree,
-    pub(crate) scheme: &'static str,
-    pub(crate) early_termination: f32,
-}
-
-impl Default for Run {
-    fn default() -> Run {
-        Run { field: TrainingFree::default(), scheme: "error:alpha=1", early_termination: 1.0 / 256.0 }
-    }
-}
-
-impl Run {
-    /// The target's picture from the sources.
-    pub(crate) fn picture(&self, sources: &SourceImages, target: &Camera) -> Result<Rendered, FieldError> {
-        let field = AnyField::new(self.field.clone());
-        weighted_picture(&field, self.scheme, sources, target, self.early_termination)
-    }
+/// The target's picture from the sources, with the usual options.
+pub(crate) fn rendered(sources: &SourceImages, target: &Camera) -> Result<Rendered, FieldError> {
+    weighted_picture(&AnyField::default(), "error:alpha=1", sources, target, 1.0 / 256.0)
 }
 
 /// A ball around the origin with a pattern all over it.

@@ -68,3 +68,16 @@ fn fail() -> ! {
 fn panic(_: &PanicInfo) -> ! {
     fail()
 }
+
+/// Functions that are measured: the emulator's trace shows where each begins, so none becomes part of its caller.
+#[macro_export]
+macro_rules! measured {
+    ($(fn $name:ident($($argument:ident: $Type:ty),+ $(,)?) $(-> $Result:ty)? $body:block)+) => {
+        $(
+            // SAFETY: no other symbol of the program has this name.
+            #[unsafe(no_mangle)]
+            #[inline(never)]
+            fn $name($($argument: $Type),+) $(-> $Result)? $body
+        )+
+    };
+}

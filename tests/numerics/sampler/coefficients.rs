@@ -130,14 +130,8 @@ fn steps_at_their_ends() {
             }
             for next in [0.9 * level, 0.1 * level].into_iter().chain(levels[known + 1..].iter().copied()) {
                 let mixes = [sampler.step(&history, next), sampler.correction(&history, next)];
-                for mix in mixes {
-                    let all = mix.results.iter().chain([&mix.state]);
-                    assert!(
-                        all.clone().all(|coefficient| coefficient.is_finite()),
-                        "{} {level} {next}",
-                        sampler.name()
-                    );
-                }
+                let mut all = mixes.iter().flat_map(|mix| mix.results.iter().chain([&mix.state]));
+                assert!(all.all(|coefficient| coefficient.is_finite()), "{sampler} {level} {next}");
             }
         }
         // A level that is not lower: nothing before it counts.

@@ -21,92 +21,58 @@ use viewfuse_list::formulas::{CHANNELS, SAMPLES, composite_ray, latents, samples
 use viewfuse_list::quantised::{ATTENTION, bytes, further_target, words};
 use viewfuse_list::rig::{Rig, VIEWS, measured_schemes};
 
-// SAFETY: no other symbol of the program has this name.
-#[unsafe(no_mangle)]
-#[inline(never)]
-fn measured_weigh(scheme: Scheme, sources: &Sources<VIEWS>, target: &Pose) -> Weights<VIEWS> {
-    weigh(scheme, sources, target)
-}
+viewfuse_firmware::measured! {
+    fn measured_weigh(scheme: Scheme, sources: &Sources<VIEWS>, target: &Pose) -> Weights<VIEWS> {
+        weigh(scheme, sources, target)
+    }
 
-// SAFETY: no other symbol of the program has this name.
-#[unsafe(no_mangle)]
-#[inline(never)]
-fn measured_attend(parameters: &QuantisedAttention, sources: &Sources<VIEWS>, target: &Pose) -> Weights<VIEWS> {
-    quantised_attention(parameters, sources, target)
-}
+    fn measured_attend(parameters: &QuantisedAttention, sources: &Sources<VIEWS>, target: &Pose) -> Weights<VIEWS> {
+        quantised_attention(parameters, sources, target)
+    }
 
-// SAFETY: no other symbol of the program has this name.
-#[unsafe(no_mangle)]
-#[inline(never)]
-fn measured_keys(parameters: &QuantisedAttention, sources: &Sources<VIEWS>) -> SourceKeys<VIEWS> {
-    SourceKeys::new(parameters, sources)
-}
+    fn measured_keys(parameters: &QuantisedAttention, sources: &Sources<VIEWS>) -> SourceKeys<VIEWS> {
+        SourceKeys::new(parameters, sources)
+    }
 
-// SAFETY: no other symbol of the program has this name.
-#[unsafe(no_mangle)]
-#[inline(never)]
-fn measured_further(keys: &SourceKeys<VIEWS>, parameters: &QuantisedAttention, target: &Pose) -> Weights<VIEWS> {
-    keys.weigh(parameters, target)
-}
+    fn measured_further(keys: &SourceKeys<VIEWS>, parameters: &QuantisedAttention, target: &Pose) -> Weights<VIEWS> {
+        keys.weigh(parameters, target)
+    }
 
-// SAFETY: no other symbol of the program has this name.
-#[unsafe(no_mangle)]
-#[inline(never)]
-fn measured_fuse_u8(weights: &Weights<VIEWS>, readings: &[[u8; CHANNELS]; VIEWS]) -> [f32; CHANNELS] {
-    fuse_readings(weights, readings)
-}
+    fn measured_fuse_u8(weights: &Weights<VIEWS>, readings: &[[u8; CHANNELS]; VIEWS]) -> [f32; CHANNELS] {
+        fuse_readings(weights, readings)
+    }
 
-// SAFETY: no other symbol of the program has this name.
-#[unsafe(no_mangle)]
-#[inline(never)]
-fn measured_fuse_i16(weights: &Weights<VIEWS>, readings: &[[i16; CHANNELS]; VIEWS]) -> [f32; CHANNELS] {
-    fuse_readings(weights, readings)
-}
+    fn measured_fuse_i16(weights: &Weights<VIEWS>, readings: &[[i16; CHANNELS]; VIEWS]) -> [f32; CHANNELS] {
+        fuse_readings(weights, readings)
+    }
 
-// SAFETY: no other symbol of the program has this name.
-#[unsafe(no_mangle)]
-#[inline(never)]
-fn measured_fuse(weights: &Weights<VIEWS>, latents: &[[f32; CHANNELS]; VIEWS]) -> [f32; CHANNELS] {
-    fuse_views(weights, latents)
-}
+    fn measured_fuse(weights: &Weights<VIEWS>, latents: &[[f32; CHANNELS]; VIEWS]) -> [f32; CHANNELS] {
+        fuse_views(weights, latents)
+    }
 
-// SAFETY: no other symbol of the program has this name.
-#[unsafe(no_mangle)]
-#[inline(never)]
-fn measured_fuse_visible(
-    weights: &Weights<VIEWS>,
-    visibility: &[f32; VIEWS],
-    latents: &[[f32; CHANNELS]; VIEWS],
-) -> [f32; CHANNELS] {
-    fuse_visible(weights, visibility, latents, [0.0; CHANNELS])
-}
+    fn measured_fuse_visible(
+        weights: &Weights<VIEWS>,
+        visibility: &[f32; VIEWS],
+        latents: &[[f32; CHANNELS]; VIEWS],
+    ) -> [f32; CHANNELS] {
+        fuse_visible(weights, visibility, latents, [0.0; CHANNELS])
+    }
 
-// SAFETY: no other symbol of the program has this name.
-#[unsafe(no_mangle)]
-#[inline(never)]
-fn measured_ray(samples: &[[f32; 4]; SAMPLES]) -> Composite<3> {
-    composite_ray(samples)
-}
+    fn measured_ray(samples: &[[f32; 4]; SAMPLES]) -> Composite<3> {
+        composite_ray(samples)
+    }
 
-// SAFETY: no other symbol of the program has this name.
-#[unsafe(no_mangle)]
-#[inline(never)]
-fn measured_depths(seed: u64) -> [f32; SAMPLES] {
-    stratified(seed)
-}
+    fn measured_depths(seed: u64) -> [f32; SAMPLES] {
+        stratified(seed)
+    }
 
-// SAFETY: no other symbol of the program has this name.
-#[unsafe(no_mangle)]
-#[inline(never)]
-fn measured_step(schedule: &NoiseSchedule, index: u32, noisy: &[f32; CHANNELS]) -> [f32; CHANNELS] {
-    denoiser_step(schedule, index, noisy)
-}
+    fn measured_step(schedule: &NoiseSchedule, index: u32, noisy: &[f32; CHANNELS]) -> [f32; CHANNELS] {
+        denoiser_step(schedule, index, noisy)
+    }
 
-// SAFETY: no other symbol of the program has this name.
-#[unsafe(no_mangle)]
-#[inline(never)]
-fn measured_sqrt(x: f32) -> f32 {
-    sqrt(x)
+    fn measured_sqrt(x: f32) -> f32 {
+        sqrt(x)
+    }
 }
 
 #[viewfuse_firmware::entry]

@@ -13,18 +13,14 @@ use viewfuse_list::Inputs;
 use viewfuse_list::attended::fourier;
 use viewfuse_list::rig::{Rig, VIEWS};
 
-// SAFETY: no other symbol of the program has this name.
-#[unsafe(no_mangle)]
-#[inline(never)]
-fn measured_embed(embedding: &FourierEmbedding, pose: &Pose) -> [f32; EMBEDDING] {
-    embedding.embed(pose)
-}
+viewfuse_firmware::measured! {
+    fn measured_embed(embedding: &FourierEmbedding, pose: &Pose) -> [f32; EMBEDDING] {
+        embedding.embed(pose)
+    }
 
-// SAFETY: no other symbol of the program has this name.
-#[unsafe(no_mangle)]
-#[inline(never)]
-fn measured_attend(embedding: &FourierEmbedding, sources: &Sources<VIEWS>, target: &Pose) -> Weights<VIEWS> {
-    cross_attention(embedding, sources, target)
+    fn measured_attend(embedding: &FourierEmbedding, sources: &Sources<VIEWS>, target: &Pose) -> Weights<VIEWS> {
+        cross_attention(embedding, sources, target)
+    }
 }
 
 #[viewfuse_firmware::entry]

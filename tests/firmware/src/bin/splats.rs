@@ -14,25 +14,18 @@ use viewfuse_list::splatted::{NEAR, SIDE, camera, row, scene};
 /// Gaussians of the scene.
 const COUNT: usize = 1000;
 
-// SAFETY: no other symbol of the program has this name.
-#[unsafe(no_mangle)]
-#[inline(never)]
-fn measured_project(gaussian: &GaussianBlock, camera: &CameraBlock) -> ProjectedGaussian {
-    project(gaussian, camera, NEAR)
-}
+viewfuse_firmware::measured! {
+    fn measured_project(gaussian: &GaussianBlock, camera: &CameraBlock) -> ProjectedGaussian {
+        project(gaussian, camera, NEAR)
+    }
 
-// SAFETY: no other symbol of the program has this name.
-#[unsafe(no_mangle)]
-#[inline(never)]
-fn measured_sort(projected: &[ProjectedGaussian; COUNT], order: &mut [u32; COUNT]) {
-    nearest_first(projected, order);
-}
+    fn measured_sort(projected: &[ProjectedGaussian; COUNT], order: &mut [u32; COUNT]) {
+        nearest_first(projected, order);
+    }
 
-// SAFETY: no other symbol of the program has this name.
-#[unsafe(no_mangle)]
-#[inline(never)]
-fn measured_row(projected: &[ProjectedGaussian; COUNT], order: &[u32; COUNT], number: u32) -> [Composite<3>; SIDE] {
-    row(projected, order, number)
+    fn measured_row(projected: &[ProjectedGaussian; COUNT], order: &[u32; COUNT], number: u32) -> [Composite<3>; SIDE] {
+        row(projected, order, number)
+    }
 }
 
 #[viewfuse_firmware::entry]
