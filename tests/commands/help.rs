@@ -1,10 +1,10 @@
 //! The help, what completes a command line, and what is said about one that was nearly right.
 
-use super::{BINARY, done};
+use super::{BINARY, assert_wrong_arguments, done, run};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
-use viewfuse_tests::command::{assert_wrong_arguments, names_in, run, toy};
+use viewfuse_tests::command::{self, names_in, toy};
 use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![
@@ -48,7 +48,7 @@ fn the_short_help_has_what_is_needed_first() {
 fn what_was_nearly_written_is_suggested() {
     let folder = toy();
     let weights = |scheme: &str, parts: &[&str]| {
-        assert_wrong_arguments(BINARY, &folder, &format!("render toy --targets 20 -o out --weights {scheme}"), parts);
+        assert_wrong_arguments(&folder, &format!("render toy --targets 20 -o out --weights {scheme}"), parts);
     };
     weights(
         "eror:alpha=1",
@@ -59,7 +59,7 @@ fn what_was_nearly_written_is_suggested() {
     for (arguments, meant) in
         [("rendr toy", "render"), ("inspct toy", "inspect"), ("render toy --wieghts mean", "--weights")]
     {
-        let outcome = run(BINARY, &folder, arguments);
+        let outcome = run(&folder, arguments);
         assert!(outcome.code == Some(2) && outcome.stderr.contains(meant), "{}", outcome.stderr);
     }
 }
@@ -69,10 +69,10 @@ fn commands_of_the_laboratory_are_told() {
     for name in ["train", "scenes", "report"] {
         for rest in ["", " --help", " learn/cars -o out --steps 5"] {
             let line = format!("`cargo run --release -p viewfuse-lab -- {name}`");
-            assert_wrong_arguments(BINARY, &folder, &format!("{name}{rest}"), &[&line]);
+            command::assert_wrong_arguments(BINARY, &folder, &format!("{name}{rest}"), &[&line]);
         }
     }
-    let outcome = run(BINARY, &folder, "trane");
+    let outcome = run(&folder, "trane");
     assert!(outcome.code == Some(2) && !outcome.stderr.contains("viewfuse-lab"), "{}", outcome.stderr);
 }
 

@@ -88,6 +88,13 @@ fn bare(views: impl IntoIterator<Item = usize>) -> Folder {
     folder
 }
 
+/// A command for which a variable names a program.
+fn with(folder: &Folder, arguments: &str, (name, value): (&str, PathBuf)) -> Command {
+    let mut command = command(folder, arguments);
+    command.env(name, value);
+    command
+}
+
 /// What a command prints; warnings and progress aside, it succeeds.
 #[track_caller]
 fn posed(command: Command) -> String {
@@ -270,13 +277,11 @@ fn too_many_and_too_few() {
 
 fn without_the_program() {
     let folder = bare(0..3);
-    let mut named: Command = command(&folder, "pose bare -o posed");
-    named.env("VIEWFUSE_OPENMVG", folder.join("nothing"));
+    let named = with(&folder, "pose bare -o posed", ("VIEWFUSE_OPENMVG", folder.join("nothing")));
     assert_command_refused(named, &folder, &["nothing: the program is not there", "`cargo openmvg` builds it"]);
     // A program that says something else.
-    let mut named: Command = command(&folder, "pose bare -o posed");
-    named.env("VIEWFUSE_OPENMVG", "/bin/echo");
     if Path::new("/bin/echo").exists() {
+        let named = with(&folder, "pose bare -o posed", ("VIEWFUSE_OPENMVG", "/bin/echo".into()));
         assert_command_refused(named, &folder, &["/bin/echo: its answer cannot be read"]);
     }
 }
@@ -289,8 +294,7 @@ fn what_lies_beside_the_output_stays() {
     assert_refused(&folder, "pose nowhere -o posed", &["nowhere"]);
     // A solver that was asked, and failed.
     if Path::new("/bin/echo").exists() {
-        let mut named: Command = command(&folder, "pose bare -o posed");
-        named.env("VIEWFUSE_OPENMVG", "/bin/echo");
+        let named = with(&folder, "pose bare -o posed", ("VIEWFUSE_OPENMVG", "/bin/echo".into()));
         assert_command_refused(named, &folder, &["/bin/echo"]);
     }
     #[cfg(unix)]

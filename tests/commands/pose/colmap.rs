@@ -1,6 +1,6 @@
 //! `--from`: a person's own COLMAP, played by a script that says what the room's poses are, or something else.
 
-use super::{COUNT_ALONE, REQUIRE, bare, no_program, no_scripts, posed, worst_rotation};
+use super::{COUNT_ALONE, REQUIRE, bare, no_program, no_scripts, posed, with, worst_rotation};
 use crate::{assert_wrong_arguments, command, list_of, read_json, text_of};
 use std::f64::consts::PI;
 use std::fmt::Write;
@@ -87,12 +87,6 @@ fn with_colmap() -> Folder {
 
 fn colmap(folder: &Folder) -> (&'static str, PathBuf) {
     ("VIEWFUSE_COLMAP", folder.join("bin/colmap"))
-}
-
-fn with(folder: &Folder, arguments: &str, (name, value): (&str, PathBuf)) -> Command {
-    let mut command = command(folder, arguments);
-    command.env(name, value);
-    command
 }
 
 fn in_place_of_openmvg() {
