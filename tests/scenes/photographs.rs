@@ -25,7 +25,7 @@ fn photographs_that_are_not_kept_are_read_when_they_are_needed() {
 #[test]
 fn the_largest_photograph_decides_the_size_up_to_the_limit() {
     let side = |folder: &scenes::Folder, size: Option<[u32; 2]>| {
-        let scene = Scene::open(&folder).expect("a scene");
+        let scene = Scene::open(folder).expect("a scene");
         let options = RenderOptions { size, ..RenderOptions::default() };
         working_side(&scene, &options, LONGEST_DEFAULT_SIDE).expect("a size")
     };

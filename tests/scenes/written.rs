@@ -328,8 +328,8 @@ fn a_scene_far_from_the_origin_is_written_in_its_own_coordinates() {
 fn hostile_names() -> Vec<(String, Vec<Layout>)> {
     let lists = || vec![Layout::Srn, Layout::Llff, Layout::Neus];
     let lines = || vec![Layout::Colmap, Layout::Middlebury];
-    let held = "plain a.b a.png dot. quote\"' #comment 1 -3 007 target_1 x_par.txt \u{e9} e\u{301} \u{feff}bom a,b;c %E9 \
-                {json} \u{1b}[2J \u{7f} *?$(rm) CON images nan";
+    let held = "plain a.b a.png dot. quote\"' #comment 1 -3 007 target_1 x_par.txt \u{e9} e\u{301} \u{feff}bom a,b;c \
+                %E9 {json} \u{1b}[2J \u{7f} *?$(rm) CON images nan";
     let mut all: Vec<(String, Vec<Layout>)> = held.split(' ').map(|name| (name.to_owned(), Vec::new())).collect();
     all.push(("x".repeat(240), Vec::new()));
     all.push(("x".repeat(241), Layout::ALL.to_vec()));
