@@ -1,15 +1,15 @@
 //! `viewfuse bench`: what it prints and what it returns.
 
-use super::{BINARY, done, list_of};
+use super::{assert_wrong_arguments, done, list_of};
 use serde_json::Value;
-use viewfuse_tests::command::{assert_wrong_arguments, files_below};
+use viewfuse_tests::command::files_below;
 use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![the_cpu_beside_its_limits,];
 
 fn the_cpu_beside_its_limits() {
     let folder = Folder::new();
-    let printed = done(folder.path(), "bench --device cpu --rounds 1 --json");
+    let printed = done(&folder, "bench --device cpu --rounds 1 --json");
     let bench: Value = serde_json::from_str(&printed).expect("JSON");
     let device = &bench["devices"][0];
     assert!(device["device"].as_str().is_some_and(|name| name.starts_with("cpu")), "{device}");
@@ -35,9 +35,9 @@ fn the_cpu_beside_its_limits() {
             assert!(figure > 0.0 && figure.is_finite(), "{kernel}");
         }
     }
-    assert_eq!(files_below(folder.path()), [], "it leaves nothing behind");
-    let table = done(folder.path(), "bench --device cpu --rounds 1");
+    assert_eq!(files_below(&folder), [], "it leaves nothing behind");
+    let table = done(&folder, "bench --device cpu --rounds 1");
     assert!(table.contains("GB/s, multiplies and adds") && table.contains("share of it"), "{table}");
-    assert_wrong_arguments(BINARY, folder.path(), "bench --rounds 0", &["0"]);
-    assert_wrong_arguments(BINARY, folder.path(), "bench --device gpu", &["gpu", "cpu"]);
+    assert_wrong_arguments(&folder, "bench --rounds 0", &["0"]);
+    assert_wrong_arguments(&folder, "bench --device gpu", &["gpu", "cpu"]);
 }

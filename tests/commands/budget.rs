@@ -1,11 +1,11 @@
 //! `--max-error` and `--max-time`.
 
-use super::{BINARY, done, list_of, number_of, read_json, text_of};
+use super::{assert_wrong_arguments, done, done_with_warnings, list_of, number_of, read_json, text_of};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use viewfuse::field::scores::psnr_of_seen;
-use viewfuse_tests::command::{assert_wrong_arguments, run, toy};
+use viewfuse_tests::command::toy;
 
 viewfuse_tests::trials![
     a_bound_on_the_error_is_kept_and_recorded,
@@ -24,8 +24,8 @@ fn frames(folder: &Path) -> Vec<Value> {
 
 fn a_bound_on_the_error_is_kept_and_recorded() {
     let folder = toy();
-    let printed = done(folder.path(), &format!("render toy {NETWORK} --max-error 30dB -o out"));
-    for frame in frames(folder.path()) {
+    let printed = done(&folder, &format!("render toy {NETWORK} --max-error 30dB -o out"));
+    for frame in frames(&folder) {
         let kept = &frame["kept"];
         let most = number_of(&kept["most_error"]);
         assert!((most - 10.0_f64.powf(-1.5)).abs() < 1.0e-6, "{kept}");
@@ -35,15 +35,15 @@ fn a_bound_on_the_error_is_kept_and_recorded() {
         assert!(printed.contains(effort), "{printed}");
     }
     // The same bound as a number gives the same pictures.
-    let picture = || fs::read(folder.path().join("out/000020.png")).expect("a picture");
+    let picture = || fs::read(folder.join("out/000020.png")).expect("a picture");
     let before = picture();
-    fs::remove_dir_all(folder.path().join("out")).expect("removed");
-    done(folder.path(), &format!("render toy {NETWORK} --max-error 0.0316228 -o out"));
+    fs::remove_dir_all(folder.join("out")).expect("removed");
+    done(&folder, &format!("render toy {NETWORK} --max-error 0.0316228 -o out"));
     assert!(before == picture());
     // Nothing may be omitted for a bound that only the exact picture keeps.
-    fs::remove_dir_all(folder.path().join("out")).expect("removed");
-    done(folder.path(), &format!("render toy {NETWORK} --max-error 119dB -o out"));
-    assert!(frames(folder.path()).iter().all(|frame| frame["kept"]["effort"] == "exact"));
+    fs::remove_dir_all(folder.join("out")).expect("removed");
+    done(&folder, &format!("render toy {NETWORK} --max-error 119dB -o out"));
+    assert!(frames(&folder).iter().all(|frame| frame["kept"]["effort"] == "exact"));
 }
 
 /// With what was omitted by these test networks before there was a default bound they are 24, 52 and 35 dB from their
@@ -51,15 +51,13 @@ fn a_bound_on_the_error_is_kept_and_recorded() {
 fn a_network_keeps_45_decibels_unless_options_say_what_is_omitted() {
     let folder = toy();
     let render = |options: &str| {
-        if folder.path().join("out").exists() {
-            fs::remove_dir_all(folder.path().join("out")).expect("removed");
+        if folder.join("out").exists() {
+            fs::remove_dir_all(folder.join("out")).expect("removed");
         }
-        let printed = done(
-            folder.path(),
-            &format!("render toy --targets 20 --views 3 --size 24x24 --device cpu {options} -o out"),
-        );
-        let picture = image::open(folder.path().join("out/000020.png")).expect("a picture").to_rgb8();
-        (picture, frames(folder.path())[0]["kept"].clone(), printed)
+        let printed =
+            done(&folder, &format!("render toy --targets 20 --views 3 --size 24x24 --device cpu {options} -o out"));
+        let picture = image::open(folder.join("out/000020.png")).expect("a picture").to_rgb8();
+        (picture, frames(&folder)[0]["kept"].clone(), printed)
     };
     for model in ["--model formula:16", "--model body:16", "--model genvs:small"] {
         let (exact, kept, _) = render(&format!("{model} --exact"));
@@ -84,18 +82,17 @@ fn a_network_keeps_45_decibels_unless_options_say_what_is_omitted() {
 
 fn a_time_that_is_too_short_is_said() {
     let folder = toy();
-    let printed = done(folder.path(), &format!("render toy {NETWORK} --max-time 1ms -o out"));
+    let printed = done(&folder, &format!("render toy {NETWORK} --max-time 1ms -o out"));
     assert_eq!(printed.matches("MORE than the 0.001 s that were asked for").count(), 2, "{printed}");
-    fs::remove_dir_all(folder.path().join("out")).expect("removed");
-    let printed = done(folder.path(), &format!("render toy {NETWORK} --max-time 600 -o out"));
+    fs::remove_dir_all(folder.join("out")).expect("removed");
+    let printed = done(&folder, &format!("render toy {NETWORK} --max-time 600 -o out"));
     assert!(!printed.contains("MORE"), "{printed}");
-    assert!(frames(folder.path()).iter().all(|frame| frame["kept"]["effort"] == "exact"));
+    assert!(frames(&folder).iter().all(|frame| frame["kept"]["effort"] == "exact"));
 }
 
 fn an_evaluation_says_how_its_bound_is_kept() {
     let folder = toy();
-    let outcome = run(BINARY, folder.path(), &format!("evaluate toy {NETWORK} --weights mean --max-error 30dB"));
-    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let outcome = done_with_warnings(&folder, &format!("evaluate toy {NETWORK} --weights mean --max-error 30dB"));
     let all = format!("{}{}", outcome.stdout, outcome.stderr);
     // Each of the two targets is held out by itself.
     assert_eq!(all.matches("mean: the bound is kept by 1 of 1 pictures: ").count(), 2, "{all}");
@@ -104,7 +101,7 @@ fn an_evaluation_says_how_its_bound_is_kept() {
 fn wrong_bounds_are_refused() {
     let folder = toy();
     let wrong = |options: &str, parts: &[&str]| {
-        assert_wrong_arguments(BINARY, folder.path(), &format!("render toy --targets 20 {options} -o out"), parts);
+        assert_wrong_arguments(&folder, &format!("render toy --targets 20 {options} -o out"), parts);
     };
     for error in ["0", "-3", "3dB", "200dB", "nan", "much", "dB"] {
         wrong(&format!("--max-error={error}"), &["--max-error", error]);

@@ -1,8 +1,8 @@
 //! `viewfuse check`: what it prints and what it returns.
 
-use super::{BINARY, done, list_of};
+use super::{assert_refused, assert_wrong_arguments, done, list_of, run};
 use serde_json::Value;
-use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, files_below, run, toy};
+use viewfuse_tests::command::{files_below, toy};
 use viewfuse_tests::scenes::Folder;
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -10,7 +10,7 @@ viewfuse_tests::trials![every_kernel_and_a_picture_on_the_cpu, json_says_the_sam
 
 fn every_kernel_and_a_picture_on_the_cpu() {
     let folder = Folder::new();
-    let printed = done(folder.path(), "check --device cpu --seeds 1");
+    let printed = done(&folder, "check --device cpu --seeds 1");
     for kernel in Kernel::ALL {
         let is_it = |line: &str| line.split_whitespace().next() == Some(kernel.name());
         let row = |line: &&str| is_it(line) && line.trim().ends_with(" ok");
@@ -19,12 +19,12 @@ fn every_kernel_and_a_picture_on_the_cpu() {
     }
     assert!(printed.contains("everything within tolerance") && !printed.contains("EXCEEDED"), "{printed}");
     assert!(printed.contains("picture: the synthetic lorry, view 000010 from 10 others at 64x64"), "{printed}");
-    assert_eq!(files_below(folder.path()), [], "it leaves nothing behind");
+    assert_eq!(files_below(&folder), [], "it leaves nothing behind");
 }
 
 fn json_says_the_same() {
     let folder = toy();
-    let printed = done(folder.path(), "check --seeds 1 --scene toy --device cpu --json");
+    let printed = done(&folder, "check --seeds 1 --scene toy --device cpu --json");
     let report: Value = serde_json::from_str(&printed).expect("JSON");
     assert_eq!((&report["seed_count"], report["devices"].as_array().map(Vec::len)), (&1.into(), Some(1)));
     let device = &report["devices"][0];
@@ -52,9 +52,9 @@ fn json_says_the_same() {
 
 fn what_is_not_there_is_refused() {
     let folder = toy();
-    assert_wrong_arguments(BINARY, folder.path(), "check --device gpu", &["gpu", "cpu"]);
-    assert_wrong_arguments(BINARY, folder.path(), "check --seeds 0", &["0"]);
-    assert_refused(BINARY, folder.path(), "check --scene nowhere", &["picture of nowhere", "no such file"]);
-    let help = run(BINARY, folder.path(), "check --help").stdout;
+    assert_wrong_arguments(&folder, "check --device gpu", &["gpu", "cpu"]);
+    assert_wrong_arguments(&folder, "check --seeds 0", &["0"]);
+    assert_refused(&folder, "check --scene nowhere", &["picture of nowhere", "no such file"]);
+    let help = run(&folder, "check --help").stdout;
     assert!(help.contains("Exit code 1 if a tolerance is exceeded or a device fails."), "{help}");
 }

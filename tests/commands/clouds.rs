@@ -1,6 +1,6 @@
 //! `viewfuse points`, read by another program's reader.
 
-use super::{BINARY, done};
+use super::{assert_refused, assert_wrong_arguments, done};
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{DefaultElement, Property};
 use std::fs::File;
@@ -8,7 +8,7 @@ use std::io::BufReader;
 use std::path::Path;
 use viewfuse::core::Vec3;
 use viewfuse::scene::Scene;
-use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, toy};
+use viewfuse_tests::command::toy;
 
 viewfuse_tests::trials![the_lorry_as_points, too_much_agreement_is_refused, another_format_is_refused_before_the_work];
 
@@ -40,11 +40,11 @@ fn points(path: &Path) -> Vec<Point> {
 
 fn the_lorry_as_points() {
     let folder = toy();
-    let printed = done(folder.path(), "points toy --size 64x64 --device cpu -o cloud/toy.ply");
-    let points = points(&folder.path().join("cloud/toy.ply"));
+    let printed = done(&folder, "points toy --size 64x64 --device cpu -o cloud/toy.ply");
+    let points = points(&folder.join("cloud/toy.ply"));
     assert!(printed.starts_with(&format!("cloud/toy.ply: {} points of 24 views\n", points.len())), "{printed}");
     assert!(points.len() > 2000, "{printed}");
-    let scene = Scene::open(folder.path().join("toy")).expect("the sample");
+    let scene = Scene::open(folder.join("toy")).expect("the sample");
     let photographs: Vec<_> = (0..24).map(|view| scene.photograph(view).expect("a photograph").pixels).collect();
     let (mut outside, mut checked, mut close, mut compared) = (0, 0, 0, 0);
     for point in &points {
@@ -87,15 +87,15 @@ fn the_lorry_as_points() {
 fn too_much_agreement_is_refused() {
     let folder = toy();
     let arguments = "points toy --sources 0..1 --agree 3 --size 16x16 --device cpu -o none.ply";
-    assert_refused(BINARY, folder.path(), arguments, &["toy: no 3 of 2 views agree"]);
+    assert_refused(&folder, arguments, &["toy: no 3 of 2 views agree"]);
 }
 
 fn another_format_is_refused_before_the_work() {
     let folder = toy();
     for file in ["toy.obj", "toy", "ply"] {
         let parts = [file, "point clouds are written as .ply"];
-        assert_wrong_arguments(BINARY, folder.path(), &format!("points toy -o {file}"), &parts);
+        assert_wrong_arguments(&folder, &format!("points toy -o {file}"), &parts);
     }
-    done(folder.path(), "points toy --size 16x16 --sources 0..7 --agree 1 --device cpu -o toy.PLY");
-    assert!(folder.path().join("toy.PLY").exists());
+    done(&folder, "points toy --size 16x16 --sources 0..7 --agree 1 --device cpu -o toy.PLY");
+    assert!(folder.join("toy.PLY").exists());
 }

@@ -1,9 +1,9 @@
 //! `viewfuse compare`.
 
-use super::{BINARY, assert_near, done, list_of, number_of, read_json};
+use super::{assert_near, assert_refused, assert_wrong_arguments, done, list_of, number_of, read_json};
 use image::DynamicImage;
 use image::metadata::Orientation;
-use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, f32_bytes, safetensors, toy};
+use viewfuse_tests::command::{f32_bytes, safetensors, toy};
 use viewfuse_tests::scenes::with_tag;
 
 viewfuse_tests::trials![
@@ -23,7 +23,7 @@ fn row<'a>(printed: &'a str, metric: &str) -> Vec<&'a str> {
 
 fn one_picture_and_folders() {
     let folder = toy();
-    let printed = done(folder.path(), "compare toy/rgb/000000.png toy/rgb/000000.png");
+    let printed = done(&folder, "compare toy/rgb/000000.png toy/rgb/000000.png");
     assert!(printed.starts_with("1 picture\n"), "{printed}");
     assert_eq!(row(&printed, "psnr")[1..], ["inf", "inf", "toy/rgb/000000.png"]);
     assert_eq!(row(&printed, "ssim")[1..3], ["1.0000", "1.0000"]);
@@ -32,13 +32,13 @@ fn one_picture_and_folders() {
         folder.write(&format!("made/{name}.png"), bytes);
     }
     folder.write("made/notes.txt", "no picture");
-    let printed = done(folder.path(), "compare made toy/rgb");
+    let printed = done(&folder, "compare made toy/rgb");
     assert!(printed.starts_with("2 pictures\n"), "{printed}");
     assert_eq!(row(&printed, "psnr")[3], "000002.png", "the worst");
     assert_ne!(row(&printed, "ssim")[2], "1.0000");
     // As the published evaluation: other numbers.
-    let published = done(folder.path(), "compare made/000002.png toy/rgb/000002.png --metrics-as viewattention");
-    let plain = done(folder.path(), "compare made/000002.png toy/rgb/000002.png");
+    let published = done(&folder, "compare made/000002.png toy/rgb/000002.png --metrics-as viewattention");
+    let plain = done(&folder, "compare made/000002.png toy/rgb/000002.png");
     assert_eq!(row(&published, "psnr").len(), 4);
     assert_eq!(plain.lines().count(), published.lines().count());
 }
@@ -56,12 +56,12 @@ fn scores_are_those_of_render() {
         let render = format!(
             "render toy --targets 20..23 --sources 0..7 --size 48x48 --weights mean --device cpu {more} -o {out}"
         );
-        done(folder.path(), &render);
-        let record = read_json(folder.path().join(out).join("run.json"));
+        done(&folder, &render);
+        let record = read_json(folder.join(out).join("run.json"));
         let scores = |name: &str| -> Vec<f64> {
             list_of(&record["frames"]).iter().map(|frame| number_of(&frame[name])).collect()
         };
-        let printed = done(folder.path(), &format!("compare {out}/ toy/rgb/"));
+        let printed = done(&folder, &format!("compare {out}/ toy/rgb/"));
         assert!(printed.starts_with("4 pictures\n") && printed.contains(&format!("({out}/run.json)")), "{printed}");
         assert!(printed.contains("4 of 4 photographs are larger: resampled by area averages"), "{printed}");
         for metric in ["psnr", "ssim"] {
@@ -71,14 +71,14 @@ fn scores_are_those_of_render() {
             assert_near(number(&printed, metric, 1), again.iter().sum::<f64>() / 4.0, rounding);
             assert_near(number(&printed, metric, 2), again.iter().copied().fold(f64::INFINITY, f64::min), rounding);
         }
-        let printed = done(folder.path(), &format!("compare {out}/000020.png toy/rgb/000020.png"));
+        let printed = done(&folder, &format!("compare {out}/000020.png toy/rgb/000020.png"));
         assert_near(number(&printed, "psnr", 1), scores("psnr")[0], 0.05);
     }
     // Another extension is the same picture's.
-    let photograph = image::open(folder.path().join("toy/rgb/000020.png")).expect("a picture").to_rgb8();
+    let photograph = image::open(folder.join("toy/rgb/000020.png")).expect("a picture").to_rgb8();
     photograph.save(folder.file("photographs/000020.jpg")).expect("a picture");
-    folder.write("one/000020.png", std::fs::read(folder.path().join("out/000020.png")).expect("a picture"));
-    let printed = done(folder.path(), "compare one photographs");
+    folder.write("one/000020.png", std::fs::read(folder.join("out/000020.png")).expect("a picture"));
+    let printed = done(&folder, "compare one photographs");
     assert!(number(&printed, "psnr", 1) > 10.0, "{printed}");
 }
 
@@ -92,17 +92,17 @@ fn transparent_pictures_are_laid_over_a_background() {
     picture("green.png", [0, 255, 0, 255]);
     picture("red.png", [255, 0, 0, 255]);
     for (background, same) in [("", "white"), ("--background 0,255,0", "green"), ("--background none", "red")] {
-        let printed = done(folder.path(), &format!("compare clear.png {same}.png {background}"));
+        let printed = done(&folder, &format!("compare clear.png {same}.png {background}"));
         assert_eq!(row(&printed, "psnr")[1], "inf", "{background}: {printed}");
     }
-    let printed = done(folder.path(), "compare clear.png green.png");
+    let printed = done(&folder, "compare clear.png green.png");
     assert!(number(&printed, "psnr", 1) < 10.0 && printed.contains("over 255,255,255 (the default)"), "{printed}");
 }
 
 /// Photographs as telephones save them: on either side of a comparison, alone and in folders, square or not.
 fn pictures_are_compared_upright() {
     let folder = toy();
-    let square = image::open(folder.path().join("toy/rgb/000003.png")).expect("a picture").into_rgb8();
+    let square = image::open(folder.join("toy/rgb/000003.png")).expect("a picture").into_rgb8();
     let oblong = image::DynamicImage::from(square.clone()).crop_imm(0, 20, 128, 80);
     for (name, plain) in [("square", square.into()), ("oblong", oblong)] {
         plain.save(folder.file(&format!("plain/{name}.png"))).expect("a picture");
@@ -119,14 +119,14 @@ fn pictures_are_compared_upright() {
     }
     for tag in 2..=8 {
         let pair = if tag % 2 == 0 { format!("plain turned-{tag}") } else { format!("turned-{tag} plain") };
-        let printed = done(folder.path(), &format!("compare {pair} --device cpu"));
+        let printed = done(&folder, &format!("compare {pair} --device cpu"));
         assert!(printed.starts_with("2 pictures\n") && number(&printed, "psnr", 2) > 25.0, "{pair}: {printed}");
     }
 }
 
 fn pictures_of_every_depth_and_kind_are_compared_alike() {
     let folder = toy();
-    let photograph = image::open(folder.path().join("toy/rgb/000003.png")).expect("a picture");
+    let photograph = image::open(folder.join("toy/rgb/000003.png")).expect("a picture");
     let (colour, grey) = (photograph.to_rgb8(), photograph.to_luma8());
     let same: [(&str, DynamicImage, Vec<DynamicImage>); 2] = [
         (
@@ -153,7 +153,7 @@ fn pictures_of_every_depth_and_kind_are_compared_alike() {
         for other in others {
             other.save(folder.file("other.png")).expect("a picture");
             for pair in ["plain.png other.png", "other.png plain.png"] {
-                let printed = done(folder.path(), &format!("compare {pair} --device cpu"));
+                let printed = done(&folder, &format!("compare {pair} --device cpu"));
                 assert_eq!(row(&printed, "psnr")[1], "inf", "{name}, {:?}: {printed}", other.color());
             }
         }
@@ -168,7 +168,7 @@ fn what_cannot_be_compared() {
     folder.image("large.png", 256, 256);
     folder.write("head.safetensors", safetensors(&[("mlp.weight", "F32", &[1], f32_bytes([1.0]))]));
     let refused = |arguments: &str, parts: &[&str]| {
-        assert_refused(BINARY, folder.path(), &format!("compare {arguments} --device cpu"), parts);
+        assert_refused(&folder, &format!("compare {arguments} --device cpu"), parts);
     };
     refused("made toy/rgb", &["made: has no pictures"]);
     refused("toy/rgb made", &["made/000000.png: is missing", "toy/rgb/000000.png"]);
@@ -184,7 +184,7 @@ fn what_cannot_be_compared() {
     refused(&format!("{one} --dists toy/rgb/000000.png"), &["toy/rgb/000000.png", "not a checkpoint"]);
     refused(&format!("{one} --fid head.safetensors"), &["--fid", "head.safetensors", "fc.weight"]);
     let wrong = |arguments: &str, parts: &[&str]| {
-        assert_wrong_arguments(BINARY, folder.path(), &format!("compare {one} {arguments}"), parts);
+        assert_wrong_arguments(&folder, &format!("compare {one} {arguments}"), parts);
     };
     wrong("--lpips alexnet.pth", &["alex=alexnet.pth"]);
     wrong("--lpips resnet=a.pth", &["alex, vgg and squeeze", "'resnet'"]);

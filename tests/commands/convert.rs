@@ -1,13 +1,13 @@
 //! `viewfuse convert`: what it prints, and what it refuses.
 
-use super::{BINARY, done};
+use super::{assert_refused, assert_wrong_arguments, done, run};
 use std::collections::BTreeMap;
 use std::path::Path;
 use viewfuse::field::pixelnerf::test_networks::deterministic_of_width as formula_of_width;
 use viewfuse::field::{genvs, pixelnerf};
 use viewfuse::job::progress::Silent;
 use viewfuse::nn::checkpoint::{Checkpoint, Precision, TensorShape};
-use viewfuse_tests::command::{self, Outcome, assert_refused, assert_wrong_arguments, files_below, toy};
+use viewfuse_tests::command::{Outcome, files_below, toy};
 use viewfuse_tests::places::{data, repository};
 use viewfuse_tests::scenes::Folder;
 
@@ -23,7 +23,7 @@ viewfuse_tests::trials![
 fn training() -> Folder {
     let folder = Folder::new();
     let file = data("checkpoints/training.pth");
-    std::fs::copy(file, folder.path().join("training.pth")).expect("the checkpoint");
+    std::fs::copy(file, folder.join("training.pth")).expect("the checkpoint");
     folder
 }
 
@@ -59,7 +59,7 @@ fn in_half_precision() {
 fn refusals() {
     let folder = training();
     let before = files_below(folder.path());
-    let refused = |arguments: &str, parts: &[&str]| assert_refused(BINARY, folder.path(), arguments, parts);
+    let refused = |arguments: &str, parts: &[&str]| assert_refused(folder.path(), arguments, parts);
     refused("convert training.pth out.pth", &["out.pth: output formats are safetensors"]);
     refused("convert none.pth out.safetensors", &["none.pth: cannot be read: No such file"]);
     std::fs::write(folder.path().join("page.pth"), "<html>").expect("a file");
@@ -81,7 +81,7 @@ fn an_unknown_max_pool_is_told() {
     };
     let silent = Checkpoint::in_memory("it", tensors.map(value), BTreeMap::new());
     silent.write_safetensors(&folder.join("a.safetensors"), Precision::Kept, &Silent).expect("written");
-    let run = |model: &str| {
+    let loading = |model: &str| {
         let small = format!("--size 16x16 --device cpu --model {model}");
         [
             format!("render toy --targets 20 --sources 0,1 {small} -o {model}.out"),
@@ -90,26 +90,26 @@ fn an_unknown_max_pool_is_told() {
             format!("convert {model} again-{model}"),
         ]
     };
-    for arguments in run("a.safetensors") {
-        let Outcome { code, stderr, .. } = command::run(BINARY, &folder, &arguments);
+    for arguments in loading("a.safetensors") {
+        let Outcome { code, stderr, .. } = run(&folder, &arguments);
         let is_told =
             stderr.matches("viewfuse: warning: a.safetensors: what its tensors do not tell is assumed").count();
         assert_eq!((code, is_told), (Some(0), 1), "{arguments}\n{stderr}");
     }
     let printed = words(&folder, "convert a.safetensors b.safetensors --set viewfuse.first_pool=0");
     assert!(printed.contains("kept viewfuse.first_pool = 0"), "{printed}");
-    for arguments in run("b.safetensors") {
-        let Outcome { code, stderr, .. } = command::run(BINARY, &folder, &arguments);
+    for arguments in loading("b.safetensors") {
+        let Outcome { code, stderr, .. } = run(&folder, &arguments);
         assert_eq!((code, stderr.contains("do not tell")), (Some(0), false), "{arguments}\n{stderr}");
     }
     for value in ["viewfuse.first_pool", "=0", "viewfuse.first_pool="] {
         let arguments = format!("convert a.safetensors c.safetensors --set {value}");
-        assert_wrong_arguments(BINARY, &folder, &arguments, &["--set", "for example viewfuse.first_pool=0"]);
+        assert_wrong_arguments(&folder, &arguments, &["--set", "for example viewfuse.first_pool=0"]);
     }
     let keys = [&pixelnerf::KEYS[..], &genvs::KEYS[..]].concat();
     let refusal = format!("nothing reads the key viewfuse.first_pol; those that exist are {}", keys.join(", "));
     let misspelled = "convert a.safetensors c.safetensors --set viewfuse.first_pol=0";
-    assert_wrong_arguments(BINARY, &folder, misspelled, &["--set", &refusal]);
+    assert_wrong_arguments(&folder, misspelled, &["--set", &refusal]);
     assert!(!folder.join("c.safetensors").exists());
 }
 
@@ -118,14 +118,14 @@ fn learned_attention_becomes_a_header() {
     let models = repository().join("host/models");
     for (name, from) in [("learned", "attention"), ("flat", "attention_flat")] {
         let from = models.join(format!("pixelnerf_cars_{from}.safetensors"));
-        std::fs::copy(from, folder.path().join(format!("{name}.safetensors"))).expect("a weighting");
+        std::fs::copy(from, folder.join(format!("{name}.safetensors"))).expect("a weighting");
     }
-    let printed = done(folder.path(), "convert learned.safetensors new/attention.h");
+    let printed = done(&folder, "convert learned.safetensors new/attention.h");
     assert!(printed.contains("new/attention.h: viewfuse_attention_parameters"), "{printed}");
-    let header = std::fs::read_to_string(folder.path().join("new/attention.h")).expect("a header");
+    let header = std::fs::read_to_string(folder.join("new/attention.h")).expect("a header");
     assert!(header.starts_with("/* The attention weighting of learned.safetensors"), "{header:.200}");
     assert_eq!(header.matches("f,").count(), 15232);
-    let refused = |arguments: &str, parts: &[&str]| assert_refused(BINARY, folder.path(), arguments, parts);
+    let refused = |arguments: &str, parts: &[&str]| assert_refused(&folder, arguments, parts);
     refused("convert flat.safetensors flat.h", &["flat.safetensors", "Fourier"]);
     refused("convert learned.safetensors half.h --half", &["half.h", "--half"]);
 }

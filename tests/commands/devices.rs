@@ -1,9 +1,9 @@
 //! `viewfuse devices`, the option `--device`, and `check` of all devices. What is there is asked of the library: on a
 //! machine without Vulkan it is the CPU alone.
 
-use super::{BINARY, done, list_of, read_json};
+use super::{assert_refused, assert_wrong_arguments, done, list_of, read_json};
 use serde_json::{Value, json};
-use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, files_below, toy};
+use viewfuse_tests::command::{files_below, toy};
 use viewfuse_tests::devices::vulkan_devices;
 use viewfuse_tests::scenes::Folder;
 use viewfuse_vulkan::{Adapter, Missing};
@@ -26,7 +26,7 @@ fn adapters() -> (Vec<Adapter>, Option<String>) {
 fn devices_lists_what_is_there() {
     let folder = Folder::new();
     let (adapters, problem) = adapters();
-    let printed = done(folder.path(), "devices");
+    let printed = done(&folder, "devices");
     let row = |start: &str, name: &str| {
         let is_it = |line: &&str| line.split_whitespace().next() == Some(start) && line.contains(name);
         assert_eq!(printed.lines().filter(is_it).count(), 1, "{start} {name}:\n{printed}");
@@ -39,7 +39,7 @@ fn devices_lists_what_is_there() {
         }
     }
     assert!(problem.is_none_or(|problem| printed.contains(&problem)), "{printed}");
-    assert_eq!(files_below(folder.path()), [], "it leaves nothing behind");
+    assert_eq!(files_below(&folder), [], "it leaves nothing behind");
 }
 
 fn devices_as_json() {
@@ -62,14 +62,9 @@ fn devices_that_are_not_there_are_refused() {
     let render = |device: &str| format!("render toy --targets 20 --size 16x16 -o out --device {device}");
     for device in ["nonsense", "gpu", "vulkan:", "vulkan0", "cpu:1", "VULKAN"] {
         let parts = [device, "auto, cpu, vulkan, vulkan:NUMBER, vulkan:NAME", "viewfuse devices"];
-        assert_wrong_arguments(BINARY, scene.path(), &render(device), &parts);
+        assert_wrong_arguments(&scene, &render(device), &parts);
     }
-    assert_wrong_arguments(
-        BINARY,
-        scene.path(),
-        &format!("{} --time-limit 0", render("cpu")),
-        &["from 0.001 to 86400"],
-    );
+    assert_wrong_arguments(&scene, &format!("{} --time-limit 0", render("cpu")), &["from 0.001 to 86400"]);
     let (adapters, problem) = adapters();
     // A number is an index, also where it stands in a device's name.
     let in_names = adapters.iter().flat_map(|adapter| adapter.name.split(|letter: char| !letter.is_ascii_digit()));
@@ -81,7 +76,7 @@ fn devices_that_are_not_there_are_refused() {
         let are = if counted.len() == 1 { "is" } else { "are" };
         let said = format!("no Vulkan device {wanted}; there {are}: {}", counted.join(", "));
         let device = format!("vulkan:{}", wanted.trim_matches('\''));
-        assert_refused(BINARY, scene.path(), &render(&device), &[problem.as_deref().unwrap_or(&said)]);
+        assert_refused(&scene, &render(&device), &[problem.as_deref().unwrap_or(&said)]);
     }
 }
 
@@ -92,9 +87,9 @@ fn the_device_is_in_the_record() {
     let expected = usable.map(|adapter| (format!("vulkan:{}", adapter.index), format!("vulkan ({})", adapter.name)));
     for (device, name) in [("cpu".to_owned(), "cpu (".to_owned())].into_iter().chain(expected) {
         let arguments = format!("render toy --targets 20 --views 3 --size 16x16 --device {device} -o out");
-        let printed = done(scene.path(), &arguments);
+        let printed = done(&scene, &arguments);
         assert!(printed.lines().any(|line| line.starts_with("device: ") && line.ends_with(", requested")), "{printed}");
-        let record = read_json(scene.path().join("out/run.json"));
+        let record = read_json(scene.join("out/run.json"));
         assert!(record["device"].as_str().is_some_and(|device| device.starts_with(&name)), "{record}");
         assert_eq!(record["device_reason"], "requested");
         // Devices that count say what their kernels took.

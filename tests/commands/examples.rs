@@ -21,7 +21,7 @@ pub(super) fn run(line: &str) -> bool {
         let scene = toy();
         fs::rename(scene.file("toy"), scene.file("photographs")).expect("photographs");
         let few = with_few_pictures(arguments.split(' ').map(str::to_owned));
-        command::done(BINARY, scene.path(), &few.join(" "));
+        command::done(BINARY, &scene, &few.join(" "));
     } else {
         return false;
     }

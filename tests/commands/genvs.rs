@@ -1,15 +1,13 @@
 //! `viewfuse` with a GeNVS.
 
-use super::{BINARY, done, list_of, read_json, text_of, texts};
+use super::{assert_refused, assert_wrong_arguments, command, done, list_of, read_json, text_of, texts};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use viewfuse::field::{genvs, pixelnerf};
 use viewfuse::job::progress::Silent;
 use viewfuse::nn::checkpoint::Precision;
-use viewfuse_tests::command::{
-    Outcome, assert_refused, assert_wrong_arguments, command, f32_bytes, names_in, safetensors, toy,
-};
+use viewfuse_tests::command::{Outcome, f32_bytes, names_in, safetensors, toy};
 
 viewfuse_tests::trials![
     a_picture_of_any_size_a_sheet_and_a_record_without_depth,
@@ -68,15 +66,14 @@ fn a_picture_of_any_size_a_sheet_and_a_record_without_depth() {
 
 fn unless_told_otherwise_the_size_is_the_networks() {
     let scene = toy();
-    done(scene.path(), "render toy --targets 20 --views 2 --model genvs:small --steps 1 --device cpu -o out");
-    let picture = image::open(scene.path().join("out/000020.png")).expect("a picture");
+    done(&scene, "render toy --targets 20 --views 2 --model genvs:small --steps 1 --device cpu -o out");
+    let picture = image::open(scene.join("out/000020.png")).expect("a picture");
     assert_eq!((picture.width(), picture.height()), (64, 64));
 }
 
 fn options_reach_the_run() {
     let scene = toy();
-    let denoising =
-        |options: &str| record(scene.path(), &format!("--model genvs:small {options}"))["denoising"].clone();
+    let denoising = |options: &str| record(&scene, &format!("--model genvs:small {options}"))["denoising"].clone();
     let heun = denoising("--sampler heun --steps 3 --noise 10,0.5 --churn 2");
     assert_eq!((&heun["sampler"], &heun["levels"], &heun["calls"]), (&"heun".into(), &3.into(), &5.into()));
     assert_eq!((&heun["noise"], &heun["churn"]), (&[10.0, 0.5][..].into(), &2.0.into()));
@@ -92,18 +89,18 @@ fn options_reach_the_run() {
 
 fn exact_omits_nothing() {
     let scene = toy();
-    let exact = record(scene.path(), "--model genvs:small --exact --weights distance:power=3");
+    let exact = record(&scene, "--model genvs:small --exact --weights distance:power=3");
     let denoising = &exact["denoising"];
     assert_eq!((&denoising["sampler"], &denoising["levels"]), (&"heun".into(), &25.into()));
     assert_eq!((&denoising["calls"], &denoising["saved_calls"]), (&49.into(), &0.into()));
     assert_eq!(omitted(&exact, "encoded views"), (0, false, 2));
     assert_eq!(omitted(&exact, "volume rows"), (0, false, 128));
     assert_eq!(omitted(&exact, "denoiser calls"), (0, false, 49));
-    let shorter = record(scene.path(), "--model genvs:small --exact --steps 2");
+    let shorter = record(&scene, "--model genvs:small --exact --steps 2");
     assert_eq!((&shorter["denoising"]["sampler"], &shorter["denoising"]["calls"]), (&"heun".into(), &3.into()));
-    let rows = record(scene.path(), "--model genvs:small --compute rows --steps 1");
+    let rows = record(&scene, "--model genvs:small --compute rows --steps 1");
     assert_eq!(omitted(&rows, "volume rows"), (0, false, 128));
-    let halves = record(scene.path(), "--model genvs:small --half-volumes --steps 1");
+    let halves = record(&scene, "--model genvs:small --half-volumes --steps 1");
     let (bytes, is_on, total) = omitted(&halves, "volume bytes");
     assert!(is_on && bytes > 0 && 2 * bytes == total, "{bytes} of {total}");
     assert_eq!((omitted(&halves, "volume rows").1, omitted(&rows, "volume bytes").0), (false, 0));
@@ -115,10 +112,10 @@ fn frames_start_from_the_ones_before() {
     let orbit = |options: &str| {
         let arguments =
             "render toy --orbit 3,full --views 2 --size 16x16 --model genvs:small --compute calls --steps 6";
-        done(scene.path(), &format!("{arguments} {options} --device cpu -o out"));
-        let record = read_json(scene.path().join("out/run.json"));
-        let first = fs::read(scene.path().join("out/orbit-000.png")).expect("a picture");
-        let last = fs::read(scene.path().join("out/orbit-002.png")).expect("a picture");
+        done(&scene, &format!("{arguments} {options} --device cpu -o out"));
+        let record = read_json(scene.join("out/run.json"));
+        let first = fs::read(scene.join("out/orbit-000.png")).expect("a picture");
+        let last = fs::read(scene.join("out/orbit-002.png")).expect("a picture");
         (record["denoising"].clone(), first, last)
     };
     let (alone, first, last) = orbit("");
@@ -147,7 +144,7 @@ fn files_of_either_network() {
     let plain = record(&folder, "--model three.safetensors");
     assert_eq!((&plain["field"], &plain["denoising"]), (&"genvs".into(), &Value::Null));
     let arguments = "render toy --targets 20 --model three.safetensors --sampler heun -o new";
-    assert_wrong_arguments(BINARY, &folder, arguments, &["--sampler cannot be used", "has no denoiser"]);
+    assert_wrong_arguments(&folder, arguments, &["--sampler cannot be used", "has no denoiser"]);
     let other = safetensors(&[("mlp.weight", "F32", &[1], f32_bytes([1.0]))]);
     folder.write("other.safetensors", other);
     let parts = [
@@ -155,13 +152,13 @@ fn files_of_either_network() {
         "'encoder.model.' (PixelNeRF)",
         "'pixel_nerf_net.' (GeNVS)",
     ];
-    assert_refused(BINARY, &folder, "render toy --targets 20 --model other.safetensors -o new", &parts);
+    assert_refused(&folder, "render toy --targets 20 --model other.safetensors -o new", &parts);
 }
 
 fn sweeps_samplers_and_omissions() {
     let folder = toy();
     let arguments = "pareto toy --targets 20,21 --views 2 --model genvs:small --size 16x16 --samples 8 --repeat 1 --device cpu -o out";
-    let mut sweep = command(BINARY, &folder, arguments);
+    let mut sweep = command(&folder, arguments);
     for words in ["heun, 8", "ipndm, 6", "ipndm, 12", "tolerance 0.03", "all, half", "all, reuse"] {
         sweep.args(["--only", words]);
     }

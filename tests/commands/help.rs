@@ -1,10 +1,10 @@
 //! The help, what completes a command line, and what is said about one that was nearly right.
 
-use super::{BINARY, done};
+use super::{BINARY, assert_wrong_arguments, done, run};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
-use viewfuse_tests::command::{assert_wrong_arguments, names_in, run, toy};
+use viewfuse_tests::command::{self, names_in, toy};
 use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![
@@ -48,12 +48,7 @@ fn the_short_help_has_what_is_needed_first() {
 fn what_was_nearly_written_is_suggested() {
     let folder = toy();
     let weights = |scheme: &str, parts: &[&str]| {
-        assert_wrong_arguments(
-            BINARY,
-            folder.path(),
-            &format!("render toy --targets 20 -o out --weights {scheme}"),
-            parts,
-        );
+        assert_wrong_arguments(&folder, &format!("render toy --targets 20 -o out --weights {scheme}"), parts);
     };
     weights(
         "eror:alpha=1",
@@ -64,7 +59,7 @@ fn what_was_nearly_written_is_suggested() {
     for (arguments, meant) in
         [("rendr toy", "render"), ("inspct toy", "inspect"), ("render toy --wieghts mean", "--weights")]
     {
-        let outcome = run(BINARY, folder.path(), arguments);
+        let outcome = run(&folder, arguments);
         assert!(outcome.code == Some(2) && outcome.stderr.contains(meant), "{}", outcome.stderr);
     }
 }
@@ -74,24 +69,24 @@ fn commands_of_the_laboratory_are_told() {
     for name in ["train", "scenes", "report"] {
         for rest in ["", " --help", " learn/cars -o out --steps 5"] {
             let line = format!("`cargo run --release -p viewfuse-lab -- {name}`");
-            assert_wrong_arguments(BINARY, folder.path(), &format!("{name}{rest}"), &[&line]);
+            command::assert_wrong_arguments(BINARY, &folder, &format!("{name}{rest}"), &[&line]);
         }
     }
-    let outcome = run(BINARY, folder.path(), "trane");
+    let outcome = run(&folder, "trane");
     assert!(outcome.code == Some(2) && !outcome.stderr.contains("viewfuse-lab"), "{}", outcome.stderr);
 }
 
 fn shells_complete_and_pages_tell() {
     let folder = Folder::new();
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
-        let script = done(folder.path(), &format!("completions {shell}"));
+        let script = done(&folder, &format!("completions {shell}"));
         assert!(script.contains("camera-path") && script.contains("evaluate"), "{shell}");
-        done(folder.path(), &format!("completions {shell} -o scripts/{shell}"));
-        assert_eq!(fs::read_to_string(folder.path().join("scripts").join(shell)).expect("a script"), script);
+        done(&folder, &format!("completions {shell} -o scripts/{shell}"));
+        assert_eq!(fs::read_to_string(folder.join("scripts").join(shell)).expect("a script"), script);
     }
     // What bash offers behind `viewfuse render --orb`.
     let ask = "source scripts/bash; COMP_WORDS=(viewfuse render --orb); COMP_CWORD=2; _viewfuse viewfuse --orb render; echo ${COMPREPLY[@]}";
-    if let Ok(answer) = Command::new("bash").args(["-c", ask]).current_dir(folder.path()).output() {
+    if let Ok(answer) = Command::new("bash").args(["-c", ask]).current_dir(&folder).output() {
         assert_eq!(
             String::from_utf8_lossy(&answer.stdout).trim(),
             "--orbit",
@@ -99,13 +94,13 @@ fn shells_complete_and_pages_tell() {
             String::from_utf8_lossy(&answer.stderr)
         );
     }
-    done(folder.path(), "completions man -o pages");
-    let pages = names_in(&folder.path().join("pages"));
+    done(&folder, "completions man -o pages");
+    let pages = names_in(&folder.join("pages"));
     assert!(pages.len() > 15 && pages.contains(&"viewfuse.1".to_owned()), "{pages:?}");
-    let page = fs::read_to_string(folder.path().join("pages/viewfuse-render.1")).expect("a page");
+    let page = fs::read_to_string(folder.join("pages/viewfuse-render.1")).expect("a page");
     assert!(
         page.contains(".TH") && page.contains("camera\\-path") && page.contains("viewfuse render photos/"),
         "{page}"
     );
-    assert!(done(folder.path(), "completions man").contains(".TH viewfuse"));
+    assert!(done(&folder, "completions man").contains(".TH viewfuse"));
 }

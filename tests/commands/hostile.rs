@@ -1,12 +1,12 @@
 //! Input from somebody else, and a machine that is full or closed: no panic, no abort, nothing on the terminal but
 //! text.
 
-use super::{BINARY, binary};
+use super::{BINARY, assert_refused, binary, command, run};
 use serde_json::json;
 use std::fs::{self, OpenOptions};
 use std::process::Stdio;
 use viewfuse_tests::checkpoints::safetensors;
-use viewfuse_tests::command::{Outcome, assert_refused, command, run, toy};
+use viewfuse_tests::command::{Outcome, toy};
 
 viewfuse_tests::trials![
     a_decoder_that_panics_is_an_error,
@@ -26,14 +26,14 @@ fn a_decoder_that_panics_is_an_error() {
     let folder = toy();
     folder.write("palette.png", PALETTE);
     let parts = ["palette.png: not a readable image: the decoder panicked"];
-    assert_refused(BINARY, folder.path(), "compare palette.png toy/rgb/000000.png", &parts);
-    assert_refused(BINARY, folder.path(), "compare toy/rgb/000000.png palette.png", &parts);
+    assert_refused(&folder, "compare palette.png toy/rgb/000000.png", &parts);
+    assert_refused(&folder, "compare toy/rgb/000000.png palette.png", &parts);
     // The same as a mask, of the photograph's shape at another scale, which is read on all cores.
     for view in 0..24 {
         folder.write(&format!("toy/masks/{view:06}.png"), PALETTE);
     }
     let parts = ["toy/masks/0000", ".png: not a readable image: the decoder panicked"];
-    assert_refused(BINARY, folder.path(), "render toy --targets 20 --size 16x16 --device cpu -o out", &parts);
+    assert_refused(&folder, "render toy --targets 20 --size 16x16 --device cpu -o out", &parts);
 }
 
 fn nothing_controls_the_terminal() {
@@ -41,17 +41,17 @@ fn nothing_controls_the_terminal() {
     let evil = "\u{1b}]0;owned\u{7}\u{1b}[31mred\u{9b}0m\u{202e}";
     let header = json!({"__metadata__": {evil: evil}, evil: {"dtype": "F32", "shape": [1], "data_offsets": [0, 4]}});
     folder.write("evil.safetensors", safetensors(&header.to_string(), &[0; 4]));
-    assert_harmless(&run(BINARY, folder.path(), "convert evil.safetensors out.safetensors"));
+    assert_harmless(&run(&folder, "convert evil.safetensors out.safetensors"));
     // In the name of a scene, of a photograph whose pose is missing, and of nothing at all.
     let scene = "sc\u{1b}[2Jene";
-    fs::rename(folder.path().join("toy"), folder.path().join(scene)).expect("a folder of that name");
+    fs::rename(folder.join("toy"), folder.join(scene)).expect("a folder of that name");
     let inspect = |path: &str| {
-        let mut inspect = command(BINARY, folder.path(), "inspect");
+        let mut inspect = command(&folder, "inspect");
         inspect.arg(path);
         Outcome::of(inspect)
     };
     assert_harmless(&inspect(scene));
-    let rgb = folder.path().join(scene).join("rgb");
+    let rgb = folder.join(scene).join("rgb");
     fs::rename(rgb.join("000003.png"), rgb.join("\u{1b}]0;3.png")).expect("a file of that name");
     assert_harmless(&inspect(scene));
     assert_harmless(&inspect("no\u{1b}[2Jsuch\nscene"));
@@ -91,17 +91,17 @@ const NAMING: [&str; 24] = [
 fn names_control_the_terminal_in_no_command() {
     let folder = toy();
     let (scene, name) = ("sc\u{1b}[2Jene", "v\u{1b}]0;owned\u{7}\u{9b}31m\u{202e}w");
-    let toy = folder.path().join("toy");
+    let toy = folder.join("toy");
     for (file, extension) in [("rgb", "png"), ("pose", "txt")] {
         let to = toy.join(file).join(format!("{name}.{extension}"));
         fs::rename(toy.join(file).join(format!("000020.{extension}")), to).expect("a file of that name");
     }
-    fs::rename(toy, folder.path().join(scene)).expect("a folder of that name");
+    fs::rename(toy, folder.join(scene)).expect("a folder of that name");
     let path = format!("name,x,y,z,look_x,look_y,look_z\na{name},0.1,0.2,1.3,0,0,0\nb{name},0.2,0.1,1.3,0,0,0\n");
     folder.write(&format!("{name}.csv"), path);
     let (mut shown, mut failed) = (0, Vec::new());
     for arguments in NAMING {
-        let mut command = command(BINARY, folder.path(), "");
+        let mut command = command(&folder, "");
         let words = arguments.split_whitespace().map(|word| match word {
             "PATH" => format!("{name}.csv"),
             _ => word.replace("SCENE", scene).replace("NAME", name).replace("VIEW", name),
@@ -140,13 +140,12 @@ fn lists_that_are_no_lists_are_wrong_arguments() {
             format!("render toy --targets 20 --sources {list} -o out"),
             format!("evaluate toy --protocol nearest:2 --weights mean --targets {list}"),
         ] {
-            let Outcome { code, stderr, .. } = run(BINARY, folder.path(), &arguments);
+            let Outcome { code, stderr, .. } = run(&folder, &arguments);
             assert_eq!(code, Some(2), "{arguments}: {stderr}");
             assert!(stderr.contains(list) && stderr.lines().count() == 1, "{arguments}: {stderr}");
         }
     }
-    let Outcome { code, stderr, .. } =
-        run(BINARY, folder.path(), "weights toy --target 20 --weights error:alpha=1,alpha=0");
+    let Outcome { code, stderr, .. } = run(&folder, "weights toy --target 20 --weights error:alpha=1,alpha=0");
     assert!(code == Some(2) && stderr.contains("alpha is given twice"), "{stderr}");
 }
 
@@ -157,22 +156,22 @@ fn standard_error_may_be_full_or_closed() {
     // A warning: the photographs' borders are of several colours.
     folder.image("toy/rgb/000003.png", 128, 128);
     let warns = "render toy --targets 20 --size 16x16 --device cpu -o out";
-    assert!(run(BINARY, folder.path(), warns).stderr.contains("warning"), "it has something to say");
+    assert!(run(&folder, warns).stderr.contains("warning"), "it has something to say");
     for (arguments, code) in
         [(warns, 0), ("inspect nowhere", 1), ("inspect --nonsense", 2), ("render toy --targets 5..2 -o out", 2)]
     {
         let full = OpenOptions::new().write(true).open("/dev/full").expect("a full device");
-        let mut run = command(BINARY, folder.path(), arguments);
+        let mut run = command(&folder, arguments);
         let status = run.stdout(Stdio::null()).stderr(full).status().expect("it starts");
         assert_eq!(status.code(), Some(code), "{arguments} with a full standard error");
         // A pipe that nobody reads any more.
         let (reader, writer) = std::io::pipe().expect("a pipe");
         drop(reader);
-        let mut run = command(BINARY, folder.path(), arguments);
+        let mut run = command(&folder, arguments);
         let status = run.stdout(Stdio::null()).stderr(writer).status().expect("it starts");
         assert_eq!(status.code(), Some(code), "{arguments} with a broken standard error");
         let mut shell = std::process::Command::new("sh");
-        shell.current_dir(folder.path()).args(["-c", &format!("exec \"$0\" {arguments} >&- 2>&-"), BINARY]);
+        shell.current_dir(&folder).args(["-c", &format!("exec \"$0\" {arguments} >&- 2>&-"), BINARY]);
         assert_eq!(shell.status().expect("a shell").code(), Some(code), "{arguments} with closed outputs");
     }
 }
@@ -210,7 +209,7 @@ fn devices_without_an_end() {
         let mut limited = std::process::Command::new("sh");
         // Four GiB of addresses: more would be taken by a reader without a limit.
         let script = format!("ulimit -v 4194304; exec \"$0\" {arguments}");
-        limited.current_dir(folder.path()).args(["-c", &script, binary(arguments)]);
+        limited.current_dir(&folder).args(["-c", &script, binary(arguments)]);
         let Outcome { code, stderr, .. } = Outcome::of(limited);
         assert_eq!(code, Some(1), "{arguments}: {stderr}");
         assert!(stderr.starts_with("viewfuse: ") && stderr.lines().count() == 1, "{arguments}: {stderr}");

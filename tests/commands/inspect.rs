@@ -1,8 +1,8 @@
 //! `viewfuse inspect`: a good scene raises no warning, a bad one its own.
 
-use super::{done, list_of, number_of, numbers, read_json, texts};
+use super::{done, list_of, number_of, numbers, read_json, run, texts};
 use serde_json::Value;
-use viewfuse_tests::command::{change_poses, names_in, run, toy};
+use viewfuse_tests::command::{change_poses, names_in, toy};
 use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![
@@ -19,7 +19,7 @@ viewfuse_tests::trials![
 ];
 
 fn inspection(folder: &Folder) -> Value {
-    serde_json::from_str(&done(folder.path(), "inspect toy --json")).expect("JSON")
+    serde_json::from_str(&done(folder, "inspect toy --json")).expect("JSON")
 }
 
 /// Exactly one of the warnings holds this text; `others` says how many more there may be.
@@ -30,7 +30,7 @@ fn assert_warns(folder: &Folder, text: &str, others: usize) {
     assert_eq!(warnings.iter().filter(|warning| warning.contains(text)).count(), 1, "{warnings:#?}");
     assert!(warnings.len() <= 1 + others, "{warnings:#?}");
     assert!(inspection["near"].as_f64() <= inspection["far"].as_f64(), "{inspection}");
-    let printed = done(folder.path(), "inspect toy");
+    let printed = done(folder, "inspect toy");
     assert!(printed.lines().any(|line| line.starts_with("warning    ") && line.contains(text)), "{printed}");
 }
 
@@ -46,16 +46,16 @@ fn a_good_scene() {
     assert!(0.5 < near && near < 1.3 && 1.3 < far && far < 2.0);
     let corners = list_of(&inspection["object"]);
     assert!(numbers(&corners[0]).iter().all(|x| *x < 0.0) && numbers(&corners[1]).iter().all(|x| *x > 0.0));
-    assert!(done(scene.path(), "inspect toy").contains("warnings   none"));
+    assert!(done(&scene, "inspect toy").contains("warnings   none"));
 }
 
 fn views_are_listed_with_their_neighbours() {
     let scene = toy();
-    let printed = done(scene.path(), "inspect toy --views");
+    let printed = done(&scene, "inspect toy --views");
     let lines: Vec<Vec<&str>> = printed.lines().map(|line| line.split_whitespace().collect()).collect();
     let row = lines.iter().find(|words| words.first() == Some(&"#3")).unwrap_or_else(|| panic!("{printed}"));
     assert_eq!(row[..3], ["#3", "000003", "128x128"], "{printed}");
-    let listed: Value = serde_json::from_str(&done(scene.path(), "inspect toy --views --json")).expect("JSON");
+    let listed: Value = serde_json::from_str(&done(&scene, "inspect toy --views --json")).expect("JSON");
     let listed = list_of(&listed);
     assert_eq!(listed.len(), 24);
     for (index, view) in listed.iter().enumerate() {
@@ -67,7 +67,7 @@ fn views_are_listed_with_their_neighbours() {
         assert!(!others.contains(&(index as u64)), "{view}");
     }
     // By index, wherever views are named.
-    let weights = |target: &str| done(scene.path(), &format!("weights toy --target {target} --sources 0..7"));
+    let weights = |target: &str| done(&scene, &format!("weights toy --target {target} --sources 0..7"));
     assert_eq!(weights("#20"), weights("000020"));
     for (arguments, names) in [
         ("--targets #20,#22..#23 --sources #0..#7/2", vec!["000020.png", "000022.png", "000023.png"]),
@@ -75,29 +75,29 @@ fn views_are_listed_with_their_neighbours() {
     ] {
         let render =
             format!("render toy {arguments} --size 16x16 --weights mean --device cpu --no-sheets --replace -o out");
-        done(scene.path(), &render);
-        let written = names_in(&scene.path().join("out"));
+        done(&scene, &render);
+        let written = names_in(&scene.join("out"));
         assert!(names.iter().all(|name| written.iter().any(|file| file == name)), "{written:?}");
     }
-    let error = run(super::BINARY, scene.path(), "render toy --targets 0000020 --size 16x16 -o elsewhere");
+    let error = run(&scene, "render toy --targets 0000020 --size 16x16 -o elsewhere");
     assert_eq!(error.code, Some(0), "a number, however it is written");
     for (target, parts) in
         [("00002x", "the nearest names are '000020', '000021', '000022'"), ("#24", "by index #0 .. #23")]
     {
-        let error = run(super::BINARY, scene.path(), &format!("weights toy --target {target}"));
+        let error = run(&scene, &format!("weights toy --target {target}"));
         assert!(error.code == Some(1) && error.stderr.contains(parts), "{}", error.stderr);
     }
 }
 
 fn draws_the_cameras() {
     let scene = toy();
-    let printed = done(scene.path(), "inspect toy -o maps/cameras.png");
+    let printed = done(&scene, "inspect toy -o maps/cameras.png");
     assert!(printed.contains("maps/cameras.png"), "{printed}");
-    assert_eq!(names_in(&scene.path().join("maps")), ["cameras.png"]);
-    let map = image::open(scene.path().join("maps/cameras.png")).expect("a picture").to_rgb8();
+    assert_eq!(names_in(&scene.join("maps")), ["cameras.png"]);
+    let map = image::open(scene.join("maps/cameras.png")).expect("a picture").to_rgb8();
     assert!(map.width() > 300 && map.pixels().any(|pixel| *pixel != *map.get_pixel(0, 0)));
     // With --json, standard output is JSON and nothing else.
-    let json = done(scene.path(), "inspect toy --json -o maps/cameras.png");
+    let json = done(&scene, "inspect toy --json -o maps/cameras.png");
     assert!(serde_json::from_str::<Value>(&json).is_ok(), "{json}");
 }
 
@@ -134,7 +134,7 @@ fn bad_poses_are_told() {
         assert_warns(&scene, warning, others);
     }
     let scene = toy();
-    std::fs::copy(scene.path().join("toy/pose/000003.txt"), scene.path().join("toy/pose/000007.txt")).expect("a copy");
+    std::fs::copy(scene.join("toy/pose/000003.txt"), scene.join("toy/pose/000007.txt")).expect("a copy");
     assert_warns(&scene, "views '000003' and '000007' have the same pose", 1);
 }
 
@@ -146,7 +146,7 @@ fn a_scene_in_a_map() {
     assert_eq!(texts(&inspection["warnings"]), Vec::<&str>::new());
     let origin = numbers(&inspection["origin"]);
     assert!(origin.len() == 3 && origin.iter().all(|x| (x - 1.0e6).abs() < 2.0), "{inspection}");
-    let printed = done(scene.path(), "inspect toy");
+    let printed = done(&scene, "inspect toy");
     let says = |line: &str| line.starts_with("frame      the file's (") && line.contains("is the origin");
     assert!(printed.lines().any(says), "{printed}");
 }
@@ -173,12 +173,12 @@ fn a_background_of_many_colours_is_a_fault_only_of_an_object() {
     let whole = inspection(&scene);
     assert!(texts(&whole["warnings"]).iter().all(|warning| !warning.contains("one colour")), "{whole}");
     assert!(whole["object"].is_null());
-    assert!(done(scene.path(), "inspect toy").contains("\nobject     none cut out: whole photographs\n"));
+    assert!(done(&scene, "inspect toy").contains("\nobject     none cut out: whole photographs\n"));
     // Some are cut out.
     let scene = toy();
     clutter(&scene, |index| index % 4 == 0);
     assert_warns(&scene, "not of one colour", 1);
-    let outcome = run(env!("CARGO_BIN_EXE_viewfuse"), scene.path(), "render toy --targets 20 --size 32x32 -o out");
+    let outcome = run(&scene, "render toy --targets 20 --size 32x32 -o out");
     let warnings = outcome.stderr.lines().filter(|line| line.contains("not of one colour")).count();
     assert_eq!(warnings, 1, "{}", outcome.stderr);
 }
@@ -189,7 +189,7 @@ fn what_the_cameras_cover() {
     let gaps = numbers(&inspected["gaps"]);
     assert!(10.0 < gaps[0] && gaps[0] < gaps[1] && gaps[1] < 40.0, "{gaps:?}");
     assert_eq!(inspected["arc"], 360.0);
-    let printed = done(scene.path(), "inspect toy");
+    let printed = done(&scene, "inspect toy");
     let line = format!(
         "\nneighbours {:.0} degrees apart (median), at most {:.0}\ncoverage   all around the focus, from ",
         gaps[0], gaps[1]
@@ -201,7 +201,7 @@ fn what_the_cameras_cover() {
 fn the_quality_is_that_of_held_out_photographs() {
     let scene = toy();
     let quality = |arguments: &str| -> Value {
-        let printed = done(scene.path(), &format!("inspect toy --json --quality{arguments}"));
+        let printed = done(&scene, &format!("inspect toy --json --quality{arguments}"));
         serde_json::from_str::<Value>(&printed).expect("JSON")["quality"].clone()
     };
     let judged = quality("");
@@ -212,7 +212,7 @@ fn the_quality_is_that_of_held_out_photographs() {
     let expected = number_of(&judged["expected"]["psnr"]);
     // A view between neighbours has nearer sources than a held-out view.
     assert!(20.0 < mean && mean < expected && expected < 45.0, "{judged}");
-    let printed = done(scene.path(), "inspect toy --quality");
+    let printed = done(&scene, "inspect toy --quality");
     let said = format!("\nleft out   6 photographs, rendered from the others: PSNR {mean:.1} dB, from ");
     assert!(
         printed.contains(&said) && printed.contains(&format!("\nexpected   PSNR {expected:.1} dB half-way")),
@@ -229,7 +229,7 @@ fn the_quality_is_that_of_held_out_photographs() {
         wrong["expected"].is_null() && wrong["problem"].as_str().is_some_and(|problem| problem.contains("silhouettes")),
         "{wrong}"
     );
-    assert!(done(scene.path(), "inspect toy --quality").contains("\nexpected   not measured: toy: the silhouettes"));
+    assert!(done(&scene, "inspect toy --quality").contains("\nexpected   not measured: toy: the silhouettes"));
 }
 
 fn what_is_excluded_is_said_and_recorded() {
@@ -247,7 +247,7 @@ fn what_is_excluded_is_said_and_recorded() {
         format!("transforms.json: 1 of {count} photographs are not there and left out"),
         format!("images: 1 photograph has no pose and is not used, {} have one (without is 002.jpg)", count - 1),
     ];
-    let (printed, verbose) = (done(folder.path(), "inspect room"), done(folder.path(), "inspect room --verbose"));
+    let (printed, verbose) = (done(&folder, "inspect room"), done(&folder, "inspect room --verbose"));
     for warning in &warnings {
         let is_said = |line: &str| line.starts_with("warning    ") && line.contains(warning);
         assert!(printed.lines().any(is_said) && verbose.lines().any(is_said), "{printed}");
@@ -255,8 +255,8 @@ fn what_is_excluded_is_said_and_recorded() {
     assert!(!printed.contains("not read   "), "{printed}");
     assert!(verbose.lines().any(|line| line.starts_with("not read   ") && line.ends_with(": aabb_scale")), "{verbose}");
     let render = "render room --targets 005 --size 32x24 --device cpu --weights mean --no-sheets -o out";
-    let outcome = run(env!("CARGO_BIN_EXE_viewfuse"), folder.path(), render);
-    let record = read_json(folder.path().join("out/run.json"));
+    let outcome = run(&folder, render);
+    let record = read_json(folder.join("out/run.json"));
     for warning in &warnings {
         assert!(texts(&record["warnings"]).iter().any(|line| line.contains(warning)), "{}", record["warnings"]);
         let said = outcome.stderr.lines().filter(|line| line.contains("warning: ") && line.contains(warning));
@@ -268,14 +268,14 @@ fn conventions_are_said_and_recorded() {
     let scene = toy();
     let render = |output: &str| {
         let options = "--targets 20 --size 32x32 --device cpu --weights mean --no-sheets";
-        done(scene.path(), &format!("render toy {options} -o {output}"));
-        std::fs::read(scene.path().join(output).join("000020.png")).expect("a picture")
+        done(&scene, &format!("render toy {options} -o {output}"));
+        std::fs::read(scene.join(output).join("000020.png")).expect("a picture")
     };
     let plain = render("plain");
-    assert_eq!(texts(&read_json(scene.path().join("plain/run.json"))["conventions"]), Vec::<&str>::new());
+    assert_eq!(texts(&read_json(scene.join("plain/run.json"))["conventions"]), Vec::<&str>::new());
     scene.write("toy/intrinsics.txt", "131.25 0 64 0\n0 131.25 64 0\n0 0 1 0\n0 0 0 1\n");
     assert!(render("matrix") == plain, "the same camera gives another picture");
     let convention = "intrinsics.txt: K alone, for the photographs' size (NSVF)";
-    assert_eq!(texts(&read_json(scene.path().join("matrix/run.json"))["conventions"]), [convention]);
-    assert!(done(scene.path(), "inspect toy").contains(&format!("\nread as    {convention}\n")));
+    assert_eq!(texts(&read_json(scene.join("matrix/run.json"))["conventions"]), [convention]);
+    assert!(done(&scene, "inspect toy").contains(&format!("\nread as    {convention}\n")));
 }

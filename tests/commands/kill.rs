@@ -1,12 +1,11 @@
 //! Kills without a warning, at random moments of every command that writes: no half-written file, nothing lost that was
 //! finished, and the same command goes on. `VIEWFUSE_KILLS=N` kills N times; the tests do it a few times.
 
-use super::{binary, done};
+use super::{command, done};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Stdio;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 use viewfuse::nn::checkpoint::Checkpoint;
@@ -14,7 +13,7 @@ use viewfuse::output::journal::JOURNAL;
 use viewfuse::output::run::RECORD;
 use viewfuse::scene::SceneFrame;
 use viewfuse::scene::gaussians::GaussianScene;
-use viewfuse_tests::command::{command, files_below, toy};
+use viewfuse_tests::command::{files_below, toy, unheard};
 use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![killed_at_any_moment];
@@ -68,7 +67,7 @@ fn folder() -> Folder {
         "train weighting small/model.safetensors learn/cars --objects 1 --rays 4 --steps 1 --validate-every 1 -o weighting",
         "evaluate toy --protocol random --trials 2 --targets-per-trial 1 --weights mean --size 16x16 --device cpu -o run",
     ] {
-        done(folder.path(), arguments);
+        done(&folder, arguments);
     }
     folder
 }
@@ -170,8 +169,7 @@ fn killed_at_any_moment() {
                 fs::remove_dir_all(&out).expect("an output");
             }
             let earlier = assert_whole(&out, like);
-            let mut run = command(binary(arguments), folder.path(), arguments);
-            let mut child = run.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the command starts");
+            let mut child = unheard(command(&folder, arguments));
             sleep(moment);
             let is_in_the_middle = child.try_wait().expect("a process").is_none();
             child.kill().expect("a kill");

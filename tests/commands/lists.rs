@@ -1,9 +1,9 @@
 //! What other programs take from the weights: arrays, tables, and lists of the few views that targets need.
 
-use super::{BINARY, assert_near, done, list_of, number_of, numbers, texts};
+use super::{assert_near, assert_wrong_arguments, done, list_of, number_of, numbers, texts};
 use serde_json::Value;
 use std::fs;
-use viewfuse_tests::command::{assert_wrong_arguments, toy};
+use viewfuse_tests::command::toy;
 
 viewfuse_tests::trials![
     weights_of_many_targets,
@@ -79,14 +79,14 @@ fn the_few_sources_of_a_target() {
     );
     let index = json(&done(&folder, "select toy -k 3 --targets 20,21 --index"));
     assert_eq!((numbers(&index["toy"]["target"]), numbers(&index["toy"]["context"]).len()), (vec![20.0, 21.0], 3));
-    assert_wrong_arguments(BINARY, &folder, "select toy -k 2 --orbit 3 --index", &["--index needs targets"]);
+    assert_wrong_arguments(&folder, "select toy -k 2 --orbit 3 --index", &["--index needs targets"]);
     let table = done(&folder, "select toy -k 2 --targets 20");
     assert!(table.contains(greatest[0]) && table.contains("for all together: "), "{table}");
 }
 
 fn the_few_sources_of_a_path() {
     let scene = toy();
-    let selected = json(&done(scene.path(), "select toy -k 4 --orbit 12 --json"));
+    let selected = json(&done(&scene, "select toy -k 4 --orbit 12 --json"));
     assert_eq!(selected["targets"].as_array().map(Vec::len), Some(12));
     assert_eq!(selected["targets"][3]["index"], Value::Null);
     let together = &selected["together"];
@@ -103,22 +103,22 @@ fn labels_name_schemes() {
     done(&folder, "render toy --targets 20 --size 16x16 --weights near=error:alpha=0.5 --device cpu -o out");
     let record = json(&fs::read_to_string(folder.join("out/run.json")).expect("a record"));
     assert_eq!(record["weighting"], "near");
-    assert_wrong_arguments(BINARY, &folder, "weights toy --target 20 --weights a/b=mean", &["'a/b' is not a label"]);
+    assert_wrong_arguments(&folder, "weights toy --target 20 --weights a/b=mean", &["'a/b' is not a label"]);
     // One that means another scheme would be read as that.
     let taken = "weights toy --target 20 --weights mean=error:alpha=1";
-    assert_wrong_arguments(BINARY, &folder, taken, &["'mean' is a weighting itself"]);
+    assert_wrong_arguments(&folder, taken, &["'mean' is a weighting itself"]);
 }
 
 fn nothing_counts_twice_in_a_table() {
     let scene = toy();
     let run = "evaluate toy --targets 20 --size 16x16 --device cpu --weights mean";
-    let once = done(scene.path(), run);
+    let once = done(&scene, run);
     // Times differ.
     let of_mean = |table: &str| -> Vec<String> {
         let row = table.lines().find(|line| line.trim_start().starts_with("mean ")).expect("a row");
         row.split_whitespace().take(5).map(str::to_owned).collect()
     };
-    let twice = done(scene.path(), &format!("{run} --weights mean"));
+    let twice = done(&scene, &format!("{run} --weights mean"));
     assert!(twice.contains("toy: 1 target\n") && of_mean(&twice) == of_mean(&once), "{twice}");
     for (more, part) in [
         ("--weights a=l1 --weights a=error:alpha=1", "two rows of the table would be called 'a'"),
@@ -126,15 +126,15 @@ fn nothing_counts_twice_in_a_table() {
         ("-o scores.png", "a table as CSV is written; give a name as scores.csv"),
         ("-o toy/transforms_train.json", "the scene toy is read from this file"),
     ] {
-        assert_wrong_arguments(BINARY, scene.path(), &format!("{run} {more}"), &[part]);
+        assert_wrong_arguments(&scene, &format!("{run} {more}"), &[part]);
     }
-    assert_wrong_arguments(BINARY, scene.path(), "inspect toy -o cameras.jpg", &["PNG", "cameras.png"]);
+    assert_wrong_arguments(&scene, "inspect toy -o cameras.jpg", &["PNG", "cameras.png"]);
 }
 
 fn tables_for_papers() {
     let scene = toy();
     let arguments = "evaluate toy --targets 20,21 --sources 0..5 --size 16x16 --weights mean --weights a_b=error:alpha=1 --device cpu";
-    let latex = done(scene.path(), &format!("{arguments} --latex"));
+    let latex = done(&scene, &format!("{arguments} --latex"));
     assert!(latex.starts_with("\\begin{table}\n") && latex.trim_end().ends_with("\\end{table}"), "{latex}");
     let rows: Vec<&str> = latex.lines().filter(|line| line.ends_with("\\\\")).collect();
     // The heading, three baselines, two schemes; as many cells in each.
@@ -143,7 +143,7 @@ fn tables_for_papers() {
     rows.iter().for_each(|row| assert_eq!(cells(row), cells(rows[0]), "{row}"));
     assert!(rows[5].starts_with("    a\\_b & $") && latex.contains("\\pm") && !latex.contains('±'), "{latex}");
     // The same numbers as in the table for people.
-    let table = done(scene.path(), arguments);
+    let table = done(&scene, arguments);
     let mean = rows[4].split(" & ").nth(1).expect("a cell");
     let number = mean.trim_start_matches("$\\mathbf{").trim_start_matches('$').split(' ').next().expect("a number");
     assert!(number.parse::<f64>().is_ok() && table.contains(number), "{mean} is not in\n{table}");

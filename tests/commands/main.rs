@@ -43,9 +43,9 @@ mod view;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use std::process::ExitCode;
+use std::process::{Child, Command, ExitCode};
 use std::sync::LazyLock;
-use viewfuse_tests::command;
+use viewfuse_tests::command::{self, Outcome};
 
 viewfuse_tests::trials![
     [
@@ -89,10 +89,52 @@ fn main() -> ExitCode {
     viewfuse_tests::trials::run(trials())
 }
 
+/// The command that knows the first of these words, ready to be started in a folder.
+fn command(folder: &Path, arguments: &str) -> Command {
+    command::command(binary(arguments), folder, arguments)
+}
+
+/// Runs a command in a folder to its end.
+fn run(folder: &Path, arguments: &str) -> Outcome {
+    Outcome::of(command(folder, arguments))
+}
+
 /// Runs a command in a folder; it must succeed and say nothing on standard error.
 #[track_caller]
 fn done(folder: &Path, arguments: &str) -> String {
     command::done(binary(arguments), folder, arguments)
+}
+
+/// Runs a command in a folder; it must succeed, and may warn.
+#[track_caller]
+fn done_with_warnings(folder: &Path, arguments: &str) -> Outcome {
+    let outcome = run(folder, arguments);
+    assert_eq!(outcome.code, Some(0), "viewfuse {arguments}\n{}{}", outcome.stdout, outcome.stderr);
+    outcome
+}
+
+/// As [`command::assert_refused`].
+#[track_caller]
+fn assert_refused(folder: &Path, arguments: &str, parts: &[&str]) {
+    command::assert_refused(binary(arguments), folder, arguments, parts);
+}
+
+/// As [`command::assert_wrong_arguments`].
+#[track_caller]
+fn assert_wrong_arguments(folder: &Path, arguments: &str, parts: &[&str]) {
+    command::assert_wrong_arguments(binary(arguments), folder, arguments, parts);
+}
+
+/// As [`command::killed_when`].
+#[track_caller]
+fn killed_when(folder: &Path, arguments: &str, ready: impl FnMut() -> bool) {
+    command::killed_when(binary(arguments), folder, arguments, ready);
+}
+
+/// Starts a command in a folder, to be interrupted.
+#[track_caller]
+fn start(folder: &Path, arguments: &str) -> Child {
+    command::spawn(command(folder, arguments))
 }
 
 /// What a file of JSON holds.
@@ -139,28 +181,9 @@ fn help_fits_and_gives_examples() {
     let here = Path::new(".");
     let version = done(here, "--version");
     assert_eq!(version.split_whitespace().next(), Some("viewfuse"), "{version}");
-    let commands = [
-        "",
-        "pose",
-        "render",
-        "view",
-        "weights",
-        "select",
-        "points",
-        "inspect",
-        "evaluate",
-        "pareto",
-        "report",
-        "compare",
-        "completions",
-        "train",
-        "scenes make",
-        "devices",
-        "verify",
-        "check",
-        "bench",
-    ];
-    for name in commands {
+    let commands = ",pose,render,view,weights,select,points,inspect,evaluate,pareto,report,compare,completions,train,\
+                    scenes make,devices,verify,check,bench";
+    for name in commands.split(',') {
         let help = done(here, &format!("{name} --help"));
         let is_example = help.contains(&format!("viewfuse {name} ")) || help.contains(&format!("viewfuse-lab {name} "));
         assert!(name.is_empty() || is_example, "an example of {name}:\n{help}");

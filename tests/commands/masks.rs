@@ -1,8 +1,8 @@
 //! `--masks`: what masks and alpha channels hide takes no part in pictures and scores.
 
-use super::{BINARY, done, number_of, read_json};
+use super::{assert_refused, assert_wrong_arguments, done, number_of, read_json, run};
 use image::{DynamicImage, GrayImage, ImageFormat, Luma, Rgb, RgbImage, Rgba, RgbaImage};
-use viewfuse_tests::command::{Outcome, assert_refused, assert_wrong_arguments, run, sample};
+use viewfuse_tests::command::{Outcome, sample};
 use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![what_masks_hide_takes_no_part, what_is_unclear_is_asked,];
@@ -16,7 +16,7 @@ fn driven(shown: impl Fn(&Folder, &str, RgbImage)) -> Folder {
     for view in 0..11 {
         let name = format!("{view:03}");
         let mut photograph =
-            image::open(folder.path().join(format!("room/images/{name}.jpg"))).expect("a photograph").into_rgb8();
+            image::open(folder.join(format!("room/images/{name}.jpg"))).expect("a photograph").into_rgb8();
         for (x, y, pixel) in photograph.enumerate_pixels_mut().filter(|(_, y, _)| *y >= BONNET) {
             *pixel = Rgb([if (x / 7 + y / 5) % 2 == 0 { 230 } else { 10 }, 20, 120]);
         }
@@ -32,9 +32,9 @@ fn put(folder: &Folder, name: &str, picture: impl Into<DynamicImage>) {
 /// The score of view 5 from the others, and what was said.
 fn rendered(folder: &Folder, more: &str) -> (f64, String) {
     let render = "render room --targets 5 --size 160x120 --weights error:alpha=1 --device cpu --no-sheets -o out";
-    let Outcome { code, stderr, .. } = run(BINARY, folder.path(), &format!("{render} --replace {more}"));
+    let Outcome { code, stderr, .. } = run(folder, &format!("{render} --replace {more}"));
     assert_eq!(code, Some(0), "{stderr}");
-    let record = read_json(folder.path().join("out/run.json"));
+    let record = read_json(folder.join("out/run.json"));
     (number_of(&record["frames"][0]["psnr"]), stderr)
 }
 
@@ -79,7 +79,7 @@ fn what_masks_hide_takes_no_part() {
         put(folder, &format!("images/{name}.jpg"), rgba(&photograph, &|_, y| y >= BONNET));
     });
     let corner = sample("room");
-    let photograph = image::open(corner.path().join("room/images/003.jpg")).expect("a photograph").into_rgb8();
+    let photograph = image::open(corner.join("room/images/003.jpg")).expect("a photograph").into_rgb8();
     put(&corner, "images/003.jpg", rgba(&photograph, &|x, y| x < 2 && y == 0));
     for (folder, count, expected, tolerance) in [(&holes, 10, masked, 0.3), (&corner, 1, plain, 0.05)] {
         let (psnr, said) = rendered(folder, "");
@@ -96,14 +96,9 @@ fn what_is_unclear_is_asked() {
         put(folder, &format!("masks/{name}.jpg.png"), inverted);
     });
     let parts = ["room/masks/", "leave 8 % of the photographs", "inverted", "--masks object or --masks ignore"];
-    assert_refused(BINARY, folder.path(), "render room --targets 5 --size 32x24 --device cpu -o out", &parts);
+    assert_refused(folder.path(), "render room --targets 5 --size 32x24 --device cpu -o out", &parts);
     let printed = done(folder.path(), "inspect room");
     assert!(printed.contains("read as    masks: unclear whether"), "{printed}");
     let wrong = "render room --targets 5 -o out --masks person";
-    assert_wrong_arguments(
-        BINARY,
-        folder.path(),
-        wrong,
-        &["unknown meaning of masks 'person'", "auto, object, ignore"],
-    );
+    assert_wrong_arguments(folder.path(), wrong, &["unknown meaning of masks 'person'", "auto, object, ignore"]);
 }

@@ -1,12 +1,12 @@
 //! What a render takes of memory.
 
-use super::{BINARY, read_json};
+use super::{command, read_json};
 use std::fs;
 use std::path::Path;
 use std::process::Stdio;
 use std::thread::sleep;
 use std::time::Duration;
-use viewfuse_tests::command::{command, toy};
+use viewfuse_tests::command::toy;
 use viewfuse_tests::trials::lacking;
 
 viewfuse_tests::trials![;
@@ -16,7 +16,7 @@ viewfuse_tests::trials![;
 
 /// Largest resident set in KiB of a command that must succeed, as the system counts it; looked at until it ends.
 fn most_memory(folder: &Path, arguments: &str) -> u64 {
-    let mut child = command(BINARY, folder, arguments).stdout(Stdio::null()).spawn().expect("the command starts");
+    let mut child = command(folder, arguments).stdout(Stdio::null()).spawn().expect("the command starts");
     let status = format!("/proc/{}/status", child.id());
     let mut most = 0;
     loop {
@@ -39,12 +39,12 @@ fn more_samples_take_no_more() {
             "render toy --targets 20 --sources 000000,000008,000016 --model genvs:small --steps 2 --samples {samples} \
              --device cpu -o out"
         );
-        most_memory(scene.path(), &arguments)
+        most_memory(&scene, &arguments)
     };
     // All points of the rays with more samples would take at least 70 MB more.
     let (few, many) = (render(32), render(512));
     assert!(many < few + (24 << 10), "{few} KiB became {many} KiB");
-    let record = read_json(scene.path().join("out/run.json"));
+    let record = read_json(scene.join("out/run.json"));
     let estimate = record["memory_estimate"].as_u64().expect("an estimate") >> 10;
     assert!(
         few > estimate / 2 && many < 3 * estimate / 2 + (16 << 10),
@@ -59,7 +59,7 @@ fn a_larger_picture_takes_no_more() {
             "render toy --targets 20 --sources 000000,000008,000016 --model formula:8 --exact --samples 32,4,4 \
              --size {side}x{side} --device cpu -o out{side}"
         );
-        most_memory(scene.path(), &arguments)
+        most_memory(&scene, &arguments)
     };
     // The smaller one is as many rays as are worked on at once; all rays of the larger one together would take three
     // times as much more, 20 MB.

@@ -1,6 +1,6 @@
 //! Videos and animated pictures of paths: their content by other readers, and runs that are killed and continued.
 
-use super::{BINARY, done, list_of, number_of, numbers, read_json};
+use super::{command, done, killed_when, list_of, number_of, numbers, read_json};
 use image::codecs::webp::WebPDecoder;
 use image::{AnimationDecoder, Rgb, RgbImage};
 use serde_json::{Value, json};
@@ -8,7 +8,7 @@ use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::Path;
 use std::process::Command;
-use viewfuse_tests::command::{Outcome, command, files_below, killed_when, names_in, toy, without_progress};
+use viewfuse_tests::command::{Outcome, files_below, names_in, toy, without_progress};
 use viewfuse_tests::trials::lacking;
 
 viewfuse_tests::trials![
@@ -42,12 +42,12 @@ fn rgb_of(frame: &y4m::Frame<'_>, width: usize, x: usize, y: usize) -> [f64; 3] 
 
 fn a_path_as_animated_webp_and_as_y4m() {
     let scene = toy();
-    let printed = done(scene.path(), &format!("{PATH} --video webp,gif,y4m --fps 12 -o out"));
+    let printed = done(&scene, &format!("{PATH} --video webp,gif,y4m --fps 12 -o out"));
     assert!(printed.contains("out/video.webp\n") && printed.contains("out/video.y4m\n"), "{printed}");
     // At a photograph's own place no other one needs to show what it shows.
     let ends = printed.lines().filter(|line| line.contains("between-000.png") || line.contains("between-004.png"));
     assert_eq!(ends.map(|line| line.contains("photograph from between")).collect::<Vec<_>>(), [false; 2], "{printed}");
-    let out = scene.path().join("out");
+    let out = scene.join("out");
     let pictures: Vec<RgbImage> = (0..5).map(|frame| png(&out, &format!("between-{frame:03}.png"))).collect();
     assert!(pictures[0] != pictures[4], "the camera does not move");
 
@@ -77,12 +77,12 @@ fn a_path_as_animated_webp_and_as_y4m() {
     assert!(video.read_frame().is_err(), "a sixth frame");
     assert_gif(&out.join("video.gif"), &pictures);
     // On standard output the same bytes, and nothing else.
-    let before = files_below(scene.path());
-    let run = command(BINARY, scene.path(), &format!("{PATH} --fps 12 -o -")).output().expect("the command starts");
+    let before = files_below(&scene);
+    let run = command(&scene, &format!("{PATH} --fps 12 -o -")).output().expect("the command starts");
     let said = without_progress(&String::from_utf8_lossy(&run.stderr));
     assert!(run.status.success() && said.is_empty(), "{said}");
     assert!(run.stdout == fs::read(out.join("video.y4m")).expect("a file"), "another video on standard output");
-    assert_eq!(files_below(scene.path()), before);
+    assert_eq!(files_below(&scene), before);
 }
 
 /// The frames of a GIF are these pictures, up to its 256 colours, at 12 a second.
@@ -109,7 +109,7 @@ fn assert_gif(path: &Path, pictures: &[RgbImage]) {
 
 fn more_frames_than_a_gif_can_show_keep_their_pace() {
     let scene = toy();
-    done(scene.path(), &format!("{PATH} --video gif --fps 120 -o out"));
+    done(&scene, &format!("{PATH} --video gif --fps 120 -o out"));
     let mut decoder =
         gif::DecodeOptions::new().read_info(File::open(scene.file("out/video.gif")).expect("a file")).expect("a GIF");
     let mut delays = Vec::new();
@@ -124,7 +124,7 @@ fn more_frames_than_a_gif_can_show_keep_their_pace() {
 fn killed(folder: &Path, arguments: &str, frames: usize) {
     let journal = folder.join("cut/frames.jsonl");
     let lines = || fs::read_to_string(&journal).unwrap_or_default().lines().count();
-    killed_when(BINARY, folder, arguments, || lines() > frames);
+    killed_when(folder, arguments, || lines() > frames);
     assert!(!folder.join("cut/run.json").exists());
 }
 
@@ -180,7 +180,7 @@ fn another_run_begins_anew() {
 
 /// Runs the command with a folder of programs as its path.
 fn with_programs(folder: &Path, programs: &Path, arguments: &str) -> Outcome {
-    let mut run = command(BINARY, folder, arguments);
+    let mut run = command(folder, arguments);
     run.env("PATH", programs);
     Outcome::of(run)
 }

@@ -2,14 +2,12 @@
 //! files.
 #![cfg(unix)]
 
-use super::{BINARY, done};
+use super::{assert_refused, assert_wrong_arguments, done, killed_when, run, start};
 use std::fs;
 use std::path::Path;
 use viewfuse::scene::SceneFrame;
 use viewfuse::scene::gaussians::GaussianScene;
-use viewfuse_tests::command::{
-    Outcome, assert_refused, assert_wrong_arguments, command, files_below, killed_when, names_in, start, toy,
-};
+use viewfuse_tests::command::{Outcome, files_below, names_in, toy};
 use viewfuse_tests::patience::{end, send, wait_while_running};
 
 viewfuse_tests::trials![
@@ -44,31 +42,31 @@ fn scores(text: &str) -> Vec<(u32, f64)> {
 
 fn held_out_views_are_scored_on_the_way() {
     let folder = toy();
-    let text = done(folder.path(), &format!("{OPTIMISE} --left-out 20,21 -o a.ply"));
+    let text = done(&folder, &format!("{OPTIMISE} --left-out 20,21 -o a.ply"));
     let scores = scores(&text);
     assert_eq!(scores.iter().map(|score| score.0).collect::<Vec<_>>(), [40, 80, 120, 160, 200, 240], "{text}");
     assert!(scores[5].1 > scores[0].1 + 3.0, "it becomes better: {text}");
     assert!(!text.contains("fit: "), "{text}");
-    let count = gaussians(&folder.path().join("a.ply")).gaussians.len();
+    let count = gaussians(&folder.join("a.ply")).gaussians.len();
     assert!(text.contains(&format!("a.ply: {count} Gaussians after 240 of 240 iterations\n")), "{text}");
     // The last score is that of `render` with the file, from the same sources.
-    let rendered = done(folder.path(), "render toy --gaussians a.ply --targets 20,21 --size 48x48 --device cpu -o out");
+    let rendered = done(&folder, "render toy --gaussians a.ply --targets 20,21 --size 48x48 --device cpu -o out");
     let psnr = |line: &str| line.split("PSNR ").nth(1)?.split(" dB").next()?.parse::<f64>().ok();
     let again: Vec<f64> = rendered.lines().filter_map(psnr).collect();
     assert!(again.len() == 2 && (again.iter().sum::<f64>() / 2.0 - scores[5].1).abs() < 0.02, "{rendered}\n{text}");
     // The same seed, any number of threads.
-    done(folder.path(), &format!("{OPTIMISE} --left-out 20,21 --threads 1 -o b.ply"));
-    let read = |name: &str| fs::read(folder.path().join(name)).expect("a file");
+    done(&folder, &format!("{OPTIMISE} --left-out 20,21 --threads 1 -o b.ply"));
+    let read = |name: &str| fs::read(folder.join(name)).expect("a file");
     assert!(read("a.ply") == read("b.ply"), "one thread makes another scene");
-    done(folder.path(), &format!("{OPTIMISE} --left-out 20,21 --seed 5 -o c.ply"));
+    done(&folder, &format!("{OPTIMISE} --left-out 20,21 --seed 5 -o c.ply"));
     assert!(read("a.ply") != read("c.ply"), "the seed changes nothing");
 }
 
 fn it_ends_with_the_weights_of_a_view() {
     let folder = toy();
     let optimised = |options: &str, output: &str| {
-        let text = done(folder.path(), &format!("{OPTIMISE} --left-out 20,21 {options} -o {output}"));
-        (scores(&text), fs::read(folder.path().join(output)).expect("a file"))
+        let text = done(&folder, &format!("{OPTIMISE} --left-out 20,21 {options} -o {output}"));
+        (scores(&text), fs::read(folder.join(output)).expect("a file"))
     };
     let (without, one, other) =
         (optimised("", "a.ply"), optimised("--towards 20", "b.ply"), optimised("--towards 21", "c.ply"));
@@ -83,8 +81,8 @@ fn it_ends_with_the_weights_of_a_view() {
 fn the_number_follows_the_pixels() {
     let folder = toy();
     let count = |options: &str| {
-        done(folder.path(), &format!("optimise toy --device cpu --iterations 4 {options} -o toy.ply"));
-        gaussians(&folder.path().join("toy.ply")).gaussians.len()
+        done(&folder, &format!("optimise toy --device cpu --iterations 4 {options} -o toy.ply"));
+        gaussians(&folder.join("toy.ply")).gaussians.len()
     };
     let usual = count("--size 32x32");
     assert!(usual > 200 && usual <= 32 * 32 * 3 / 2, "{usual} Gaussians for 32x32 pixels");
@@ -94,8 +92,8 @@ fn the_number_follows_the_pixels() {
 
 fn ctrl_c_keeps_what_there_is() {
     let folder = toy();
-    let path = folder.path().join("toy.ply");
-    let mut child = start(BINARY, folder.path(), &format!("{OPTIMISE} --iterations 100000 -o toy.ply"));
+    let path = folder.join("toy.ply");
+    let mut child = start(&folder, &format!("{OPTIMISE} --iterations 100000 -o toy.ply"));
     wait_while_running(&mut child, || path.exists());
     send("-INT", &child);
     assert_eq!(end(&mut child).expect("an end").code(), Some(130));
@@ -103,27 +101,25 @@ fn ctrl_c_keeps_what_there_is() {
     let count = gaussians(&path).gaussians.len();
     assert!(count > 100 && text.contains(&format!("toy.ply: {count} Gaussians after ")), "{text}");
     assert!(text.contains(" of 300000 iterations\n"), "{text}");
-    assert_eq!(names_in(folder.path()), ["toy", "toy.ply"]);
+    assert_eq!(names_in(&folder), ["toy", "toy.ply"]);
 }
 
 fn after_a_kill_it_goes_on_from_the_file() {
     let folder = toy();
-    let path = folder.path().join("toy.ply");
-    killed_when(BINARY, folder.path(), &format!("{OPTIMISE} --iterations 100000 --left-out 20 -o toy.ply"), || {
-        path.exists()
-    });
+    let path = folder.join("toy.ply");
+    killed_when(&folder, &format!("{OPTIMISE} --iterations 100000 --left-out 20 -o toy.ply"), || path.exists());
     let before = fs::read(&path).expect("a file");
     assert!(gaussians(&path).gaussians.len() > 100);
     let resumed = |output: &str| {
-        let text = done(folder.path(), &format!("{OPTIMISE} --left-out 20 --resume toy.ply -o {output}"));
-        (scores(&text), fs::read(folder.path().join(output)).expect("a file"))
+        let text = done(&folder, &format!("{OPTIMISE} --left-out 20 --resume toy.ply -o {output}"));
+        (scores(&text), fs::read(folder.join(output)).expect("a file"))
     };
     // What goes on from a file is the same each time; it has the finest size's 60 iterations, and is better than the
     // file.
     let (first, second) = (resumed("a.ply"), resumed("b.ply"));
     assert!(first == second, "two scenes from one file");
     assert_eq!(first.0.iter().map(|score| score.0).collect::<Vec<_>>(), [200, 240]);
-    let rendered = done(folder.path(), "render toy --gaussians toy.ply --targets 20 --size 48x48 --device cpu -o out");
+    let rendered = done(&folder, "render toy --gaussians toy.ply --targets 20 --size 48x48 --device cpu -o out");
     let psnr = rendered.split("PSNR ").nth(1).and_then(|rest| rest.split(' ').next()).expect("a score");
     assert!(first.0[1].1 > psnr.parse().expect("a number"), "{rendered} {:?}", first.0);
     assert!(fs::read(&path).expect("a file") == before, "the file that it goes on from has changed");
@@ -134,92 +130,91 @@ fn options_of_the_field_are_those_of_the_command() {
     let folder = toy();
     let render = |options: &str, output: &str| {
         let arguments = "render toy --targets 20 --size 32x32 --weights mean --no-sheets --device cpu";
-        done(folder.path(), &format!("{arguments} {options} -o {output}"));
-        fs::read(folder.path().join(output).join("000020.png")).expect("a picture")
+        done(&folder, &format!("{arguments} {options} -o {output}"));
+        fs::read(folder.join(output).join("000020.png")).expect("a picture")
     };
     let few = render("--model gaussians --gaussian-iterations 4", "few");
     assert!(few != render("--model gaussians --gaussian-iterations 8", "more"), "iterations change nothing");
     let count = "--model gaussians --gaussian-iterations 4 --gaussian-count 300";
     assert!(few != render(count, "count"), "the number changes nothing");
     let wrong = "render toy --targets 20 --model gaussians --gaussian-count 0 -o out";
-    assert_wrong_arguments(BINARY, folder.path(), wrong, &["--gaussian-count"]);
+    assert_wrong_arguments(&folder, wrong, &["--gaussian-count"]);
     let without = "render toy --targets 20 --gaussian-count 300 -o out";
-    assert_wrong_arguments(BINARY, folder.path(), without, &["--gaussian-count cannot be used"]);
+    assert_wrong_arguments(&folder, without, &["--gaussian-count cannot be used"]);
 }
 
 fn what_it_refuses() {
     let folder = toy();
-    assert_wrong_arguments(BINARY, folder.path(), &format!("{OPTIMISE} -o toy.obj"), &["written as .ply or .html"]);
-    assert_wrong_arguments(BINARY, folder.path(), &format!("{OPTIMISE} --count 0 -o toy.ply"), &["--count"]);
-    assert_refused(BINARY, folder.path(), &format!("{OPTIMISE} --resume no.ply -o toy.ply"), &["no.ply"]);
-    assert_refused(BINARY, folder.path(), &format!("{OPTIMISE} --left-out 99 -o toy.ply"), &["99"]);
+    assert_wrong_arguments(&folder, &format!("{OPTIMISE} -o toy.obj"), &["written as .ply or .html"]);
+    assert_wrong_arguments(&folder, &format!("{OPTIMISE} --count 0 -o toy.ply"), &["--count"]);
+    assert_refused(&folder, &format!("{OPTIMISE} --resume no.ply -o toy.ply"), &["no.ply"]);
+    assert_refused(&folder, &format!("{OPTIMISE} --left-out 99 -o toy.ply"), &["99"]);
 }
 
 /// Held-out sources prefer the sharper recipe on the sample scene; the views that a person keeps back are none of them.
 fn more_quality_is_tried_on_sources_and_has_colours_by_direction() {
     let folder = toy();
-    let text = done(folder.path(), &format!("{OPTIMISE} --left-out 20,21 --quality standard -o a.ply"));
+    let text = done(&folder, &format!("{OPTIMISE} --left-out 20,21 --quality standard -o a.ply"));
     let trial = text.lines().find(|line| line.contains("left out of a trial")).expect("a trial");
     assert!(trial.starts_with("2 of 22 photographs") && trial.contains("standard is used"), "{trial}");
     let about = text.lines().find(|line| line.contains(" iterations more, about ")).expect("a time");
     assert!(about.ends_with(" s") || about.ends_with(" minutes"), "{about}");
     let sharp = scores(&text);
-    let fast = scores(&done(folder.path(), &format!("{OPTIMISE} --left-out 20,21 -o b.ply")));
+    let fast = scores(&done(&folder, &format!("{OPTIMISE} --left-out 20,21 -o b.ply")));
     let (sharp, fast) = (sharp.last().expect("scores").1, fast.last().expect("scores").1);
     assert!(sharp > fast + 0.5, "{sharp} and {fast} dB");
-    let (first, second) = (gaussians(&folder.path().join("a.ply")), gaussians(&folder.path().join("b.ply")));
+    let (first, second) = (gaussians(&folder.join("a.ply")), gaussians(&folder.join("b.ply")));
     assert_eq!((first.degree, second.degree), (3, 0));
     // 48x48 pixels, three quarters of a Gaussian each.
     assert_eq!(first.gaussians.len(), 1728, "the number rises to its limit");
     // The last score is that of the file, harmonics included.
-    let rendered = done(folder.path(), "render toy --gaussians a.ply --targets 20,21 --size 48x48 --device cpu -o out");
+    let rendered = done(&folder, "render toy --gaussians a.ply --targets 20,21 --size 48x48 --device cpu -o out");
     let psnr = |line: &str| line.split("PSNR ").nth(1)?.split(" dB").next()?.parse::<f64>().ok();
     let again: Vec<f64> = rendered.lines().filter_map(psnr).collect();
     assert!(again.len() == 2 && (again.iter().sum::<f64>() / 2.0 - sharp).abs() < 0.02, "{rendered}\n{text}");
     // It goes on from the file with its harmonics: the first score of few iterations is no worse.
     let more = "--resume a.ply --left-out 20,21 --quality standard --iterations 40 -o c.ply";
-    let resumed = scores(&done(folder.path(), &format!("{OPTIMISE} {more}")));
+    let resumed = scores(&done(&folder, &format!("{OPTIMISE} {more}")));
     assert!(resumed.last().expect("a score").1 > sharp - 0.5, "{resumed:?} after {sharp}");
-    assert_eq!(gaussians(&folder.path().join("c.ply")).degree, 3);
+    assert_eq!(gaussians(&folder.join("c.ply")).degree, 3);
     let fast = format!("{OPTIMISE} --resume a.ply --iterations 1 -o d.ply");
-    let Outcome { code, stderr, .. } = Outcome::of(command(BINARY, folder.path(), &fast));
+    let Outcome { code, stderr, .. } = run(&folder, &fast);
     assert!(code == Some(0) && stderr.contains("the colours to go on from depend on the direction"), "{stderr}");
 }
 
 fn few_photographs_and_a_short_time_have_fewer_iterations() {
     let folder = toy();
-    let few = done(folder.path(), &format!("{OPTIMISE} --sources 0..9 --quality standard -o a.ply"));
+    let few = done(&folder, &format!("{OPTIMISE} --sources 0..9 --quality standard -o a.ply"));
     assert!(few.contains("10 photographs are too few for standard, from 12 on: fast\n"), "{few}");
     assert!(few.contains(" after 240 of 240 iterations\n"), "{few}");
     // The trial alone takes a second.
-    let short = done(folder.path(), &format!("{OPTIMISE} --quality standard --max-time 1s -o b.ply"));
+    let short = done(&folder, &format!("{OPTIMISE} --quality standard --max-time 1s -o b.ply"));
     assert!(short.contains(" after 220 of 220 iterations\n"), "{short}");
     let wrong = format!("{OPTIMISE} --max-time 10m -o a.ply");
-    assert_wrong_arguments(BINARY, folder.path(), &wrong, &["--max-time is for --quality standard and high"]);
+    assert_wrong_arguments(&folder, &wrong, &["--max-time is for --quality standard and high"]);
     for (options, words) in
         [("--quality best", "best is no quality"), ("--quality high --max-time soon", "soon is no time")]
     {
-        assert_wrong_arguments(BINARY, folder.path(), &format!("{OPTIMISE} {options} -o a.ply"), &[words]);
+        assert_wrong_arguments(&folder, &format!("{OPTIMISE} {options} -o a.ply"), &[words]);
     }
 }
 
 fn a_page_holds_what_the_file_holds() {
     let folder = toy();
-    let file = done(folder.path(), &format!("{OPTIMISE} -o toy.ply"));
-    let Outcome { code, stdout, stderr } =
-        Outcome::of(command(BINARY, folder.path(), &format!("{OPTIMISE} --quality fast -o toy.html")));
+    let file = done(&folder, &format!("{OPTIMISE} -o toy.ply"));
+    let Outcome { code, stdout, stderr } = run(&folder, &format!("{OPTIMISE} --quality fast -o toy.html"));
     assert_eq!((code, stderr.as_str()), (Some(0), ""));
     assert_eq!(stdout.replace("toy.html", "toy.ply"), file);
-    let page = fs::read_to_string(folder.path().join("toy.html")).expect("a page");
+    let page = fs::read_to_string(folder.join("toy.html")).expect("a page");
     assert!(page.starts_with("<!doctype html>") || page.starts_with("<!DOCTYPE html>"), "{}", &page[..40]);
     assert!(!page.contains("src=\"http") && !page.contains("href=\"http"), "it needs a network");
-    let bytes = files_below(folder.path()).into_iter().find(|(path, _)| path.ends_with("toy.ply")).expect("a file").1;
+    let bytes = files_below(&folder).into_iter().find(|(path, _)| path.ends_with("toy.ply")).expect("a file").1;
     assert!((page.len() as u64) < bytes + 200_000, "{} bytes of a page for {bytes} of a file", page.len());
 }
 
 fn without_a_view_that_is_kept_back_it_says_what_its_figure_is() {
     let folder = toy();
-    let text = done(folder.path(), "optimise toy --sources 0..5 --size 32x32 --iterations 20 --device cpu -o a.ply");
+    let text = done(&folder, "optimise toy --sources 0..5 --size 32x32 --iterations 20 --device cpu -o a.ply");
     let line = text.lines().find_map(|line| line.strip_prefix("fit: PSNR ")).unwrap_or_else(|| panic!("{text}"));
     let (psnr, rest) = line.split_once(" dB on 3 of the sources themselves").expect("what it is of");
     assert!(psnr.parse::<f64>().is_ok_and(|psnr| (5.0..50.0).contains(&psnr)), "{psnr}");

@@ -1,9 +1,9 @@
 //! Outputs that would replace something else: refused before work begins, with everything as it was.
 
-use super::{BINARY, binary, done};
+use super::{assert_refused, assert_wrong_arguments, done, run};
 use std::fs;
 use std::path::{Path, PathBuf};
-use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, names_in, toy};
+use viewfuse_tests::command::{names_in, toy};
 use viewfuse_tests::scenes::{Folder, middlebury};
 
 viewfuse_tests::trials![
@@ -34,9 +34,9 @@ fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
 /// The arguments are wrong, and every file is what it was.
 #[track_caller]
 fn assert_kept(folder: &Folder, arguments: &str, parts: &[&str]) {
-    let before = contents(folder.path());
-    assert_wrong_arguments(binary(arguments), folder.path(), arguments, parts);
-    assert_eq!(contents(folder.path()), before, "viewfuse {arguments} changed a file");
+    let before = contents(folder);
+    assert_wrong_arguments(folder, arguments, parts);
+    assert_eq!(contents(folder), before, "viewfuse {arguments} changed a file");
 }
 
 fn pictures_do_not_replace_photographs() {
@@ -46,7 +46,7 @@ fn pictures_do_not_replace_photographs() {
     }
     #[cfg(unix)]
     {
-        std::os::unix::fs::symlink("toy/rgb", folder.path().join("elsewhere")).expect("a link");
+        std::os::unix::fs::symlink("toy/rgb", folder.join("elsewhere")).expect("a link");
         assert_kept(&folder, &format!("{RENDER} -o elsewhere"), &["elsewhere", "the scene toy is read from"]);
     }
     for command in [
@@ -58,15 +58,15 @@ fn pictures_do_not_replace_photographs() {
     }
     // Photographs that lie in the scene's own folder.
     let flat = middlebury();
-    let before = contents(flat.path());
-    assert_wrong_arguments(BINARY, flat.path(), "render . --targets toy0001 -o .", &["is read from this folder"]);
-    assert_eq!(contents(flat.path()), before);
+    let before = contents(&flat);
+    assert_wrong_arguments(&flat, "render . --targets toy0001 -o .", &["is read from this folder"]);
+    assert_eq!(contents(&flat), before);
     // A folder of one's own in the scene's stays possible, also a second time.
     for _ in 0..2 {
-        done(folder.path(), &format!("{RENDER} -o toy/out"));
+        done(&folder, &format!("{RENDER} -o toy/out"));
     }
-    assert!(folder.path().join("toy/out/000020.png").is_file());
-    assert!(done(folder.path(), "inspect toy").contains("24 photographs"));
+    assert!(folder.join("toy/out/000020.png").is_file());
+    assert!(done(&folder, "inspect toy").contains("24 photographs"));
 }
 
 fn files_do_not_replace_lists() {
@@ -76,39 +76,39 @@ fn files_do_not_replace_lists() {
         assert_kept(&folder, &format!("{EVALUATE} -o {out}"), &[out, "is read from this file"]);
     }
     for _ in 0..2 {
-        done(folder.path(), "inspect toy -o toy/cameras.png");
+        done(&folder, "inspect toy -o toy/cameras.png");
     }
 }
 
 fn an_evaluation_keeps_its_record() {
     let folder = toy();
     let run = "evaluate toy --protocol random --trials 2 --weights mean --size 16x16 --device cpu -o out";
-    done(folder.path(), run);
-    let before = contents(folder.path());
+    done(&folder, run);
+    let before = contents(&folder);
     let parts = ["out/run.json: is not the record of a render", "another folder"];
-    assert_refused(BINARY, folder.path(), &format!("{RENDER} -o out"), &parts);
-    assert_eq!(contents(folder.path()), before);
-    assert!(done(folder.path(), run).contains("0 jobs done; 2 of 2"), "it goes on");
+    assert_refused(&folder, &format!("{RENDER} -o out"), &parts);
+    assert_eq!(contents(&folder), before);
+    assert!(done(&folder, run).contains("0 jobs done; 2 of 2"), "it goes on");
     // Nor is the record of a render taken for that of an evaluation.
-    done(folder.path(), &format!("{RENDER} -o pictures"));
-    let before = contents(folder.path());
-    assert_refused(BINARY, folder.path(), &run.replace("-o out", "-o pictures"), &["pictures/run.json"]);
-    assert_eq!(contents(folder.path()), before);
+    done(&folder, &format!("{RENDER} -o pictures"));
+    let before = contents(&folder);
+    assert_refused(&folder, &run.replace("-o out", "-o pictures"), &["pictures/run.json"]);
+    assert_eq!(contents(&folder), before);
 }
 
 fn names_that_meet_in_a_file() {
     let scene = toy();
     for (kind, ending) in [("rgb", "png"), ("pose", "txt")] {
         for (from, to) in [("000020", "x"), ("000021", "x_depth"), ("000022", "y_sheet"), ("000023", "y_confidence")] {
-            let name = |name: &str| scene.path().join(format!("toy/{kind}/{name}.{ending}"));
+            let name = |name: &str| scene.join(format!("toy/{kind}/{name}.{ending}"));
             fs::rename(name(from), name(to)).expect("another name");
         }
     }
     let small = "--size 16x16 --device cpu -o out";
     let parts = ["'x'", "'x_depth'", "x_depth.png", "different folders"];
-    assert_refused(BINARY, scene.path(), &format!("render toy --targets x,x_depth {small}"), &parts);
-    done(scene.path(), &format!("render toy --targets x,y_sheet {small}"));
-    assert!(names_in(&scene.path().join("out")).contains(&"y_sheet_sheet.png".to_owned()));
+    assert_refused(&scene, &format!("render toy --targets x,x_depth {small}"), &parts);
+    done(&scene, &format!("render toy --targets x,y_sheet {small}"));
+    assert!(names_in(&scene.join("out")).contains(&"y_sheet_sheet.png".to_owned()));
 }
 
 fn inputs_are_not_replaced() {
@@ -121,11 +121,11 @@ fn inputs_are_not_replaced() {
     let parts = ["runs/model.safetensors", "is the input"];
     assert_kept(&folder, &format!("train weighting {model} cars -o runs"), &parts);
     assert_kept(&folder, &format!("train pixelnerf cars --from {model} -o runs"), &parts);
-    done(folder.path(), "evaluate toy --protocol random --weights mean --size 16x16 --device cpu -o out");
+    done(&folder, "evaluate toy --protocol random --weights mean --size 16x16 --device cpu -o out");
     assert_kept(&folder, "report out -o out/run.json", &["out/run.json", "belongs to out"]);
     assert_kept(&folder, "report out -o out/scores-0-of-1.jsonl", &["belongs to out"]);
     for _ in 0..2 {
-        done(folder.path(), "report out -o out/page.html");
+        done(&folder, "report out -o out/page.html");
     }
 }
 
@@ -152,11 +152,11 @@ fn no_option_names_both_an_input_and_an_output() {
     }
     #[cfg(unix)]
     {
-        std::os::unix::fs::symlink("p.csv", folder.path().join("link.csv")).expect("a link");
+        std::os::unix::fs::symlink("p.csv", folder.join("link.csv")).expect("a link");
         assert_kept(&folder, "weights toy --camera-path p.csv --npy link.csv", &["link.csv: is the input p.csv"]);
     }
     // The same name elsewhere is another file.
-    done(folder.path(), "weights toy --camera-path p.csv --npy toy/p.csv");
+    done(&folder, "weights toy --camera-path p.csv --npy toy/p.csv");
 }
 
 /// A folder without a record, and one whose record names other targets.
@@ -167,17 +167,17 @@ fn files_of_a_person_are_no_pictures_of_a_run() {
         folder.write(&file, "mine");
         let out = format!("out-{mine}");
         let parts = [&*file, "no earlier run wrote this file", "another folder"];
-        assert_refused(BINARY, folder.path(), &format!("{RENDER} --video gif -o {out}"), &parts);
-        assert_refused(BINARY, folder.path(), &format!("{RENDER} --video gif --replace -o {out}"), &parts);
-        done(folder.path(), &format!("{} --video gif -o {out}-b", RENDER.replace("20", "21")));
+        assert_refused(&folder, &format!("{RENDER} --video gif -o {out}"), &parts);
+        assert_refused(&folder, &format!("{RENDER} --video gif --replace -o {out}"), &parts);
+        done(&folder, &format!("{} --video gif -o {out}-b", RENDER.replace("20", "21")));
         folder.write(&format!("{out}-b/000020.png"), "mine");
         let parts = ["000020.png", "no earlier run wrote this file"];
-        assert_refused(BINARY, folder.path(), &format!("{RENDER} -o {out}-b"), &parts);
-        assert_eq!(fs::read(folder.path().join(file)).expect("it stays"), b"mine");
+        assert_refused(&folder, &format!("{RENDER} -o {out}-b"), &parts);
+        assert_eq!(fs::read(folder.join(file)).expect("it stays"), b"mine");
     }
     // What a run wrote is replaced by the next one.
     for _ in 0..2 {
-        done(folder.path(), &format!("{RENDER} --video gif -o again"));
+        done(&folder, &format!("{RENDER} --video gif -o again"));
     }
 }
 
@@ -185,7 +185,7 @@ fn files_of_a_person_are_no_pictures_of_a_run() {
 fn links_to_nothing_are_noticed_first() {
     use std::os::unix::fs::symlink;
     let folder = toy();
-    symlink("nowhere/at/all", folder.path().join("out")).expect("a link");
+    symlink("nowhere/at/all", folder.join("out")).expect("a link");
     for arguments in [
         format!("{RENDER} -o out"),
         format!("{EVALUATE} -o out"),
@@ -194,7 +194,7 @@ fn links_to_nothing_are_noticed_first() {
         "convert toy/rgb/000000.png out/a.safetensors".to_owned(),
         "train pixelnerf cars -o out".to_owned(),
     ] {
-        assert_refused(binary(&arguments), folder.path(), &arguments, &["cannot be written: out is a link to nothing"]);
+        assert_refused(&folder, &arguments, &["cannot be written: out is a link to nothing"]);
     }
 }
 
@@ -211,22 +211,22 @@ fn what_a_kill_left_is_removed() {
     for other in ["out/.viewfuse-backup", "out/.hidden", "learn/.unfinished-drafts/x"] {
         folder.write(other, "whole");
     }
-    done(folder.path(), &format!("{RENDER} -o out"));
+    done(&folder, &format!("{RENDER} -o out"));
     let hidden = |name: &str| {
-        let names = names_in(&folder.path().join(name));
+        let names = names_in(&folder.join(name));
         names.into_iter().filter(|name| name.starts_with('.')).collect::<Vec<_>>()
     };
     assert_eq!(hidden("out"), [".hidden", ".viewfuse-backup"]);
-    done(folder.path(), "export toy --layout transforms -o learn/toy");
+    done(&folder, "export toy --layout transforms -o learn/toy");
     assert_eq!(hidden("learn"), [".unfinished-drafts"]);
     // What another process still writes stays.
-    let path = folder.path().join("out/.viewfuse-unfinished-busyyy");
+    let path = folder.join("out/.viewfuse-unfinished-busyyy");
     let busy = fs::File::create(&path).expect("a file");
     busy.lock().expect("a lock");
-    done(folder.path(), &format!("{RENDER} -o out"));
+    done(&folder, &format!("{RENDER} -o out"));
     assert!(path.exists());
     busy.unlock().expect("unlocked");
-    done(folder.path(), &format!("{RENDER} -o out"));
+    done(&folder, &format!("{RENDER} -o out"));
     assert!(!path.exists());
 }
 
@@ -240,14 +240,14 @@ fn names_that_no_file_has_are_noticed_first() {
         format!("{RENDER} -o new/{long}"),
         format!("optimise toy --size 16x16 --device cpu -o {long}.ply"),
     ] {
-        let refused = viewfuse_tests::command::run(BINARY, folder.path(), &arguments);
+        let refused = run(&folder, &arguments);
         assert_eq!((refused.code, refused.stdout.as_str()), (Some(1), ""), "{}", refused.stderr);
         assert!(
             refused.stderr.ends_with("cannot be written: File name too long (os error 36)\n"),
             "{}",
             refused.stderr
         );
-        assert_eq!(names_in(folder.path()), ["toy"]);
+        assert_eq!(names_in(&folder), ["toy"]);
     }
 }
 
@@ -262,6 +262,6 @@ fn files_are_no_folders_of_pictures() {
         assert_kept(&folder, &format!("{RENDER} -o {name}"), &parts);
     }
     // A folder that is there is one, whatever its name is.
-    fs::create_dir(folder.path().join("old.gif")).expect("a folder");
-    done(folder.path(), &format!("{RENDER} -o old.gif"));
+    fs::create_dir(folder.join("old.gif")).expect("a folder");
+    done(&folder, &format!("{RENDER} -o old.gif"));
 }

@@ -1,12 +1,12 @@
 //! `viewfuse pareto`.
 
-use super::{BINARY, done, list_of, number_of, read_json, text_of};
+use super::{assert_refused, assert_wrong_arguments, command, done, list_of, number_of, read_json, text_of};
 use serde_json::Value;
 use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 use viewfuse::evaluate::pareto::front::best_for_their_time;
-use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, command, names_in, toy};
+use viewfuse_tests::command::{names_in, toy};
 
 viewfuse_tests::trials![
     sweeps_what_a_network_omits,
@@ -25,28 +25,8 @@ fn record(folder: &Path) -> Value {
 
 /// Lines of the CSV file, by column.
 fn table(folder: &Path) -> Vec<HashMap<String, String>> {
-    let text = fs::read_to_string(folder.join("out/pareto.csv")).expect("a table");
-    // No name of a setting or a CPU is without commas, so quotes count.
-    let cells = |line: &str| -> Vec<String> {
-        let mut cells = vec![String::new()];
-        let mut quoted = false;
-        for letter in line.chars() {
-            match letter {
-                '"' => quoted = !quoted,
-                ',' if !quoted => cells.push(String::new()),
-                _ => cells.last_mut().expect("a cell").push(letter),
-            }
-        }
-        cells
-    };
-    let mut lines = text.lines().map(cells);
-    let header = lines.next().expect("a header");
-    lines
-        .map(|line| {
-            assert_eq!(line.len(), header.len(), "{line:?}");
-            header.iter().cloned().zip(line).collect()
-        })
-        .collect()
+    let table = csv::Reader::from_path(folder.join("out/pareto.csv")).expect("a table");
+    table.into_deserialize().collect::<Result<_, _>>().expect("as many cells in every row")
 }
 
 fn number(row: &HashMap<String, String>, column: &str) -> f64 {
@@ -79,21 +59,9 @@ fn sweeps_what_a_network_omits() {
     let rows = table(&folder);
     let settings: Vec<&str> = rows.iter().map(|row| row["setting"].as_str()).collect();
     assert!((26..=45).contains(&settings.len()), "{settings:?}");
-    for setting in [
-        "exact",
-        "at most 40 dB",
-        "unused views",
-        "leave out 0.1",
-        "latent layers",
-        "empty space, 4",
-        "empty rays",
-        "empty parts",
-        "hidden, 1/256",
-        "all",
-        "all but space",
-        "all, 8+4+4",
-        "all, 16+0+0",
-    ] {
+    let expected = "exact; at most 40 dB; unused views; leave out 0.1; latent layers; empty space, 4; empty rays; \
+                    empty parts; hidden, 1/256; all; all but space; all, 8+4+4; all, 16+0+0";
+    for setting in expected.split("; ") {
         assert_eq!(settings.iter().filter(|other| **other == setting).count(), 1, "{setting} in {settings:?}");
         assert!(printed.contains(setting), "{setting} in\n{printed}");
     }
@@ -169,8 +137,8 @@ fn targets_without_photographs_have_no_loss() {
 
 fn bad_input_is_refused() {
     let folder = toy();
-    let refused = |arguments: &str, parts: &[&str]| assert_refused(BINARY, &folder, arguments, parts);
-    let wrong = |arguments: &str, parts: &[&str]| assert_wrong_arguments(BINARY, &folder, arguments, parts);
+    let refused = |arguments: &str, parts: &[&str]| assert_refused(&folder, arguments, parts);
+    let wrong = |arguments: &str, parts: &[&str]| assert_wrong_arguments(&folder, arguments, parts);
     refused("pareto toy -o out", &["toy: no targets", "--targets"]);
     refused("pareto nowhere --targets 20 -o out", &["nowhere"]);
     refused("pareto toy --targets 20 --device vulkan:99 -o out", &[]);
@@ -194,7 +162,7 @@ fn ctrl_c_leaves_what_was_there() {
     fs::create_dir(folder.join("out")).expect("a folder");
     fs::write(folder.join("out/pareto.csv"), "older").expect("an older result");
     let arguments = NETWORK.replace("--repeat 2", "--repeat 1000");
-    let mut run = command(BINARY, &folder, &format!("{arguments} -o out"));
+    let mut run = command(&folder, &format!("{arguments} -o out"));
     let run = run.env("VIEWFUSE_PROGRESS", "0").stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = run.spawn().expect("the command starts");
     let mut news = BufReader::new(child.stderr.take().expect("a pipe")).lines();

@@ -9,7 +9,7 @@ mod helper;
 mod on_the_way;
 mod stopped;
 
-use super::{BINARY, list_of, read_json};
+use super::{BINARY, assert_refused, assert_wrong_arguments, command, done_with_warnings, list_of, read_json, run};
 use image::{DynamicImage, ImageFormat, RgbImage, imageops};
 use std::fs;
 use std::io::Cursor;
@@ -17,9 +17,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use viewfuse::core::pose::Pose;
 use viewfuse::scene::Scene;
-use viewfuse_tests::command::{
-    Outcome, assert_command_refused, assert_refused, assert_wrong_arguments, command, files_below, interrupt, spawn,
-};
+use viewfuse_tests::command::{Outcome, assert_command_refused, files_below, interrupt, spawn};
 use viewfuse_tests::patience::wait_while_running;
 use viewfuse_tests::places::data;
 use viewfuse_tests::scenes::{FILM, Folder, ORIENTATION, with_exif};
@@ -90,6 +88,13 @@ fn bare(views: impl IntoIterator<Item = usize>) -> Folder {
     folder
 }
 
+/// A command for which a variable names a program.
+fn with(folder: &Folder, arguments: &str, (name, value): (&str, PathBuf)) -> Command {
+    let mut command = command(folder, arguments);
+    command.env(name, value);
+    command
+}
+
 /// What a command prints; warnings and progress aside, it succeeds.
 #[track_caller]
 fn posed(command: Command) -> String {
@@ -124,14 +129,14 @@ fn worst_rotation(scene: &Scene) -> f32 {
 
 fn eight_photographs_to_a_picture() {
     let folder = bare(0..8);
-    let said = posed(command(BINARY, folder.path(), "pose bare -o posed --seed 3"));
+    let said = done_with_warnings(&folder, "pose bare -o posed --seed 3").stdout;
     assert!(said.starts_with("registered 8 of 8 photographs\n") && said.contains("from EXIF; 320x240"), "{said}");
-    let scene = Scene::open(folder.path().join("posed")).expect("a scene");
+    let scene = Scene::open(folder.join("posed")).expect("a scene");
     assert_eq!((scene.layout, scene.views.len()), ("colmap", 8));
     assert!(scene.points.len() > 100, "{} points", scene.points.len());
     let worst = worst_rotation(&scene);
     assert!(worst < 1.5, "{worst} degrees");
-    let record = read_json(folder.path().join("posed/pose.json"));
+    let record = read_json(folder.join("posed/pose.json"));
     let accepted = list_of(&record["accepted"]);
     assert_eq!(accepted.iter().filter(|photo| photo["verdict"] == "sure").count(), 8, "{record}");
     // Features are found in enlarged photographs; cameras are those of the photographs.
@@ -140,14 +145,14 @@ fn eight_photographs_to_a_picture() {
     let [x, y] = camera.principal();
     assert!(camera.width() == 320 && (x - 160.0).abs() < 1.0 && (y - 120.0).abs() < 1.0, "{camera:?}");
     assert!(record["attempts"][0]["solver"].as_str().is_some_and(|name| name.starts_with("openmvg-sfm ")), "{record}");
-    assert!(image::open(folder.path().join("posed/cameras.png")).is_ok());
+    assert!(image::open(folder.join("posed/cameras.png")).is_ok());
     // From nothing to a picture.
-    posed(command(
-        BINARY,
-        folder.path(),
+    done_with_warnings(
+        &folder,
         "render posed --targets 3 -o out --size 160x120 --weights distance:power=2 --device cpu",
-    ));
-    let psnr = read_json(folder.path().join("out/run.json"))["frames"][0]["psnr"].as_f64().expect("a score");
+    )
+    .stdout;
+    let psnr = read_json(folder.join("out/run.json"))["frames"][0]["psnr"].as_f64().expect("a score");
     assert!(psnr > 21.0, "{psnr} dB");
 }
 
@@ -160,7 +165,7 @@ fn what_does_not_belong_is_excluded_by_name() {
     let other = image::open(data("toy/rgb/000003.png")).expect("another scene").to_rgb8();
     let other = imageops::resize(&other, 320, 240, imageops::FilterType::Triangle);
     folder.write("bare/other.jpg", with_exif(&jpeg(other), &[(FILM, ROOM_FILM)]));
-    let said = posed(command(BINARY, folder.path(), "pose bare -o posed"));
+    let said = done_with_warnings(&folder, "pose bare -o posed").stdout;
     assert!(said.starts_with("registered 5 of 9 photographs\n"), "{said}");
     for (name, reason) in [
         ("cut.jpg", "the file ends before the picture does"),
@@ -170,7 +175,7 @@ fn what_does_not_belong_is_excluded_by_name() {
     ] {
         assert!(said.contains(&format!("left out   {name}: {reason}")), "{name}: {said}");
     }
-    let scene = Scene::open(folder.path().join("posed")).expect("a scene");
+    let scene = Scene::open(folder.join("posed")).expect("a scene");
     assert_eq!(scene.views.len(), 5);
     assert!(worst_rotation(&scene) < 1.5);
 }
@@ -182,9 +187,9 @@ fn sizes_and_orientations_may_differ() {
     folder.write("bare/004.jpg", with_exif(&jpeg(small), &[(FILM, ROOM_FILM)]));
     let lying = with_exif(&jpeg(imageops::rotate270(&decoded(5))), &[(ORIENTATION, 6), (FILM, ROOM_FILM)]);
     folder.write("bare/005.jpg", lying);
-    let said = posed(command(BINARY, folder.path(), "pose bare -o posed --layout transforms"));
+    let said = done_with_warnings(&folder, "pose bare -o posed --layout transforms").stdout;
     assert!(said.contains("320x240"), "{said}");
-    let scene = Scene::open(folder.path().join("posed")).expect("a scene");
+    let scene = Scene::open(folder.join("posed")).expect("a scene");
     let turned = scene.view_named("005").map(|view| &scene.views[view].camera.pinhole).expect("the lying one");
     assert_eq!((turned.width(), turned.height()), (320, 240), "upright");
     assert!(scene.views.len() >= 5, "{said}");
@@ -197,14 +202,14 @@ fn a_step_leaves_few_enough() {
     for number in 0..300 {
         folder.write(&format!("many/{number}.jpg"), with_exif(&room(number % 8), &[(FILM, ROOM_FILM)]));
     }
-    let refused = Outcome::of(command(BINARY, folder.path(), "pose many -o posed"));
+    let refused = run(&folder, "pose many -o posed");
     assert_eq!(refused.code, Some(1), "{}", refused.stderr);
     let step = refused.stderr.split("take one in ").nth(1).and_then(|rest| rest.split(';').next());
     let step: usize = step.and_then(|step| step.parse().ok()).unwrap_or_else(|| panic!("{}", refused.stderr));
-    let said = posed(command(BINARY, folder.path(), &format!("pose many -o posed --every {step}")));
+    let said = done_with_warnings(&folder, &format!("pose many -o posed --every {step}")).stdout;
     assert!(said.starts_with(&format!("registered 8 of {} photographs\n", 300usize.div_ceil(step))), "{said}");
     assert!(said.contains("9.jpg: the same picture as "), "{said}");
-    assert_eq!(Scene::open(folder.path().join("posed")).expect("a scene").views.len(), 8);
+    assert_eq!(Scene::open(folder.join("posed")).expect("a scene").views.len(), 8);
 }
 
 fn photographs_of_nothing_in_common() {
@@ -216,20 +221,20 @@ fn photographs_of_nothing_in_common() {
         let spots = RgbImage::from_fn(320, 240, |x, y| image::Rgb([level(x / 5, y / 5) as u8; 3]));
         folder.write(&format!("bare/{name}.jpg"), jpeg(imageops::blur(&spots, 1.0)));
     }
-    let before = files_below(folder.path());
-    let outcome = Outcome::of(command(BINARY, folder.path(), "pose bare -o posed"));
+    let before = files_below(&folder);
+    let outcome = run(&folder, "pose bare -o posed");
     assert_eq!((outcome.code, outcome.stdout.as_str()), (Some(1), ""), "{}", outcome.stderr);
     let last = outcome.stderr.lines().last().unwrap_or_default();
     for part in ["viewfuse: bare: no poses that can be trusted", "15 degrees", "--focal"] {
         assert!(last.contains(part), "{part}: {}", outcome.stderr);
     }
-    assert_eq!(files_below(folder.path()), before);
+    assert_eq!(files_below(&folder), before);
 }
 
 fn ctrl_c_leaves_nothing() {
     let folder = bare(0..8);
-    let before = files_below(folder.path());
-    let mut child = spawn(command(BINARY, folder.path(), "pose bare -o posed"));
+    let before = files_below(&folder);
+    let mut child = spawn(command(&folder, "pose bare -o posed"));
     let process = child.id();
     // The program has begun.
     let has_child = || {
@@ -242,59 +247,42 @@ fn ctrl_c_leaves_nothing() {
     };
     wait_while_running(&mut child, || has_child() || threads_have());
     interrupt(child, "-INT");
-    assert_eq!(files_below(folder.path()), before);
+    assert_eq!(files_below(&folder), before);
 }
 
 fn formats_that_are_not_read() {
     let folder = bare(0..3);
     folder.write("bare/IMG_7.HEIC", "ftypheic");
-    assert_refused(
-        BINARY,
-        folder.path(),
-        "pose bare -o posed",
-        &["bare/IMG_7.HEIC: HEIC is not read", "heif-convert IMG_7.HEIC"],
-    );
+    assert_refused(&folder, "pose bare -o posed", &["bare/IMG_7.HEIC: HEIC is not read", "heif-convert IMG_7.HEIC"]);
     folder.remove("bare/IMG_7.HEIC").write("bare/DSC_1.NEF", "raw");
-    assert_refused(BINARY, folder.path(), "pose bare -o posed", &["bare/DSC_1.NEF: a camera's raw format is not read"]);
+    assert_refused(&folder, "pose bare -o posed", &["bare/DSC_1.NEF: a camera's raw format is not read"]);
 }
 
 fn too_many_and_too_few() {
     let folder = Folder::new();
-    assert_refused(BINARY, folder.path(), "pose nowhere -o posed", &["nowhere: no such file or folder"]);
+    assert_refused(&folder, "pose nowhere -o posed", &["nowhere: no such file or folder"]);
     folder.write("empty/notes.txt", "nothing");
-    assert_refused(BINARY, folder.path(), "pose empty -o posed", &["empty: no photographs here"]);
+    assert_refused(&folder, "pose empty -o posed", &["empty: no photographs here"]);
     for number in 0..300 {
         folder.write(&format!("many/{number}.jpg"), room(0));
     }
-    assert_refused(
-        BINARY,
-        folder.path(),
-        "pose many -o posed",
-        &["many: 300 photographs", "--every N takes every Nth"],
-    );
+    assert_refused(&folder, "pose many -o posed", &["many: 300 photographs", "--every N takes every Nth"]);
     let two = bare(0..2);
     two.write("bare/cut.jpg", &room(5)[..4000]);
-    assert_refused(
-        BINARY,
-        two.path(),
-        "pose bare -o posed",
-        &["bare: 2 of the photographs can be used", "cut.jpg: the file ends"],
-    );
-    assert_refused(BINARY, two.path(), "pose bare -o bare", &["bare: exists already"]);
-    assert_wrong_arguments(BINARY, two.path(), "pose bare -o posed --focal 0", &["--focal"]);
-    assert_wrong_arguments(BINARY, two.path(), "pose bare -o posed --layout srn", &["--layout"]);
+    assert_refused(&two, "pose bare -o posed", &["bare: 2 of the photographs can be used", "cut.jpg: the file ends"]);
+    assert_refused(&two, "pose bare -o bare", &["bare: exists already"]);
+    assert_wrong_arguments(&two, "pose bare -o posed --focal 0", &["--focal"]);
+    assert_wrong_arguments(&two, "pose bare -o posed --layout srn", &["--layout"]);
 }
 
 fn without_the_program() {
     let folder = bare(0..3);
-    let mut named: Command = command(BINARY, folder.path(), "pose bare -o posed");
-    named.env("VIEWFUSE_OPENMVG", folder.path().join("nothing"));
-    assert_command_refused(named, folder.path(), &["nothing: the program is not there", "`cargo openmvg` builds it"]);
+    let named = with(&folder, "pose bare -o posed", ("VIEWFUSE_OPENMVG", folder.join("nothing")));
+    assert_command_refused(named, &folder, &["nothing: the program is not there", "`cargo openmvg` builds it"]);
     // A program that says something else.
-    let mut named: Command = command(BINARY, folder.path(), "pose bare -o posed");
-    named.env("VIEWFUSE_OPENMVG", "/bin/echo");
     if Path::new("/bin/echo").exists() {
-        assert_command_refused(named, folder.path(), &["/bin/echo: its answer cannot be read"]);
+        let named = with(&folder, "pose bare -o posed", ("VIEWFUSE_OPENMVG", "/bin/echo".into()));
+        assert_command_refused(named, &folder, &["/bin/echo: its answer cannot be read"]);
     }
 }
 
@@ -303,21 +291,20 @@ fn what_lies_beside_the_output_stays() {
     let folder = bare(0..3);
     folder.write(".posed.attempts/notes.txt", "mine").write(".posed.attempts/inner/more.txt", "mine");
     // Without an input nothing has begun.
-    assert_refused(BINARY, folder.path(), "pose nowhere -o posed", &["nowhere"]);
+    assert_refused(&folder, "pose nowhere -o posed", &["nowhere"]);
     // A solver that was asked, and failed.
     if Path::new("/bin/echo").exists() {
-        let mut named: Command = command(BINARY, folder.path(), "pose bare -o posed");
-        named.env("VIEWFUSE_OPENMVG", "/bin/echo");
-        assert_command_refused(named, folder.path(), &["/bin/echo"]);
+        let named = with(&folder, "pose bare -o posed", ("VIEWFUSE_OPENMVG", "/bin/echo".into()));
+        assert_command_refused(named, &folder, &["/bin/echo"]);
     }
     #[cfg(unix)]
     {
-        fs::create_dir(folder.path().join("elsewhere")).expect("a folder");
-        let link = folder.path().join(".linked.attempts");
-        std::os::unix::fs::symlink(folder.path().join("elsewhere"), &link).expect("a link");
-        assert_refused(BINARY, folder.path(), "pose bare -o linked", &[".linked.attempts: it is a link"]);
-        std::os::unix::fs::symlink("elsewhere", folder.path().join("posed")).expect("a link");
-        assert_refused(BINARY, folder.path(), "pose bare -o posed", &["posed: exists already"]);
+        fs::create_dir(folder.join("elsewhere")).expect("a folder");
+        let link = folder.join(".linked.attempts");
+        std::os::unix::fs::symlink(folder.join("elsewhere"), &link).expect("a link");
+        assert_refused(&folder, "pose bare -o linked", &[".linked.attempts: it is a link"]);
+        std::os::unix::fs::symlink("elsewhere", folder.join("posed")).expect("a link");
+        assert_refused(&folder, "pose bare -o posed", &["posed: exists already"]);
     }
 }
 
@@ -325,8 +312,7 @@ fn bare_photographs_say_how() {
     let folder = bare(0..3);
     for arguments in ["inspect bare", "render bare --orbit 3 -o out", "view bare --no-browser"] {
         assert_refused(
-            BINARY,
-            folder.path(),
+            &folder,
             arguments,
             &["bare: 3 photographs, and nothing that gives their poses", "`viewfuse pose FOLDER -o posed`", "--pose"],
         );

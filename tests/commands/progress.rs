@@ -1,7 +1,7 @@
 //! Progress where standard error is no terminal: each long command names its stages, its share never falls, and lines
 //! come while it works, with the time that is left.
 
-use super::{BINARY, binary};
+use super::command;
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::ops::Range;
@@ -12,7 +12,7 @@ use viewfuse::check::check_kernel;
 use viewfuse::check::measure::Role;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::job::progress::Progress;
-use viewfuse_tests::command::{command, toy, toy_twice};
+use viewfuse_tests::command::{toy, toy_twice};
 use viewfuse_tests::places::data;
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -47,7 +47,7 @@ impl Line {
 /// Every change that a command tells; it must succeed.
 #[track_caller]
 fn lines(folder: &Path, arguments: &str) -> Vec<Line> {
-    let mut run = command(binary(arguments), folder, arguments);
+    let mut run = command(folder, arguments);
     let output = run.env("VIEWFUSE_PROGRESS", "0").output().expect("the command starts");
     let said = String::from_utf8(output.stderr).expect("text");
     assert!(output.status.success(), "viewfuse {arguments}\n{said}");
@@ -133,7 +133,7 @@ fn training_and_its_scenes_name_their_stages() {
 /// Without its variable a line every five seconds; here every second, of work that is ended once it has told enough.
 fn lines_come_while_it_works() {
     let scene = toy();
-    let mut run = command(BINARY, scene.path(), "render toy --orbit 5000 --size 96x96 --device cpu --no-sheets -o out");
+    let mut run = command(&scene, "render toy --orbit 5000 --size 96x96 --device cpu --no-sheets -o out");
     let run = run.env("VIEWFUSE_PROGRESS", "1").stdout(Stdio::null()).stderr(Stdio::piped());
     let mut child = run.spawn().expect("the command starts");
     let error = BufReader::new(child.stderr.take().expect("a pipe"));
@@ -142,7 +142,7 @@ fn lines_come_while_it_works() {
     child.wait().expect("a dead process");
     assert!(told.len() == 3 && told.is_sorted_by_key(|line| line.share), "{told:?}");
     // A command that takes less than the time between lines says nothing.
-    let mut quick = command(BINARY, scene.path(), "inspect toy --json");
+    let mut quick = command(&scene, "inspect toy --json");
     let quick = quick.env("VIEWFUSE_PROGRESS", "100000").output().expect("the command starts");
     assert!(quick.status.success() && quick.stderr.is_empty(), "{}", String::from_utf8_lossy(&quick.stderr));
 }

@@ -1,8 +1,8 @@
 //! The Python package. Its wheel is built and tested by `host/python/test`, which takes minutes and the network: only
 //! with `VIEWFUSE_REQUIRE_PYTHON=1`. That it is built from the same crates as the command is tested always.
 
+use super::readme::metadata;
 use super::{BINARY, list_of};
-use serde_json::Value;
 use std::collections::BTreeSet;
 use std::process::Command;
 use viewfuse_tests::places::repository;
@@ -42,12 +42,7 @@ fn locked(file: &str) -> Vec<(String, String, BTreeSet<String>)> {
 /// Every version is that of the command, so that both compute the same, and the lock has all that our crates need.
 fn it_is_built_from_the_same_crates() {
     let (of_python, ours) = (locked("host/python/Cargo.lock"), locked("Cargo.lock"));
-    let metadata = Command::new(env!("CARGO"))
-        .args(["metadata", "--no-deps", "--offline", "--locked", "--format-version", "1"])
-        .current_dir(repository())
-        .output()
-        .expect("cargo");
-    let metadata: Value = serde_json::from_slice(&metadata.stdout).expect("JSON");
+    let metadata = metadata();
     // Of what the library needs; Python's side is no part of the ordinary build.
     let mut needed = BTreeSet::from(["viewfuse"]);
     while let Some(more) = of_python.iter().find_map(|(name, _, needs)| {

@@ -1,18 +1,17 @@
 //! Kills without a warning while two runs want one folder: one of them has it, nothing of both is mixed, and nothing is
 //! lost that was finished. `VIEWFUSE_KILLS=N` kills N times; the tests do it a few times.
 
-use super::BINARY;
+use super::command;
 use super::kill::{Files, assert_whole, is_unfinished, undisturbed};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, SystemTime};
 use viewfuse::output::journal::JOURNAL;
 use viewfuse::output::run::RECORD;
-use viewfuse_tests::command::{command, files_below, toy};
+use viewfuse_tests::command::{files_below, toy, unheard};
 
 viewfuse_tests::trials![killed_while_two_race];
 
@@ -79,11 +78,6 @@ fn assert_unmixed(out: &Path, whole: &Files, like: &[Files; 2]) -> Option<usize>
     of_journal
 }
 
-fn start(folder: &Path, arguments: &str) -> Child {
-    let mut run = command(BINARY, folder, arguments);
-    run.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the command starts")
-}
-
 fn killed_while_two_race() {
     let kills = std::env::var("VIEWFUSE_KILLS").map_or(FEW, |count| count.parse().expect("VIEWFUSE_KILLS is a number"));
     let folder = toy();
@@ -91,7 +85,7 @@ fn killed_while_two_race() {
     let (mut random, mut in_the_middle, mut went_on) = (0x2545_f491_4f6c_dd1d_u64 ^ kills as u64, 0, 0);
     for kill in 0..kills {
         let race = kill % RACES.len();
-        let out = folder.path().join(format!("out{race}"));
+        let out = folder.join(format!("out{race}"));
         let commands = RACES[race].map(|arguments| arguments.replace("OUT", &format!("out{race}")));
         let clear = || {
             if out.is_dir() {
@@ -101,7 +95,7 @@ fn killed_while_two_race() {
         if known.len() < RACES.len() {
             let made = [0, 1].map(|run| {
                 clear();
-                undisturbed(folder.path(), &commands[run], &out)
+                undisturbed(&folder, &commands[run], &out)
             });
             let longest = made[0].1.max(made[1].1);
             known.push((made.map(|(files, _)| files), longest));
@@ -114,7 +108,7 @@ fn killed_while_two_race() {
         random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         // Two at once take longer than one alone.
         let moment = time.mul_f64(1.5 * (random >> 33) as f64 / f64::from(1_u32 << 31));
-        let mut runs = [0, 1].map(|run| start(folder.path(), &commands[run]));
+        let mut runs = [0, 1].map(|run| unheard(command(&folder, &commands[run])));
         sleep(moment);
         in_the_middle += usize::from(runs.iter_mut().any(|run| run.try_wait().expect("a process").is_none()));
         // One of them, the other, or both; the one that is left has its time.
@@ -138,7 +132,7 @@ fn killed_while_two_race() {
             // frame is made again.
             finished.pop();
         }
-        super::done(folder.path(), &commands[next]);
+        super::done(&folder, &commands[next]);
         let after = assert_whole(&out, &Files::new());
         assert!(after.keys().eq(like[next].keys()), "{}: {:?}", commands[next], after.keys());
         for (path, bytes) in after.iter().filter(|(path, _)| is_result(path)) {

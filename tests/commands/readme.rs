@@ -166,9 +166,13 @@ fn cargo(arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).expect("text")
 }
 
+/// What cargo knows of the workspace's packages.
+pub(super) fn metadata() -> Value {
+    serde_json::from_str(&cargo(&["metadata", "--no-deps", "--format-version", "1"])).expect("JSON")
+}
+
 fn every_package_can_stand_alone() {
-    let metadata: Value =
-        serde_json::from_str(&cargo(&["metadata", "--no-deps", "--format-version", "1"])).expect("JSON");
+    let metadata = metadata();
     let licences = |folder: &Path| ["LICENSE-MIT", "LICENSE-APACHE"].map(|name| read(&folder.join(name)));
     let ours = licences(&repository().join("host"));
     // The core's, the kernels' and the main README are compiled with the tests' library.

@@ -1,11 +1,13 @@
 //! `viewfuse render`.
 
-use super::{BINARY, assert_near, done, list_of, number_of, numbers, read_json, texts};
+use super::{
+    assert_near, assert_wrong_arguments, done, done_with_warnings, list_of, number_of, numbers, read_json, run, texts,
+};
 use image::{ColorType, DynamicImage};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use viewfuse_tests::command::{Outcome, change_poses, names_in, run, toy};
+use viewfuse_tests::command::{Outcome, change_poses, names_in, toy};
 
 viewfuse_tests::trials![
     writes_a_picture_a_depth_map_a_sheet_and_a_record,
@@ -88,8 +90,8 @@ fn writes_a_picture_a_depth_map_a_sheet_and_a_record() {
 
 fn drops_what_counts_little() {
     let scene = toy();
-    done(scene.path(), "render toy --targets 20 --size 32x32 --leave-out 0.2 --weights error:alpha=1 -o out");
-    let record = record(scene.path(), "out");
+    done(&scene, "render toy --targets 20 --size 32x32 --leave-out 0.2 --weights error:alpha=1 -o out");
+    let record = record(&scene, "out");
     assert_eq!((&record["weighting"], &record["chosen"]), (&"error:alpha=1".into(), &Value::Null));
     let frame = &record["frames"][0];
     let (used, before) = (numbers(&frame["weights"]), numbers(&frame["weights_before"]));
@@ -108,13 +110,13 @@ fn drops_what_counts_little() {
 
 fn orbits() {
     let scene = toy();
-    done(scene.path(), "render toy --orbit 3 --size 32x32 -o out");
+    done(&scene, "render toy --orbit 3 --size 32x32 -o out");
     let expected: Vec<String> = (0..3)
         .flat_map(|frame| ["", "_depth", "_sheet"].map(|part| format!("orbit-{frame:03}{part}.png")))
         .chain(["run.json".to_owned()])
         .collect();
-    assert_eq!(names_in(&scene.path().join("out")), expected);
-    let record = record(scene.path(), "out");
+    assert_eq!(names_in(&scene.join("out")), expected);
+    let record = record(&scene, "out");
     let centres: Vec<[f64; 3]> = (0..3)
         .map(|frame| [0, 1, 2].map(|row| numbers(&record["frames"][frame]["world_from_camera"][row])[3]))
         .collect();
@@ -130,16 +132,14 @@ fn orbits() {
 fn an_orbit_stays_where_photographs_are() {
     let scene = toy();
     let shares = |output: &str| -> Vec<f64> {
-        let frames = record(scene.path(), output)["frames"].as_array().expect("frames").clone();
+        let frames = record(&scene, output)["frames"].as_array().expect("frames").clone();
         frames.iter().map(|frame| number_of(&frame["seen"])).collect()
     };
     // Two views that are neighbours.
     let orbit = |count: &str, output: &str| {
         let arguments =
             format!("render toy --orbit {count} --sources 0,8 --size 32x32 --weights mean --no-sheets -o {output}");
-        let outcome = run(BINARY, scene.path(), &arguments);
-        assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
-        outcome.stderr
+        done_with_warnings(&scene, &arguments).stderr
     };
     let said = orbit("4", "arc");
     assert!(
@@ -156,21 +156,21 @@ fn an_orbit_stays_where_photographs_are() {
     assert!(said.lines().any(|line| line.contains("warning: ") && line.contains(warning)), "{said}");
     let full = shares("full");
     assert!(full.iter().filter(|share| **share < 0.1).count() >= 2, "{full:?}");
-    let warnings = record(scene.path(), "full")["warnings"].clone();
+    let warnings = record(&scene, "full")["warnings"].clone();
     assert!(texts(&warnings).iter().any(|text| text.contains(warning)), "{warnings}");
 }
 
 fn cameras_of_a_map_stay_in_its_coordinates() {
     let (scene, origin) = (toy(), [4_468_123.37, -5_333_987.91, 512.253]);
-    done(scene.path(), "render toy --orbit 2 --targets 20 --size 32x32 -o near");
+    done(&scene, "render toy --orbit 2 --targets 20 --size 32x32 -o near");
     change_poses(&scene, |_, matrix| (0..3).for_each(|axis| matrix[4 * axis + 3] += origin[axis]));
-    let said = done(scene.path(), "inspect toy");
+    let said = done(&scene, "inspect toy");
     assert!(
         said.contains("\nframe      the file's (44681") && said.contains(") is the origin, its 1 the unit\n"),
         "{said}"
     );
-    done(scene.path(), "render toy --orbit 2 --targets 20 --size 32x32 -o far");
-    let [near, far] = ["near", "far"].map(|folder| record(scene.path(), folder));
+    done(&scene, "render toy --orbit 2 --targets 20 --size 32x32 -o far");
+    let [near, far] = ["near", "far"].map(|folder| record(&scene, folder));
     assert_eq!(near["frames"].as_array().map(Vec::len), Some(3));
     for frame in 0..3 {
         for (axis, offset) in origin.iter().enumerate() {
@@ -198,8 +198,8 @@ fn the_same_run_makes_the_same_pictures() {
 fn chooses_sources() {
     let scene = toy();
     let sources = |choice: &str| {
-        done(scene.path(), &format!("render toy --targets 20 --size 16x16 {choice} -o out"));
-        let record = record(scene.path(), "out");
+        done(&scene, &format!("render toy --targets 20 --size 16x16 {choice} -o out"));
+        let record = record(&scene, "out");
         let names: Vec<usize> = texts(&record["sources"]).iter().map(|n| n.parse().expect("a number")).collect();
         assert_eq!(numbers(&record["frames"][0]["weights"]).len(), names.len());
         names
@@ -235,7 +235,7 @@ fn a_network_is_told_the_scale_it_gets() {
         let folder = toy();
         change_poses(&folder, |_, matrix| [3, 7, 11].into_iter().for_each(|at| matrix[at] *= scale));
         let render = "render toy --targets 20 --sources 0..2 --model formula:8 --size 16x16 --device cpu -o out";
-        let Outcome { code, stderr, .. } = run(BINARY, folder.path(), render);
+        let Outcome { code, stderr, .. } = run(&folder, render);
         assert_eq!(code, Some(0), "{stderr}");
         assert_eq!(stderr.contains("units from what they look at"), said.is_some(), "{scale}: {stderr}");
         assert!(said.is_none_or(|said| stderr.contains(said)), "{scale}: {stderr}");
@@ -245,13 +245,13 @@ fn a_network_is_told_the_scale_it_gets() {
 fn fast_tries_nothing() {
     let scene = toy();
     let render = "render toy --targets 20 --size 32x32 --device cpu --no-sheets";
-    let printed = done(scene.path(), &format!("{render} --fast -o fast"));
+    let printed = done(&scene, &format!("{render} --fast -o fast"));
     assert!(!printed.contains("chosen: ") && !printed.contains("expected PSNR"), "{printed}");
-    let fast = record(scene.path(), "fast");
+    let fast = record(&scene, "fast");
     assert!(fast["chosen"].is_null() && fast["weighting"] == "distance:power=2", "{fast}");
-    done(scene.path(), &format!("{render} --weights distance:power=2 -o given"));
-    let [fast, given] = ["fast", "given"].map(|output| pictures(&scene.path().join(output)));
+    done(&scene, &format!("{render} --weights distance:power=2 -o given"));
+    let [fast, given] = ["fast", "given"].map(|output| pictures(&scene.join(output)));
     assert_eq!(fast, given);
     let arguments = format!("{render} --fast --weights mean -o both");
-    viewfuse_tests::command::assert_wrong_arguments(BINARY, scene.path(), &arguments, &["--fast", "--weights"]);
+    assert_wrong_arguments(&scene, &arguments, &["--fast", "--weights"]);
 }

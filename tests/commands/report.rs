@@ -5,11 +5,11 @@
 //! `tmp/report` of the target folder.
 
 use super::browser::{Browser, REQUIRE};
-use super::{done, lab, list_of, text_of};
+use super::{assert_refused, assert_wrong_arguments, done, list_of, text_of};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
-use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, files_below, toy};
+use viewfuse_tests::command::{files_below, toy};
 use viewfuse_tests::scenes::Folder;
 
 const SMALL: &str =
@@ -56,9 +56,9 @@ fn page(folder: &Path) -> String {
 
 fn the_page_holds_everything() {
     let folder = runs();
-    let said = done(folder.path(), REPORT);
+    let said = done(&folder, REPORT);
     assert!(said.starts_with("page.html: ") && said.ends_with(" kB\n"), "{said}");
-    let first = page(folder.path());
+    let first = page(&folder);
     // No address but those that hold what they point to, and those on the page.
     for attribute in ["src=\"", "href=\"", "url("] {
         for rest in first.split(attribute).skip(1) {
@@ -90,10 +90,10 @@ fn the_page_holds_everything() {
         assert!(first.contains(part), "no {part}");
     }
     // The same again is the same page, and the records alone are one as well.
-    done(folder.path(), REPORT);
-    assert_eq!(page(folder.path()), first);
-    done(folder.path(), "report --training trained --title <b>&amp; -o page.html");
-    assert!(page(folder.path()).contains("<h1>&lt;b&gt;&amp;amp;</h1>"));
+    done(&folder, REPORT);
+    assert_eq!(page(&folder), first);
+    done(&folder, "report --training trained --title <b>&amp; -o page.html");
+    assert!(page(&folder).contains("<h1>&lt;b&gt;&amp;amp;</h1>"));
 }
 
 fn evaluations_under_way_are_shown() {
@@ -110,7 +110,7 @@ fn evaluations_under_way_are_shown() {
 
 fn what_is_no_record_is_refused() {
     let folder = toy();
-    let refused = |arguments: &str, parts: &[&str]| assert_refused(lab(), &folder, arguments, parts);
+    let refused = |arguments: &str, parts: &[&str]| assert_refused(&folder, arguments, parts);
     refused("report toy -o page.html", &["toy/run.json: cannot be read"]);
     refused(
         "report --pareto toy/intrinsics.txt -o page.html",
@@ -118,7 +118,7 @@ fn what_is_no_record_is_refused() {
     );
     refused("report --training toy -o page.html", &["toy/record.json: cannot be read"]);
     refused("report --training toy -o toy", &["toy: cannot be written: it is a folder"]);
-    assert_wrong_arguments(lab(), &folder, "report -o page.html", &["required"]);
+    assert_wrong_arguments(&folder, "report -o page.html", &["required"]);
     done(&folder, &format!("evaluate toy --protocol random {SMALL} -o out"));
     fs::remove_file(folder.join("out/pictures/job-00000-truth.png")).expect("a picture");
     refused("report out -o page.html", &["out/pictures/job-00000-truth.png: cannot be read"]);
@@ -163,8 +163,8 @@ fn assert_marks(table: &Value) {
 fn a_person_sees_what_was_measured() {
     let browser = &Browser::needed();
     let folder = runs();
-    done(folder.path(), REPORT);
-    let page = page(folder.path());
+    done(&folder, REPORT);
+    let page = page(&folder);
     let seen = browser.look(&page);
     assert_eq!(seen.console, "", "the browser complains");
     let views = seen.views.as_array().expect("a view for each width");
@@ -186,7 +186,7 @@ fn a_person_sees_what_was_measured() {
         tables.iter().for_each(|table| assert_marks(table));
     }
     // The cells are the table's that the command prints.
-    let printed = done(folder.path(), &format!("evaluate toy lorry --protocol random {SMALL} --pictures 1 -o random"));
+    let printed = done(&folder, &format!("evaluate toy lorry --protocol random {SMALL} --pictures 1 -o random"));
     let row = printed.lines().find(|line| line.starts_with(" distance:power=2")).expect("a row");
     let words = |text: &str| text.replace(['*', '~'], "").split_whitespace().map(str::to_owned).collect::<Vec<_>>();
     let rows = list_of(&views[0]["tables"][3]["rows"]);
@@ -195,7 +195,7 @@ fn a_person_sees_what_was_measured() {
     let shown: Vec<String> = cells.iter().flat_map(|cell| words(text_of(&cell["text"]))).collect();
     assert_eq!(shown, words(row));
     // What is bold has its mark on the terminal, and nothing else.
-    let counted = done(folder.path(), &format!("evaluate toy lorry --protocol count:sources=2+4+8 {SMALL} -o count"));
+    let counted = done(&folder, &format!("evaluate toy lorry --protocol count:sources=2+4+8 {SMALL} -o count"));
     let tables = list_of(&views[0]["tables"]);
     let mut marks = [0, 0];
     for (printed, tables) in [(&counted, &tables[..3]), (&printed, &tables[3..4])] {
@@ -220,9 +220,9 @@ fn a_person_sees_what_was_measured() {
 fn the_looks_at_the_page_can_fail() {
     let browser = &Browser::needed();
     let folder = toy();
-    done(folder.path(), &format!("evaluate toy --protocol random {SMALL} --pictures 0 -o out"));
-    done(folder.path(), "report out -o page.html");
-    let good = page(folder.path());
+    done(&folder, &format!("evaluate toy --protocol random {SMALL} --pictures 0 -o out"));
+    done(&folder, "report out -o page.html");
+    let good = page(&folder);
     let with = |addition: &str| browser.look(&good.replace("</main>", &format!("{addition}</main>")));
     let wide = with("<p style=\"width: 400px\">x</p>");
     assert_eq!(wide.views[0]["wide"], json!(["P."]));
@@ -244,14 +244,14 @@ fn the_looks_at_the_page_can_fail() {
 fn light_and_dark() {
     let browser = &Browser::needed();
     let folder = small_run();
-    done(folder.path(), "report run -o page.html");
+    done(&folder, "report run -o page.html");
     let pictures = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report");
     fs::create_dir_all(&pictures).expect("a folder");
     for (name, width, is_dark) in
         [("phone", 360, false), ("phone-dark", 360, true), ("desktop", 1280, false), ("desktop-dark", 1280, true)]
     {
         let file = pictures.join(format!("{name}.png"));
-        let picture = browser.picture(&folder.path().join("page.html"), &file, width, is_dark);
+        let picture = browser.picture(&folder.join("page.html"), &file, width, is_dark);
         assert_eq!(picture.width(), width, "{name}");
         // The page's margin is its background; somewhere on it there are words.
         let background = picture.get_pixel(2, 2).0.map(u32::from);
@@ -268,7 +268,7 @@ fn light_and_dark() {
 fn small_run() -> Folder {
     let folder = toy();
     let run = "evaluate toy --protocol random --trials 2 --targets-per-trial 1 --pictures 1 --size 16x16 --device cpu";
-    done(folder.path(), &format!("{run} --weights mean -o run"));
+    done(&folder, &format!("{run} --weights mean -o run"));
     folder
 }
 
@@ -296,21 +296,21 @@ fn a_received_folder_shows_only_its_own() {
         for old in [truth, "job-00000-source-000.png", "job-00000-scheme-000.png"] {
             fs::write(&file, text.replace(old, name)).expect("a file");
             let parts = ["run/pictures/job-00000.json: names", "no picture in the folder"];
-            assert_refused(lab(), &folder, "report run -o page.html", &parts);
+            assert_refused(&folder, "report run -o page.html", &parts);
         }
     }
     fs::write(&file, text.replace(truth, "false.png")).expect("a file");
-    assert_refused(lab(), &folder, "report run -o page.html", &["run/pictures/false.png: is not a PNG"]);
+    assert_refused(&folder, "report run -o page.html", &["run/pictures/false.png: is not a PNG"]);
     #[cfg(unix)]
     {
         use std::os::unix::fs::symlink;
         fs::copy(folder.join("toy/rgb/000000.png"), folder.join("mine.png")).expect("a picture");
         symlink(folder.join("mine.png"), folder.join("run/pictures/link.png")).expect("a link");
         fs::write(&file, text.replace(truth, "link.png")).expect("a file");
-        assert_refused(lab(), &folder, "report run -o page.html", &["link.png", "no picture in the folder"]);
+        assert_refused(&folder, "report run -o page.html", &["link.png", "no picture in the folder"]);
         folder.write("trained/record.json", "{}");
         symlink("/etc/passwd", folder.join("trained/curve.svg")).expect("a link");
-        assert_refused(lab(), &folder, "report --training trained -o page.html", &["curve.svg: is not the curve"]);
+        assert_refused(&folder, "report --training trained -o page.html", &["curve.svg: is not the curve"]);
     }
     fs::write(&file, text).expect("a file");
     done(&folder, "report run -o page.html");
@@ -326,7 +326,7 @@ fn damaged_numbers_are_refused() {
         fs::write(folder.join(name), format!("{value}\n")).expect("a file");
         text
     };
-    let refused = |parts: &[&str]| assert_refused(lab(), &folder, "report run -o page.html", parts);
+    let refused = |parts: &[&str]| assert_refused(&folder, "report run -o page.html", parts);
     for count in [1_000_000_000_000_000_000_u64, 10_000_001] {
         let whole = change("run/run.json", &|record| record["job_count"] = count.into());
         refused(&["run/run.json: job_count is", &count.to_string(), "at most 10000000"]);
@@ -350,7 +350,7 @@ fn damaged_numbers_are_refused() {
         record["devices"][0]["points"][1][key] = 1.0e300.into();
         folder.write("sweep/pareto.json", record.to_string());
         let parts = ["sweep/pareto.json: is not a record of viewfuse pareto", "out of its range"];
-        assert_refused(lab(), &folder, "report --pareto sweep -o page.html", &parts);
+        assert_refused(&folder, "report --pareto sweep -o page.html", &parts);
     }
     // An empty record of settings is that of a machine that lost its power: the evaluation goes on.
     folder.write("run/run.json", "");

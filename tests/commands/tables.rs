@@ -1,10 +1,10 @@
 //! `viewfuse weights` and `viewfuse evaluate`: tables for people, JSON and CSV for programs.
 
-use super::{BINARY, assert_near, done, number_of, numbers, read_json, texts};
+use super::{assert_near, command, done, done_with_warnings, number_of, numbers, read_json, texts};
 use serde_json::Value;
 use std::fs;
 use viewfuse::weighting::scheme_names;
-use viewfuse_tests::command::{names_in, run, toy, toy_twice};
+use viewfuse_tests::command::{names_in, toy, toy_twice};
 
 viewfuse_tests::trials![
     weights_as_a_table,
@@ -17,7 +17,7 @@ viewfuse_tests::trials![
 
 fn weights_as_a_table() {
     let scene = toy();
-    let table = done(scene.path(), "weights toy --target 20 --sources 0..9");
+    let table = done(&scene, "weights toy --target 20 --sources 0..9");
     assert!(table.starts_with("toy: target 000020, 10 sources\n"), "{table}");
     let rows: Vec<Vec<&str>> = table
         .lines()
@@ -36,13 +36,13 @@ fn weights_as_a_table() {
     for name in ["mean", "l1", "gaussian", "beta=1", "power=3", "alpha=0.5"] {
         assert!(names.contains(name), "{name} is no column of\n{table}");
     }
-    assert_eq!(names_in(scene.path()), ["toy"]);
+    assert_eq!(names_in(&scene), ["toy"]);
 }
 
 fn weights_as_json() {
     let scene = toy();
     let weights = |arguments: &str| -> Value {
-        serde_json::from_str(&done(scene.path(), &format!("weights toy --json {arguments}"))).expect("JSON")
+        serde_json::from_str(&done(&scene, &format!("weights toy --json {arguments}"))).expect("JSON")
     };
     let all = weights("--target 20");
     assert_eq!((&all["target"], texts(&all["sources"]).len()), (&"000020".into(), 23));
@@ -63,7 +63,7 @@ fn weights_as_json() {
 fn evaluates_schemes_against_the_nearest_copy() {
     let scene = toy_twice();
     let run = "evaluate toy again --targets 20,21 --size 64x64 --weights mean --weights error:alpha=1 -o scores.csv";
-    let table = done(scene.path(), run);
+    let table = done(&scene, run);
     for title in ["toy: 2 targets", "again: 2 targets", "all 2 scenes: 4 targets"] {
         assert!(table.contains(title), "no {title:?} in\n{table}");
     }
@@ -72,7 +72,7 @@ fn evaluates_schemes_against_the_nearest_copy() {
         assert_eq!(table.lines().filter(|line| begins(line)).count(), 3, "rows of {row} in\n{table}");
     }
 
-    let csv = fs::read_to_string(scene.path().join("scores.csv")).expect("the scores");
+    let csv = fs::read_to_string(scene.join("scores.csv")).expect("the scores");
     let mut lines = csv.lines().map(|line| line.split(',').collect::<Vec<_>>());
     assert_eq!(
         lines.next(),
@@ -99,9 +99,9 @@ fn evaluates_schemes_against_the_nearest_copy() {
 
 fn evaluates_the_views_that_are_no_sources() {
     let scene = toy();
-    let table = done(scene.path(), "evaluate toy --sources all/2 --size 32x32 --weights error:alpha=1");
+    let table = done(&scene, "evaluate toy --sources all/2 --size 32x32 --weights error:alpha=1");
     assert!(table.contains("toy: 12 targets"), "{table}");
-    assert_eq!(names_in(scene.path()), ["toy"]);
+    assert_eq!(names_in(&scene), ["toy"]);
 }
 
 fn auto_is_a_row_and_leaves_the_others_alone() {
@@ -110,9 +110,8 @@ fn auto_is_a_row_and_leaves_the_others_alone() {
     let job = format!("{} --targets 5 --sources 1,3,4,6,7,9 --size 64x48", room.display());
     let scores = |weights: &str| -> Vec<(String, f64)> {
         // The sources are far apart, and a warning says so.
-        let outcome = run(BINARY, scene.path(), &format!("evaluate {job} {weights} -o scores.csv"));
-        assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
-        let csv = fs::read_to_string(scene.path().join("scores.csv")).expect("the scores");
+        done_with_warnings(&scene, &format!("evaluate {job} {weights} -o scores.csv"));
+        let csv = fs::read_to_string(scene.join("scores.csv")).expect("the scores");
         let line = |line: &str| {
             let cells: Vec<&str> = line.split(',').collect();
             (cells[1].to_owned(), cells[4].parse().expect("a number"))
@@ -125,9 +124,8 @@ fn auto_is_a_row_and_leaves_the_others_alone() {
     let (both, alone) = (scores("--weights auto --weights mean"), scores("--weights mean"));
     assert_near(score(&both, "mean"), score(&alone, "mean"), 1.0e-6);
     // The same choice as `render` makes without being told a scheme.
-    let outcome = run(BINARY, scene.path(), &format!("render {job} -o out"));
-    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
-    let record = read_json(scene.path().join("out/run.json"));
+    done_with_warnings(&scene, &format!("render {job} -o out"));
+    let record = read_json(scene.join("out/run.json"));
     assert_near(score(&both, "auto"), number_of(&record["frames"][0]["psnr"]), 1.0e-4);
 }
 
@@ -136,15 +134,14 @@ fn auto_is_a_row_and_leaves_the_others_alone() {
 fn a_reader_that_goes_away_is_no_failure() {
     use std::io::Read;
     use std::process::Stdio;
-    use viewfuse_tests::command::command;
     let scene = toy();
     for arguments in ["weights toy --target 20", "render toy --targets 20 --size 32x32 -o out"] {
-        let mut run = command(super::BINARY, scene.path(), arguments);
+        let mut run = command(&scene, arguments);
         let mut child = run.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the command starts");
         drop(child.stdout.take());
         let mut said = String::new();
         child.stderr.take().expect("a pipe").read_to_string(&mut said).expect("text");
         assert_eq!((child.wait().expect("an end").code(), said.as_str()), (Some(0), ""), "viewfuse {arguments}");
     }
-    assert!(scene.path().join("out/run.json").is_file());
+    assert!(scene.join("out/run.json").is_file());
 }

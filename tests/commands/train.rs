@@ -1,14 +1,12 @@
 //! `viewfuse-lab train`: what a run leaves, and that it ends in the same numbers however often it is killed.
 #![cfg(unix)]
 
-use super::{done, lab};
+use super::{assert_refused, assert_wrong_arguments, command, done, killed_when, read_json, start};
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::Stdio;
-use viewfuse_tests::command::{
-    assert_refused, assert_wrong_arguments, command, interrupt, killed_when, names_in, start,
-};
+use viewfuse_tests::command::{interrupt, names_in};
 use viewfuse_tests::patience;
 use viewfuse_tests::scenes::Folder;
 
@@ -33,7 +31,7 @@ const GENVS: &str = "train genvs learn/cars --width 4 --objects 1 --samples 8 --
 
 fn scenes() -> Folder {
     let folder = Folder::new();
-    done(folder.path(), "scenes make cars learn --train 2 --val 1 --test 0 --views 10 --test-views 10 --size 64");
+    done(&folder, "scenes make cars learn --train 2 --val 1 --test 0 --views 10 --test-views 10 --size 64");
     folder
 }
 
@@ -43,7 +41,7 @@ fn bytes(folder: &Path, name: &str) -> Vec<u8> {
 
 /// Starts a run and kills it without a warning as soon as it has written its state.
 fn kill(folder: &Path, arguments: &str, state: &str) {
-    killed_when(lab(), folder, arguments, || folder.join(state).exists());
+    killed_when(folder, arguments, || folder.join(state).exists());
 }
 
 fn a_killed_run_goes_on_and_ends_in_the_same_numbers() {
@@ -54,12 +52,12 @@ fn a_killed_run_goes_on_and_ends_in_the_same_numbers() {
         names_in(&folder.join("whole")),
         ["curve.csv", "curve.svg", "model.safetensors", "record.json", "state.safetensors",]
     );
-    let record: serde_json::Value = serde_json::from_slice(&bytes(&folder, "whole/record.json")).expect("a record");
+    let record = read_json(folder.join("whole/record.json"));
     assert_eq!((&record["steps"], record["scores"].as_array().map(Vec::len)), (&30.into(), Some(3)));
     assert!(String::from_utf8_lossy(&bytes(&folder, "whole/curve.svg")).starts_with("<svg"));
 
     kill(&folder, &format!("{PIXELNERF} -o parts"), "parts/state.safetensors");
-    let half: serde_json::Value = serde_json::from_slice(&bytes(&folder, "parts/record.json")).expect("a record");
+    let half = read_json(folder.join("parts/record.json"));
     assert!(half["steps"].as_u64() < Some(30), "it was killed too late to tell anything");
     // On another number of threads, too.
     done(&folder, &format!("{PIXELNERF} -o parts --threads 1"));
@@ -75,7 +73,6 @@ fn a_killed_run_goes_on_and_ends_in_the_same_numbers() {
     let before = bytes(&folder, "whole/state.safetensors");
     let other = PIXELNERF.replace("--rays 12", "--rays 13");
     assert_refused(
-        lab(),
         &folder,
         &format!("{other} -o whole"),
         &["whole/state.safetensors", "settings.rays was 12 and is 13"],
@@ -103,13 +100,13 @@ fn ctrl_c_writes_the_state_first() {
     let long = PIXELNERF.replace("--steps 30", "--steps 100000").replace("--write-every 0", "--write-every 1000");
     // The first state appears when the run is asked to end: nothing else writes it.
     let arguments = format!("{long} --validate-every 5 -o run").replace(" --validate-every 10", "");
-    let mut child = start(lab(), &folder, &arguments);
+    let mut child = start(&folder, &arguments);
     let mut news = BufReader::new(child.stdout.take().expect("its output"));
     let mut first = String::new();
     news.read_line(&mut first).expect("text");
     assert!(first.starts_with("step 5: "), "{first}");
     interrupt(child, "-INT");
-    let record: serde_json::Value = serde_json::from_slice(&bytes(&folder, "run/record.json")).expect("a record");
+    let record = read_json(folder.join("run/record.json"));
     assert!(record["steps"].as_u64() >= Some(5) && folder.join("run/state.safetensors").exists(), "{record}");
 }
 
@@ -126,13 +123,8 @@ fn genvs_goes_on_too() {
     done(&folder, &format!("{from} -o more"));
     assert_eq!(bytes(&folder, "more/model.safetensors"), bytes(&folder, model));
     let small = from.replace("--samples 8", "--samples 8 --side 32");
-    assert_refused(
-        lab(),
-        &folder,
-        &format!("{small} -o out"),
-        &[model, "for pictures of 64x64 pixels", "not of 32x32"],
-    );
-    assert_wrong_arguments(lab(), &folder, &format!("{from} --width 4 -o out"), &["--from", "--width"]);
+    assert_refused(&folder, &format!("{small} -o out"), &[model, "for pictures of 64x64 pixels", "not of 32x32"]);
+    assert_wrong_arguments(&folder, &format!("{from} --width 4 -o out"), &["--from", "--width"]);
 }
 
 fn data_are_told_by_what_is_in_them() {
@@ -147,35 +139,35 @@ fn data_are_told_by_what_is_in_them() {
     fs::rename(folder.join("learn"), folder.join("moved")).expect("a folder");
     done(&folder, &format!("{} -o run", first.replace("learn/", "moved/")));
     done(&folder, "scenes make cars learn --train 2 --val 1 --test 0 --views 10 --test-views 10 --size 64 --seed 2");
-    assert_refused(lab(), &folder, &format!("{first} -o run"), &["run/state.safetensors", "settings", "data was"]);
+    assert_refused(&folder, &format!("{first} -o run"), &["run/state.safetensors", "settings", "data was"]);
     // Nor from another network of the same name.
     let moved = from.replace("learn/", "moved/");
     done(&folder, &format!("{moved} -o more"));
     done(&folder, &format!("{} --seed 3 -o other", first.replace("learn/", "moved/")));
     fs::rename(folder.join("other/model.safetensors"), folder.join("run/model.safetensors")).expect("a file");
-    assert_refused(lab(), &folder, &format!("{moved} -o more"), &["more/state.safetensors", "checkpoint was"]);
+    assert_refused(&folder, &format!("{moved} -o more"), &["more/state.safetensors", "checkpoint was"]);
 }
 
 fn wrong_input_is_told() {
     let folder = scenes();
-    let refused = |arguments: &str, parts: &[&str]| assert_refused(lab(), folder.path(), arguments, parts);
+    let refused = |arguments: &str, parts: &[&str]| assert_refused(&folder, arguments, parts);
     refused("train pixelnerf learn/lorries -o out", &["lorries"]);
     refused("train weighting learn/cars.json learn/cars -o out", &["learn/cars.json"]);
-    fs::write(folder.path().join("state.safetensors"), "nothing").expect("a file");
+    fs::write(folder.join("state.safetensors"), "nothing").expect("a file");
     refused("train pixelnerf learn/cars -o .", &["./state.safetensors: is not the state of a training run"]);
     if cfg!(target_os = "linux") {
         // Nobody can make a folder there; it is noticed before the first of many steps.
         refused("train pixelnerf learn/cars --steps 1000000 -o /proc/out", &["/proc/out/", "cannot be written"]);
     }
-    assert_wrong_arguments(lab(), folder.path(), "train genvs learn/cars -o out --width 5", &["a multiple of 4"]);
+    assert_wrong_arguments(&folder, "train genvs learn/cars -o out --width 5", &["a multiple of 4"]);
     let attention = "train pixelnerf learn/cars -o out --weights cross-attention";
-    assert_wrong_arguments(lab(), folder.path(), attention, &["--weights", "formulas only"]);
+    assert_wrong_arguments(&folder, attention, &["--weights", "formulas only"]);
     refused("train pixelnerf learn/cars -o out --sources 3,10", &["has 10 photographs; 11 are needed"]);
     refused("train genvs learn/cars -o out --sources 3,9 --targets 2", &["has 10 photographs; 11 are needed"]);
     // Validation has three sources, however few the steps have.
-    done(folder.path(), "scenes make cars few --train 1 --val 1 --test 0 --views 3 --test-views 3 --size 64");
+    done(&folder, "scenes make cars few --train 1 --val 1 --test 0 --views 3 --test-views 3 --size 64");
     refused("train genvs few/cars --side 16 -o out --sources 1 --targets 1", &["has 3 photographs; 4 are needed"]);
-    assert!(!folder.path().join("out").exists());
+    assert!(!folder.join("out").exists());
 }
 
 /// Numbers with which nothing would be computed, learned or written, or that no memory holds.
@@ -183,7 +175,7 @@ fn numbers_without_sense_are_refused() {
     let folder = scenes();
     let wrong = |model: &str, option: &str, parts: &[&str]| {
         let arguments = format!("train {model} learn/cars -o out {option}");
-        assert_wrong_arguments(lab(), folder.path(), &arguments, parts);
+        assert_wrong_arguments(&folder, &arguments, parts);
     };
     for option in ["objects", "rays", "width"] {
         for value in ["0", "100000", "18446744073709551615"] {
@@ -210,7 +202,7 @@ fn numbers_without_sense_are_refused() {
     wrong("pixelnerf", "--sides 32,33", &["--sides", "a multiple of 16"]);
     wrong("genvs", "--new-denoiser", &["required arguments"]);
     let larger = "train pixelnerf learn/cars -o out --side 32 --sides 32,48";
-    assert_refused(lab(), folder.path(), larger, &["sides is 48", "a multiple of 16 from 16 to the side"]);
+    assert_refused(&folder, larger, &["sides is 48", "a multiple of 16 from 16 to the side"]);
     for value in ["0", "8", "100000"] {
         wrong("pixelnerf", &format!("--side {value}"), &["--side", "a multiple of 16 from 16 to 1024"]);
     }
@@ -223,12 +215,12 @@ fn numbers_without_sense_are_refused() {
         }
     }
     let all = "train pixelnerf learn/cars -o out --objects 1024 --rays 1024 --coarse 1024 --width 1024";
-    assert_refused(lab(), folder.path(), all, &["objects", "at most 2^28"]);
+    assert_refused(&folder, all, &["objects", "at most 2^28"]);
     let all = "train genvs learn/cars -o out --objects 1024 --sources 3";
-    assert_refused(lab(), folder.path(), all, &["objects is 1024", "volume", "at most 2^30"]);
+    assert_refused(&folder, all, &["objects is 1024", "volume", "at most 2^30"]);
     // The least that can be computed.
     let least = "--side 16 --objects 1 --rays 1 --coarse 2 --fine 0 --width 1 --steps 1";
-    done(folder.path(), &format!("train pixelnerf learn/cars -o least {least}"));
+    done(&folder, &format!("train pixelnerf learn/cars -o least {least}"));
 }
 
 /// The state of a run with this in the place of its progress.
@@ -244,8 +236,8 @@ fn with_progress(state: &[u8], progress: &str) -> Vec<u8> {
 fn a_damaged_state_is_refused_and_an_empty_one_is_none() {
     let folder = scenes();
     let run = format!("{} -o run", PIXELNERF.replace("--steps 30", "--steps 2"));
-    done(folder.path(), &run);
-    let path = folder.path().join("run/state.safetensors");
+    done(&folder, &run);
+    let path = folder.join("run/state.safetensors");
     let state = fs::read(&path).expect("a state");
     let sound = r#"{"steps":1,"seconds":1.0,"losses":[[1,0.5]],"pending":[0.0,0],"scores":[[1,12.0]]}"#;
     for (from, to) in [
@@ -257,22 +249,22 @@ fn a_damaged_state_is_refused_and_an_empty_one_is_none() {
         ("1.0,", "-1.0,"),
     ] {
         fs::write(&path, with_progress(&state, &sound.replace(from, to))).expect("a file");
-        assert_refused(lab(), folder.path(), &run, &["run/state.safetensors: is not the state", "out of range"]);
+        assert_refused(&folder, &run, &["run/state.safetensors: is not the state", "out of range"]);
     }
     fs::write(&path, with_progress(&state, sound)).expect("a file");
-    done(folder.path(), &run);
+    done(&folder, &run);
     // A machine that lost its power leaves an empty file: the run begins again.
     fs::write(&path, "").expect("a file");
-    assert!(done(folder.path(), &run).contains("2 steps in"));
+    assert!(done(&folder, &run).contains("2 steps in"));
     fs::remove_file(&path).expect("a file");
     fs::create_dir(&path).expect("a folder in the way");
-    assert_refused(lab(), folder.path(), &run, &["run/state.safetensors: cannot be written: it is a folder"]);
+    assert_refused(&folder, &run, &["run/state.safetensors: cannot be written: it is a folder"]);
 }
 
 fn a_loss_is_shown_once_there_is_one() {
     let folder = scenes();
     let run = PIXELNERF.replace("--validate-every 10", "--validate-every 1").replace("--steps 30", "--steps 2");
-    let said = done(folder.path(), &format!("{run} -o run"));
+    let said = done(&folder, &format!("{run} -o run"));
     assert!(said.contains("step 1: loss 0.") && !said.contains("NaN"), "{said}");
 }
 
@@ -281,7 +273,7 @@ fn a_loss_is_shown_once_there_is_one() {
 fn curves_are_there_while_it_runs() {
     let folder = scenes();
     let long = PIXELNERF.replace("--steps 30", "--steps 100000").replace("--write-every 0", "--write-every 1000");
-    let mut run = command(lab(), &folder, &format!("{long} -o run"));
+    let mut run = command(&folder, &format!("{long} -o run"));
     let run = run.env("VIEWFUSE_PROGRESS", "0").stdout(Stdio::null()).stderr(Stdio::piped());
     let mut child = run.spawn().expect("the command starts");
     let curve = || fs::read_to_string(folder.join("run/curve.csv")).unwrap_or_default();
@@ -300,7 +292,7 @@ fn curves_are_there_while_it_runs() {
 
     // The table has the points of the record.
     done(&folder, &format!("{} -o whole", PIXELNERF.replace("--steps 30", "--steps 70")));
-    let record: serde_json::Value = serde_json::from_slice(&bytes(&folder, "whole/record.json")).expect("a record");
+    let record = read_json(folder.join("whole/record.json"));
     let table = fs::read_to_string(folder.join("whole/curve.csv")).expect("a table");
     let cells: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
     assert_eq!(cells[0], ["step", "loss", "PSNR dB"]);
@@ -322,7 +314,7 @@ fn number(text: &str) -> f64 {
 fn more_steps_go_on_from_fewer() {
     let folder = scenes();
     let run = |steps: u32| format!("{} -o run", PIXELNERF.replace("--steps 30", &format!("--steps {steps}")));
-    let record = || serde_json::from_slice::<serde_json::Value>(&bytes(&folder, "run/record.json")).expect("a record");
+    let record = || read_json(folder.join("run/record.json"));
     done(&folder, &run(4));
     assert!(record()["extended"].is_null(), "{}", record());
     let short = bytes(&folder, "run/model.safetensors");
@@ -337,5 +329,5 @@ fn more_steps_go_on_from_fewer() {
     assert_eq!(bytes(&folder, "run/model.safetensors"), long);
     assert_eq!(record()["extended"], serde_json::json!([[4, 4]]));
     // Fewer steps are another run.
-    assert_refused(lab(), &folder, &run(5), &["run/state.safetensors", "schedule.steps was 7"]);
+    assert_refused(&folder, &run(5), &["run/state.safetensors", "schedule.steps was 7"]);
 }

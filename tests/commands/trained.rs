@@ -16,7 +16,7 @@ viewfuse_tests::trials![
 fn scores(network: &str, weightings: &[&str]) -> BTreeMap<String, f64> {
     let folder = Folder::new();
     let schemes: String = weightings.iter().map(|scheme| format!(" --weights {scheme}")).collect();
-    let table = folder.path().join("scores.csv");
+    let table = folder.join("scores.csv");
     done(
         &repository(),
         &format!(
@@ -57,7 +57,7 @@ fn networks_beat_the_nearest_copy_with_every_weighting() {
 fn most_samples_are_omitted_and_the_picture_stays() {
     let folder = Folder::new();
     let render = |name: &str, options: &str| -> Value {
-        let output = folder.path().join(name);
+        let output = folder.join(name);
         done(
             &repository(),
             &format!(
@@ -79,7 +79,7 @@ fn most_samples_are_omitted_and_the_picture_stays() {
     });
     assert!(omitted > 0.85 * all, "{omitted} of {all}");
     let [picture, exact] = ["default", "exact"]
-        .map(|name| image::open(folder.path().join(name).join("000048.png")).expect("a picture").to_rgb8());
+        .map(|name| image::open(folder.join(name).join("000048.png")).expect("a picture").to_rgb8());
     let psnr = viewfuse_core::metrics::psnr(picture.as_raw(), exact.as_raw());
     assert!(psnr > 40.0, "{psnr} dB");
 }

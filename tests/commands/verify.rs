@@ -1,8 +1,8 @@
 //! `viewfuse verify` on reference values computed here in `f64`, right and wrong.
 
-use super::{BINARY, done, number_of};
+use super::{done, number_of, run};
 use serde_json::{Value, json};
-use viewfuse_tests::command::{run, safetensors};
+use viewfuse_tests::command::safetensors;
 use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![
@@ -43,7 +43,7 @@ fn weighting() -> Value {
 /// The reference is refused: exit code 1, and the quantity's row says so. Nothing is written.
 #[track_caller]
 fn assert_exceeded(folder: &Folder, file: &str, quantity: &str) {
-    let outcome = run(BINARY, folder.path(), &format!("verify {file}"));
+    let outcome = run(folder, &format!("verify {file}"));
     assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(1), ""), "{}", outcome.stdout);
     let exceeded: Vec<&str> = outcome.stdout.lines().filter(|line| line.contains("EXCEEDED")).collect();
     assert!(exceeded.len() == 1 && exceeded[0].trim().starts_with(quantity), "{}", outcome.stdout);
@@ -52,7 +52,7 @@ fn assert_exceeded(folder: &Folder, file: &str, quantity: &str) {
 fn right_weights_pass() {
     let folder = Folder::new();
     folder.write("weighting.json", weighting().to_string());
-    let printed = done(folder.path(), "verify weighting.json");
+    let printed = done(&folder, "verify weighting.json");
     assert!(printed.contains("8 of 8 quantities within tolerance"), "{printed}");
     assert!(printed.contains("not computed by this version: a_method_of_the_future"), "{printed}");
     assert!(!printed.contains("EXCEEDED"), "{printed}");
@@ -76,7 +76,7 @@ fn a_weight_that_is_no_number_does_not_pass() {
         let mut reference = weighting();
         reference["cases"][0]["official"]["distance"]["f64"][0] = bad;
         folder.write("weighting.json", reference.to_string());
-        let outcome = run(BINARY, folder.path(), "verify weighting.json");
+        let outcome = run(&folder, "verify weighting.json");
         assert_eq!((outcome.code, outcome.stdout.as_str()), (Some(1), ""));
         assert!(outcome.stderr.contains("weighting.json: case 'by hand', distance: no list of weights"), "{outcome:?}");
     }
@@ -95,7 +95,7 @@ fn metrics_right_and_wrong() {
     let folder = Folder::new();
     let right = [10.0 * (255.0_f64 * 255.0 / 100.0).log10(), f64::INFINITY, 0.0];
     folder.write("metrics.safetensors", metrics(right));
-    let printed = done(folder.path(), "verify metrics.safetensors");
+    let printed = done(&folder, "verify metrics.safetensors");
     assert!(printed.contains("1 of 1 quantities within tolerance"), "{printed}");
     for (pair, wrong) in [(0, right[0] + 1.0e-3), (1, 100.0), (2, 1.0e-3), (0, f64::NAN), (1, f64::NAN)] {
         let mut psnr = right;
@@ -105,7 +105,7 @@ fn metrics_right_and_wrong() {
     }
     // One bad file among good ones fails the run, and the good one is still reported.
     folder.write("weighting.json", weighting().to_string());
-    let outcome = run(BINARY, folder.path(), "verify metrics.safetensors weighting.json");
+    let outcome = run(&folder, "verify metrics.safetensors weighting.json");
     assert_eq!(outcome.code, Some(1));
     assert!(outcome.stdout.contains("0 of 1 quantities") && outcome.stdout.contains("8 of 8 quantities"));
 }
@@ -114,7 +114,7 @@ fn metrics_right_and_wrong() {
 fn scores_of_the_official_codes() {
     let folder = Folder::new();
     folder.write("metrics.safetensors", REFERENCE);
-    let printed = done(folder.path(), "verify metrics.safetensors --device cpu");
+    let printed = done(&folder, "verify metrics.safetensors --device cpu");
     assert!(printed.contains("7 of 7 quantities within tolerance"), "{printed}");
     assert!(!printed.contains("not computed"), "{printed}");
 }

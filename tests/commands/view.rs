@@ -24,7 +24,6 @@ use super::BINARY;
 use devtools::Tab;
 use std::fs;
 use std::path::Path;
-use viewfuse_tests::command::run;
 use viewfuse_tests::places::repository;
 use viewfuse_tests::viewer::Program;
 
@@ -40,12 +39,6 @@ fn start(folder: &Path, arguments: &str) -> Program {
 #[track_caller]
 fn room(more: &str) -> Program {
     start(&repository(), &format!("tests/data/room {more}"))
-}
-
-/// Runs the command, which must succeed; it may warn.
-fn done_with_warnings(folder: &Path, arguments: &str) {
-    let outcome = run(BINARY, folder, arguments);
-    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
 }
 
 /// Whether a picture came since [`NOTE_PICTURES`]: a coarse one, or at once a full one where those take no longer.

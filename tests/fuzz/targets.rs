@@ -19,6 +19,7 @@ mod state;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
+use viewfuse_tests::scenes as made;
 
 /// What a reader made of an input.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -56,10 +57,10 @@ type Row = (&'static str, fn() -> Box<dyn Target>);
 
 /// All targets.
 pub(crate) const ALL: [Row; 26] = [
-    ("images", || Box::new(images::Images::new())),
+    ("images", || Box::new(images::Images(OneFile::new("photograph")))),
     ("transforms", || Box::new(scenes::transforms())),
-    ("srn", || Box::new(scenes::srn())),
-    ("middlebury", || Box::new(scenes::middlebury())),
+    ("srn", || Box::new(scenes::Broken::of(&made::srn()))),
+    ("middlebury", || Box::new(scenes::Broken::of(&made::middlebury()))),
     ("llff", || Box::new(scenes::llff())),
     ("neus", || Box::new(scenes::neus())),
     ("neus-array", || Box::new(scenes::neus_array())),
@@ -68,16 +69,16 @@ pub(crate) const ALL: [Row; 26] = [
     ("safetensors", || Box::new(checkpoints::Checkpoints::safetensors())),
     ("pickles", || Box::new(checkpoints::Checkpoints::pickles())),
     ("pytorch", || Box::new(checkpoints::Checkpoints::files())),
-    ("attention", || Box::new(checkpoints::Attention::new())),
+    ("attention", || Box::new(checkpoints::Attention(OneFile::new("attention.safetensors")))),
     ("evaluation", || Box::new(records::evaluation())),
     ("pareto", || Box::new(records::sweep())),
     ("training", || Box::new(records::training())),
-    ("state", || Box::new(state::State::new())),
+    ("state", || Box::new(state::State(OneFile::new("state.safetensors")))),
     ("requests", || Box::new(requests::Requests)),
     ("journals", || Box::new(journals::Journals::new())),
     ("path-tables", || Box::new(paths::Paths::tables())),
     ("path-json", || Box::new(paths::Paths::json())),
-    ("gaussians", || Box::new(gaussians::Gaussians::new())),
+    ("gaussians", || Box::new(gaussians::Gaussians(OneFile::new("scene.ply")))),
     ("shell", || Box::new(shell::Shell)),
     ("specs", || Box::new(parsers::Specs)),
     ("views", || Box::new(parsers::ViewLists::new())),

@@ -45,7 +45,7 @@ fn a_model_may_stand_in_several_places() {
         let scene = open(&folder);
         assert_pixel(&scene, 1, [7.5 + 5.0, 6.5 - 3.0]);
         // The model's folder may be named itself.
-        let inner = Scene::open(folder.path().join(model)).expect("the model");
+        let inner = Scene::open(folder.join(model)).expect("the model");
         assert_eq!(inner.views.len(), 2);
     }
 }
@@ -105,7 +105,7 @@ fn of_several_models_the_largest_is_read() {
             photographs.ends_with("images: 1 photograph has no pose and is not used, 2 have one (without is 1.png)")
         );
         // By its path, another one; of equal ones the first.
-        let chosen = Scene::open(folder.path().join("sparse/0")).expect("the model");
+        let chosen = Scene::open(folder.join("sparse/0")).expect("the model");
         assert_eq!((names(&chosen), chosen.warnings.len()), (vec!["1"], 2));
         model(&folder, "0", &ALL, is_text);
         model(&folder, "10", &ALL, is_text);

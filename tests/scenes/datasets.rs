@@ -14,9 +14,9 @@ fn folder(scenes: &[&str]) -> Folder {
 
 /// Opens a path in a folder; the scenes are told relative to it.
 fn open(folder: &Folder, path: &str, split: Split) -> Result<(String, Vec<String>), DatasetError> {
-    let Dataset { name, scenes } = Dataset::open(folder.path().join(path), split)?;
+    let Dataset { name, scenes } = Dataset::open(folder.join(path), split)?;
     let relative = |scene: &std::path::PathBuf| {
-        scene.strip_prefix(folder.path()).expect("inside the folder").to_string_lossy().into_owned()
+        scene.strip_prefix(folder).expect("inside the folder").to_string_lossy().into_owned()
     };
     Ok((name, scenes.iter().map(relative).collect()))
 }

@@ -1,6 +1,6 @@
 //! Bad scenes: each is refused with one line that names the file, and the line or key, that a person must open.
 
-use super::made::{assert_message, assert_refused};
+use super::made::{assert_message, assert_refused, names};
 use serde_json::{Value, json};
 use std::fs;
 use viewfuse::scene::Scene;
@@ -32,12 +32,12 @@ fn with(index: usize, value: f64) -> String {
 #[test]
 fn nothing_to_read() {
     let folder = Folder::new();
-    let missing = Scene::open(folder.path().join("nowhere")).expect_err("no such path");
+    let missing = Scene::open(folder.join("nowhere")).expect_err("no such path");
     assert_message(&missing, &folder, "nowhere: no such file or folder", &[]);
     let forms = ["transforms.json", "*_par.txt", "rgb/", "intrinsics.txt", "poses_bounds.npy", "cameras.bin", ".npz"];
     assert_refused(&folder, ": no scene here; looked for", &forms);
     folder.write("notes.txt", "hello");
-    let text = Scene::open(folder.path().join("notes.txt")).expect_err("not a scene");
+    let text = Scene::open(folder.join("notes.txt")).expect_err("not a scene");
     assert_message(&text, &folder, "notes.txt: no scene here", &[]);
     folder.write("a_par.txt", "0").write("b_par.txt", "0");
     assert_refused(&folder, ": holds both a_par.txt and b_par.txt", &[]);
@@ -67,7 +67,7 @@ fn partners_missing() {
     folder.remove("intrinsics.txt");
     assert_refused(&folder, "intrinsics.txt: no such file", &[]);
     let folder = scenes::srn();
-    fs::remove_dir_all(folder.path().join("pose")).expect("a folder to delete");
+    fs::remove_dir_all(folder.join("pose")).expect("a folder to delete");
     assert_refused(&folder, "pose: no such file", &[]);
 
     let folder = scenes::middlebury();
@@ -247,9 +247,9 @@ fn images_of_the_wrong_size() {
 fn images_that_cannot_be_read() {
     // Cut in its pixels: the header is good, so that the scene opens and the photograph fails.
     let folder = scenes::srn();
-    let whole = fs::read(folder.path().join("rgb/2.png")).expect("an image");
+    let whole = fs::read(folder.join("rgb/2.png")).expect("an image");
     folder.write("rgb/2.png", &whole[..whole.len() - 24]);
-    let scene = Scene::open(folder.path()).expect("headers are good");
+    let scene = Scene::open(&folder).expect("headers are good");
     assert_message(&scene.photograph(0).expect_err("half an image"), &folder, "rgb/2.png: not a readable image", &[]);
     // Cut in its header.
     folder.write("rgb/2.png", &whole[..20]);
@@ -315,16 +315,15 @@ fn names_that_are_no_text_work_and_stay_different() {
     for name in [&b"caf\xe9"[..], &b"caf\xe8"[..]] {
         let file = |folder_name: &str, extension: &str| {
             let name = [name, b".", extension.as_bytes()].concat();
-            folder.path().join(folder_name).join(OsStr::from_bytes(&name))
+            folder.join(folder_name).join(OsStr::from_bytes(&name))
         };
-        fs::copy(folder.path().join("rgb/2.png"), file("rgb", "png")).expect("a photograph");
-        fs::copy(folder.path().join("pose/2.txt"), file("pose", "txt")).expect("a pose");
-        fs::create_dir_all(folder.path().join("masks")).expect("a folder");
-        fs::copy(folder.path().join("rgb/2.png"), file("masks", "png")).expect("a mask");
+        fs::copy(folder.join("rgb/2.png"), file("rgb", "png")).expect("a photograph");
+        fs::copy(folder.join("pose/2.txt"), file("pose", "txt")).expect("a pose");
+        fs::create_dir_all(folder.join("masks")).expect("a folder");
+        fs::copy(folder.join("rgb/2.png"), file("masks", "png")).expect("a mask");
     }
-    let scene = Scene::open(folder.path()).expect("a scene");
-    let names: Vec<&str> = scene.views.iter().map(|view| view.name.as_str()).collect();
-    assert_eq!(names, ["2", "10", "caf%E8", "caf%E9", "target_1"]);
+    let scene = Scene::open(&folder).expect("a scene");
+    assert_eq!(names(&scene), ["2", "10", "caf%E8", "caf%E9", "target_1"]);
     assert_eq!(scene.views.iter().filter(|view| view.mask.is_some()).count(), 2);
     assert!(scene.photograph(3).is_ok());
     // A list that is no text is named with its line.

@@ -151,7 +151,7 @@ fn png(picture: &DynamicImage) -> Vec<u8> {
 
 /// The scene, whose masks say where an object is.
 fn of_object(folder: &Folder) -> Scene {
-    Scene::open_masked(folder.path(), MaskChoice::Object).expect("a scene")
+    Scene::open_masked(folder, MaskChoice::Object).expect("a scene")
 }
 
 /// The half of the photograph that is red is the one that its mask says counts.
@@ -190,7 +190,7 @@ fn a_mask_is_turned_like_its_photograph() {
                 let scene = of_object(&folder);
                 let out = Folder::new();
                 for layout in [Layout::Transforms, Layout::Colmap, Layout::Neus] {
-                    let path = out.path().join(layout.to_string());
+                    let path = out.join(layout.to_string());
                     write(&scene, layout, &path, &Silent).expect("written");
                     let read = Scene::open(&path).expect("a scene");
                     assert_eq!(scene.photograph(0).expect("one"), read.photograph(0).expect("the other"));

@@ -8,33 +8,35 @@ use glam::{DMat3, DVec3};
 use serde_json::json;
 use std::io::{Read, Write};
 use std::path::Path;
-use tempfile::TempDir;
 use viewfuse::scene::gaussians::{GaussianFile, GaussianScene};
 use viewfuse::scene::{Scene, SceneFrame};
 use viewfuse_core::Vec3;
 use viewfuse_core::gaussian::colour_along;
+use viewfuse_tests::scenes::Folder;
 
 fn read(path: &Path) -> Result<GaussianFile, String> {
     GaussianFile::read(path, &SceneFrame::FILE).map_err(|error| error.to_string())
 }
 
-fn folder() -> TempDir {
-    tempfile::tempdir().expect("a folder")
+/// The header of a file of Gaussians, with its last line, and the bytes of its rows.
+fn parts(path: &Path) -> (String, Vec<u8>) {
+    let mut bytes = std::fs::read(path).expect("a file");
+    let end = bytes.windows(11).position(|part| part == b"end_header\n").expect("a header") + 11;
+    let rows = bytes.split_off(end);
+    (String::from_utf8(bytes).expect("text"), rows)
 }
 
 /// The file of a scene, with these replacements in its header.
 fn changed(scene: &GaussianScene, changes: &[(&str, &str)]) -> Result<GaussianFile, String> {
-    let folder = folder();
-    let path = folder.path().join("a.ply");
+    let folder = Folder::new();
+    let path = folder.join("a.ply");
     scene.write(&path, &SceneFrame::FILE).expect("a file");
-    let bytes = std::fs::read(&path).expect("a file");
-    let end = bytes.windows(11).position(|part| part == b"end_header\n").expect("a header") + 11;
-    let mut header = String::from_utf8(bytes[..end].to_vec()).expect("text");
+    let (mut header, rows) = parts(&path);
     for (from, to) in changes {
         assert!(header.contains(from), "{from}");
         header = header.replacen(from, to, 1);
     }
-    std::fs::write(&path, [header.as_bytes(), &bytes[end..]].concat()).expect("a file");
+    std::fs::write(&path, [header.as_bytes(), &rows].concat()).expect("a file");
     read(&path)
 }
 
@@ -43,20 +45,18 @@ fn nerfstudios_world_is_undone() {
     let scene = Scene::open("data/room").expect("the sample");
     let turn = DMat3::from_rotation_z(0.6) * DMat3::from_rotation_x(-0.4);
     let (offset, scale) = (DVec3::new(0.2, -0.3, 0.1), 0.31);
-    let folder = folder();
-    let path = folder.path().join("splat.ply");
+    let folder = Folder::new();
+    let path = folder.join("splat.ply");
     let gaussians = drawn(20, 3, 8);
-    let bytes = {
-        gaussians.write(&path, &SceneFrame::FILE).expect("a file");
-        let bytes = std::fs::read(&path).expect("a file");
-        let place = bytes.windows(17).position(|part| part == b"comment viewfuse\n").expect("ours");
-        [&bytes[..place], &bytes[place + 17..]].concat()
-    };
-    std::fs::write(&path, bytes).expect("a file");
+    gaussians.write(&path, &SceneFrame::FILE).expect("a file");
+    let (header, rows) = parts(&path);
+    let foreign = header.replacen("comment viewfuse\n", "", 1);
+    assert_ne!(foreign, header, "ours");
+    std::fs::write(&path, [foreign.as_bytes(), &rows].concat()).expect("a file");
     let rows: Vec<Vec<f64>> =
         (0..3).map(|row| turn.row(row).to_array().into_iter().chain([offset[row]]).collect()).collect();
     let parser = json!({ "transform": rows, "scale": scale });
-    std::fs::write(folder.path().join("dataparser_transforms.json"), parser.to_string()).expect("a file");
+    folder.write("dataparser_transforms.json", parser.to_string());
     let file = GaussianFile::open(&path, &scene).expect("a file");
     assert!(file.notes.iter().any(|note| note.contains("dataparser_transforms.json")), "{:?}", file.notes);
     for (index, (new, old)) in file.scene.gaussians.iter().zip(&gaussians.gaussians).enumerate() {
@@ -101,15 +101,13 @@ fn properties_and_comments_mean_what_their_writers_mean() {
     }
     assert!(by("by nobody").expect("a file").notes[0].contains("\"by nobody\" is not known"));
     // mip-splatting's filter: wider, and as much fainter.
-    let folder = folder();
-    let path = folder.path().join("a.ply");
+    let folder = Folder::new();
+    let path = folder.join("a.ply");
     scene.write(&path, &SceneFrame::FILE).expect("a file");
-    let mut bytes = std::fs::read(&path).expect("a file");
-    let end = bytes.windows(11).position(|part| part == b"end_header\n").expect("a header") + 11;
-    bytes[end + 12..end + 16].copy_from_slice(&0.05_f32.to_le_bytes());
-    let place = bytes.windows(8).position(|part| part == b"float nx").expect("a column");
-    let renamed = [&bytes[..place], b"float filter_3D", &bytes[place + 8..]].concat();
-    std::fs::write(&path, renamed).expect("a file");
+    let (header, mut rows) = parts(&path);
+    rows[12..16].copy_from_slice(&0.05_f32.to_le_bytes());
+    let renamed = header.replacen("float nx", "float filter_3D", 1);
+    std::fs::write(&path, [renamed.as_bytes(), &rows].concat()).expect("a file");
     let (new, old) = (read(&path).expect("a file").scene.gaussians[0], scene.gaussians[0]);
     let mut share = 1.0;
     for (new, old) in new.log_scales.iter().zip(old.log_scales) {
@@ -140,12 +138,12 @@ fn properties_and_comments_mean_what_their_writers_mean() {
 #[test]
 fn smaller_formats_are_written_and_read() {
     let scene = drawn(300, 1, 4);
-    let folder = folder();
+    let folder = Folder::new();
     for (name, tolerance) in [("a.splat", 1.0e-6_f32), ("a.spz", 1.0e-5)] {
-        let path = folder.path().join(name);
+        let path = folder.join(name);
         scene.write(&path, &SceneFrame::FILE).expect("a file");
         // By content, whatever it is called.
-        let renamed = folder.path().join("b.bin");
+        let renamed = folder.join("b.bin");
         std::fs::copy(&path, &renamed).expect("a copy");
         let found = read(&renamed).expect(name).scene;
         assert_eq!(found.gaussians.len(), 300);
@@ -160,7 +158,7 @@ fn smaller_formats_are_written_and_read() {
     }
     // Niantic's axes: y and z point the other way.
     let mut bytes = Vec::new();
-    let file = std::fs::File::open(folder.path().join("a.spz")).expect("a file");
+    let file = std::fs::File::open(folder.join("a.spz")).expect("a file");
     GzDecoder::new(file).read_to_end(&mut bytes).expect("gzip");
     assert_eq!((&bytes[..4], bytes[12]), (&b"NGSP"[..], 1));
     let y = i32::from_le_bytes([0, bytes[19], bytes[20], bytes[21]]) >> 8;
@@ -169,7 +167,7 @@ fn smaller_formats_are_written_and_read() {
     bytes[14] = 2;
     let mut stream = GzEncoder::new(Vec::new(), Compression::fast());
     stream.write_all(&bytes).expect("gzip");
-    let path = folder.path().join("extended.spz");
+    let path = folder.join("extended.spz");
     std::fs::write(&path, stream.finish().expect("gzip")).expect("a file");
     assert!(read(&path).expect_err("extensions").contains("with extensions (flags 0x2)"));
     for (name, bytes, word) in [
@@ -178,7 +176,7 @@ fn smaller_formats_are_written_and_read() {
         ("a.splat", &[1; 33][..], "not a .splat"),
         ("a.spz", &b"\x1f\x8b\x08"[..], "not a readable .spz"),
     ] {
-        let path = folder.path().join(name);
+        let path = folder.join(name);
         std::fs::write(&path, bytes).expect("a file");
         assert!(read(&path).expect_err(name).contains(word));
     }
@@ -201,8 +199,8 @@ fn compressed_ply_is_read() {
         .for_each(|v| bytes.extend(v.to_le_bytes()));
     let words = [2047_u32 << 21 | 2047, 1 << 30 | 1023 << 20 | 512 << 10 | 512, 0, 255 << 24 | 128];
     words.iter().for_each(|word| bytes.extend(word.to_le_bytes()));
-    let folder = folder();
-    let path = folder.path().join("a.ply");
+    let folder = Folder::new();
+    let path = folder.join("a.ply");
     std::fs::write(&path, bytes).expect("a file");
     let first = read(&path).expect("a file").scene.gaussians[0];
     assert_eq!((first.position, first.log_scales), ([1.0, -2.0, 3.0], [-5.0; 3]));
@@ -280,16 +278,14 @@ const READERS: [Rule; 6] = [sibr, inria, antimatter, gsplat, supersplat, three];
 
 #[test]
 fn strict_readers_open_what_is_written() {
-    let folder = folder();
-    let path = folder.path().join("a.ply");
+    let folder = Folder::new();
+    let path = folder.join("a.ply");
     let far = SceneFrame { origin: DVec3::new(451_234.5, 5_213_456.25, 312.0), scale: 1.0 };
     for (degree, frame) in [(0, SceneFrame::FILE), (1, far), (3, far)] {
         let scene = drawn(9, degree, 3);
         scene.write(&path, &frame).expect("a file");
-        let bytes = std::fs::read(&path).expect("a file");
-        let end = bytes.windows(10).position(|part| part == b"end_header").expect("a header") + 10;
-        let text = String::from_utf8_lossy(&bytes[..end]).into_owned();
-        let lines: Vec<&str> = text.lines().collect();
+        let (header, _) = parts(&path);
+        let lines: Vec<&str> = header.lines().collect();
         READERS.iter().for_each(|rule| rule(&lines).expect("a reader"));
         let found = GaussianScene::read(&path, &frame).expect("our own file");
         assert_eq!((found.degree, &found.f_rest), (degree, &scene.f_rest));
@@ -304,8 +300,8 @@ fn strict_readers_open_what_is_written() {
 
 #[test]
 fn no_gaussians_are_said() {
-    let (folder, scene) = (folder(), Scene::open("data/room").expect("the sample"));
-    let path = folder.path().join("a.ply");
+    let (folder, scene) = (Folder::new(), Scene::open("data/room").expect("the sample"));
+    let path = folder.join("a.ply");
     GaussianScene::default().write(&path, &SceneFrame::FILE).expect("a file");
     let told = GaussianFile::open(&path, &scene).expect_err("nothing").to_string();
     assert!(told.ends_with("the file has no Gaussians: there is nothing to show"), "{told}");

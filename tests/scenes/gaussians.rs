@@ -5,12 +5,12 @@ use glam::DVec3;
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{DefaultElement, Property};
 use std::path::{Path, PathBuf};
-use tempfile::TempDir;
 use viewfuse::check::poses::Random;
 use viewfuse::scene::SceneFrame;
 use viewfuse::scene::gaussians::{Gaussian, GaussianScene, MAX_LOGARITHM};
 use viewfuse_core::Vec3;
 use viewfuse_core::gaussian::{REST_COUNTS, colour_along};
+use viewfuse_tests::scenes::Folder;
 
 /// Gaussians of random parameters.
 pub(super) fn drawn(count: usize, degree: u32, seed: u32) -> GaussianScene {
@@ -28,9 +28,9 @@ pub(super) fn drawn(count: usize, degree: u32, seed: u32) -> GaussianScene {
     GaussianScene { gaussians, degree, f_rest, is_antialiased: false }
 }
 
-fn written(scene: &GaussianScene, frame: &SceneFrame) -> (TempDir, PathBuf) {
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("scene.ply");
+fn written(scene: &GaussianScene, frame: &SceneFrame) -> (Folder, PathBuf) {
+    let folder = Folder::new();
+    let path = folder.join("scene.ply");
     scene.write(&path, frame).expect("a file");
     (folder, path)
 }
@@ -143,9 +143,8 @@ fn columns() -> Vec<(&'static str, &'static str, f64)> {
 }
 
 fn read(bytes: &[u8]) -> Result<GaussianScene, String> {
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("scene.ply");
-    std::fs::write(&path, bytes).expect("a file");
+    let folder = Folder::new();
+    let path = folder.write("scene.ply", bytes).join("scene.ply");
     GaussianScene::read(&path, &SceneFrame::FILE).map_err(|error| {
         let message = error.to_string();
         message.strip_prefix(&path.display().to_string()).expect("the file").to_owned()

@@ -8,10 +8,8 @@ mod kinds;
 mod prisms;
 mod rooms;
 
-use folders::assert_poses;
 use image::RgbaImage;
 use std::fs;
-use std::path::PathBuf;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::random::uniform;
@@ -38,16 +36,6 @@ fn orbit(side: u32) -> Orbit {
 
 fn camera(side: u32) -> Camera {
     orbit(side).camera(0.7, 0.4).expect("a camera off the pole")
-}
-
-fn sample_folder() -> PathBuf {
-    viewfuse_tests::places::data("toy")
-}
-
-fn sample_cameras() -> Vec<Camera> {
-    let mut cameras = training_cameras().expect("training cameras");
-    cameras.extend(test_cameras().expect("test cameras"));
-    cameras
 }
 
 /// What `f64` says about the sphere and the ray through an image coordinate.
@@ -202,36 +190,6 @@ fn turning_a_placement_turns_the_shape_and_keeps_it_rigid() {
     let placement = standing.turned_about_x(0.3).turned_about_y(-1.1).turned_about_z(2.5);
     let p = Vec3::new(0.2, -0.5, 0.9);
     assert!(near(placement.to_local(placement.rotate_to_world(p) + placement.origin_world()), p));
-}
-
-#[test]
-fn pictures_do_not_depend_on_the_number_of_threads() {
-    let (object, camera) = (lorry(), sample_cameras()[3]);
-    let with_threads = |count| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build().expect("a thread pool");
-        pool.install(|| render(&object, &camera))
-    };
-    let (one, three) = (with_threads(1), with_threads(3));
-    assert_eq!(one.as_raw(), three.as_raw(), "bit for bit");
-    let other = render(&object, &sample_cameras()[4]);
-    assert_ne!(one.as_raw(), other.as_raw(), "different views are different pictures");
-}
-
-#[test]
-fn the_sample_is_what_the_code_makes() {
-    let (object, cameras) = (lorry(), sample_cameras());
-    assert!(object.bounding_radius() < 0.55, "the lorry leaves the pictures: {}", object.bounding_radius());
-    for index in [0, 11, 22] {
-        let path = sample_folder().join(format!("rgb/{index:06}.png"));
-        let stored = image::open(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-        assert_eq!(stored.color(), image::ColorType::Rgba8, "{}", path.display());
-        assert!(stored.into_rgba8() == render(&object, &cameras[index]), "{} is out of date", path.display());
-    }
-    assert_poses(&sample_folder(), &cameras);
-    let intrinsics = fs::read_to_string(sample_folder().join("intrinsics.txt")).expect("intrinsics.txt");
-    assert_eq!(intrinsics, "131.25 64. 64. 0.\n0. 0. 0.\n1.\n128 128\n");
-    let count = fs::read_dir(sample_folder().join("rgb")).expect("rgb").count();
-    assert_eq!(count, cameras.len(), "pictures in the sample");
 }
 
 #[test]

@@ -2,27 +2,10 @@
 //!
 //! The camera sees the point at (0.5, -0.25, 2): the pixel is `focal * (0.25, -0.125) + principal`.
 
+use super::made::{assert_pixel, names, open};
 use serde_json::json;
 use viewfuse::scene::{ImageFault, Scene, SceneFault, Split};
-use viewfuse_core::Vec3;
-use viewfuse_tests::scenes::{self, Folder, POINT_WORLD};
-
-fn open(folder: &Folder) -> Scene {
-    Scene::open(folder.path()).expect("a good scene")
-}
-
-fn names(scene: &Scene) -> Vec<&str> {
-    scene.views.iter().map(|view| view.name.as_str()).collect()
-}
-
-/// Where the view sees the point is where it must be, to 1e-4 of a pixel.
-#[track_caller]
-fn assert_pixel(scene: &Scene, view: usize, expected: [f64; 2]) {
-    let seen = scene.views[view].camera.project(Vec3::from_array(POINT_WORLD));
-    assert!(seen.in_front && (f64::from(seen.depth) - 2.0).abs() < 1e-6, "{seen:?}");
-    let error = (f64::from(seen.x) - expected[0]).abs().max((f64::from(seen.y) - expected[1]).abs());
-    assert!(error < 1e-4, "{seen:?} instead of {expected:?}");
-}
+use viewfuse_tests::scenes::{self, Folder};
 
 #[test]
 fn srn_folder() {
@@ -84,7 +67,7 @@ fn nsvf_intrinsics() {
     }
     for (from, to, said) in [("20 0", "20 0.5", "the skew 0.5"), ("0 0 0 1", "0 0 0 2", "the form fx 0 cx")] {
         folder.write("intrinsics.txt", wide.replace(from, to));
-        let error = Scene::open(folder.path()).expect_err("no K").to_string();
+        let error = Scene::open(&folder).expect_err("no K").to_string();
         assert!(error.contains("intrinsics.txt:1: ") && error.contains(said), "{error}");
     }
 }
@@ -106,7 +89,7 @@ fn blender_transforms() {
 fn instant_ngp_transforms() {
     let folder = scenes::transforms_folder(&scenes::transforms());
     assert_pixel(&open(&folder), 0, [7.5 + 5.0, 6.5 - 3.0]);
-    let file = Scene::open(folder.path().join("transforms.json")).expect("the file itself");
+    let file = Scene::open(folder.join("transforms.json")).expect("the file itself");
     assert_eq!(file.views, open(&folder).views);
 
     // A photograph of half the size, rounded down as resampling tools do.
@@ -147,7 +130,7 @@ fn middlebury_list() {
     assert_eq!((scene.layout, names(&scene)), ("middlebury", vec!["toy0001", "toy0002"]));
     // Half a pixel more than K says: there, (0, 0) is a pixel's centre.
     assert_pixel(&scene, 1, [7.5 + 5.0, 5.5 - 3.0]);
-    let list = Scene::open(folder.path().join("toy_par.txt")).expect("the list itself");
+    let list = Scene::open(folder.join("toy_par.txt")).expect("the list itself");
     assert_eq!(list.views, scene.views);
 }
 
@@ -233,13 +216,12 @@ fn pixels_that_are_not_there() {
 #[test]
 fn views_numbered_alike_in_two_folders_are_told_apart() {
     let mut transforms = scenes::transforms();
-    let frame = |path: &str| serde_json::json!({ "file_path": path, "transform_matrix": scenes::opengl_matrix() });
-    transforms["frames"] = serde_json::json!([frame("left/0001.png"), frame("right/0001.png"), frame("left/0002.png")]);
+    let frame = |path: &str| json!({ "file_path": path, "transform_matrix": scenes::opengl_matrix() });
+    transforms["frames"] = json!([frame("left/0001.png"), frame("right/0001.png"), frame("left/0002.png")]);
     let folder = scenes::transforms_folder(&transforms);
     for name in ["left/0001.png", "right/0001.png", "left/0002.png"] {
         folder.image(name, 16, 12);
     }
     let scene = open(&folder);
-    let names: Vec<&str> = scene.views.iter().map(|view| view.name.as_str()).collect();
-    assert_eq!(names, ["left_0001", "right_0001", "0002"]);
+    assert_eq!(names(&scene), ["left_0001", "right_0001", "0002"]);
 }

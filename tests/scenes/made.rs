@@ -12,7 +12,7 @@ pub(super) const QUATERNION: [f64; 4] = [0.5, -0.5, -0.5, -0.5];
 pub(super) const TRANSLATION: [f64; 3] = [-2.0, -3.0, -1.0];
 
 pub(super) fn open(folder: &Folder) -> Scene {
-    Scene::open(folder.path()).unwrap_or_else(|error| panic!("{error}"))
+    Scene::open(folder).unwrap_or_else(|error| panic!("{error}"))
 }
 
 pub(super) fn names(scene: &Scene) -> Vec<&str> {
@@ -32,7 +32,7 @@ pub(super) fn assert_pixel(scene: &Scene, view: usize, expected: [f64; 2]) {
 #[track_caller]
 pub(super) fn assert_message(error: &SceneError, folder: &Folder, begins: &str, parts: &[&str]) {
     let message = error.to_string();
-    let relative = message.strip_prefix(&folder.path().display().to_string()).unwrap_or_default();
+    let relative = message.strip_prefix(&folder.display().to_string()).unwrap_or_default();
     assert!(relative.trim_start_matches('/').starts_with(begins), "{message:?} does not begin with {begins:?}");
     assert!(!message.contains('\n') && message.len() < 700, "{message:?}");
     for part in parts {
@@ -43,7 +43,7 @@ pub(super) fn assert_message(error: &SceneError, folder: &Folder, begins: &str, 
 /// The scene in the folder is refused so.
 #[track_caller]
 pub(super) fn assert_refused(folder: &Folder, begins: &str, parts: &[&str]) {
-    assert_message(&Scene::open(folder.path()).expect_err("a bad scene"), folder, begins, parts);
+    assert_message(&Scene::open(folder).expect_err("a bad scene"), folder, begins, parts);
 }
 
 /// A camera of COLMAP's: number, model's number and name, parameters; for images of 32 x 24.

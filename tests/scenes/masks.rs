@@ -34,7 +34,7 @@ fn room(name: impl Fn(&str) -> String, counts: impl Fn(u32, u32, u32) -> bool) -
 }
 
 fn opened(folder: &Folder, masks: MaskChoice) -> Scene {
-    Scene::open_masked(folder.path().join("room"), masks).expect("a scene")
+    Scene::open_masked(folder.join("room"), masks).expect("a scene")
 }
 
 /// The line of `inspect` about masks.
@@ -89,7 +89,7 @@ fn masks_of_instant_ngp_are_inverted() {
         assert_hides_the_thing(&scene);
         // Written, they are as all others.
         let out = Folder::new();
-        write(&scene, Layout::Transforms, &out.path().join("room"), &Silent).expect("written");
+        write(&scene, Layout::Transforms, &out.join("room"), &Silent).expect("written");
         assert_hides_the_thing(&opened(&out, MaskChoice::Auto));
     }
 }
@@ -135,7 +135,7 @@ fn silhouettes_are_object_masks() {
     let names: [fn(&str) -> String; 2] = [|name| format!("{name}.png"), |name| format!("{name}.png.png")];
     for name in names {
         let folder = toy();
-        let plain = Scene::open(folder.path().join("toy")).expect("the sample");
+        let plain = Scene::open(folder.join("toy")).expect("the sample");
         let photographs: Vec<_> = (0..plain.views.len()).map(|view| plain.photograph(view).expect("one")).collect();
         for (view, photograph) in plain.views.iter().zip(&photographs) {
             let (width, height) = photograph.pixels.dimensions();
@@ -144,7 +144,7 @@ fn silhouettes_are_object_masks() {
             let opaque: RgbImage = DynamicImage::from(photograph.pixels.clone()).into_rgb8();
             opaque.save(folder.file(&format!("toy/rgb/{}.png", view.name))).expect("a photograph");
         }
-        let scene = Scene::open(folder.path().join("toy")).expect("a scene");
+        let scene = Scene::open(folder.join("toy")).expect("a scene");
         assert!(line(&scene).starts_with("masks: where the object is, 24 files, "), "{}", line(&scene));
         for (view, photograph) in photographs.iter().enumerate() {
             assert!(scene.photograph(view).expect("the same") == *photograph, "{view}");
@@ -152,7 +152,7 @@ fn silhouettes_are_object_masks() {
         // Layouts whose masks say what does not count get the object as an alpha channel.
         let out = Folder::new();
         for layout in [Layout::Transforms, Layout::Colmap, Layout::Neus] {
-            let path = out.path().join(layout.to_string());
+            let path = out.join(layout.to_string());
             write(&scene, layout, &path, &Silent).expect("written");
             let read = Scene::open(&path).expect("a scene");
             for (view, photograph) in photographs.iter().enumerate() {
@@ -226,7 +226,7 @@ fn red_before_green(masks: bool) -> Folder {
 fn a_lens_moves_a_mask_as_it_moves_the_photograph() {
     let [masked, plain] = [true, false].map(|masks| {
         let folder = red_before_green(masks);
-        Scene::open(folder.path()).expect("a scene").photograph(0).expect("a photograph")
+        Scene::open(&folder).expect("a scene").photograph(0).expect("a photograph")
     });
     let hidden = plain.seen.expect("corners").pixels().filter(|seen| seen[0] == 0).count();
     let seen = masked.seen.expect("pixels that do not count");
@@ -260,24 +260,24 @@ fn layouts_without_ignore_masks_hold_them_as_transparency_or_not_at_all() {
     let folder = room(|name| format!("masks/{name}.png"), |view, x, y| !thing(view, x, y));
     let scene = opened(&folder, MaskChoice::Auto);
     let out = Folder::new();
-    let written = write(&scene, Layout::Srn, &out.path().join("srn"), &Silent).expect("written");
+    let written = write(&scene, Layout::Srn, &out.join("srn"), &Silent).expect("written");
     assert!(
         written.lost.contains(&"the ignore masks of 11 photographs: what does not count is transparent".to_owned())
     );
-    let read = Scene::open(out.path().join("srn")).expect("a scene");
+    let read = Scene::open(out.join("srn")).expect("a scene");
     let photograph = read.photograph(5).expect("a photograph");
     assert!(photograph.pixels.enumerate_pixels().all(|(x, y, pixel)| (pixel[3] == 0) == thing(5, x, y)));
     let album = Album::open(&read, [3, 5], &Silent).expect("photographs");
     let images = album.sources(&[3, 5], 320, BackgroundChoice::Auto, &Silent).expect("sources");
     assert!(!images.has_silhouettes && images.warnings.len() == 1, "{:?}", images.warnings);
-    let error = write(&scene, Layout::Neus, &out.path().join("neus"), &Silent).expect_err("no place").to_string();
+    let error = write(&scene, Layout::Neus, &out.join("neus"), &Silent).expect_err("no place").to_string();
     assert!(error.contains("cannot hold this scene: its masks say where the object is"), "{error}");
 }
 
 #[test]
 fn what_is_hidden_before_an_objects_background_is_background() {
     let folder = toy();
-    let path = folder.path().join("toy");
+    let path = folder.join("toy");
     let plain = Scene::open(&path).expect("the sample");
     let pinhole = plain.views[0].camera.pinhole;
     let (width, height) = (pinhole.width(), pinhole.height());

@@ -17,8 +17,8 @@ fn path_of(name: &str, text: impl AsRef<[u8]>) -> Result<CameraPath, String> {
     folder.write(name, text);
     let scene = open(&folder);
     let pinhole = scene.views[0].camera.pinhole;
-    let outcome = CameraPath::open(&folder.path().join(name), &scene, &pinhole);
-    outcome.map_err(|error| error.to_string().replace(&folder.path().display().to_string(), ""))
+    let outcome = CameraPath::open(&folder.join(name), &scene, &pinhole);
+    outcome.map_err(|error| error.to_string().replace(&folder.display().to_string(), ""))
 }
 
 /// Where a camera sees the point of [`POINT_WORLD`], which is 2 in front of it.
@@ -103,8 +103,7 @@ fn the_world_of_nerfstudios_training() {
     // What it writes begins before the scene was turned: the product of both.
     let parser = json!({ "transform": [[0, 0, 1, 4], [0, 1, 0, 4], [-1, 0, 0, 5]], "scale": 0.5 });
     folder.write("run/dataparser_transforms.json", parser.to_string());
-    let open_path =
-        || CameraPath::open(&folder.path().join("run/camera_path.json"), &scene, &scene.views[0].camera.pinhole);
+    let open_path = || CameraPath::open(&folder.join("run/camera_path.json"), &scene, &scene.views[0].camera.pinhole);
     let camera = open_path().expect("a path").cameras[0].camera;
     let rows = scene.views[0].camera.pose.to_opencv();
     for (row, expected) in camera.pose.to_opencv().iter().zip(rows) {

@@ -25,7 +25,7 @@ fn photographs_that_are_not_kept_are_read_when_they_are_needed() {
 #[test]
 fn the_largest_photograph_decides_the_size_up_to_the_limit() {
     let side = |folder: &scenes::Folder, size: Option<[u32; 2]>| {
-        let scene = Scene::open(folder.path()).expect("a scene");
+        let scene = Scene::open(folder).expect("a scene");
         let options = RenderOptions { size, ..RenderOptions::default() };
         working_side(&scene, &options, LONGEST_DEFAULT_SIDE).expect("a size")
     };
@@ -35,7 +35,7 @@ fn the_largest_photograph_decides_the_size_up_to_the_limit() {
     folder.image("rgb/10.png", 1600, 1200);
     assert_eq!(side(&folder, None), LONGEST_DEFAULT_SIDE);
     assert_eq!(side(&folder, Some([32, 24])), 32);
-    let scene = Scene::open(folder.path()).expect("a scene");
+    let scene = Scene::open(&folder).expect("a scene");
     let (small, large) = (&scene.views[0].camera, &scene.views[1].camera);
     assert_eq!((reduced_size(small, 512), reduced_size(large, 512)), ((16, 12), (512, 384)));
     assert_eq!(scaled_size(small, 512), (512, 384));

@@ -39,7 +39,7 @@ fn parts_in_files_are_one_scene() {
     let chosen = |list: &str| view_list(&scene, list).expect("views");
     assert_eq!((chosen("test"), chosen("train,val/2"), chosen("all")), (vec![2], vec![0, 1], vec![0, 1, 2]));
     // One of the files by its name is that part alone.
-    let test = Scene::open(folder.path().join("transforms_test.json")).expect("a part");
+    let test = Scene::open(folder.join("transforms_test.json")).expect("a part");
     assert_eq!((names(&test), test.views[0].split), (vec!["r_0"], Some(Split::Test)));
     // A whole scene's file wins.
     folder.write("transforms.json", json!({ "camera_angle_x": angle, "frames": [frame("val/r_0.png")] }).to_string());
@@ -56,14 +56,14 @@ fn a_photograph_may_lie_outside_the_folder() {
     let mut transforms = scenes::transforms();
     transforms["frames"] = json!([frame("../photographs/1.png"), frame(&absolute)]);
     folder.write("poses/transforms.json", transforms.to_string());
-    let scene = Scene::open(folder.path().join("poses")).expect("a scene");
+    let scene = Scene::open(folder.join("poses")).expect("a scene");
     assert_eq!(names(&scene), ["1", "2"]);
     assert_eq!(scene.views[1].image.as_deref(), Some(elsewhere.file("2.png").as_path()));
     // What is no picture is not read.
     folder.write("notes.txt", "private");
     transforms["frames"] = json!([frame("../notes.txt")]);
     folder.write("poses/transforms.json", transforms.to_string());
-    let error = Scene::open(folder.path().join("poses")).expect_err("no picture").to_string();
+    let error = Scene::open(folder.join("poses")).expect_err("no picture").to_string();
     assert!(error.contains("notes.txt") && !error.contains("private"), "{error}");
 }
 
@@ -102,7 +102,7 @@ fn photographs_may_be_smaller_and_paths_those_of_another_system() {
     let folder = with_frames(frames.into(), &["images_4/1.png", "images_4/2.png"]);
     let scene = open(&folder);
     assert_eq!((names(&scene), scene.warnings.len()), (vec!["1", "2"], 0));
-    assert_eq!(scene.views[1].image, Some(folder.path().join("images_4/2.png")));
+    assert_eq!(scene.views[1].image, Some(folder.join("images_4/2.png")));
 }
 
 #[test]
@@ -119,7 +119,7 @@ fn masks_are_named_or_stand_beside() {
     mask("masks/1.png", 255, 16, 12);
     mask("masks/2.png.png", 51, 16, 12);
     mask("masks/3.jpg", 255, 32, 24);
-    let scene = Scene::open_masked(folder.path(), MaskChoice::Object).expect("a scene");
+    let scene = Scene::open_masked(&folder, MaskChoice::Object).expect("a scene");
     let found: Vec<_> = scene.views.iter().map(|view| view.mask.as_ref().map(|mask| mask.file_name())).collect();
     let named = |name: &'static str| Some(Some(std::ffi::OsStr::new(name)));
     assert_eq!(found, [named("m.png"), named("2.png.png"), named("3.jpg"), None]);

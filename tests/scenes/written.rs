@@ -13,7 +13,7 @@ use viewfuse_tests::scenes::{self, Folder};
 
 fn written(scene: &Scene, layout: Layout) -> (Folder, Scene, Written) {
     let folder = Folder::new();
-    let path = folder.path().join("out");
+    let path = folder.join("out");
     let written = write(scene, layout, &path, &Silent).unwrap_or_else(|error| panic!("{error}"));
     let read = Scene::open(&path).unwrap_or_else(|error| panic!("{layout}: {error}"));
     assert_eq!(read.layout, layout.reader());
@@ -49,6 +49,15 @@ fn assert_same_photographs(layout: Layout, scene: &Scene, read: &Scene) {
             assert_eq!(scene.photograph(index).expect("one"), read.photograph(index).expect("the other"), "{layout}");
         }
     }
+}
+
+/// LLFF's scene, whose second camera stands elsewhere.
+fn llff_of_two_places() -> Folder {
+    let folder = llff();
+    let mut second = llff_row();
+    (second[3], second[8]) = (1.25, 2.5);
+    folder.write("poses_bounds.npy", npy(&[2, 17], &[llff_row(), second].concat()));
+    folder
 }
 
 /// Centre and radius of the unit sphere of a NeuS scene in the coordinates of the files that it was written from.
@@ -87,10 +96,7 @@ fn assert_same_in_the_sphere(scene: &Scene, read: &Scene) {
 #[test]
 fn every_layout_that_can_hold_a_scene_gives_it_back() {
     // One focal length, the principal point in the centre, near and far: all layouts hold it.
-    let folder = llff();
-    let mut second = llff_row();
-    (second[3], second[8]) = (1.25, 2.5);
-    folder.write("poses_bounds.npy", npy(&[2, 17], &[llff_row(), second].concat()));
+    let folder = llff_of_two_places();
     let scene = open(&folder);
     for layout in Layout::ALL {
         let (_folder, read, written) = written(&scene, layout);
@@ -113,7 +119,7 @@ fn points_and_poses_without_photographs() {
         let (folder, read, written) = self::written(&scene, layout);
         assert_same(layout, &scene, &read);
         assert_eq!((&read.points, written.lost), (&scene.points, vec![]));
-        let is_binary = folder.path().join("out/sparse/0/cameras.bin").exists();
+        let is_binary = folder.join("out/sparse/0/cameras.bin").exists();
         assert_eq!(is_binary, layout == Layout::ColmapBinary);
     }
     let (_folder, read, written) = self::written(&scene, Layout::Transforms);
@@ -153,7 +159,7 @@ fn lenses_and_masks() {
             assert_same(layout, &ignoring, &read);
             assert_eq!(read.masks, MaskMeaning::Ignore);
         }
-        let scene = Scene::open_masked(folder.path(), MaskChoice::Object).expect("a scene");
+        let scene = Scene::open_masked(&folder, MaskChoice::Object).expect("a scene");
         assert!(scene.views[0].lens.is_some() && scene.views[0].mask.is_some());
         for layout in [Layout::Transforms, Layout::Colmap, Layout::ColmapBinary] {
             let (_folder, read, written) = written(&scene, layout);
@@ -171,7 +177,7 @@ fn lenses_and_masks() {
         let (folder, read, _) = self::written(&scene, Layout::Neus);
         let after = read.photograph(0).expect("the other");
         assert!(before.pixels == after.pixels && after.has_alpha && read.views[0].lens.is_none());
-        assert_eq!(read.views[0].mask, Some(folder.path().join("out/mask/1.png")));
+        assert_eq!(read.views[0].mask, Some(folder.join("out/mask/1.png")));
         assert!(written.lost.iter().any(|line| line.contains("the lens of 1 photographs")));
     }
 }
@@ -204,13 +210,13 @@ fn a_lens_that_a_layout_has_not_is_undone() {
 #[test]
 fn what_a_layout_cannot_hold_is_refused_and_leaves_nothing() {
     let folder = Folder::new();
-    let path = folder.path().join("out");
+    let path = folder.join("out");
     let refused = |scene: &Scene, layout: Layout, part: &str| {
         let error = write(scene, layout, &path, &Silent).expect_err("unfit");
         assert!(matches!(error, WriteSceneError::Unfit { .. }), "{error}");
         let message = error.to_string();
         assert!(message.contains(part) && message.contains(&format!("the layout {layout} cannot hold")), "{message}");
-        assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 0);
+        assert_eq!(std::fs::read_dir(&folder).expect("a folder").count(), 0);
     };
     let (srn, colmap) = (scenes::srn(), colmap_text());
     for layout in Layout::ALL.into_iter().filter(|layout| *layout != Layout::Srn) {
@@ -227,7 +233,7 @@ fn what_a_layout_cannot_hold_is_refused_and_leaves_nothing() {
     assert!(matches!(write(&scene, Layout::Srn, &path, &Silent), Err(WriteSceneError::Scene(_))));
     let (scene, stopping) = (open(&colmap), Listener::stops_after(0));
     assert!(matches!(write(&scene, Layout::Colmap, &path, &stopping), Err(WriteSceneError::Interrupted(_))));
-    assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 0);
+    assert_eq!(std::fs::read_dir(&folder).expect("a folder").count(), 0);
     // What is there stays; an empty folder is filled.
     folder.write("out/mine.txt", "mine");
     assert!(matches!(write(&scene, Layout::Colmap, &path, &Silent), Err(WriteSceneError::Occupied { .. })));
@@ -245,8 +251,8 @@ fn a_scene_of_a_unit_sphere_keeps_it() {
     folder.remove("mask/03.png");
     let scene = open(&folder);
     let out = Folder::new();
-    write(&scene, Layout::Neus, &out.path().join("out"), &Silent).expect("written");
-    let read = Scene::open(out.path().join("out")).expect("a scene");
+    write(&scene, Layout::Neus, &out.join("out"), &Silent).expect("written");
+    let read = Scene::open(out.join("out")).expect("a scene");
     assert_same(Layout::Neus, &scene, &read);
     assert_eq!(sphere(&read.path), (DVec3::ZERO, 1.0));
     assert_eq!((read.views[0].near_far, read.views.len()), (scene.views[0].near_far, 2));
@@ -271,12 +277,12 @@ fn names_without_numbers_of_their_own_find_their_cameras_and_masks() {
         }
     }
     folder.write("transforms.json", json!({ "fl_x": 20, "frames": frames }).to_string());
-    let scene = Scene::open_masked(folder.path(), MaskChoice::Object).expect("a scene");
+    let scene = Scene::open_masked(&folder, MaskChoice::Object).expect("a scene");
     assert_eq!(names(&scene), ["left_1", "right_1", "b"]);
     assert_eq!(scene.views.iter().filter(|view| view.mask.is_some()).count(), 2);
     let out = Folder::new();
-    write(&scene, Layout::Neus, &out.path().join("out"), &Silent).expect("written");
-    let read = Scene::open(out.path().join("out")).expect("a scene");
+    write(&scene, Layout::Neus, &out.join("out"), &Silent).expect("written");
+    let read = Scene::open(out.join("out")).expect("a scene");
     let (centre, radius) = sphere(&read.path);
     for (index, view) in scene.views.iter().enumerate() {
         let other = read.view_named(&view.name).expect("the same view");
@@ -322,32 +328,9 @@ fn a_scene_far_from_the_origin_is_written_in_its_own_coordinates() {
 fn hostile_names() -> Vec<(String, Vec<Layout>)> {
     let lists = || vec![Layout::Srn, Layout::Llff, Layout::Neus];
     let lines = || vec![Layout::Colmap, Layout::Middlebury];
-    let held = [
-        "plain",
-        "a.b",
-        "a.png",
-        "dot.",
-        "quote\"'",
-        "#comment",
-        "1",
-        "-3",
-        "007",
-        "target_1",
-        "x_par.txt",
-        "\u{e9}",
-        "e\u{301}",
-        "\u{feff}bom",
-        "a,b;c",
-        "%E9",
-        "{json}",
-        "\u{1b}[2J",
-        "\u{7f}",
-        "*?$(rm)",
-        "CON",
-        "images",
-        "nan",
-    ];
-    let mut all: Vec<(String, Vec<Layout>)> = held.iter().map(|name| ((*name).to_owned(), Vec::new())).collect();
+    let held = "plain a.b a.png dot. quote\"' #comment 1 -3 007 target_1 x_par.txt \u{e9} e\u{301} \u{feff}bom a,b;c \
+                %E9 {json} \u{1b}[2J \u{7f} *?$(rm) CON images nan";
+    let mut all: Vec<(String, Vec<Layout>)> = held.split(' ').map(|name| (name.to_owned(), Vec::new())).collect();
     all.push(("x".repeat(240), Vec::new()));
     all.push(("x".repeat(241), Layout::ALL.to_vec()));
     all.extend([".hidden", "..", "..."].map(|name| (name.to_owned(), lists())));
@@ -365,10 +348,7 @@ fn hostile_names() -> Vec<(String, Vec<Layout>)> {
 /// Every layout gives a scene of hostile names back, or refuses it and leaves nothing.
 #[test]
 fn hostile_names_are_given_back_or_refused() {
-    let folder = llff();
-    let mut second = llff_row();
-    (second[3], second[8]) = (1.25, 2.5);
-    folder.write("poses_bounds.npy", npy(&[2, 17], &[llff_row(), second].concat()));
+    let folder = llff_of_two_places();
     let plain = open(&folder);
     for (index, view) in plain.views.iter().enumerate() {
         let level = 90 * index as u8;
@@ -383,7 +363,7 @@ fn hostile_names_are_given_back_or_refused() {
         scene.views.iter_mut().zip(names).for_each(|(view, name)| view.name = name);
         for layout in Layout::ALL {
             let out = Folder::new();
-            let path = out.path().join("out");
+            let path = out.join("out");
             match write(&scene, layout, &path, &Silent) {
                 Ok(_) => {
                     assert!(!refused_by.contains(&layout), "{layout}: {name:?} was to be refused");
@@ -401,7 +381,7 @@ fn hostile_names_are_given_back_or_refused() {
                 Err(error) => {
                     assert!(refused_by.contains(&layout), "{layout}: {error}");
                     assert!(error.to_string().contains(&format!("the name {name:?}")), "{error}");
-                    assert_eq!(std::fs::read_dir(out.path()).expect("a folder").count(), 0, "{layout}: {name:?}");
+                    assert_eq!(std::fs::read_dir(&out).expect("a folder").count(), 0, "{layout}: {name:?}");
                 }
             }
         }
@@ -411,15 +391,12 @@ fn hostile_names_are_given_back_or_refused() {
 /// What no rule of names foresees is found when the files are read back: LLFF's rows are in the order of the files.
 #[test]
 fn poses_of_other_photographs_are_not_written() {
-    let folder = llff();
-    let mut second = llff_row();
-    (second[3], second[8]) = (1.25, 2.5);
-    folder.write("poses_bounds.npy", npy(&[2, 17], &[llff_row(), second].concat()));
+    let folder = llff_of_two_places();
     let mut scene = open(&folder);
     // `a-b.png` comes before `a.png`, `a` before `a-b`.
     scene.views.iter_mut().zip(["a", "a-b"]).for_each(|(view, name)| view.name = name.to_owned());
     let out = Folder::new();
-    let error = write(&scene, Layout::Llff, &out.path().join("out"), &Silent).expect_err("another order");
+    let error = write(&scene, Layout::Llff, &out.join("out"), &Silent).expect_err("another order");
     assert!(error.to_string().contains("is read back with the pose of another"), "{error}");
-    assert_eq!(std::fs::read_dir(out.path()).expect("a folder").count(), 0);
+    assert_eq!(std::fs::read_dir(&out).expect("a folder").count(), 0);
 }

@@ -58,17 +58,16 @@ pub fn done(binary: &str, folder: &Path, arguments: &str) -> String {
 /// Starts the command and kills it without a warning as soon as `ready` holds; it must not end before.
 #[track_caller]
 pub fn killed_when(binary: &str, folder: &Path, arguments: &str, ready: impl FnMut() -> bool) {
-    let mut run = command(binary, folder, arguments);
-    let mut child = run.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the command starts");
+    let mut child = unheard(command(binary, folder, arguments));
     patience::wait_while_running(&mut child, ready);
     child.kill().expect("a process to kill");
     child.wait().expect("a dead process");
 }
 
-/// Starts the command, to be interrupted.
+/// Starts a command whose output nobody reads.
 #[track_caller]
-pub fn start(binary: &str, folder: &Path, arguments: &str) -> Child {
-    spawn(command(binary, folder, arguments))
+pub fn unheard(mut command: Command) -> Child {
+    command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the command starts")
 }
 
 /// Starts a command whose output is kept.

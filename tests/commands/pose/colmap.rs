@@ -1,7 +1,7 @@
 //! `--from`: a person's own COLMAP, played by a script that says what the room's poses are, or something else.
 
-use super::{COUNT_ALONE, REQUIRE, bare, no_program, no_scripts, posed, worst_rotation};
-use crate::{BINARY, list_of, read_json, text_of};
+use super::{COUNT_ALONE, REQUIRE, bare, no_program, no_scripts, posed, with, worst_rotation};
+use crate::{assert_wrong_arguments, command, list_of, read_json, text_of};
 use std::f64::consts::PI;
 use std::fmt::Write;
 use std::fs;
@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::process::Command;
 use viewfuse::scene::Scene;
 use viewfuse::scene::rig::Rig;
-use viewfuse_tests::command::{Outcome, assert_command_refused, assert_wrong_arguments, command, files_below};
+use viewfuse_tests::command::{Outcome, assert_command_refused, files_below};
 use viewfuse_tests::places::data;
 use viewfuse_tests::scenes::Folder;
 
@@ -86,13 +86,7 @@ fn with_colmap() -> Folder {
 }
 
 fn colmap(folder: &Folder) -> (&'static str, PathBuf) {
-    ("VIEWFUSE_COLMAP", folder.path().join("bin/colmap"))
-}
-
-fn with(folder: &Folder, arguments: &str, (name, value): (&str, PathBuf)) -> Command {
-    let mut command = command(BINARY, folder.path(), arguments);
-    command.env(name, value);
-    command
+    ("VIEWFUSE_COLMAP", folder.join("bin/colmap"))
 }
 
 fn in_place_of_openmvg() {
@@ -101,15 +95,15 @@ fn in_place_of_openmvg() {
     model(&folder, "dsp-sift", |_| 0.0);
     let said = posed(with(&folder, "pose bare -o posed --from colmap --seed 5", colmap(&folder)));
     assert!(said.starts_with("registered 5 of 5 photographs\n") && said.contains("by COLMAP 9.8.7 (SIFT)"), "{said}");
-    let scene = Scene::open(folder.path().join("posed")).expect("a scene");
+    let scene = Scene::open(folder.join("posed")).expect("a scene");
     assert!(worst_rotation(&scene) < 0.1 && scene.points.len() == 40, "{}", worst_rotation(&scene));
-    let record = read_json(folder.path().join("posed/pose.json"));
+    let record = read_json(folder.join("posed/pose.json"));
     let attempts = list_of(&record["attempts"]);
     let told: Vec<_> =
         attempts.iter().map(|attempt| (attempt["solver"].as_str(), attempt["features"].as_str())).collect();
     assert_eq!(told, [(Some("COLMAP 9.8.7"), Some("sift")), (Some("COLMAP 9.8.7"), Some("dsp-sift"))]);
     // What it was asked: the known camera and the seed, and of the options only those that it has.
-    let calls = fs::read_to_string(folder.path().join("bin/calls")).expect("calls");
+    let calls = fs::read_to_string(folder.join("bin/calls")).expect("calls");
     let steps: Vec<_> = calls.lines().map(|call| call.split(' ').next().unwrap_or_default()).collect();
     assert_eq!(steps, ["feature_extractor", "exhaustive_matcher", "mapper"].repeat(2));
     let focal = calls.lines().next().and_then(|call| call.split("--ImageReader.camera_params ").nth(1));
@@ -124,8 +118,8 @@ fn as_a_second_opinion() {
     model(&folder, "dsp-sift", |photo| 20.0 * photo as f64);
     let said = posed(with(&folder, "pose bare -o posed --from openmvg,colmap", colmap(&folder)));
     assert!(said.starts_with("registered 5 of 5 photographs\n"), "{said}");
-    assert!(worst_rotation(&Scene::open(folder.path().join("posed")).expect("a scene")) < 1.5);
-    let record = read_json(folder.path().join("posed/pose.json"));
+    assert!(worst_rotation(&Scene::open(folder.join("posed")).expect("a scene")) < 1.5);
+    let record = read_json(folder.join("posed/pose.json"));
     let attempts = list_of(&record["attempts"]);
     let solver =
         |own: &serde_json::Value| own["solver"].as_str().unwrap_or_default().split(' ').next().map(str::to_owned);
@@ -140,15 +134,15 @@ fn as_a_second_opinion() {
 /// It looked for poses and wrote nothing.
 #[track_caller]
 fn assert_not_posed(folder: &Folder, parts: &[&str]) {
-    let before = files_below(&folder.path().join("bare"));
+    let before = files_below(&folder.join("bare"));
     let outcome = Outcome::of(with(folder, "pose bare -o posed --from colmap", colmap(folder)));
     assert_eq!((outcome.code, outcome.stdout.as_str()), (Some(1), ""), "{}", outcome.stderr);
     let last = outcome.stderr.lines().last().unwrap_or_default();
     for part in ["viewfuse: bare: no poses that can be trusted"].iter().chain(parts) {
         assert!(last.contains(part), "{part}: {}", outcome.stderr);
     }
-    assert!(!folder.path().join("posed").exists());
-    assert_eq!(files_below(&folder.path().join("bare")), before);
+    assert!(!folder.join("posed").exists());
+    assert_eq!(files_below(&folder.join("bare")), before);
 }
 
 fn what_it_cannot_do_is_said() {
@@ -159,23 +153,23 @@ fn what_it_cannot_do_is_said() {
     let damaged = Outcome::of(with(&folder, "pose bare -o posed --from colmap", colmap(&folder)));
     assert_eq!((damaged.code, damaged.stdout.as_str()), (Some(1), ""), "{}", damaged.stderr);
     assert!(damaged.stderr.contains("colmap: its model"), "{}", damaged.stderr);
-    assert!(!folder.path().join("posed").exists());
+    assert!(!folder.join("posed").exists());
     let echo = ("VIEWFUSE_COLMAP", PathBuf::from("/bin/echo"));
     if echo.1.exists() {
         let other = with(&folder, "pose bare -o posed --from colmap", echo);
-        assert_command_refused(other, folder.path(), &["/bin/echo: does not say that it is COLMAP"]);
+        assert_command_refused(other, &folder, &["/bin/echo: does not say that it is COLMAP"]);
     }
 }
 
 fn not_installed() {
     let folder = bare(0..3);
-    let nothing = ("VIEWFUSE_COLMAP", folder.path().join("nothing"));
+    let nothing = ("VIEWFUSE_COLMAP", folder.join("nothing"));
     let missing = with(&folder, "pose bare -o posed --from colmap", nothing);
-    assert_command_refused(missing, folder.path(), &["nothing: the program is not there", "`apt install colmap`"]);
-    let nothing = ("VIEWFUSE_PYTHON", folder.path().join("nothing"));
+    assert_command_refused(missing, &folder, &["nothing: the program is not there", "`apt install colmap`"]);
+    let nothing = ("VIEWFUSE_PYTHON", folder.join("nothing"));
     let missing = with(&folder, "pose bare -o posed --from pycolmap", nothing);
-    assert_command_refused(missing, folder.path(), &["nothing: the program is not there", "pip install pycolmap"]);
-    assert_wrong_arguments(BINARY, folder.path(), "pose bare -o posed --from bundler", &["--from"]);
+    assert_command_refused(missing, &folder, &["nothing: the program is not there", "pip install pycolmap"]);
+    assert_wrong_arguments(&folder, "pose bare -o posed --from bundler", &["--from"]);
 }
 
 fn python_without_pycolmap() {
@@ -186,8 +180,8 @@ fn python_without_pycolmap() {
     let folder = bare(0..3);
     // A module of this name that cannot be imported stands before one that is installed.
     folder.write("modules/pycolmap.py", "raise ImportError('none here')\n");
-    let mut refused = command(BINARY, folder.path(), "pose bare -o posed --from pycolmap");
-    refused.env("PYTHONPATH", folder.path().join("modules")).env_remove("VIEWFUSE_PYTHON");
+    let mut refused = command(&folder, "pose bare -o posed --from pycolmap");
+    refused.env("PYTHONPATH", folder.join("modules")).env_remove("VIEWFUSE_PYTHON");
     let before = folder.path();
     assert_command_refused(
         refused,

@@ -2,10 +2,10 @@
 //! which poses are doubtful whenever their scene is opened.
 
 use super::{bare, no_scripts};
-use crate::{BINARY, done};
+use crate::{command, done, done_with_warnings};
 use serde_json::json;
 use std::process::Command;
-use viewfuse_tests::command::{Outcome, assert_command_refused, command, names_in, run, toy};
+use viewfuse_tests::command::{Outcome, assert_command_refused, names_in, toy};
 use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![
@@ -28,8 +28,8 @@ fn matched() -> Folder {
 }
 
 fn pose(folder: &Folder, arguments: &str) -> Command {
-    let mut pose = command(BINARY, folder.path(), &format!("pose bare -o posed{arguments}"));
-    pose.env("VIEWFUSE_OPENMVG", folder.path().join("openmvg"));
+    let mut pose = command(folder, &format!("pose bare -o posed{arguments}"));
+    pose.env("VIEWFUSE_OPENMVG", folder.join("openmvg"));
     pose
 }
 
@@ -55,8 +55,8 @@ fn where_it_broke() {
         last.contains("fall apart into 2 groups (000, 001, 002; 003, 004): take some between 002 and 003 first"),
         "{last}"
     );
-    assert_eq!(names_in(folder.path()), ["answer.json", "bare", "graph.png", "openmvg"]);
-    let picture = image::open(folder.path().join("graph.png")).expect("a picture").to_rgb8();
+    assert_eq!(names_in(&folder), ["answer.json", "bare", "graph.png", "openmvg"]);
+    let picture = image::open(folder.join("graph.png")).expect("a picture").to_rgb8();
     let red = picture.pixels().filter(|pixel| pixel[0] > 180 && pixel[1] < 80).count();
     assert!(red > 200, "five photographs without a pose: {red}");
 }
@@ -64,15 +64,15 @@ fn where_it_broke() {
 fn the_picture_replaces_nothing_that_is_read() {
     let folder = matched();
     for (file, part) in [("bare/graph.png", "lies in bare"), ("posed/graph.png", "lies in posed")] {
-        let before = names_in(&folder.path().join("bare"));
+        let before = names_in(&folder.join("bare"));
         let outcome = Outcome::of(pose(&folder, &format!(" --matches {file}")));
         assert_eq!(outcome.code, Some(2), "{}", outcome.stderr);
         assert!(outcome.stderr.contains(part), "{}", outcome.stderr);
-        assert_eq!(names_in(&folder.path().join("bare")), before);
+        assert_eq!(names_in(&folder.join("bare")), before);
     }
     assert_command_refused(
         pose(&folder, " --matches answer.json/graph.png"),
-        folder.path(),
+        &folder,
         &["answer.json is not a folder"],
     );
 }
@@ -90,20 +90,20 @@ fn later_commands_say_it() {
         json!(names.map(|(photograph, verdict)| json!({ "photograph": photograph, "verdict": verdict })))
     };
     record(accepted([("000000", "sure"), ("000003", "sure")]), 2);
-    assert!(!done(toy.path(), "inspect toy").contains("pose.json"), "nothing to say");
+    assert!(!done(&toy, "inspect toy").contains("pose.json"), "nothing to say");
     record(accepted([("000000", "sure"), ("000003", "doubtful")]), 3);
     let told = [
         "toy/pose.json: 1 of 2 poses are doubtful (000003)",
         "toy/pose.json: poses were found for 2 of 3 photographs (without c.jpg)",
     ];
-    let inspected = done(toy.path(), "inspect toy");
-    let rendered = run(BINARY, toy.path(), "render toy --targets 3 -o out --size 16x16 --weights mean --device cpu");
-    assert_eq!(rendered.code, Some(0), "{}", rendered.stderr);
+    let inspected = done(&toy, "inspect toy");
+    let render = "render toy --targets 3 -o out --size 16x16 --weights mean --device cpu";
+    let rendered = done_with_warnings(&toy, render);
     for line in told {
         assert!(inspected.contains(&format!("warning    {line}")), "{inspected}");
         assert!(rendered.stderr.contains(&format!("warning: {line}")), "{}", rendered.stderr);
     }
     // Another file of this name is not ours.
     toy.write("toy/pose.json", "{}");
-    assert!(!done(toy.path(), "inspect toy").contains("pose.json"));
+    assert!(!done(&toy, "inspect toy").contains("pose.json"));
 }

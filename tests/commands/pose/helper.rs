@@ -2,11 +2,11 @@
 //! what it started.
 
 use super::{bare, no_scripts};
-use crate::BINARY;
+use crate::command;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
-use viewfuse_tests::command::{assert_command_refused, command, interrupt, names_in, spawn};
+use viewfuse_tests::command::{assert_command_refused, interrupt, names_in, spawn};
 use viewfuse_tests::patience::{end, send, wait_until, wait_while_running};
 use viewfuse_tests::scenes::Folder;
 
@@ -27,9 +27,9 @@ fn with_script(script: &str) -> Folder {
 }
 
 fn pose(folder: &Folder, solver: &str) -> Command {
-    let mut pose = command(BINARY, folder.path(), &format!("pose bare -o posed --from {solver}"));
-    pose.env("VIEWFUSE_OPENMVG", folder.path().join("openmvg")).env("VIEWFUSE_COLMAP", folder.path().join("openmvg"));
-    pose.env("TMPDIR", folder.path().join("scratch"));
+    let mut pose = command(folder, &format!("pose bare -o posed --from {solver}"));
+    pose.env("VIEWFUSE_OPENMVG", folder.join("openmvg")).env("VIEWFUSE_COLMAP", folder.join("openmvg"));
+    pose.env("TMPDIR", folder.join("scratch"));
     pose
 }
 

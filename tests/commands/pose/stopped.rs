@@ -1,11 +1,11 @@
 //! Runs that are killed or interrupted go on behind the attempts that they had finished.
 
 use super::{REQUIRE, bare, no_program, no_scripts, posed, program};
-use crate::{BINARY, read_json};
+use crate::{command, read_json};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use viewfuse_tests::command::{Outcome, command, files_below, interrupt, spawn};
+use viewfuse_tests::command::{Outcome, files_below, interrupt, spawn};
 use viewfuse_tests::patience::{end, wait_while_running};
 use viewfuse_tests::scenes::Folder;
 
@@ -24,20 +24,20 @@ fn counted() -> Folder {
 
 /// `run` names the run.
 fn pose(folder: &Folder, run: &str, output: &str) -> Command {
-    let mut command = command(BINARY, folder.path(), &format!("pose bare -o {output} --seed 2"));
-    command.env("ASKED", folder.path().join(format!("asked-{run}")));
-    command.env("VIEWFUSE_OPENMVG", folder.path().join("openmvg"));
+    let mut command = command(folder, &format!("pose bare -o {output} --seed 2"));
+    command.env("ASKED", folder.join(format!("asked-{run}")));
+    command.env("VIEWFUSE_OPENMVG", folder.join("openmvg"));
     command
 }
 
 /// How often a run asked the program.
 fn asked(folder: &Folder, run: &str) -> usize {
-    fs::read_to_string(folder.path().join(format!("asked-{run}"))).unwrap_or_default().lines().count()
+    fs::read_to_string(folder.join(format!("asked-{run}"))).unwrap_or_default().lines().count()
 }
 
 /// The answers that are kept for `posed`.
 fn kept(folder: &Folder) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder.path().join(".posed.attempts")).into_iter().flatten().flatten();
+    let entries = fs::read_dir(folder.join(".posed.attempts")).into_iter().flatten().flatten();
     entries.map(|entry| entry.path()).filter(|path| path.extension().is_some_and(|end| end == "json")).collect()
 }
 

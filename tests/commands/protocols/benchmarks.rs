@@ -1,9 +1,8 @@
 //! Protocols of few-shot papers: the views they take, what they refuse, what is printed beside them.
 
-use crate::{BINARY, list_of, number_of, read_json, text_of};
+use crate::{assert_refused, assert_wrong_arguments, done, list_of, number_of, read_json, text_of};
 use image::{GrayImage, Luma};
 use serde_json::{Value, json};
-use std::fs;
 use std::path::Path;
 use viewfuse::evaluate::protocol::{Draws, Job, Protocol};
 use viewfuse::scene::dataset::Split;
@@ -11,7 +10,7 @@ use viewfuse::scene::{Scene, View};
 use viewfuse_core::camera::Camera;
 use viewfuse_lab::scenes::cameras::{random_views, sphere, spiral_views};
 use viewfuse_lab::scenes::{render_with, toy::lorry};
-use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, done, toy, toy_twice};
+use viewfuse_tests::command::{toy, toy_twice};
 use viewfuse_tests::scenes::{self, Folder, npy};
 
 viewfuse_tests::trials![
@@ -173,13 +172,13 @@ fn blender_on_a_scene_in_its_layout() {
         let transforms = json!({ "camera_angle_x": angle, "frames": frames });
         folder.write(&format!("lorry/transforms_{split}.json"), transforms.to_string());
     }
-    let scene = Scene::open(folder.path().join("lorry")).expect("a scene");
+    let scene = Scene::open(folder.join("lorry")).expect("a scene");
     let count = |split| scene.views.iter().filter(|view| view.split == Some(split)).count();
     assert_eq!([Split::Train, Split::Validation, Split::Test].map(count), [8, 1, 4]);
     assert!(scene.photograph(0).is_ok_and(|photograph| photograph.has_alpha));
     let expected = sphere.pinhole;
     assert!(scene.views.iter().all(|view| (view.camera.pinhole.focal()[0] - expected.focal()[0]).abs() < 1e-4));
-    let whole = json(folder.path(), "lorry --protocol blender:8");
+    let whole = json(&folder, "lorry --protocol blender:8");
     assert_eq!(whole["jobs"][0]["targets"], json!(["test_r_0", "test_r_40", "test_r_104"]));
     assert_eq!(whole["settings"]["protocol"], "blender:8");
     let rows = list_of(&whole["tables"][0]["rows"]);
@@ -211,14 +210,14 @@ fn nearest_takes_the_nearest_cameras() {
 
 /// The command's JSON.
 fn json(folder: &Path, arguments: &str) -> Value {
-    let text = done(BINARY, folder, &format!("evaluate {arguments} --json --device cpu --weights mean --weights l1"));
+    let text = done(folder, &format!("evaluate {arguments} --json --device cpu --weights mean --weights l1"));
     serde_json::from_str(&text).unwrap_or_else(|error| panic!("{arguments}: {error}: {text}"))
 }
 
 fn tables_without_a_folder() {
     let scene = toy();
     let run = "evaluate toy --protocol llff:3 --size 32x32 --device cpu --weights mean --weights l1";
-    let text = done(BINARY, scene.path(), run);
+    let text = done(&scene, run);
     for part in [
         "toy, 32x32: targets 000000, 000008, 000016 from 000001, 000012, 000023\n",
         "metric: full: prediction and photograph over the run's background\n",
@@ -232,16 +231,16 @@ fn tables_without_a_folder() {
     ] {
         assert!(text.contains(part), "no {part:?} in\n{text}");
     }
-    assert_eq!(viewfuse_tests::command::names_in(scene.path()), ["toy"]);
+    assert_eq!(viewfuse_tests::command::names_in(&scene), ["toy"]);
     // The same numbers with a folder.
-    let kept = done(BINARY, scene.path(), &format!("{run} -o kept"));
+    let kept = done(&scene, &format!("{run} -o kept"));
     let rows = |text: &str| -> Vec<String> {
         let is_row = |line: &&str| line.starts_with(" nearest copy") || line.starts_with(" warped");
         text.lines().filter(is_row).map(str::to_owned).collect()
     };
     assert!(rows(&text).len() == 3 && rows(&text) == rows(&kept), "{text}\n{kept}");
     assert!(kept.contains("1 job done; 1 of 1 are in kept"), "{kept}");
-    let record = read_json(scene.path().join("kept/run.json"));
+    let record = read_json(scene.join("kept/run.json"));
     assert_eq!((&record["protocol"], &record["scenes"][0]["size"]), (&"llff:3".into(), &json!([32, 32])));
     assert!(record["metric"].as_str().is_some_and(|metric| metric.starts_with("full: ")), "{record}");
 }
@@ -275,14 +274,12 @@ fn nearest_with_targets() {
     assert_eq!(whole["jobs"].as_array().map(Vec::len), Some(2));
     assert!(whole["published"].is_null(), "{}", whole["published"]);
     assert_wrong_arguments(
-        BINARY,
         &folder,
         "evaluate toy --protocol llff:3 --targets 5",
         &["--targets cannot be used with --protocol llff:3", "nearest:K"],
     );
-    assert_refused(BINARY, &folder, "evaluate toy --protocol nearest:3 --targets 99", &["toy: has no view '99'"]);
+    assert_refused(&folder, "evaluate toy --protocol nearest:3 --targets 99", &["toy: has no view '99'"]);
     assert_refused(
-        BINARY,
         &folder,
         "evaluate toy --protocol blender:8",
         &["protocol 'blender:8' fits none of the scenes", "transforms_test.json"],
@@ -291,7 +288,7 @@ fn nearest_with_targets() {
 
 /// The sample scene with the names of DTU's views, its photographs laid over black, and its silhouettes as masks beside
 /// them if they are wanted.
-fn like_dtu(folder: &Path, with_masks: bool) {
+fn like_dtu(folder: &Folder, scene: &str, with_masks: bool) {
     let numbers = [1, 10, 14, 24, 27, 29, 22, 25, 28];
     let mut frames = Vec::new();
     let sample = sample();
@@ -302,8 +299,7 @@ fn like_dtu(folder: &Path, with_masks: bool) {
             let pixel = photograph.get_pixel(x, y);
             image::Rgb([0, 1, 2].map(|c| (u32::from(pixel[c]) * u32::from(pixel[3]) / 255) as u8))
         });
-        fs::create_dir_all(folder.join("images")).expect("a folder");
-        over_black.save(folder.join(&name)).expect("a picture");
+        over_black.save(folder.file(&format!("{scene}/{name}"))).expect("a picture");
         let [fx, fy] = view.camera.pinhole.focal();
         let [cx, cy] = view.camera.pinhole.principal();
         let mut frame = json!({
@@ -315,23 +311,19 @@ fn like_dtu(folder: &Path, with_masks: bool) {
                 Luma([photograph.get_pixel(x, y)[3]])
             });
             let name = format!("masks/{number:06}.png");
-            fs::create_dir_all(folder.join("masks")).expect("a folder");
-            mask.save(folder.join(&name)).expect("a picture");
+            mask.save(folder.file(&format!("{scene}/{name}"))).expect("a picture");
             frame["mask_path"] = name.into();
         }
         frames.push(frame);
     }
-    let transforms = json!({ "frames": frames }).to_string();
-    fs::write(folder.join("transforms.json"), transforms).expect("a file");
+    folder.write(&format!("{scene}/transforms.json"), json!({ "frames": frames }).to_string());
 }
 
 fn masks_serve_the_metric() {
-    let folder = tempfile::tempdir().expect("a folder");
-    for (name, with_masks) in [("masked", true), ("bare", false)] {
-        fs::create_dir(folder.path().join(name)).expect("a folder");
-        like_dtu(&folder.path().join(name), with_masks);
-    }
-    let run = |scene: &str, protocol: &str| json(folder.path(), &format!("{scene} --protocol {protocol} --size 32x32"));
+    let folder = Folder::new();
+    like_dtu(&folder, "masked", true);
+    like_dtu(&folder, "bare", false);
+    let run = |scene: &str, protocol: &str| json(&folder, &format!("{scene} --protocol {protocol} --size 32x32"));
     let names = |whole: &Value| -> Vec<String> {
         let metrics = list_of(&whole["tables"][0]["metrics"]).clone();
         metrics.iter().map(|metric| text_of(&metric["label"]).to_owned()).collect()
@@ -354,10 +346,9 @@ fn masks_serve_the_metric() {
 }
 
 fn published_figures_stand_beside_the_same_size() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = Folder::new();
     // Shaped as LLFF's photographs are, and large enough.
     let sample = sample();
-    fs::create_dir_all(folder.path().join("fern/images")).expect("a folder");
     let frames: Vec<Value> = (0..10)
         .map(|view| {
             let name = format!("images/{view:03}.png");
@@ -365,17 +356,15 @@ fn published_figures_stand_beside_the_same_size() {
                 if (160..340).contains(&x) && (90..290).contains(&y) { [200, 90, x as u8] } else { [0; 3] }
             };
             let picture = image::RgbImage::from_fn(504, 378, |x, y| image::Rgb(colour(x, y)));
-            picture.save(folder.path().join("fern").join(&name)).expect("a picture");
+            picture.save(folder.file(&format!("fern/{name}"))).expect("a picture");
             json!({
                 "file_path": name, "transform_matrix": sample.views[view].camera.pose.to_opengl(),
                 "fl_x": 400.0, "fl_y": 400.0, "cx": 252.0, "cy": 189.0, "w": 504, "h": 378,
             })
         })
         .collect();
-    let transforms = json!({ "frames": frames }).to_string();
-    fs::write(folder.path().join("fern/transforms.json"), transforms).expect("a file");
-    let run = "evaluate fern --protocol llff:3 --device cpu --weights mean";
-    let text = done(BINARY, folder.path(), run);
+    folder.write("fern/transforms.json", json!({ "frames": frames }).to_string());
+    let text = done(&folder, "evaluate fern --protocol llff:3 --device cpu --weights mean");
     for part in [
         "published for LLFF, 3 sources, 504x378, PSNR: means over the benchmark's 8 scenes (fern, flower, ",
         ", 1 of the 1 here among them",

@@ -85,10 +85,10 @@ fn protocols_as_text() {
 
 fn random_hangs_on_seed_name_and_trial_alone() {
     let (one, two) = (toy(), toy());
-    let elsewhere = scene(&two.path().join("toy"));
-    let here = scene(&one.path().join("toy"));
-    std::fs::rename(one.path().join("toy"), one.path().join("lorry")).expect("another name");
-    let renamed = scene(&one.path().join("lorry"));
+    let elsewhere = scene(&two.join("toy"));
+    let here = scene(&one.join("toy"));
+    std::fs::rename(one.join("toy"), one.join("lorry")).expect("another name");
+    let renamed = scene(&one.join("lorry"));
     let jobs = |scenes: &[Scene], draws| plan("random", scenes, draws).jobs;
 
     let alone = jobs(std::slice::from_ref(&elsewhere), DRAWS);
@@ -115,7 +115,7 @@ fn random_hangs_on_seed_name_and_trial_alone() {
 /// Over many trials every view is a source about as often as any other.
 fn random_prefers_no_view() {
     let folder = toy();
-    let scenes = [scene(&folder.path().join("toy"))];
+    let scenes = [scene(&folder.join("toy"))];
     let jobs = plan("random", &scenes, Draws { trial_count: 4000, ..DRAWS }).jobs;
     let mut counts = [0_u32; 24];
     jobs.iter().flat_map(|job| &job.sources).for_each(|&view| counts[view] += 1);
@@ -125,7 +125,7 @@ fn random_prefers_no_view() {
 
 fn more_sources_hold_the_fewer() {
     let folder = toy();
-    let scenes = [scene(&folder.path().join("toy"))];
+    let scenes = [scene(&folder.join("toy"))];
     let Plan { jobs, notes } = plan("count", &scenes, DRAWS);
     // 24 photographs: 32 sources there are none.
     assert_eq!(jobs.len(), 3 * 5);
@@ -145,7 +145,7 @@ fn more_sources_hold_the_fewer() {
 
 fn close_has_exactly_one_near_source() {
     let folder = toy();
-    let scenes = [scene(&folder.path().join("toy"))];
+    let scenes = [scene(&folder.join("toy"))];
     let cameras: Vec<_> = scenes[0].views.iter().map(|view| view.camera).collect();
     let focus = Rig::of(&cameras).focus.as_dvec3();
     let degrees = |a: usize, b: usize| {
@@ -186,7 +186,7 @@ fn close_has_exactly_one_near_source() {
 
 fn fixed_takes_the_views_of_its_lists() {
     let folder = toy();
-    let scenes = [scene(&folder.path().join("toy"))];
+    let scenes = [scene(&folder.join("toy"))];
     let jobs = plan("fixed:chairs", &scenes, DRAWS).jobs;
     assert_eq!(jobs, [Job { scene: 0, trial: 0, sources: vec![5, 8, 14], targets: vec![3, 10, 18] }]);
     // Sources are no targets.
@@ -203,7 +203,7 @@ fn fixed_takes_the_views_of_its_lists() {
 
 fn a_field_may_need_more_sources() {
     let folder = toy();
-    let scenes = [scene(&folder.path().join("toy"))];
+    let scenes = [scene(&folder.join("toy"))];
     let error = protocol("count:sources=2+8").plan(&scenes, DRAWS, 3).expect_err("2 are too few").to_string();
     assert!(error.contains("count:sources=2+8") && error.contains("at least 3"), "{error}");
 }

@@ -5,19 +5,18 @@
 //! fail.
 
 use super::folders::finished;
-use crate::{BINARY, lab};
+use crate::{BINARY, done};
 use serde_json::Value;
 use std::fs;
 use std::net::TcpListener;
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
-use tempfile::TempDir;
-use viewfuse_tests::command::done;
+use viewfuse_tests::command::unheard;
 use viewfuse_tests::patience::wait_until;
 use viewfuse_tests::places::repository;
+use viewfuse_tests::scenes::Folder;
 use viewfuse_tests::trials::lacking;
 
 const REQUIRED: &str = "VIEWFUSE_REQUIRE_CLUSTER";
@@ -51,27 +50,20 @@ fn recipe(start: &str) -> String {
 
 /// A folder with two scenes of cars, and the command under its name, whose first run in the folder is killed.
 struct Workspace {
-    folder: TempDir,
+    folder: Folder,
     /// Where programs are looked for.
     path: String,
 }
 
 impl Workspace {
     fn new() -> Workspace {
-        let folder = tempfile::tempdir().expect("a folder");
-        done(
-            lab(),
-            folder.path(),
-            "scenes make cars data --train 0 --val 0 --test 2 --views 4 --test-views 6 --size 64",
-        );
-        fs::create_dir(folder.path().join("bin")).expect("a folder");
+        let folder = Folder::new();
+        done(&folder, "scenes make cars data --train 0 --val 0 --test 2 --views 4 --test-views 6 --size 64");
         // The first worker is killed by its own name, so that none can end before the signal comes.
-        let first = "#!/bin/sh\nmkdir killed 2>/dev/null && kill -KILL $$\n";
-        let command = folder.path().join("bin/viewfuse");
-        fs::write(&command, format!("{first}exec '{BINARY}' \"$@\"\n")).expect("a script");
-        fs::set_permissions(&command, fs::Permissions::from_mode(0o755)).expect("permissions");
+        let first = "mkdir killed 2>/dev/null && kill -KILL $$\n";
+        folder.script("bin/viewfuse", &format!("{first}exec '{BINARY}' \"$@\"\n"));
         let path = std::env::var("PATH").unwrap_or_default();
-        Workspace { path: format!("{}:{path}", folder.path().join("bin").display()), folder }
+        Workspace { path: format!("{}:{path}", folder.join("bin").display()), folder }
     }
 
     /// A recipe as a script: the same with small pictures, into another folder.
@@ -79,26 +71,26 @@ impl Workspace {
         let code = recipe(start);
         assert!(code.contains("--protocol random -o runs/random"), "{code}");
         let code = code.replace("--protocol random -o runs/random", &format!("{SMALL} -o {out}"));
-        let path = self.folder.path().join(format!("{}.sh", out.replace('/', "-")));
+        let path = self.folder.join(format!("{}.sh", out.replace('/', "-")));
         fs::write(&path, code).expect("a script");
         path
     }
 
     fn command(&self, program: &str) -> Command {
         let mut command = Command::new(program);
-        command.current_dir(self.folder.path()).env("PATH", &self.path).stdin(Stdio::null());
+        command.current_dir(&self.folder).env("PATH", &self.path).stdin(Stdio::null());
         command
     }
 
     /// The jobs that are done in a folder.
     fn jobs(&self, out: &str) -> Vec<Value> {
-        let folder = self.folder.path().join(out);
+        let folder = self.folder.join(out);
         if folder.is_dir() { finished(&folder) } else { Vec::new() }
     }
 
     /// The numbers of one process.
     fn alone(&self) -> Vec<Value> {
-        done(BINARY, self.folder.path(), &format!("evaluate data/cars --split test {SMALL} -o alone"));
+        done(&self.folder, &format!("evaluate data/cars --split test {SMALL} -o alone"));
         let jobs = self.jobs("alone");
         assert_eq!(jobs.len(), 8);
         jobs
@@ -107,7 +99,7 @@ impl Workspace {
     /// The same command without shards computes what is missing, which is nothing.
     fn assert_whole(&self, out: &str, expected: &[Value]) {
         assert_eq!(self.jobs(out), expected);
-        let text = done(BINARY, self.folder.path(), &format!("evaluate data/cars --split test {SMALL} -o {out}"));
+        let text = done(&self.folder, &format!("evaluate data/cars --split test {SMALL} -o {out}"));
         assert!(text.contains("mean"), "{text}");
         assert_eq!(self.jobs(out), expected);
     }
@@ -119,7 +111,8 @@ fn gnu_parallel() {
     let script = workspace.script("# GNU parallel", "runs/parallel");
     let run = || {
         let mut command = workspace.command("sh");
-        command.arg(&script).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("a shell")
+        command.arg(&script);
+        unheard(command)
     };
     // GNU parallel's exit code is how many of its jobs failed.
     assert_eq!(run().wait().expect("an end").code(), Some(1));
@@ -136,7 +129,7 @@ struct Slurm {
 
 impl Slurm {
     fn start(workspace: &Workspace) -> Slurm {
-        let folder = workspace.folder.path().join("slurm");
+        let folder = workspace.folder.join("slurm");
         ["state", "spool"].iter().for_each(|name| fs::create_dir_all(folder.join(name)).expect("a folder"));
         let host = Command::new("hostname").arg("-s").output().expect("a name").stdout;
         let host = String::from_utf8(host).expect("a name").trim().to_owned();

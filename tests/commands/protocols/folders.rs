@@ -1,14 +1,11 @@
 //! The folder of an evaluation: killed, split, gone on with, refused.
 
-use crate::{BINARY, list_of, number_of, read_json, text_of};
+use crate::{assert_refused, assert_wrong_arguments, done, killed_when, list_of, number_of, read_json, run, text_of};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use viewfuse_core::attention::POSE_FEATURES;
-use viewfuse_tests::command::{
-    Outcome, assert_refused, assert_wrong_arguments, done, f32_bytes, killed_when, names_in, run, safetensors, toy,
-    toy_twice,
-};
+use viewfuse_tests::command::{Outcome, f32_bytes, names_in, safetensors, toy, toy_twice};
 
 viewfuse_tests::trials![
     shards_together_are_the_whole,
@@ -58,12 +55,12 @@ fn printed(text: &str) -> Vec<String> {
 
 fn shards_together_are_the_whole() {
     let folder = toy();
-    let whole = done(BINARY, &folder, &format!("{RUN} -o whole"));
+    let whole = done(&folder, &format!("{RUN} -o whole"));
     assert!(whole.contains("6 jobs done; 6 of 6 are in whole"), "{whole}");
     assert_eq!(printed(&whole).len(), 1 + 6, "{whole}");
     // Out of order, and the second of three last.
     for (shard, part) in [("2/3", "missing: 0, 1, 3, 4"), ("0/3", "missing: 1, 4;"), ("1/3", "6 of 6 are in parts")] {
-        let text = done(BINARY, &folder, &format!("{RUN} -o parts --shard {shard}"));
+        let text = done(&folder, &format!("{RUN} -o parts --shard {shard}"));
         assert!(text.contains(&format!("shard {shard}: 2 jobs done")) && text.contains(part), "{text}");
         if shard == "1/3" {
             assert_eq!(printed(&text), printed(&whole));
@@ -79,7 +76,7 @@ fn shards_together_are_the_whole() {
     let journals = names_in(&folder.join("parts"));
     assert_eq!(journals.iter().filter(|name| name.contains("-of-3.jsonl")).count(), 3, "{journals:?}");
     // Once more without shards: nothing is left to do, and the tables are printed.
-    let again = done(BINARY, &folder, &format!("{RUN} -o parts"));
+    let again = done(&folder, &format!("{RUN} -o parts"));
     assert!(again.contains("0 jobs done; 6 of 6"), "{again}");
     assert_eq!(printed(&again), printed(&whole));
     // Pictures are of the first jobs, whoever did them.
@@ -96,13 +93,13 @@ fn shards_together_are_the_whole() {
 fn a_killed_run_ends_in_the_same_numbers() {
     let folder = toy();
     let run = RUN.replace("--trials 6", "--trials 40").replace("24x24", "40x40");
-    done(BINARY, &folder, &format!("{run} -o undisturbed"));
+    done(&folder, &format!("{run} -o undisturbed"));
     let journal = folder.join("killed/scores-0-of-1.jsonl");
     let line_count = || fs::read(&journal).map_or(0, |text| text.iter().filter(|byte| **byte == b'\n').count());
     let mut kept = Vec::new();
     for kill in 1..=3 {
         let least = line_count() + 2;
-        killed_when(BINARY, &folder, &format!("{run} -o killed"), || line_count() >= least);
+        killed_when(&folder, &format!("{run} -o killed"), || line_count() >= least);
         let text = fs::read(&journal).expect("a journal");
         assert!(text.starts_with(&kept), "kill {kill} changed what was done");
         kept = text[..=text.iter().rposition(|byte| *byte == b'\n').expect("a line")].to_vec();
@@ -111,7 +108,7 @@ fn a_killed_run_ends_in_the_same_numbers() {
     assert!(before < 40, "all was done before the last kill");
     // A kill in the middle of a line.
     fs::write(&journal, [&kept[..], b"{\"job\":39,\"scene\":0,\"scene_na"].concat()).expect("half a line");
-    let text = done(BINARY, &folder, &format!("{run} -o killed"));
+    let text = done(&folder, &format!("{run} -o killed"));
     assert!(text.contains(&format!("{} jobs done; 40 of 40", 40 - before)), "{before} before: {text}");
     assert!(fs::read(&journal).expect("a journal").starts_with(&kept));
     assert_eq!(finished(&folder.join("killed")), finished(&folder.join("undisturbed")));
@@ -125,9 +122,8 @@ fn a_killed_run_ends_in_the_same_numbers() {
 fn other_settings_are_refused() {
     let folder = toy_twice();
     let first = RUN.replace("--trials 6", "--trials 1");
-    done(BINARY, &folder, &format!("{first} -o out"));
-    let refused =
-        |arguments: &str, parts: &[&str]| assert_refused(BINARY, &folder, &format!("{arguments} -o out"), parts);
+    done(&folder, &format!("{first} -o out"));
+    let refused = |arguments: &str, parts: &[&str]| assert_refused(&folder, &format!("{arguments} -o out"), parts);
     let beginning = "out/run.json: is of an evaluation with other settings (";
     refused(&first.replace("--trials 1", "--trials 2"), &[beginning, "trials: 2 here, 1 there)", "use another folder"]);
     refused(&first.replace("24x24", "16x16"), &["size: 16x16 here, 24x24 there"]);
@@ -137,7 +133,7 @@ fn other_settings_are_refused() {
     refused(&first.replace(" toy ", " toy again "), &["scenes: toy, again here, toy there"]);
     refused(&format!("{first} --exact"), &["exact: true here, false there"]);
     // Threads, pictures and shards change no number.
-    done(BINARY, &folder, &format!("{first} --threads 1 --pictures 0 --shard 0/2 -o out"));
+    done(&folder, &format!("{first} --threads 1 --pictures 0 --shard 0/2 -o out"));
     // Another camera: another scene of the same name.
     let pose = folder.join("toy/pose/000003.txt");
     let text = fs::read_to_string(&pose).expect("a pose");
@@ -169,10 +165,10 @@ fn parameters_of_the_same_name_are_told_apart() {
     };
     write(1.0);
     let run = format!("{} --weights attention:own.safetensors -o out", RUN.replace("--trials 6", "--trials 1"));
-    done(BINARY, &folder, &run);
-    done(BINARY, &folder, &run);
+    done(&folder, &run);
+    done(&folder, &run);
     write(1.5);
-    assert_refused(BINARY, &folder, &run, &["out/run.json", "other settings (own.safetensors: "]);
+    assert_refused(&folder, &run, &["out/run.json", "other settings (own.safetensors: "]);
 }
 
 fn data_sets_and_published_metrics() {
@@ -182,42 +178,41 @@ fn data_sets_and_published_metrics() {
     }
     fs::rename(folder.join("toy"), folder.join("cars_test/lorry")).expect("another place");
     let run = RUN.replace("--trials 6", "--trials 1").replace(" toy ", " cars --split test ");
-    done(BINARY, &folder, &format!("{run} -o plain"));
-    done(BINARY, &folder, &format!("{run} --metrics-as viewattention -o published"));
+    done(&folder, &format!("{run} -o plain"));
+    done(&folder, &format!("{run} --metrics-as viewattention -o published"));
     let [plain, published] = ["plain", "published"].map(|run| finished(&folder.join(run)).remove(0));
     assert_eq!((&plain["scene_name"], &published["sources"]), (&Value::from("lorry"), &plain["sources"]));
     // Pictures are stretched to their own range first: other numbers of the same pictures.
     assert_ne!(plain["scores"][0]["values"], published["scores"][0]["values"]);
     assert_refused(
-        BINARY,
         &folder,
         &format!("{run} --metrics-as viewattention -o plain"),
         &["metrics-as: viewattention here, plain there"],
     );
-    assert_refused(BINARY, &folder, &run.replace("--split test", "--split val -o x"), &["cars", "val"]);
-    assert_wrong_arguments(BINARY, &folder, &format!("{run} --fid net.pth -o fid"), &["--fid", "viewfuse compare"]);
+    assert_refused(&folder, &run.replace("--split test", "--split val -o x"), &["cars", "val"]);
+    assert_wrong_arguments(&folder, &format!("{run} --fid net.pth -o fid"), &["--fid", "viewfuse compare"]);
     // A file that is no network leaves no folder behind, whose settings would then be wrong.
     fs::write(folder.join("net.safetensors"), safetensors(&[("x", "F32", &[1], f32_bytes([1.0]))])).expect("a file");
-    assert_refused(BINARY, &folder, &format!("{run} --lpips alex=net.safetensors -o lpips"), &["net.safetensors"]);
+    assert_refused(&folder, &format!("{run} --lpips alex=net.safetensors -o lpips"), &["net.safetensors"]);
 }
 
 fn one_writer_a_shard() {
     let folder = toy();
     let first = RUN.replace("--trials 6", "--trials 1");
-    done(BINARY, &folder, &format!("{first} -o out"));
+    done(&folder, &format!("{first} -o out"));
     let journal = fs::File::options().append(true).open(folder.join("out/scores-0-of-1.jsonl")).expect("a journal");
     journal.lock().expect("a lock");
-    assert_refused(BINARY, &folder, &format!("{first} -o out"), &["scores-0-of-1.jsonl: another process", "--shard"]);
-    done(BINARY, &folder, &format!("{first} -o out --shard 1/2"));
+    assert_refused(&folder, &format!("{first} -o out"), &["scores-0-of-1.jsonl: another process", "--shard"]);
+    done(&folder, &format!("{first} -o out --shard 1/2"));
     // A process that another test starts at this moment has the file open too until it runs its program: closing is not
     // enough.
     journal.unlock().expect("unlocked");
-    done(BINARY, &folder, &format!("{first} -o out"));
+    done(&folder, &format!("{first} -o out"));
 }
 
 fn pictures_show_sources_predictions_and_truth() {
     let folder = toy();
-    done(BINARY, &folder, &format!("{RUN} --pictures 2 -o out"));
+    done(&folder, &format!("{RUN} --pictures 2 -o out"));
     let pictures = folder.join("out/pictures");
     let described: Vec<String> = names_in(&pictures).into_iter().filter(|name| name.ends_with(".json")).collect();
     assert_eq!(described, ["job-00000.json", "job-00001.json"]);
@@ -253,21 +248,18 @@ fn pictures_show_sources_predictions_and_truth() {
 
 fn arguments_that_do_not_fit() {
     let folder = toy();
-    let wrong = |arguments: &str, parts: &[&str]| assert_wrong_arguments(BINARY, &folder, arguments, parts);
+    let wrong = |arguments: &str, parts: &[&str]| assert_wrong_arguments(&folder, arguments, parts);
     wrong("evaluate toy --protocol random --shard 0/2", &["required"]);
     wrong("evaluate toy --protocol farthest -o out", &["farthest", "random[:sources=N]"]);
     wrong("evaluate toy --protocol random --targets 3 -o out", &["--protocol", "--targets"]);
     wrong("evaluate toy --shard 0/2 -o out", &["required"]);
     wrong("evaluate toy --protocol random --shard 2/2 -o out", &["2/2", "counted from 0"]);
-    let refused = |arguments: &str, parts: &[&str]| assert_refused(BINARY, &folder, arguments, parts);
+    let refused = |arguments: &str, parts: &[&str]| assert_refused(&folder, arguments, parts);
     refused("evaluate toy --protocol fixed -o out", &["toy: has no view '56'"]);
     refused("evaluate toy --protocol count:sources=30 -o out", &["fits none of the scenes", "34 are needed"]);
     refused("evaluate toy --protocol random -o toy/intrinsics.txt", &["intrinsics.txt"]);
     refused("evaluate toy nowhere --protocol random -o out", &["nowhere"]);
-    let Outcome { code, stdout, .. } = run(
-        BINARY,
-        &folder,
-        "evaluate toy --protocol close:degrees=25 --size 16x16 --device cpu --weights mean -o out",
-    );
+    let Outcome { code, stdout, .. } =
+        run(&folder, "evaluate toy --protocol close:degrees=25 --size 16x16 --device cpu --weights mean -o out");
     assert!(code == Some(0) && stdout.contains("close:sources=5,degrees=25, sources: 5; 1 scene"), "{stdout}");
 }

@@ -42,7 +42,7 @@ impl Attacked {
         let folder = toy();
         let mut limited = Command::new("sh");
         limited.args(["-c", "ulimit -n 1024; exec \"$@\"", "sh", BINARY, "view", "toy", "--no-browser"]);
-        limited.args("--device cpu --sources 0..3 --size 24x24".split(' ')).current_dir(folder.path());
+        limited.args("--device cpu --sources 0..3 --size 24x24".split(' ')).current_dir(&folder);
         Attacked { program: Program::of(limited), _folder: folder }
     }
 
@@ -236,7 +236,7 @@ fn resets_are_not_reported() {
 /// A browser leaves the scheme's own port out.
 fn port_80_needs_no_number() {
     let folder = toy();
-    let program = start(folder.path(), "toy --sources 0..3 --size 24x24 --port 80");
+    let program = start(&folder, "toy --sources 0..3 --size 24x24 --port 80");
     let path = format!("{}status", program.path);
     for host in ["127.0.0.1", "localhost", "127.0.0.1:80", "localhost:80"] {
         assert_eq!(program.connect().ask("GET", &path, &[("Host", host)], b"").status, 200, "{host}");

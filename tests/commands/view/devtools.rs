@@ -192,11 +192,21 @@ impl Tab<'_> {
         self.mouse("mouseReleased", to, json!({}));
     }
 
+    /// Fingers are put down at places, move to the next ones in turn, and are lifted.
     #[track_caller]
-    pub(super) fn touch(&self, kind: &str, points: &[[f64; 2]]) {
-        let points: Vec<Value> =
-            points.iter().enumerate().map(|(id, [x, y])| json!({"x": x, "y": y, "id": id})).collect();
-        self.call("Input.dispatchTouchEvent", json!({"type": kind, "touchPoints": points}));
+    pub(super) fn slide(&self, places: &[&[[f64; 2]]]) {
+        for (step, fingers) in places.iter().chain([&&[][..]]).enumerate() {
+            let kind = if step == 0 {
+                "touchStart"
+            } else if fingers.is_empty() {
+                "touchEnd"
+            } else {
+                "touchMove"
+            };
+            let point = |(id, [x, y]): (usize, &[f64; 2])| json!({"x": x, "y": y, "id": id});
+            let points: Vec<Value> = fingers.iter().enumerate().map(point).collect();
+            self.call("Input.dispatchTouchEvent", json!({"type": kind, "touchPoints": points}));
+        }
     }
 
     #[track_caller]

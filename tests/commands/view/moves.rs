@@ -40,8 +40,8 @@ fn pictures_of_the_room_follow_the_hand() {
 fn pictures_of_gaussians_follow_the_hand() {
     let browser = &Browser::needed();
     let folder = toy();
-    done(folder.path(), "optimise toy --size 96x96 --device cpu -o toy.ply");
-    let scene = format!("{0}/toy --gaussians {0}/toy.ply", folder.path().display());
+    done(&folder, "optimise toy --size 96x96 --device cpu -o toy.ply");
+    let scene = format!("{0}/toy --gaussians {0}/toy.ply", folder.display());
     pictures_follow_the_hand(browser, &scene, [128.0, 128.0], "gaussians.png");
 }
 

@@ -4,7 +4,7 @@
 use super::super::browser::{Browser, REQUIRE};
 use super::super::{done, numbers};
 use super::devtools::{Chromium, Tab};
-use super::keep;
+use super::{WEIGHTS, keep};
 use glam::{Quat, Vec3};
 use image::{Rgb, RgbImage};
 use serde_json::json;
@@ -141,9 +141,7 @@ fn complaints(tab: &Tab<'_>) -> Vec<String> {
 }
 
 fn weights(tab: &Tab<'_>) -> Vec<f64> {
-    let list =
-        tab.evaluate("[...document.querySelectorAll('#sources output')].map((own) => Number(own.dataset.weight))");
-    numbers(&list)
+    numbers(&tab.evaluate(WEIGHTS))
 }
 
 fn a_page_shows_the_gaussians_of_core() {
@@ -222,18 +220,14 @@ fn a_page_follows_a_hand_and_a_finger() {
     assert!(phone.number("document.documentElement.scrollWidth") <= 390.0, "it is wider than the screen");
     let [x, y] = phone.middle_of("#picture");
     let before = weights(&phone);
-    phone.touch("touchStart", &[[x, y]]);
-    phone.touch("touchMove", &[[x + 80.0, y]]);
-    phone.touch("touchEnd", &[]);
+    phone.slide(&[&[[x, y]], &[[x + 80.0, y]]]);
     phone.wait_for(STILL);
     let turned = weights(&phone);
     assert!(turned.iter().zip(&before).any(|(a, b)| (a - b).abs() > 0.05), "{turned:?}");
     // Two fingers that part bring it nearer: the camera, and with it the weight of the nearest source.
     let distance = "(() => { const list = [...document.querySelectorAll('#sources output')]; return Math.max(...list.map((own) => own.dataset.weight)); })()";
     let far = phone.number(distance);
-    phone.touch("touchStart", &[[x - 20.0, y], [x + 20.0, y]]);
-    phone.touch("touchMove", &[[x - 60.0, y], [x + 60.0, y]]);
-    phone.touch("touchEnd", &[]);
+    phone.slide(&[&[[x - 20.0, y], [x + 20.0, y]], &[[x - 60.0, y], [x + 60.0, y]]]);
     phone.wait_for(STILL);
     assert!((phone.number(distance) - far).abs() > 0.01);
     assert_eq!(phone.evaluate("document.querySelector('.mouse').checkVisibility()"), json!(false));
@@ -246,15 +240,12 @@ fn the_page_of_a_command_opens() {
     let browser = &Browser::needed();
     let folder = toy();
     for output in ["toy.ply", "toy.html"] {
-        done(
-            folder.path(),
-            &format!("optimise toy --size 96x96 --sources 0..19 --device cpu --quality fast -o {output}"),
-        );
+        done(&folder, &format!("optimise toy --size 96x96 --sources 0..19 --device cpu --quality fast -o {output}"));
     }
     let chromium = Chromium::start(browser);
-    let tab = chromium.open(&address(&folder.path().join("toy.html")), WINDOW, false);
+    let tab = chromium.open(&address(&folder.join("toy.html")), WINDOW, false);
     tab.wait_for(STILL);
-    let count = GaussianScene::read(&folder.path().join("toy.ply"), &SceneFrame::FILE).expect("a file").gaussians.len();
+    let count = GaussianScene::read(&folder.join("toy.ply"), &SceneFrame::FILE).expect("a file").gaussians.len();
     let first = tab.text("document.querySelector('header p').textContent");
     assert!(first.contains(&format!(" MB, {count} Gaussians fitted to 20 photographs: ")), "{first}");
     let before = tab.picture();
@@ -266,8 +257,8 @@ fn the_page_of_a_command_opens() {
     let picture = shown(&tab, [WIDTH, WIDTH]);
     let rendered = |view: &str| {
         let options = format!("--targets {view} --sources 8..19 --size {WIDTH}x{WIDTH} --no-sheets --device cpu");
-        done(folder.path(), &format!("render toy --gaussians toy.ply {options} -o {view}"));
-        image::open(folder.path().join(format!("{view}/00000{view}.png"))).expect("a picture").to_rgb8()
+        done(&folder, &format!("render toy --gaussians toy.ply {options} -o {view}"));
+        image::open(folder.join(format!("{view}/00000{view}.png"))).expect("a picture").to_rgb8()
     };
     let (right, other) = (psnr(&picture, &rendered("3")), psnr(&picture, &rendered("5")));
     println!("the command's page: {right:.2} dB, another view {other:.2} dB");

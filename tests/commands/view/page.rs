@@ -1,15 +1,16 @@
 //! The page in a browser: a hand, two hands on a phone, keys, menus, tabs, and what is taken elsewhere.
 
 use super::super::browser::{Browser, REQUIRE};
-use super::super::{BINARY, assert_near, number_of, numbers, read_json};
+use super::super::{assert_near, command, done_with_warnings, number_of, numbers, read_json};
 use super::devtools::{Chromium, Tab};
-use super::{FOLLOWED, NOTE_PICTURES, WEIGHTS, done_with_warnings, keep, room, weights};
+use super::{FOLLOWED, NOTE_PICTURES, WEIGHTS, keep, room, weights};
 use image::{RgbImage, RgbaImage};
 use serde_json::{Value, json};
 use std::fs;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
-use viewfuse_tests::command::{command, names_in, toy};
+use viewfuse_tests::command::{names_in, toy};
 use viewfuse_tests::patience::wait_until;
 use viewfuse_tests::places::data;
 use viewfuse_tests::scenes::Folder;
@@ -33,6 +34,57 @@ const FULL: &str = "window.shows && shows.shown && shows.shown.full && shows.sho
 /// Small enough that a full picture comes soon.
 const SMALL: &str = "--sources 003..007 --size 96x72 --weights error:alpha=1";
 
+/// A page in a window of a desk, which shows its first full picture.
+#[track_caller]
+fn opened<'a>(chromium: &'a Chromium, program: &Program) -> Tab<'a> {
+    let tab = chromium.open(&program.address(), [1280, 860], false);
+    tab.wait_for(FULL);
+    tab
+}
+
+/// Acts, and waits for a picture that follows and for the full one at its end.
+#[track_caller]
+fn followed(tab: &Tab<'_>, act: impl FnOnce()) {
+    tab.evaluate(NOTE_PICTURES);
+    act();
+    tab.wait_for(FOLLOWED);
+    tab.wait_for(FULL);
+}
+
+/// Gives an element of the page a value, as a hand does.
+#[track_caller]
+fn choose(tab: &Tab<'_>, id: &str, value: &str, event: &str) {
+    tab.evaluate(&format!(
+        "(() => {{ const own = document.getElementById('{id}'); own.value = '{value}'; own.dispatchEvent(new Event('{event}', {{bubbles: true}})); }})()"
+    ));
+}
+
+#[track_caller]
+fn click(tab: &Tab<'_>, id: &str) {
+    tab.evaluate(&format!("document.getElementById('{id}').click()"));
+}
+
+/// The text of an element.
+#[track_caller]
+fn text_in(tab: &Tab<'_>, id: &str) -> String {
+    tab.text(&format!("document.getElementById('{id}').textContent"))
+}
+
+/// Runs the command line that the page shows, on the room, in a folder.
+#[track_caller]
+fn done_by_line(folder: &Path, line: &str) {
+    let line = line.replacen("tests/data/room", &data("room").display().to_string(), 1);
+    done_with_warnings(folder, line.strip_prefix("viewfuse ").expect("the command"));
+}
+
+/// Downloads go to the folder `saved` of the browser's own.
+fn keep_downloads(chromium: &Chromium) -> PathBuf {
+    let saved = chromium.folder().join("saved");
+    let downloads = json!({"behavior": "allow", "downloadPath": saved.display().to_string()});
+    chromium.call(None, "Browser.setDownloadBehavior", downloads);
+    saved
+}
+
 /// The pixels of the picture on the page.
 fn canvas(tab: &Tab<'_>) -> RgbaImage {
     use base64::Engine;
@@ -53,8 +105,7 @@ fn a_hand_turns_the_view() {
     let browser = &Browser::needed();
     let program = room(SMALL);
     let chromium = Chromium::start(browser);
-    let tab = chromium.open(&program.address(), [1280, 860], false);
-    tab.wait_for(FULL);
+    let tab = opened(&chromium, &program);
     tab.wait_for(
         "[...document.images].every((own) => own.complete && own.naturalWidth > 0) && document.images.length === 5",
     );
@@ -62,7 +113,7 @@ fn a_hand_turns_the_view() {
         (canvas(&tab), weights(&tab), tab.text("document.getElementById('map').toDataURL()"));
     let distinct: std::collections::HashSet<[u8; 4]> = first.pixels().map(|pixel| pixel.0).collect();
     assert!(distinct.len() > 1000, "{} colours", distinct.len());
-    assert!(tab.text("document.getElementById('status').textContent").starts_with("full, 96 × 72"));
+    assert!(text_in(&tab, "status").starts_with("full, 96 × 72"));
 
     // A drag turns the view: pictures on the way, a full one at its end.
     let [x, y] = tab.middle_of("#picture");
@@ -93,10 +144,7 @@ fn a_hand_turns_the_view() {
         ));
         assert!(gap < 1.0e-9, "{there} and {back}: {gap}");
     }
-    tab.evaluate(NOTE_PICTURES);
-    tab.key("0");
-    tab.wait_for(FOLLOWED);
-    tab.wait_for(FULL);
+    followed(&tab, || tab.key("0"));
     assert!(canvas(&tab) == first, "the start is what it was");
     tab.evaluate(NOTE_PICTURES);
     tab.mouse("mouseWheel", [x, y], json!({"deltaX": 0, "deltaY": -300}));
@@ -108,16 +156,11 @@ fn a_hand_turns_the_view() {
 
 /// Schemes by the menu, their parameter by the slider, layers over the picture, and a view from a source.
 fn schemes_and_layers(tab: &Tab<'_>) {
-    let choose = |id: &str, value: &str, event: &str| {
-        tab.evaluate(&format!(
-            "(() => {{ const own = document.getElementById('{id}'); own.value = '{value}'; own.dispatchEvent(new Event('{event}', {{bubbles: true}})); }})()"
-        ));
-    };
-    choose("scheme", "mean", "change");
+    choose(tab, "scheme", "mean", "change");
     tab.wait_for(&format!("{WEIGHTS}.every((own) => Math.abs(own - 0.2) < 1e-6)"));
     weights(tab);
-    choose("scheme", "gaussian", "change");
-    choose("parameter", "700", "input");
+    choose(tab, "scheme", "gaussian", "change");
+    choose(tab, "parameter", "700", "input");
     tab.wait_for("document.getElementById('parameter-value').textContent === '6.31'");
     assert_eq!(tab.text("document.getElementById('parameter').getAttribute('aria-valuetext')"), "beta 6.31");
     tab.wait_for(&format!("Math.max(...{WEIGHTS}) > 0.25"));
@@ -144,10 +187,7 @@ fn tabs_come_and_go() {
     first.wait_for(FULL);
     second.wait_for(FULL);
     let [x, y] = second.middle_of("#picture");
-    second.evaluate(NOTE_PICTURES);
-    second.drag([x, y], [x + 150.0, y], 5);
-    second.wait_for(FOLLOWED);
-    second.wait_for(FULL);
+    followed(&second, || second.drag([x, y], [x + 150.0, y], 5));
     // Each has a view of its own.
     assert_eq!(first.evaluate("shows.pose.centre.every((own, i) => own === shows.scene.start.centre[i])"), true);
     assert_eq!(second.evaluate("shows.pose.centre.every((own, i) => own === shows.scene.start.centre[i])"), false);
@@ -156,10 +196,7 @@ fn tabs_come_and_go() {
     second.mouse("mousePressed", [x, y], json!({}));
     second.mouse("mouseMoved", [x + 50.0, y], json!({}));
     second.close();
-    first.evaluate(NOTE_PICTURES);
-    first.key("ArrowLeft");
-    first.wait_for(FOLLOWED);
-    first.wait_for(FULL);
+    followed(&first, || first.key("ArrowLeft"));
     assert_eq!(first.console(), [""; 0]);
     first.close();
     std::thread::sleep(Duration::from_millis(300));
@@ -169,7 +206,7 @@ fn tabs_come_and_go() {
     assert_eq!(program.interrupt().0, Some(0));
     third.key("ArrowLeft");
     third.wait_for("!document.getElementById('problem').hidden");
-    assert!(third.text("document.getElementById('problem').textContent").contains("does not answer"));
+    assert!(text_in(&third, "problem").contains("does not answer"));
 }
 
 fn a_phone_shows_all_of_it() {
@@ -186,20 +223,12 @@ fn a_phone_shows_all_of_it() {
     assert!(!tab.text("document.getElementById('picture').getAttribute('aria-label')").contains("keys"));
     // One finger turns, two move.
     let [x, y] = tab.middle_of("#picture");
-    tab.evaluate(NOTE_PICTURES);
-    tab.touch("touchStart", &[[x, y]]);
-    tab.touch("touchMove", &[[x + 40.0, y]]);
-    tab.touch("touchMove", &[[x + 80.0, y]]);
-    tab.touch("touchEnd", &[]);
-    tab.wait_for(FOLLOWED);
-    tab.wait_for(FULL);
+    followed(&tab, || tab.slide(&[&[[x, y]], &[[x + 40.0, y]], &[[x + 80.0, y]]]));
     assert!(difference(&canvas(&tab), &first) > 2.0, "the picture does not follow the finger");
     let distance = "Math.hypot(...shows.pose.centre.map((own, i) => own - shows.focus[i]))";
     let before = tab.number(distance);
-    tab.touch("touchStart", &[[x - 30.0, y], [x + 30.0, y]]);
-    tab.touch("touchMove", &[[x - 45.0, y], [x + 45.0, y]]);
-    tab.touch("touchMove", &[[x - 60.0, y], [x + 60.0, y]]);
-    tab.touch("touchEnd", &[]);
+    let fingers = |apart: f64| [[x - apart, y], [x + apart, y]];
+    tab.slide(&[&fingers(30.0), &fingers(45.0), &fingers(60.0)]);
     assert!(tab.number(distance) < 0.7 * before, "a pinch does not move");
     assert_eq!(tab.number("window.visualViewport.scale"), 1.0, "the page is not enlarged instead");
     weights(&tab);
@@ -248,50 +277,46 @@ fn a_view_is_taken_elsewhere() {
     let browser = &Browser::needed();
     let program = room(SMALL);
     let chromium = Chromium::start(browser);
-    let tab = chromium.open(&program.address(), [1280, 860], false);
-    tab.wait_for(FULL);
-    let downloads = json!({"behavior": "allow", "downloadPath": chromium.folder().join("saved").display().to_string()});
-    chromium.call(None, "Browser.setDownloadBehavior", downloads);
+    let tab = opened(&chromium, &program);
+    let files = keep_downloads(&chromium);
     let permissions = json!({"permissions": ["clipboardReadWrite", "clipboardSanitizedWrite"]});
     chromium.call(None, "Browser.grantPermissions", permissions);
     for _ in 0..4 {
         tab.key("ArrowLeft");
     }
     let folder = Folder::new();
-    tab.evaluate("document.getElementById('save').click()");
-    let saved = chromium.folder().join("saved/view.json");
-    wait_until("nothing is saved", || saved.exists() && names_in(saved.parent().expect("a folder")).len() == 1);
+    click(&tab, "save");
+    let saved = files.join("view.json");
+    wait_until("nothing is saved", || saved.exists() && names_in(&files).len() == 1);
     // With a photograph beside it, it is a scene of one view.
     fs::copy(&saved, folder.file("transforms.json")).expect("a copy");
     RgbImage::new(96, 72).save(folder.file("view.png")).expect("a picture");
-    let scene = viewfuse::scene::Scene::open(folder.path()).expect("a scene");
+    let scene = viewfuse::scene::Scene::open(&folder).expect("a scene");
     let pose = scene.views[0].camera.pose.to_opencv();
     let shown: Vec<f64> = numbers(&tab.evaluate("matrixOf(shows.pose).flat()"));
     for (number, shown) in pose.iter().flatten().zip(shown) {
         assert_near(f64::from(*number), shown, 1.0e-6);
     }
     tab.call("Page.bringToFront", json!({}));
-    tab.evaluate("document.getElementById('copy').click()");
+    click(&tab, "copy");
     tab.wait_for("document.getElementById('said').textContent.startsWith('Copied')");
     let line = tab.text("navigator.clipboard.readText()");
-    assert_eq!(line, tab.text("document.getElementById('command').textContent"));
+    assert_eq!(line, text_in(&tab, "command"));
     let start = "viewfuse render tests/data/room --camera-path view.json --sources 003,004,005,006,007 --size 96x72";
     assert!(line.starts_with(start) && line.ends_with(" --weights error:alpha=1 -o out"), "{line}");
     // The line renders what is shown.
     fs::copy(&saved, folder.file("view.json")).expect("a copy");
-    let line = line.replacen("tests/data/room", &data("room").display().to_string(), 1);
-    done_with_warnings(folder.path(), line.strip_prefix("viewfuse ").expect("the command"));
-    let rendered = image::open(folder.path().join("out/view.png")).expect("a picture").to_rgb8();
+    done_by_line(&folder, &line);
+    let rendered = image::open(folder.join("out/view.png")).expect("a picture").to_rgb8();
     let (_, picture) =
         program.connect().picture(&request("x", &tab.evaluate("matrixOf(shows.pose)"), false)).unpacked();
     assert!(rendered == picture, "the command line renders another picture");
     // The picture is saved with the values that the run recorded.
-    tab.evaluate("document.getElementById('save-picture').click()");
-    let files = chromium.folder().join("saved");
+    click(&tab, "save-picture");
     wait_until("no picture is saved", || names_in(&files).len() == 3 && files.join("run.json").exists());
     let of_page = image::open(files.join("view.png")).expect("a picture").to_rgb8();
     assert!(of_page == rendered, "another picture is saved");
-    let (saved, run) = (read_json(files.join("run.json")), read_json(folder.path().join("out/run.json")));
+    let (saved, run) = (read_json(files.join("run.json")), read_json(folder.join("out/run.json")));
     for key in ["viewfuse", "device", "field", "weighting", "chosen", "size", "background", "sources", "depth_units"] {
         assert_eq!(saved[key], run[key], "{key}");
     }
@@ -300,7 +325,7 @@ fn a_view_is_taken_elsewhere() {
     }
     // A view of the scene that is no source has a name.
     tab.evaluate("goTo(shows.scene.others[0].pose)");
-    let line = tab.text("document.getElementById('command').textContent");
+    let line = text_in(&tab, "command");
     assert!(line.contains("render tests/data/room --targets 000 --sources"), "{line}");
     assert_eq!(tab.console(), [""; 0]);
 }
@@ -325,64 +350,51 @@ fn a_path_goes_through_keyframes() {
     let browser = &Browser::needed();
     let program = room(SMALL);
     let chromium = Chromium::start(browser);
-    let tab = chromium.open(&program.address(), [1280, 860], false);
-    tab.wait_for(FULL);
-    let downloads = json!({"behavior": "allow", "downloadPath": chromium.folder().join("saved").display().to_string()});
-    chromium.call(None, "Browser.setDownloadBehavior", downloads);
-    let click = |id: &str| tab.evaluate(&format!("document.getElementById('{id}').click()"));
+    let tab = opened(&chromium, &program);
+    let files = keep_downloads(&chromium);
     assert_eq!(tab.evaluate("document.getElementById('play').disabled"), true);
     let centre = "shows.pose.centre";
     let first = numbers(&tab.evaluate(centre));
     for _ in 0..3 {
-        click("add-keyframe");
+        click(&tab, "add-keyframe");
         (0..4).for_each(|_| tab.key("ArrowLeft"));
     }
     let last = numbers(&tab.evaluate("shows.keyframes[2].pose.centre"));
     tab.evaluate("document.querySelector('#keyframes li:nth-child(2) button:last-child').click()");
     assert_eq!(tab.number("shows.keyframes.length"), 2.0);
-    tab.evaluate(
-        "(() => { const own = document.getElementById('frames'); own.value = 3; \
-         own.dispatchEvent(new Event('input', {bubbles: true})); })()",
-    );
+    choose(&tab, "frames", "3", "input");
     keep(&tab, "keyframes.png");
     // Played to its end, it is at the last keyframe.
-    click("play");
+    click(&tab, "play");
     tab.wait_for("document.getElementById('play').textContent === 'Play'");
     let played = numbers(&tab.evaluate(centre));
     (0..3).for_each(|i| assert_near(played[i], last[i], 1.0e-6));
     // A key stops it.
-    tab.evaluate(
-        "(() => { const own = document.getElementById('frames'); own.value = 2000; \
-         own.dispatchEvent(new Event('input', {bubbles: true})); })()",
-    );
-    click("play");
+    choose(&tab, "frames", "2000", "input");
+    click(&tab, "play");
     tab.wait_for("document.getElementById('play').textContent === 'Stop'");
     tab.key("ArrowLeft");
-    assert_eq!(tab.text("document.getElementById('play').textContent"), "Play");
-    tab.evaluate(
-        "(() => { const own = document.getElementById('frames'); own.value = 3; \
-         own.dispatchEvent(new Event('input', {bubbles: true})); })()",
-    );
-    click("save-video");
+    assert_eq!(text_in(&tab, "play"), "Play");
+    choose(&tab, "frames", "3", "input");
+    click(&tab, "save-video");
     let format = tab.text("shows.scene.video.format");
-    let film = chromium.folder().join(format!("saved/video.{format}"));
+    let film = files.join(format!("video.{format}"));
     wait_until("no video is saved", || film.exists());
-    assert!(tab.text("document.getElementById('said').textContent").ends_with(": 3 frames."));
+    assert!(text_in(&tab, "said").ends_with(": 3 frames."));
     tab.wait_for("document.getElementById('save-video').textContent === 'Save video'");
     if format == "webp" {
         let bytes = fs::read(&film).expect("a video");
         assert!(bytes.starts_with(b"RIFF") && bytes.windows(4).filter(|word| word == b"ANMF").count() == 3);
     }
     fs::remove_file(film).expect("a file");
-    click("save-path");
-    let saved = chromium.folder().join("saved/path.json");
-    wait_until("no path is saved", || saved.exists() && names_in(saved.parent().expect("a folder")).len() == 1);
+    click(&tab, "save-path");
+    let saved = files.join("path.json");
+    wait_until("no path is saved", || saved.exists() && names_in(&files).len() == 1);
     let folder = Folder::new();
     fs::copy(&saved, folder.file("path.json")).expect("a copy");
-    let line = tab.text("document.getElementById('path-command').textContent");
-    let line = line.replacen("tests/data/room", &data("room").display().to_string(), 1);
-    done_with_warnings(folder.path(), line.strip_prefix("viewfuse ").expect("the command"));
-    let written = names_in(&folder.path().join("out"));
+    let line = text_in(&tab, "path-command");
+    done_by_line(&folder, &line);
+    let written = names_in(&folder.join("out"));
     for name in ["view_0.png", "view_1.png", "view_2.png", "video.webp"] {
         assert!(written.iter().any(|file| file == name), "{name} is not in {written:?}");
     }
@@ -406,28 +418,24 @@ fn the_scheme_becomes_that_of_render() {
     let browser = &Browser::needed();
     let folder = toy();
     let options = "--sources 000000..000011 --size 48x48";
-    let program = super::start(folder.path(), &format!("toy {options}"));
+    let program = super::start(&folder, &format!("toy {options}"));
     let chromium = Chromium::start(browser);
-    let tab = chromium.open(&program.address(), [1280, 860], false);
-    tab.wait_for(FULL);
+    let tab = opened(&chromium, &program);
     tab.wait_for("shows.first !== null");
     tab.wait_for(&format!("{FULL} && shows.shown.scheme === shows.first"));
     let chosen = tab.text("shows.first");
-    let told = tab.text("document.getElementById('choosing').textContent");
+    let told = text_in(&tab, "choosing");
     assert!(told.starts_with(&chosen), "{told}");
     assert!(chosen.starts_with(&tab.text("document.getElementById('scheme').value")));
-    let line = tab.text("document.getElementById('command').textContent");
+    let line = text_in(&tab, "command");
     assert!(line.ends_with(" --weights auto -o out"), "{line}");
-    done_with_warnings(folder.path(), &format!("render toy --targets 000020 {options} --device cpu -o out"));
-    let record = read_json(folder.path().join("out/run.json"));
+    done_with_warnings(&folder, &format!("render toy --targets 000020 {options} --device cpu -o out"));
+    let record = read_json(folder.join("out/run.json"));
     assert_eq!(record["weighting"], chosen.as_str());
     // What the person chooses is kept, and its command line names it.
-    tab.evaluate(
-        "(() => { const own = document.getElementById('scheme'); own.value = 'mean'; \
-         own.dispatchEvent(new Event('change', {bubbles: true})); })()",
-    );
+    choose(&tab, "scheme", "mean", "change");
     tab.wait_for("shows.shown.scheme === 'mean'");
-    let line = tab.text("document.getElementById('command').textContent");
+    let line = text_in(&tab, "command");
     assert!(line.ends_with(" --weights mean -o out"), "{line}");
     assert_eq!(tab.console(), [""; 0]);
 }
@@ -437,8 +445,8 @@ fn names_from_files_are_no_commands() {
     let browser = &Browser::needed();
     const NAME: &str = "$(touch pwned)';touch pwned;#{weights} $& \u{1b}[201~";
     let folder = toy();
-    let scene = folder.path().join("{view}$'{weights}");
-    fs::rename(folder.path().join("toy"), &scene).expect("renamed");
+    let scene = folder.join("{view}$'{weights}");
+    fs::rename(folder.join("toy"), &scene).expect("renamed");
     const LONG: &str = "DSC_2024_a_long_name_of_a_photograph_000001";
     for (part, ending) in [("rgb", "png"), ("pose", "txt")] {
         let path = |name: &str| scene.join(part).join(format!("{name}.{ending}"));
@@ -446,28 +454,24 @@ fn names_from_files_are_no_commands() {
             fs::rename(path(before), path(name)).expect("renamed");
         }
     }
-    let mut arguments = command(
-        BINARY,
-        folder.path(),
-        &format!("view --sources 000000,000002,{LONG} --size 24x24 --no-browser --device cpu"),
-    );
+    let mut arguments =
+        command(&folder, &format!("view --sources 000000,000002,{LONG} --size 24x24 --no-browser --device cpu"));
     arguments.arg("{view}$'{weights}");
     let program = Program::of(arguments);
     let chromium = Chromium::start(browser);
-    let tab = chromium.open(&program.address(), [1280, 860], false);
-    tab.wait_for(FULL);
+    let tab = opened(&chromium, &program);
     // A long name takes no room of another one, and its end can be read.
     let names = "[...document.querySelectorAll('#sources .name')]";
     assert_eq!(tab.evaluate(&format!("{names}.every((own) => own.scrollWidth <= own.clientWidth)")), true);
     assert!(tab.text(&format!("{names}.map((own) => own.textContent).join(' ')")).contains("_000001"));
     let name = serde_json::to_string(NAME).expect("JSON");
     tab.evaluate(&format!("goTo(shows.scene.others.find((own) => own.name === {name}).pose)"));
-    let line = tab.text("document.getElementById('command').textContent");
+    let line = text_in(&tab, "command");
     assert!(!line.chars().any(char::is_control), "{line:?}");
     let script = format!("viewfuse() {{ printf '%s\\n' \"$@\"; }}\n{line}\n");
-    let words = Command::new("bash").args(["-c", &script]).current_dir(folder.path()).output().expect("bash");
+    let words = Command::new("bash").args(["-c", &script]).current_dir(&folder).output().expect("bash");
     let words = String::from_utf8(words.stdout).expect("text");
     let expected = format!("render\n{{view}}$'{{weights}}\n--targets\n{NAME}\n--sources\n");
     assert!(words.starts_with(&expected), "{line}\n{words}");
-    assert!(!folder.path().join("pwned").exists());
+    assert!(!folder.join("pwned").exists());
 }

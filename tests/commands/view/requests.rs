@@ -1,14 +1,14 @@
 //! The server by requests alone: who may ask, what is answered, and that it ends.
 
-use super::super::{BINARY, assert_near, list_of, number_of, numbers};
-use super::{done_with_warnings, room, start};
+use super::super::{BINARY, assert_near, assert_refused, command, done_with_warnings, list_of, number_of, numbers};
+use super::{room, start};
 use image::codecs::webp::WebPDecoder;
 use image::{AnimationDecoder, DynamicImage};
 use serde_json::{Value, json};
 use std::io::Cursor;
 use std::path::Path;
 use std::time::Duration;
-use viewfuse_tests::command::{assert_refused, command, files_below, names_in, toy};
+use viewfuse_tests::command::{files_below, names_in, toy};
 use viewfuse_tests::devices::vulkan_devices;
 use viewfuse_tests::patience::wait_until;
 use viewfuse_tests::places::{data, repository};
@@ -83,7 +83,7 @@ fn filming(programs: &Path) -> Program {
         "view {} --sources 003..007 --size 64x48 --weights mean --no-browser --device cpu",
         data("room").display()
     );
-    let mut viewer = command(BINARY, &repository(), &arguments);
+    let mut viewer = command(&repository(), &arguments);
     viewer.env("PATH", programs).env("TMPDIR", programs);
     Program::of(viewer)
 }
@@ -111,7 +111,7 @@ fn video(program: &Program, path: &Value) -> Answer {
 
 fn a_video_has_the_pictures_of_its_path() {
     let folder = Folder::new();
-    let program = filming(folder.path());
+    let program = filming(&folder);
     let scene = program.scene();
     assert_eq!(scene["video"], json!({"format": "webp", "most_frames": 240}));
     let film = path(&scene["start"], 3);
@@ -143,12 +143,12 @@ fn a_video_has_the_pictures_of_its_path() {
     let long = film.to_string() + &" ".repeat(2000);
     let target = format!("{}picture", program.path);
     assert_eq!(program.connect().ask("POST", &target, &[("Host", &program.host)], long.as_bytes()).status, 413);
-    assert_eq!(names_in(folder.path()), [""; 0], "its scratch folder is gone");
+    assert_eq!(names_in(&folder), [""; 0], "its scratch folder is gone");
 }
 
 fn one_video_at_a_time_for_who_waits() {
     let folder = Folder::new();
-    let mut program = filming(folder.path());
+    let mut program = filming(&folder);
     let start = program.scene()["start"].clone();
     let filmed = || program.get("status").json()["video"].clone();
     let (short, long) = (path(&start, 2), path(&start, 240));
@@ -171,14 +171,14 @@ fn one_video_at_a_time_for_who_waits() {
     wait_until("no frame is made", || filmed()[0].as_u64() >= Some(1));
     drop(waiting);
     assert_eq!(program.interrupt().0, Some(0));
-    assert_eq!(names_in(folder.path()), [""; 0]);
+    assert_eq!(names_in(&folder), [""; 0]);
 }
 
 fn a_video_is_mp4_where_ffmpeg_is() {
     let folder = Folder::new();
     // What comes in is what goes out, to the last argument.
     folder.script("ffmpeg", "[ \"$1\" = -version ] && exit\nfor last; do :; done\nexec /bin/cat > \"$last\"\n");
-    let program = filming(folder.path());
+    let program = filming(&folder);
     let scene = program.scene();
     assert_eq!(scene["video"]["format"], "mp4");
     let answer = video(&program, &path(&scene["start"], 2));
@@ -191,7 +191,7 @@ fn a_video_is_mp4_where_ffmpeg_is() {
         answer.status == 503 && said.contains("the video cannot be written") && said.contains("no such codec"),
         "{said}"
     );
-    assert_eq!(names_in(folder.path()), ["ffmpeg"]);
+    assert_eq!(names_in(&folder), ["ffmpeg"]);
 }
 
 /// The ring around the subject, and a picture from its other side.
@@ -226,9 +226,9 @@ fn full_pictures_are_those_of_render() {
     for scheme in ["error:alpha=1", "gaussian:beta=2"] {
         let arguments =
             format!("render {} --targets 005 --weights {scheme} {options} --device cpu -o out", scene.display());
-        done_with_warnings(folder.path(), &arguments);
+        done_with_warnings(&folder, &arguments);
     }
-    let program = start(folder.path(), &format!("{} {options} --weights error:alpha=1", scene.display()));
+    let program = start(&folder, &format!("{} {options} --weights error:alpha=1", scene.display()));
     let found = program.scene();
     let others = list_of(&found["others"]);
     let pose = &others.iter().find(|view| view["name"] == "005").expect("view 005")["pose"];
@@ -246,7 +246,7 @@ fn full_pictures_are_those_of_render() {
         assert_near(sum, 1.0, 1.0e-5);
         pictures.push(picture);
     }
-    let rendered = image::open(folder.path().join("out/005.png")).expect("a picture").to_rgb8();
+    let rendered = image::open(folder.join("out/005.png")).expect("a picture").to_rgb8();
     assert!(pictures[2] == rendered, "the picture is not that of render");
     assert!(pictures[0] != pictures[1] && pictures[0] != rendered);
 }
@@ -254,7 +254,7 @@ fn full_pictures_are_those_of_render() {
 /// Whatever a person does with the camera, there is a picture or a sentence that says why not.
 fn no_view_is_an_error_of_the_server() {
     let folder = toy();
-    let program = start(folder.path(), "toy --sources 0..3 --size 24x24 --weights mean");
+    let program = start(&folder, "toy --sources 0..3 --size 24x24 --weights mean");
     let found = program.scene();
     let mut connection = program.connect();
     for (axis, value) in [(0, 0.0), (2, -1.0e3), (1, 1.0e6), (0, 1.0e12), (2, 1.0e30), (1, -3.0e38), (0, 1.0e39)] {
@@ -278,7 +278,7 @@ fn no_view_is_an_error_of_the_server() {
 fn the_scheme_can_be_chosen_for_the_scene() {
     let folder = toy();
     let options = "--sources 000000..000011 --size 48x48";
-    let program = start(folder.path(), &format!("toy {options} --weights auto"));
+    let program = start(&folder, &format!("toy {options} --weights auto"));
     let found = program.scene();
     let pose = &found["others"][8]["pose"];
     assert_eq!((&found["scheme"], &found["chooses"]), (&json!("error:alpha=1"), &json!(true)));
@@ -297,8 +297,8 @@ fn the_scheme_can_be_chosen_for_the_scene() {
     let shown = [&chosen, &json!("mean"), &chosen].map(picture);
     for (scheme, row) in ["auto", "mean"].into_iter().zip(&shown) {
         let arguments = format!("render toy --targets 000020 --weights {scheme} {options} --device cpu -o {scheme}");
-        done_with_warnings(folder.path(), &arguments);
-        let path = folder.path().join(scheme).join("000020.png");
+        done_with_warnings(&folder, &arguments);
+        let path = folder.join(scheme).join("000020.png");
         assert!(image::open(path).expect("a picture").to_rgb8() == *row, "{scheme}: another picture");
     }
     assert!(shown[0] != shown[1] && shown[0] == shown[2]);
@@ -308,7 +308,7 @@ fn the_scheme_can_be_chosen_for_the_scene() {
 fn a_vulkan_device_shows_the_same() {
     let folder = toy();
     let pictures = ["cpu", "vulkan"].map(|device| {
-        let program = Program::start(BINARY, device, folder.path(), "toy --sources 0..3 --size 32x32");
+        let program = Program::start(BINARY, device, &folder, "toy --sources 0..3 --size 32x32");
         let found = program.scene();
         assert_eq!(found["device"].as_str().is_some_and(|name| name.starts_with("cpu")), device == "cpu", "{found}");
         let mut connection = program.connect();
@@ -349,8 +349,8 @@ fn the_newest_request_wins() {
 
 fn ctrl_c_ends_it_and_nothing_is_written() {
     let folder = toy();
-    let before = files_below(folder.path());
-    let mut program = start(folder.path(), "toy --size 48x48");
+    let before = files_below(&folder);
+    let mut program = start(&folder, "toy --size 48x48");
     let start = program.scene()["start"].clone();
     program.connect().picture(&request("a", &start, true)).unpacked();
     // In the middle of a full picture.
@@ -359,7 +359,7 @@ fn ctrl_c_ends_it_and_nothing_is_written() {
     drop(connection);
     assert_eq!(program.interrupt(), (Some(0), String::new()));
     assert!(std::net::TcpStream::connect(&program.host).is_err(), "it still listens");
-    assert_eq!(files_below(folder.path()), before);
+    assert_eq!(files_below(&folder), before);
 }
 
 fn a_taken_port_is_an_error() {
@@ -367,8 +367,8 @@ fn a_taken_port_is_an_error() {
     let port = listener.local_addr().expect("an address").port();
     let folder = toy();
     let parts = ["cannot listen on 127.0.0.1", &port.to_string(), "--port"];
-    assert_refused(BINARY, folder.path(), &format!("view toy --no-browser --device cpu --port {port}"), &parts);
-    assert_refused(BINARY, folder.path(), "view toy --no-browser --size 48x20", &["does not keep the shape", "--size"]);
+    assert_refused(&folder, &format!("view toy --no-browser --device cpu --port {port}"), &parts);
+    assert_refused(&folder, "view toy --no-browser --size 48x20", &["does not keep the shape", "--size"]);
 }
 
 /// Fields without a cheaper form are shown in smaller pictures of their own.
@@ -378,7 +378,7 @@ fn learned_fields_are_shown() {
         [("formula:8 --samples 16,4,4", json!(["depth"])), ("genvs:small --steps 2 --samples 8", json!([]))]
     {
         let arguments = format!("toy --sources 000000,000008,000016 --size 32x32 --model {model}");
-        let program = start(folder.path(), &arguments);
+        let program = start(&folder, &arguments);
         let start = program.scene()["start"].clone();
         let mut connection = program.connect();
         let (coarse, picture) = connection.picture(&request("a", &start, true)).unpacked();
@@ -392,10 +392,10 @@ fn learned_fields_are_shown() {
 /// At rest the picture of `render`, while moving a smaller one of the same.
 fn gaussians_are_shown() {
     let folder = toy();
-    done_with_warnings(folder.path(), "optimise toy --size 48x48 --device cpu -o toy.ply");
-    done_with_warnings(folder.path(), "render toy --gaussians toy.ply --targets 20 --size 64x64 --device cpu -o out");
-    let expected = image::open(folder.path().join("out/000020.png")).expect("a picture").to_rgb8();
-    let program = start(folder.path(), "toy --gaussians toy.ply --sources 0..19 --size 64x64");
+    done_with_warnings(&folder, "optimise toy --size 48x48 --device cpu -o toy.ply");
+    done_with_warnings(&folder, "render toy --gaussians toy.ply --targets 20 --size 64x64 --device cpu -o out");
+    let expected = image::open(folder.join("out/000020.png")).expect("a picture").to_rgb8();
+    let program = start(&folder, "toy --gaussians toy.ply --sources 0..19 --size 64x64");
     let found = program.scene();
     let others = list_of(&found["others"]);
     let pose = &others.iter().find(|view| view["name"] == "000020").expect("view 20")["pose"];

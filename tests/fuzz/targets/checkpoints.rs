@@ -129,13 +129,7 @@ impl Target for Checkpoints {
     }
 }
 
-pub(crate) struct Attention(OneFile);
-
-impl Attention {
-    pub(crate) fn new() -> Attention {
-        Attention(OneFile::new("attention.safetensors"))
-    }
-}
+pub(crate) struct Attention(pub(super) OneFile);
 
 impl Target for Attention {
     fn seeds(&self) -> Vec<Vec<u8>> {

@@ -5,13 +5,7 @@ use viewfuse::scene::SceneFrame;
 use viewfuse::scene::gaussians::{Gaussian, GaussianScene, MAX_LOGARITHM};
 use viewfuse_core::gaussian::REST_COUNTS;
 
-pub(crate) struct Gaussians(OneFile);
-
-impl Gaussians {
-    pub(crate) fn new() -> Gaussians {
-        Gaussians(OneFile::new("scene.ply"))
-    }
-}
+pub(crate) struct Gaussians(pub(super) OneFile);
 
 impl Target for Gaussians {
     fn seeds(&self) -> Vec<Vec<u8>> {

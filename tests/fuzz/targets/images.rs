@@ -6,13 +6,7 @@ use std::io::Cursor;
 use viewfuse::scene::read_picture;
 use viewfuse_tests::scenes::png_checksum;
 
-pub(crate) struct Images(OneFile);
-
-impl Images {
-    pub(crate) fn new() -> Images {
-        Images(OneFile::new("photograph"))
-    }
-}
+pub(crate) struct Images(pub(super) OneFile);
 
 impl Target for Images {
     fn seeds(&self) -> Vec<Vec<u8>> {

@@ -52,32 +52,11 @@ fn weighting_means_the_same(text: &str) -> Result<bool, String> {
 
 impl Target for Specs {
     fn seeds(&self) -> Vec<Vec<u8>> {
-        let texts = [
-            "mean",
-            "error:alpha=0.5,angle=full",
-            "gaussian:beta=2",
-            "distance:power=2",
-            "attention:file.safetensors",
-            "auto",
-            "half=error:alpha=0.5",
-            "random:sources=3",
-            "close:sources=5,degrees=10",
-            "count:sources=2+8",
-            "fixed:cars",
-            "fixed:1,2:all/3",
-            "nearest:4",
-            "llff:3",
-            "dtu:9,masks=given",
-            "blender:8",
-            "0/4",
-            "vulkan:1",
-            "cpu",
-            "10,20,30",
-            "white",
-            "transforms",
-            "train",
-        ];
-        texts.iter().map(|text| text.as_bytes().to_vec()).collect()
+        let texts = "mean error:alpha=0.5,angle=full gaussian:beta=2 distance:power=2 attention:file.safetensors auto \
+                     half=error:alpha=0.5 random:sources=3 close:sources=5,degrees=10 count:sources=2+8 fixed:cars \
+                     fixed:1,2:all/3 nearest:4 llff:3 dtu:9,masks=given blender:8 0/4 vulkan:1 cpu 10,20,30 white \
+                     transforms train";
+        texts.split(' ').map(|text| text.as_bytes().to_vec()).collect()
     }
 
     fn words(&self) -> &'static [&'static str] {

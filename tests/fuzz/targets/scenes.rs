@@ -31,7 +31,7 @@ impl Broken {
     }
 
     /// A copy of a scene that a test made: of its files, those that are no photographs are broken.
-    fn of(scene: &Folder) -> Broken {
+    pub(crate) fn of(scene: &Folder) -> Broken {
         let names: Vec<(String, PathBuf)> = files_below(scene.path())
             .into_iter()
             .filter(|(path, _)| path.is_file())
@@ -50,14 +50,6 @@ pub(crate) fn transforms() -> Broken {
     let folder = made::transforms_folder(&scene);
     folder.image("masks/0001.png", 16, 12);
     Broken::of(&folder)
-}
-
-pub(crate) fn srn() -> Broken {
-    Broken::of(&made::srn())
-}
-
-pub(crate) fn middlebury() -> Broken {
-    Broken::of(&made::middlebury())
 }
 
 pub(crate) fn llff() -> Broken {

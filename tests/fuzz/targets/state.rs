@@ -5,13 +5,7 @@ use serde_json::json;
 use viewfuse_lab::train::check_state;
 use viewfuse_tests::checkpoints::safetensors;
 
-pub(crate) struct State(OneFile);
-
-impl State {
-    pub(crate) fn new() -> State {
-        State(OneFile::new("state.safetensors"))
-    }
-}
+pub(crate) struct State(pub(super) OneFile);
 
 impl Target for State {
     fn seeds(&self) -> Vec<Vec<u8>> {

@@ -10,6 +10,7 @@ use viewfuse_lab::scenes::cameras::{random_views, sphere, spiral_views};
 use viewfuse_lab::scenes::collection::{Made, MakeError, ObjectCounts, RAYS_PER_SIDE, Settings, make};
 use viewfuse_lab::scenes::{car, render_with};
 use viewfuse_tests::command::files_below;
+use viewfuse_tests::scenes::Folder;
 
 const COUNTS: ObjectCounts = ObjectCounts { train: 3, validation: 1, test: 1 };
 
@@ -23,8 +24,8 @@ fn made(out: &Path, settings: &Settings, counts: ObjectCounts) -> Result<Made, M
 
 #[test]
 fn poses_are_exact_and_pictures_are_those_of_the_object() {
-    let place = tempfile::tempdir().expect("a temporary folder");
-    let out = place.path().join("deep/cars");
+    let place = Folder::new();
+    let out = place.join("deep/cars");
     assert_eq!(made(&out, &settings(), COUNTS).expect("a collection"), Made { new_count: 5, kept_count: 0 });
     let sphere = sphere(64).expect("a size");
     let spiral = spiral_views(&sphere, 3).expect("cameras");
@@ -49,62 +50,62 @@ fn poses_are_exact_and_pictures_are_those_of_the_object() {
 
 #[test]
 fn what_is_there_is_kept_and_what_is_missing_is_made() {
-    let place = tempfile::tempdir().expect("a temporary folder");
-    made(place.path(), &settings(), COUNTS).expect("a collection");
-    let before = files_below(place.path());
-    let picture = place.path().join("cars_train/000001/rgb/000000.png");
+    let place = Folder::new();
+    made(&place, &settings(), COUNTS).expect("a collection");
+    let before = files_below(&place);
+    let picture = place.join("cars_train/000001/rgb/000000.png");
     let bytes = fs::read(&picture).expect("a picture");
 
-    fs::remove_dir_all(place.path().join("cars_train/000001")).expect("a scene to delete");
-    let mark = place.path().join("cars_train/000000/rgb/000000.png");
+    fs::remove_dir_all(place.join("cars_train/000001")).expect("a scene to delete");
+    let mark = place.join("cars_train/000000/rgb/000000.png");
     fs::write(&mark, "kept").expect("a mark");
-    assert_eq!(made(place.path(), &settings(), COUNTS).expect("the rest"), Made { new_count: 1, kept_count: 4 });
+    assert_eq!(made(&place, &settings(), COUNTS).expect("the rest"), Made { new_count: 1, kept_count: 4 });
     assert_eq!(fs::read(&picture).expect("the picture again"), bytes, "bit for bit");
     assert_eq!(fs::read(&mark).expect("the mark"), b"kept");
 
     let more = ObjectCounts { train: 4, ..COUNTS };
-    assert_eq!(made(place.path(), &settings(), more).expect("one more"), Made { new_count: 1, kept_count: 5 });
+    assert_eq!(made(&place, &settings(), more).expect("one more"), Made { new_count: 1, kept_count: 5 });
     assert_eq!(fs::read(&mark).expect("the mark"), b"kept");
     let names = |files: Vec<(std::path::PathBuf, u64)>| files.into_iter().map(|(path, _)| path).collect::<Vec<_>>();
-    let after = names(files_below(place.path()));
+    let after = names(files_below(&place));
     assert!(names(before).iter().all(|path| after.contains(path)), "something is gone");
 }
 
 #[test]
 fn other_settings_are_refused_before_anything_is_written() {
-    let place = tempfile::tempdir().expect("a temporary folder");
+    let place = Folder::new();
     let few = ObjectCounts { train: 1, validation: 0, test: 0 };
-    made(place.path(), &settings(), few).expect("a collection");
-    let before = files_below(place.path());
+    made(&place, &settings(), few).expect("a collection");
+    let before = files_below(&place);
     for other in [
         Settings::new(12, 64, 2, 3),
         Settings::new(11, 128, 2, 3),
         Settings::new(11, 64, 3, 3),
         Settings::new(11, 64, 2, 4),
     ] {
-        let error = made(place.path(), &other, COUNTS).expect_err("other settings");
+        let error = made(&place, &other, COUNTS).expect_err("other settings");
         assert!(matches!(error, MakeError::OtherSettings { .. }), "{error}");
         assert!(error.to_string().contains("cars.json: what is there was made with other settings"), "{error}");
     }
-    fs::write(place.path().join("cars.json"), "{}").expect("a file");
-    let error = made(place.path(), &settings(), COUNTS).expect_err("no settings in the file");
+    fs::write(place.join("cars.json"), "{}").expect("a file");
+    let error = made(&place, &settings(), COUNTS).expect_err("no settings in the file");
     assert!(matches!(error, MakeError::Parse { .. }), "{error}");
-    fs::remove_file(place.path().join("cars.json")).expect("a file to delete");
-    let error = made(place.path(), &settings(), COUNTS).expect_err("no file of settings");
+    fs::remove_file(place.join("cars.json")).expect("a file to delete");
+    let error = made(&place, &settings(), COUNTS).expect_err("no file of settings");
     assert!(matches!(error, MakeError::NoSettings { .. }), "{error}");
-    assert_eq!(files_below(place.path()).len(), before.len() - 1, "something was written");
-    let error = made(place.path(), &Settings::new(11, 0, 2, 3), COUNTS).expect_err("no pixels");
+    assert_eq!(files_below(&place).len(), before.len() - 1, "something was written");
+    let error = made(&place, &Settings::new(11, 0, 2, 3), COUNTS).expect_err("no pixels");
     assert!(matches!(error, MakeError::Size { size: 0, .. }), "{error}");
 }
 
 #[test]
 fn pictures_do_not_depend_on_the_number_of_threads_or_objects() {
     let bytes = |threads: usize, train: u32| {
-        let place = tempfile::tempdir().expect("a temporary folder");
+        let place = Folder::new();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a thread pool");
         let counts = ObjectCounts { train, validation: 0, test: 0 };
-        pool.install(|| made(place.path(), &settings(), counts)).expect("a collection");
-        fs::read(place.path().join("cars_train/000001/rgb/000001.png")).expect("a picture")
+        pool.install(|| made(&place, &settings(), counts)).expect("a collection");
+        fs::read(place.join("cars_train/000001/rgb/000001.png")).expect("a picture")
     };
     assert_eq!(bytes(1, 2), bytes(3, 4));
 }

@@ -6,6 +6,7 @@ use std::path::Path;
 use viewfuse::job::progress::Silent;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_lab::scenes::{WriteError, render, write_scene};
+use viewfuse_tests::scenes::Folder;
 
 /// Every pose file reads back as exactly the camera it was written from.
 pub(crate) fn assert_poses(folder: &Path, cameras: &[Camera]) {
@@ -21,8 +22,8 @@ pub(crate) fn assert_poses(folder: &Path, cameras: &[Camera]) {
 
 #[test]
 fn a_scene_folder_appears_whole_and_is_never_overwritten() {
-    let place = tempfile::tempdir().expect("a temporary folder");
-    let folder = place.path().join("deep/scene");
+    let place = Folder::new();
+    let folder = place.join("deep/scene");
     let cameras = orbit(16).spiral(3, [0.2, 0.8]).expect("cameras");
     write_scene(&folder, &sphere(), &cameras, 4, &Silent).expect("a scene");
     assert_poses(&folder, &cameras);
@@ -30,7 +31,7 @@ fn a_scene_folder_appears_whole_and_is_never_overwritten() {
     assert_eq!(intrinsics, "16. 8. 8. 0.\n0. 0. 0.\n1.\n16 16\n");
     let stored = image::open(folder.join("rgb/000002.png")).expect("the last picture").into_rgba8();
     assert_eq!(stored, render(&sphere(), &cameras[2]));
-    let beside = fs::read_dir(place.path().join("deep")).expect("the parent").count();
+    let beside = fs::read_dir(place.join("deep")).expect("the parent").count();
     assert_eq!(beside, 1, "nothing but the scene is left");
 
     let refused = write_scene(&folder, &sphere(), &cameras[..1], 4, &Silent);
@@ -40,8 +41,8 @@ fn a_scene_folder_appears_whole_and_is_never_overwritten() {
 
 #[test]
 fn scenes_that_the_layout_can_not_hold_are_refused_with_the_path() {
-    let place = tempfile::tempdir().expect("a temporary folder");
-    let folder = place.path().join("scene");
+    let place = Folder::new();
+    let folder = place.join("scene");
     let mut cameras = orbit(16).spiral(2, [0.2, 0.8]).expect("cameras");
     let no_views = write_scene(&folder, &sphere(), &[], 4, &Silent).expect_err("no views");
     assert!(matches!(no_views, WriteError::ViewCount { count: 0, .. }), "{no_views:?}");
@@ -53,13 +54,13 @@ fn scenes_that_the_layout_can_not_hold_are_refused_with_the_path() {
     cameras[0].pinhole = pinhole;
     let oblong = write_scene(&folder, &sphere(), &cameras, 4, &Silent).expect_err("two focal lengths");
     assert!(matches!(oblong, WriteError::Intrinsics { view: 0, .. }), "{oblong:?}");
-    let file = place.path().join("file");
+    let file = place.join("file");
     fs::write(&file, "").expect("a file");
     let blocked =
         write_scene(&file.join("scene"), &sphere(), &[camera(16)], 4, &Silent).expect_err("a file in the way");
     for error in [no_views, mixed, oblong, blocked] {
         let message = error.to_string();
-        assert!(message.contains(&place.path().display().to_string()), "no path in: {message}");
+        assert!(message.contains(&place.display().to_string()), "no path in: {message}");
     }
-    assert_eq!(fs::read_dir(place.path()).expect("the folder").count(), 1, "only the file is there");
+    assert_eq!(fs::read_dir(&place).expect("the folder").count(), 1, "only the file is there");
 }
