@@ -148,24 +148,6 @@ impl World {
         let whole = SweepBlock::new(&self.object, &self.views[view as usize], view);
         if whole.row_count < 10 { whole } else { SweepBlock { first_row: 3, row_count: whole.row_count - 5, ..whole } }
     }
-
-    /// Changes the texels of all views but the first by 1 %.
-    pub fn change_texels(&mut self) {
-        change_texels(&mut self.texels[self.views[1].first_texel as usize..]);
-    }
-
-    /// Changes the depths by 1 %.
-    pub fn change_depths(&mut self) {
-        change_depths(&mut self.depths);
-    }
-
-    /// Points all over the box and a little around it.
-    pub fn points(&self, count: u32) -> Vec<Vec3> {
-        let numbers = &mut Numbers::new(99);
-        (0..count)
-            .map(|_| Vec3::new(numbers.between(-0.8, 0.8), numbers.between(-0.8, 0.8), numbers.between(-0.8, 0.8)))
-            .collect()
-    }
 }
 
 /// Changes red and alpha by 1 %, in opposite directions: equal changes would not change the colour.
