@@ -1,7 +1,6 @@
 //! Small random worlds for kernels: cameras of unequal sizes around a box, smooth blobs for pictures, depths of a ball
 //! with dents and holes.
 
-use super::hull_oracle::Scene;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock, Pinhole};
 use viewfuse_core::pose::Pose;
@@ -136,11 +135,6 @@ impl World {
                 self.entries.push(if hole { NO_SURFACE } else { depth - numbers.between(0.0, 0.2) });
             }
         }
-    }
-
-    /// What the oracle takes of it.
-    pub fn scene(&self) -> Scene<'_> {
-        Scene { object: &self.object, views: &self.views, texels: &self.texels }
     }
 
     /// Some rows of a view's sweep; all of a small view's.
