@@ -1,7 +1,6 @@
 //! Small random worlds for kernels: cameras of unequal sizes around a box, smooth blobs for pictures, depths of a ball
 //! with dents and holes.
 
-use super::hull_oracle::Scene;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock, Pinhole};
 use viewfuse_core::pose::Pose;
@@ -138,33 +137,10 @@ impl World {
         }
     }
 
-    /// What the oracle takes of it.
-    pub fn scene(&self) -> Scene<'_> {
-        Scene { object: &self.object, views: &self.views, texels: &self.texels }
-    }
-
     /// Some rows of a view's sweep; all of a small view's.
     pub fn sweep(&self, view: u32) -> SweepBlock {
         let whole = SweepBlock::new(&self.object, &self.views[view as usize], view);
         if whole.row_count < 10 { whole } else { SweepBlock { first_row: 3, row_count: whole.row_count - 5, ..whole } }
-    }
-
-    /// Changes the texels of all views but the first by 1 %.
-    pub fn change_texels(&mut self) {
-        change_texels(&mut self.texels[self.views[1].first_texel as usize..]);
-    }
-
-    /// Changes the depths by 1 %.
-    pub fn change_depths(&mut self) {
-        change_depths(&mut self.depths);
-    }
-
-    /// Points all over the box and a little around it.
-    pub fn points(&self, count: u32) -> Vec<Vec3> {
-        let numbers = &mut Numbers::new(99);
-        (0..count)
-            .map(|_| Vec3::new(numbers.between(-0.8, 0.8), numbers.between(-0.8, 0.8), numbers.between(-0.8, 0.8)))
-            .collect()
     }
 }
 

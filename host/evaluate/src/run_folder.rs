@@ -139,16 +139,10 @@ impl RunFolder {
     /// [`FolderError`].
     pub fn open(path: &Path) -> Result<RunFolder, FolderError> {
         let file = path.join(SETTINGS);
-        let text = read_at_most(&file, LONGEST_SETTINGS).map_err(|cause| FolderError::Io {
-            path: file.clone(),
-            doing: "cannot be read",
-            cause,
-        })?;
-        let settings: Settings = serde_json::from_slice(&text).map_err(|cause| FolderError::Json {
-            path: file.clone(),
-            line: None,
-            cause,
-        })?;
+        let unreadable = |cause| FolderError::Io { path: file.clone(), doing: "cannot be read", cause };
+        let text = read_at_most(&file, LONGEST_SETTINGS).map_err(unreadable)?;
+        let foreign = |cause| FolderError::Json { path: file.clone(), line: None, cause };
+        let settings: Settings = serde_json::from_slice(&text).map_err(foreign)?;
         if settings.job_count > MAX_JOBS {
             return Err(FolderError::JobCount { path: file, count: settings.job_count });
         }

@@ -63,6 +63,12 @@ pub(super) fn splat(numbers: &mut Numbers, [width, height]: [u32; 2], depth: f32
     }
 }
 
+/// What a tile says of a splat.
+pub(super) fn tile_sums(numbers: &mut Numbers) -> SplatGradient {
+    let number = |most: f32| numbers.between(-most, most);
+    SplatGradient::of([1.0, 2.0, 2.0, 4.0, 4.0, 4.0, 1.0, 1.0, 1.0].map(number))
+}
+
 impl Picture {
     fn new(numbers: &mut Numbers, size: u32) -> Picture {
         let width = f64::from(size).sqrt().ceil() as u32;
@@ -228,16 +234,7 @@ impl Case for ProjectGradients {
             uses.extend(3 * gaussian..3 * gaussian + 1 + gaussian % 3);
             use_starts.push(uses.len() as u32);
         }
-        let sums = |_| SplatGradient {
-            opacity: numbers.between(-1.0, 1.0),
-            along: [numbers.between(-2.0, 2.0), numbers.between(-2.0, 2.0)],
-            padding: 0.0,
-            squares: [0; 3].map(|_| numbers.between(-4.0, 4.0)),
-            unused: 0.0,
-            colour: [0; 3].map(|_| numbers.between(-1.0, 1.0)),
-            behind: 0.0,
-        };
-        let sums = (0..3 * size).map(sums).collect();
+        let sums = (0..3 * size).map(|_| tile_sums(numbers)).collect();
         let gradients = Output::Zeros(gaussians.len());
         vec![ProjectGradients { block, gaussians, splats, use_starts, uses, sums, gradients }]
     }

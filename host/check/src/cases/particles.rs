@@ -1,7 +1,7 @@
 //! [`Kernel::ProjectParticles`] and [`Kernel::GatherGradients`]: Gaussians before a camera and beside it, with and
 //! without spherical harmonics, in the lists of the tiles that show them.
 
-use super::gaussians::{NEAR, block, gaussians};
+use super::gaussians::{NEAR, block, gaussians, tile_sums};
 use super::*;
 use crate::gaussian_oracle;
 use crate::list_oracle::{is_reached, lists};
@@ -119,11 +119,7 @@ impl Case for GatherGradients {
         let listed = ListBlock { width, height, splat_count: block.gaussian_count, capacity: 0 };
         let (starts, mut entries) = lists(&listed, &splats);
         entries.push(0);
-        let sums = |_| {
-            let mut number = |most: f32| numbers.between(-most, most);
-            SplatGradient::of([1.0, 2.0, 2.0, 4.0, 4.0, 4.0, 1.0, 1.0, 1.0].map(&mut number))
-        };
-        let sums = (0..entries.len()).map(sums).collect();
+        let sums = (0..entries.len()).map(|_| tile_sums(numbers)).collect();
         let gradients = Output::Zeros(gaussians.len());
         vec![GatherGradients { block, gaussians, splats, starts, entries, sums, gradients }]
     }

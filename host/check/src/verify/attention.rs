@@ -2,6 +2,7 @@
 //! initialisation.
 
 use super::file::File;
+use super::weighting::pose;
 use super::{Measure, Quantity, Report, VerifyError};
 use safetensors::tensor::{Dtype, TensorView};
 use std::convert::Infallible;
@@ -28,13 +29,7 @@ pub(super) fn verify(file: &File<'_>, report: &mut Report) -> Result<(), VerifyE
     };
     let poses = |name: &str| -> Result<Vec<Pose>, VerifyError> {
         let values = file.floats(name).map_err(|_| content(name, "must be F32 [pose, 4, 4]".into()))?;
-        values
-            .chunks_exact(16)
-            .map(|m| {
-                let rows = [0, 4, 8, 12].map(|at| [m[at], m[at + 1], m[at + 2], m[at + 3]]);
-                Pose::from_opengl(&rows).map_err(|error| content(name, format!("not a camera pose: {error}")))
-            })
-            .collect()
+        values.chunks_exact(16).map(|matrix| pose(matrix).map_err(|message| content(name, message))).collect()
     };
     let source_poses = poses("attention_src")?;
     let sources =

@@ -107,14 +107,9 @@ fn scheme_of(method: &str) -> Option<Weighting> {
 }
 
 /// A camera-to-world matrix, row-major, in OpenGL axes.
-fn pose(matrix: &[f32]) -> Result<Pose, String> {
-    let mut rows = [[0.0; 4]; 4];
-    if matrix.len() != 16 {
-        return Err(format!("a pose has 16 numbers, not {}", matrix.len()));
-    }
-    for (row, values) in rows.iter_mut().zip(matrix.chunks_exact(4)) {
-        row.copy_from_slice(values);
-    }
+pub(super) fn pose(matrix: &[f32]) -> Result<Pose, String> {
+    let numbers: &[f32; 16] = matrix.try_into().map_err(|_| format!("a pose has 16 numbers, not {}", matrix.len()))?;
+    let rows = std::array::from_fn(|row| std::array::from_fn(|column| numbers[4 * row + column]));
     Pose::from_opengl(&rows).map_err(|error| format!("not a camera pose: {error}"))
 }
 

@@ -66,11 +66,7 @@ impl LpipsTrunk {
 
 impl Display for LpipsTrunk {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            LpipsTrunk::Alex => "alex",
-            LpipsTrunk::Vgg => "vgg",
-            LpipsTrunk::Squeeze => "squeeze",
-        })
+        f.write_str(self.metric().trim_start_matches("lpips-"))
     }
 }
 

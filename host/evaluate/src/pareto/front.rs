@@ -51,27 +51,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_none_and_of_one() {
-        assert_eq!(best_for_their_time(&[]), [false; 0]);
-        assert_eq!(best_for_their_time(&[[3.0, 7.0]]), [true]);
-    }
-
-    #[test]
-    fn slower_and_worse_is_beaten() {
-        let points = [[1.0, 5.0], [2.0, 3.0], [2.5, 4.0], [3.0, 0.0], [4.0, 0.0], [1.0, 6.0]];
-        assert_eq!(best_for_their_time(&points), [true, true, false, true, false, false]);
-    }
-
-    #[test]
-    fn ties_are_all_marked() {
-        assert_eq!(best_for_their_time(&[[1.0, 2.0], [1.0, 2.0], [2.0, 2.0]]), [true, true, false]);
-    }
-
-    #[test]
-    fn what_is_no_number_is_not_marked_and_beats_nothing() {
+    fn what_no_other_point_beats_is_marked() {
         let nan = f64::NAN;
-        assert_eq!(best_for_their_time(&[[nan, 0.0], [0.0, nan], [5.0, 5.0]]), [false, false, true]);
-        assert_eq!(best_for_their_time(&[[nan, nan]]), [false]);
+        let cases: [(&str, &[[f64; 2]], &[bool]); 6] = [
+            ("none", &[], &[]),
+            ("one", &[[3.0, 7.0]], &[true]),
+            (
+                "slower and worse is beaten",
+                &[[1.0, 5.0], [2.0, 3.0], [2.5, 4.0], [3.0, 0.0], [4.0, 0.0], [1.0, 6.0]],
+                &[true, true, false, true, false, false],
+            ),
+            ("ties are all marked", &[[1.0, 2.0], [1.0, 2.0], [2.0, 2.0]], &[true, true, false]),
+            ("NaN is not marked and beats nothing", &[[nan, 0.0], [0.0, nan], [5.0, 5.0]], &[false, false, true]),
+            ("NaN alone", &[[nan, nan]], &[false]),
+        ];
+        for (case, points, marked) in cases {
+            assert_eq!(best_for_their_time(points), marked, "{case}");
+        }
     }
 
     fn point(setting: &str, seconds: f64, error: f32, truth_psnr: Option<f64>) -> Point {

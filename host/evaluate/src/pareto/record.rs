@@ -179,6 +179,10 @@ impl DeviceRecord {
     }
 }
 
+/// The columns of all fields.
+const COLUMNS: &str = "device,setting,best,seconds,seconds_least,seconds_most,encode_seconds,gain,psnr_exact_db,\
+    largest_difference,psnr_truth_db,truth_loss_db,repeatable";
+
 /// The points of all devices as CSV, one a line. The PSNR of equal pictures is `inf`, that of pictures with a NaN
 /// `NaN`. Fields with a denoiser have a column for its calls in one round. Each kind of work that the field skips has
 /// two columns: the amount skipped and the total.
@@ -187,23 +191,7 @@ impl DeviceRecord {
 /// Only if memory runs out.
 pub fn csv_of(record: &ParetoRecord) -> Result<Vec<u8>, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    let mut header: Vec<String> = [
-        "device",
-        "setting",
-        "best",
-        "seconds",
-        "seconds_least",
-        "seconds_most",
-        "encode_seconds",
-        "gain",
-        "psnr_exact_db",
-        "largest_difference",
-        "psnr_truth_db",
-        "truth_loss_db",
-        "repeatable",
-    ]
-    .map(str::to_owned)
-    .to_vec();
+    let mut header: Vec<String> = COLUMNS.split(',').map(str::to_owned).collect();
     let points = || record.devices.iter().flat_map(|device| device.points.iter().map(move |point| (device, point)));
     // Fields with a denoiser have one more column, and all settings are of one field.
     let has_calls = points().any(|(_, point)| point.denoising.is_some());

@@ -6,6 +6,7 @@ use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use viewfuse_cli::shared::{Terminal, on_threads, parse_size as parse_picture_size, say};
+use viewfuse_job::progress::Progress;
 
 #[derive(Args)]
 pub(super) struct Arguments {
@@ -139,6 +140,7 @@ fn run_photograph(arguments: &PhotographArguments) -> anyhow::Result<ExitCode> {
 fn run_toy(out: &Path) -> anyhow::Result<ExitCode> {
     let cameras = [toy::training_cameras()?, toy::test_cameras()?].concat();
     let progress = Terminal::new("making the scene");
+    progress.expect(cameras.len());
     write_scene(out, &toy::lorry(), &cameras, render::RAYS_PER_SIDE, &progress)?;
     drop(progress);
     say(format_args!("{}: {} views", out.display(), cameras.len()))?;

@@ -11,7 +11,7 @@
 //! objects can be added to one and leave all others as they are.
 
 use crate::scenes::cameras::{random_views, sphere, spiral_views};
-use crate::scenes::folder::{self, write_views};
+use crate::scenes::folder::{self, write_scene};
 use crate::scenes::kinds::car;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -152,7 +152,7 @@ pub fn make(out: &Path, settings: &Settings, counts: ObjectCounts, progress: &dy
             random = random_views(&sphere, settings.seed, scene.index, settings.views)?;
             &random
         };
-        write_views(&scene.folder, &object, cameras, RAYS_PER_SIDE, progress)?;
+        write_scene(&scene.folder, &object, cameras, RAYS_PER_SIDE, progress)?;
         Ok::<(), MakeError>(())
     })?;
     made.new_count = missing.len();

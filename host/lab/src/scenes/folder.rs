@@ -49,20 +49,9 @@ pub enum WriteError {
 
 /// Renders `object` from every camera and writes the scene to `folder`, which must not exist; its parent is created
 /// where it is missing. Views are named by the index of their camera. A pixel is the mean of `rays_per_side` squared
-/// rays ([`render_with`]). It checks `progress` between the views and stops if it says so.
+/// rays ([`render_with`]). It checks `progress` between the views, stops if it says so, and tells it each view's step,
+/// which the caller has told it to expect.
 pub fn write_scene(
-    folder: &Path,
-    object: &Object,
-    cameras: &[Camera],
-    rays_per_side: u32,
-    progress: &dyn Progress,
-) -> Result<(), WriteError> {
-    progress.expect(cameras.len());
-    write_views(folder, object, cameras, rays_per_side, progress)
-}
-
-/// As [`write_scene`], for a caller that expects the views: only their steps are told.
-pub(crate) fn write_views(
     folder: &Path,
     object: &Object,
     cameras: &[Camera],

@@ -48,6 +48,11 @@ pub(super) fn tensor(values: Vec<f32>, shape: &[usize], dtype: DType) -> Tensor 
     Tensor::from_vec(values, shape, &Device::Cpu).and_then(|tensor| tensor.to_dtype(dtype)).expect("a tensor")
 }
 
+/// All numbers of a tensor of this type.
+pub(super) fn numbers<T: candle_core::WithDType>(tensor: &Tensor) -> Vec<T> {
+    tensor.flatten_all().and_then(|all| all.to_vec1()).expect("numbers")
+}
+
 pub(super) fn noise(shape: &[usize], seed: u32) -> Tensor {
     let count: usize = shape.iter().product();
     tensor((0..count as u32).map(|index| normal([seed, 7], index, 0)).collect(), shape, DType::F64)
@@ -55,7 +60,7 @@ pub(super) fn noise(shape: &[usize], seed: u32) -> Tensor {
 
 /// That every actual number is the expected one but for a share of the largest.
 pub(super) fn assert_close(actual: &[f32], expected: &Tensor, share: f64) {
-    let expected = expected.flatten_all().and_then(|all| all.to_vec1::<f64>()).expect("numbers");
+    let expected: Vec<f64> = numbers(expected);
     assert_eq!(actual.len(), expected.len());
     let largest = expected.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
     let spread = expected.iter().fold(0.0_f64, |most, value| most.max((value - expected[0]).abs()));

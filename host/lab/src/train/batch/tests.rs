@@ -1,6 +1,6 @@
 //! Sources show what their cameras say.
 
-use super::super::gradient_check::scene;
+use super::super::gradient_check::{numbers, scene};
 use super::{Batch, Cut, SourceDraw, Targets};
 use crate::train::draw::Draw;
 use candle_core::DType;
@@ -16,7 +16,7 @@ fn batch(step: u32, drawn: SourceDraw) -> Batch {
 }
 
 fn pictures(batch: &Batch) -> Vec<f32> {
-    batch.pictures.flatten_all().and_then(|all| all.to_vec1()).expect("numbers")
+    numbers(&batch.pictures)
 }
 
 /// A point is where it was, seen from the corner of the part, at the part's scale.

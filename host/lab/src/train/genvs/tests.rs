@@ -4,7 +4,7 @@ use super::super::average::Average;
 use super::super::draw::Draw;
 use super::super::genvs_learner::loss;
 use super::super::gradient_check::{
-    assert_close, assert_gradients, mixed, noise, orbit, photographs, tensor, variable,
+    assert_close, assert_gradients, mixed, noise, numbers, orbit, photographs, tensor, variable,
 };
 use super::super::operations::{
     Apply, Convolution, MarchSizes, MarchVolumes, Normalise, Operation, SampledRays, Window,
@@ -93,10 +93,7 @@ fn assert_graph_is_the_renderers(estimate: Estimate) {
     for level in [0.05, 1.0, 80.0] {
         let noisy = (noise(&[1, 64, 64, 3], 3) * f64::from(level)).expect("noise");
         let denoised = network.denoised(&noisy, &features, &[Preconditioning::at(level)]).expect("a picture");
-        let plain = |tensor: &Tensor| {
-            let tensor = tensor.flatten_all().and_then(|all| all.to_dtype(DType::F32));
-            tensor.and_then(|all| all.to_vec1::<f32>()).expect("numbers")
-        };
+        let plain = |tensor: &Tensor| numbers::<f32>(&tensor.to_dtype(DType::F32).expect("numbers"));
         let said = reference.denoised(&plain(&noisy), &plain(&features), [64, 64], level).expect("a picture");
         assert_close(&said, &denoised, 2.0 * ROUNDING);
     }
@@ -197,8 +194,7 @@ fn a_new_denoiser_shows_the_colours_and_leaves_the_volumes() {
     let kept = Genvs::continued(&old, 32, None, DType::F32, 1).expect("a network");
     for (name, variable) in kept.parameters.iter() {
         let new = network.parameters.get(name).expect("the same names");
-        let numbers = |tensor: &Tensor| tensor.flatten_all().and_then(|all| all.to_vec1::<f32>()).expect("numbers");
-        let is_same = numbers(variable) == numbers(new);
+        let is_same = numbers::<f32>(variable) == numbers::<f32>(new);
         assert!(is_same || name.starts_with("denoiser."), "{name} changed");
         assert!(!is_same || !name.ends_with("enc.32x32_conv.weight"), "the denoiser is the old one");
     }
@@ -207,9 +203,8 @@ fn a_new_denoiser_shows_the_colours_and_leaves_the_volumes() {
     let noisy = (noise(&[1, 32, 32, 3], 3) * 80.0).and_then(|all| all.to_dtype(DType::F32)).expect("noise");
     let denoised = network.denoised(&noisy, &features, &[Preconditioning::at(80.0)]).expect("a picture");
     let shown = colours(&features).and_then(|all| all.to_dtype(DType::F64)).expect("colours");
-    let denoised = denoised.flatten_all().and_then(|all| all.to_vec1::<f32>()).expect("numbers");
     // c_skip is 4e-5 there, times noise of up to 4 deviations of 80.
-    assert_close(&denoised, &shown, 5.0e-3);
+    assert_close(&numbers::<f32>(&denoised), &shown, 5.0e-3);
 }
 
 #[test]
@@ -248,7 +243,7 @@ fn noise_and_features_begin_in_groups_of_their_own() {
     let taps = |name: &str| -> Vec<[usize; 2]> {
         let weights = network.parameters.get(&format!("denoiser.model.{name}.weight")).expect("a tensor");
         let [_, inputs, height, width] = *weights.dims() else { panic!("{:?}", weights.dims()) };
-        let values: Vec<f32> = weights.flatten_all().and_then(|all| all.to_vec1()).expect("numbers");
+        let values: Vec<f32> = numbers(weights);
         let set = values.iter().enumerate().filter(|(_, value)| **value != 0.0);
         set.map(|(index, _)| index / (height * width)).map(|pair| [pair / inputs, pair % inputs]).collect()
     };

@@ -271,6 +271,18 @@ pub(super) fn sum<T: Real>(lists: Vec<Vec<T>>) -> Vec<T> {
     all
 }
 
+/// The gradients of all objects from those of each: of its own inputs and of the weights of its views, one object behind
+/// another, and the sum of those of the parameters that objects share. Only the weights' if the network does not train.
+pub(super) fn of_all<T: Real>(objects: Vec<(Vec<T>, Vec<T>, Vec<T>)>, trains: bool) -> [Option<Vec<T>>; 3] {
+    let (mut of_inputs, mut of_weights, mut of_parameters) = (Vec::new(), Vec::new(), Vec::new());
+    for (inputs, weights, parameters) in objects {
+        of_inputs.extend(inputs);
+        of_weights.extend(weights);
+        of_parameters.push(parameters);
+    }
+    [trains.then_some(of_inputs), Some(of_weights), trains.then(|| sum(of_parameters))]
+}
+
 /// Numbers as rows and columns. Their count is that of the matrix by construction.
 pub(super) fn matrix<T>(values: &[T], rows: usize, columns: usize) -> ArrayView2<'_, T> {
     ArrayView2::from_shape((rows, columns), values).expect("as many numbers as the matrix has")

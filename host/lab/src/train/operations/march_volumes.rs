@@ -4,7 +4,7 @@
 //! Chunks of rays go through all steps, so that intermediate values stay in a core's caches; the backward pass computes
 //! them again.
 
-use super::convolve::sum;
+use super::convolve::of_all;
 use super::linear::{input_gradient, layer_gradient, linear, linear_back, rectified};
 use super::{Operation, Real};
 use rayon::prelude::*;
@@ -323,13 +323,6 @@ impl Operation<3> for MarchVolumes {
             (of_volumes, of_weights, of_parameters)
         };
         let all: Vec<_> = (0..self.objects_rays.len()).into_par_iter().map(one).collect();
-        let (mut of_volumes, mut of_weights, mut of_parameters) = (Vec::new(), Vec::new(), Vec::new());
-        for (volumes, weights, parameters) in all {
-            of_volumes.extend(volumes);
-            of_weights.extend(weights);
-            of_parameters.push(parameters);
-        }
-        let trains = !self.is_frozen;
-        [trains.then_some(of_volumes), Some(of_weights), trains.then(|| sum(of_parameters))]
+        of_all(all, !self.is_frozen)
     }
 }

@@ -4,7 +4,7 @@
 //! pass computes them again, for the points that have a gradient: most of a ray's are in empty space or behind a
 //! surface. The library's operations would move 90 times the activations through memory for the same work.
 
-use super::convolve::sum;
+use super::convolve::of_all;
 use super::linear::{layer_gradient, linear, linear_back, rectified};
 use super::{Operation, Real};
 use rayon::prelude::*;
@@ -361,13 +361,6 @@ impl Operation<3> for PointNetwork {
             (of_grids, of_weights, of_parameters)
         };
         let all: Vec<_> = self.with_gradient(gradient).par_iter().enumerate().map(one).collect();
-        let (mut of_grids, mut of_weights, mut of_parameters) = (Vec::new(), Vec::new(), Vec::new());
-        for (grids, weights, parameters) in all {
-            of_grids.extend(grids);
-            of_weights.extend(weights);
-            of_parameters.push(parameters);
-        }
-        let trains = !self.is_frozen;
-        [trains.then_some(of_grids), Some(of_weights), trains.then(|| sum(of_parameters))]
+        of_all(all, !self.is_frozen)
     }
 }

@@ -5,12 +5,12 @@ use super::super::batch::{Batch, SourceDraw, Targets};
 use super::super::compositing::{coarse_depths, fine_depths, merged, points, weights as sample_weights};
 use super::super::draw::Draw;
 use super::super::gradient_check::{
-    assert_close, assert_gradients, mixed, noise, orbit, photographs, scene, tensor, variable,
+    assert_close, assert_gradients, mixed, noise, numbers, orbit, photographs, scene, tensor, variable,
 };
 use super::super::images::{enlarge, max_pool};
 use super::super::operations::{Apply, PointNetwork, PointNetworkSizes, Points, RectifiedDensity};
 use super::{PixelNerf, PointInputs, SampleCounts};
-use candle_core::{DType, Result, Tensor, Var};
+use candle_core::{DType, Tensor, Var};
 use std::sync::Arc;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_core::pose::Pose;
@@ -95,9 +95,7 @@ fn new_levels_change_nothing_at_first() {
     assert_eq!([&same, &new].map(|network| network.architecture.levels.len()), [2, 4]);
     assert!(new.parameters.get("encoder.model.layer4.0.conv1.weight").is_ok());
     let pictures = noise(&[1, 32, 32, 3], 7);
-    let grids = |network: &PixelNerf| {
-        network.grids(&pictures).and_then(|grids| grids.flatten_all()?.to_vec1::<f64>()).expect("grids")
-    };
+    let grids = |network: &PixelNerf| numbers::<f64>(&network.grids(&pictures).expect("grids"));
     assert_eq!(grids(&same), grids(&new));
     // The written file is read as it was trained.
     let (tensors, metadata) = new.checkpoint().expect("tensors");
@@ -135,21 +133,14 @@ fn the_point_network_has_its_gradient() {
         mixed(&grids.apply_op3(&weights, &parameters, Apply(point_network(false)))?)
     });
     // With the network left as it is, the weights' gradient is the same.
-    let of_weights = |is_frozen: bool| -> Result<Vec<f64>> {
-        let raw = grids.apply_op3(&weights, &parameters, Apply(point_network(is_frozen)))?;
-        mixed(&raw)?.backward()?.get(&weights).expect("a gradient").flatten_all()?.to_vec1()
-    };
-    let frozen = {
-        // Only what is asked for may be differentiated then.
-        let (grids, parameters) = (grids.as_detached_tensor(), parameters.as_detached_tensor());
-        let raw = grids.apply_op3(&weights, &parameters, Apply(point_network(true))).expect("samples");
+    let of_weights = |is_frozen: bool, grids: &Tensor, parameters: &Tensor| -> Vec<f64> {
+        let raw = grids.apply_op3(&weights, parameters, Apply(point_network(is_frozen))).expect("samples");
         let gradients = mixed(&raw).and_then(|sum| sum.backward()).expect("gradients");
-        gradients
-            .get(&weights)
-            .and_then(|gradient| gradient.flatten_all().ok()?.to_vec1::<f64>().ok())
-            .expect("a gradient")
+        numbers(gradients.get(&weights).expect("a gradient"))
     };
-    assert_eq!(frozen, of_weights(false).expect("gradients"));
+    // Only what is asked for may be differentiated then.
+    let frozen = of_weights(true, &grids.as_detached_tensor(), &parameters.as_detached_tensor());
+    assert_eq!(frozen, of_weights(false, &grids, &parameters));
 }
 
 #[test]
@@ -257,9 +248,9 @@ fn a_batch_is_a_function_of_seed_and_step() {
         let draw = Draw { seed: 5, step };
         Batch::of(&scenes, &[0, 1], &draw, 20, SourceDraw::whole(3), Targets::Many, DType::F32).expect("a batch")
     };
-    let numbers = |batch: &Batch| batch.truth.flatten_all().and_then(|all| all.to_vec1::<f32>()).expect("numbers");
-    assert_eq!(numbers(&batch(1)), numbers(&batch(1)));
-    assert_ne!(numbers(&batch(1)), numbers(&batch(2)));
+    let truth = |step: u32| numbers::<f32>(&batch(step).truth);
+    assert_eq!(truth(1), truth(1));
+    assert_ne!(truth(1), truth(2));
     for step in 0..50 {
         let batch = batch(step);
         for (sources, rays) in batch.sources.iter().zip(&batch.rays) {
