@@ -235,12 +235,24 @@ mod tests {
         }
     }
 
+    fn folder_with_photograph() -> (tempfile::TempDir, PathBuf) {
+        let scratch = tempfile::tempdir().expect("a folder");
+        let photograph = scratch.path().join("a.png");
+        fs::write(&photograph, "pixels").expect("a file");
+        (scratch, photograph)
+    }
+
+    /// The focal length that is found for a photograph with seed 0, and kept in a folder.
+    fn focal(solver: &Counting, folder: &Path, photograph: &Path) -> Option<f64> {
+        let solution = Kept::new(solver, folder).solve(&job(photograph, 0), &Silent);
+        solution.ok().map(|solution| solution.cameras[0].focal)
+    }
+
     #[test]
     fn the_same_question_is_asked_once() {
-        let scratch = tempfile::tempdir().expect("a folder");
-        let [photograph, moved] = ["a.png", "b.png"].map(|name| scratch.path().join(name));
-        fs::write(&photograph, "pixels").expect("a file");
-        fs::write(&moved, "pixels").expect("a file");
+        let (scratch, photograph) = folder_with_photograph();
+        let moved = scratch.path().join("b.png");
+        fs::copy(&photograph, &moved).expect("a file");
         let folder = Kept::folder_beside(&scratch.path().join("posed")).expect("a name");
         let solver = Counting::default();
         let focal = |path: &Path, seed| {
@@ -281,9 +293,7 @@ mod tests {
     /// A folder of the right name, with answers and with what is no answer by its name, its content or its kind.
     #[test]
     fn only_answers_are_removed() {
-        let scratch = tempfile::tempdir().expect("a folder");
-        let photograph = scratch.path().join("a.png");
-        fs::write(&photograph, "pixels").expect("a file");
+        let (scratch, photograph) = folder_with_photograph();
         let folder = scratch.path().join(".posed.attempts");
         let solver = Counting::default();
         let kept = Kept::new(&solver, &folder);
@@ -302,33 +312,25 @@ mod tests {
     #[cfg(unix)]
     #[test]
     fn nothing_is_kept_or_removed_through_a_link() {
-        let scratch = tempfile::tempdir().expect("a folder");
-        let photograph = scratch.path().join("a.png");
-        fs::write(&photograph, "pixels").expect("a file");
+        let (scratch, photograph) = folder_with_photograph();
         let [folder, target] = [".posed.attempts", "elsewhere"].map(|name| scratch.path().join(name));
         fs::create_dir(&target).expect("a folder");
         let solver = Counting::default();
         assert!(Kept::new(&solver, &target).solve(&job(&photograph, 0), &Silent).is_ok());
         std::os::unix::fs::symlink(&target, &folder).expect("a link");
         assert!(Kept::check(&folder).is_err() && Kept::check(&target).is_ok());
-        let focal = || {
-            Kept::new(&solver, &folder).solve(&job(&photograph, 0), &Silent).map(|solution| solution.cameras[0].focal)
-        };
-        assert_eq!((focal().ok(), focal().ok()), (Some(2.0), Some(3.0)), "asked each time");
+        let focal = || focal(&solver, &folder, &photograph);
+        assert_eq!((focal(), focal()), (Some(2.0), Some(3.0)), "asked each time");
         Kept::remove(&folder).expect("left alone");
         assert_eq!((fs::read_dir(&target).expect("a folder").count(), folder.is_symlink()), (1, true));
     }
 
     #[test]
     fn without_a_place_nothing_is_kept() {
-        let scratch = tempfile::tempdir().expect("a folder");
-        let photograph = scratch.path().join("a.png");
-        fs::write(&photograph, "pixels").expect("a file");
+        let (scratch, photograph) = folder_with_photograph();
         let (solver, folder) = (Counting::default(), scratch.path().join("not/there/.posed.attempts"));
-        let focal = || {
-            Kept::new(&solver, &folder).solve(&job(&photograph, 0), &Silent).map(|solution| solution.cameras[0].focal)
-        };
-        assert_eq!((focal().ok(), focal().ok()), (Some(1.0), Some(2.0)));
+        let focal = || focal(&solver, &folder, &photograph);
+        assert_eq!((focal(), focal()), (Some(1.0), Some(2.0)));
         assert!(!scratch.path().join("not").exists());
         assert_eq!(Kept::folder_beside(Path::new("..")), None);
     }
