@@ -113,7 +113,7 @@ impl<D: Device> Convolution<D> {
             Residual::Channels(values, first) => (Some(values), 0, first),
         };
         let block = ConvolveBlock { residual_pitch, residual_first, ..block };
-        self.dispatch(scratch.device(), scratch.precision(), &block, image, residual, output)
+        self.dispatch(scratch.device(), scratch.precision, &block, image, residual, output)
     }
 
     /// The same for some rows alone, exact; its windows are single pixels.

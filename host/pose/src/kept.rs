@@ -4,6 +4,7 @@
 //! An answer is kept under a digest of all that it depends on: the photographs' pixels, the cameras, the features, the
 //! seed, the program that is asked, and this crate's version.
 
+use crate::intake::file_name;
 use crate::solution::{Features, MAX_ANSWER, PoseJob, Solution, Solver, SolverError};
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -113,7 +114,7 @@ impl<'a> Kept<'a> {
     /// Keeps a text. A disk that cannot be written to costs no more than that: the scene's own files will tell.
     fn keep(&self, file: &Path, text: &[u8]) {
         if Kept::check(self.folder).is_ok() && (fs::create_dir(self.folder).is_ok() || self.folder.is_dir()) {
-            let _ = write_whole(file, &sealed(&name_of(file), text));
+            let _ = write_whole(file, &sealed(&file_name(file), text));
         }
     }
 
@@ -133,7 +134,7 @@ impl<'a> Kept<'a> {
 
 /// The answer in a file of this program.
 fn answer_in(file: &Path) -> Option<Answer> {
-    let name = name_of(file);
+    let name = file_name(file);
     let digest = name.strip_suffix(SUFFIX)?;
     let is_digest = digest.len() == SEAL && digest.bytes().all(|byte| byte.is_ascii_hexdigit());
     if !is_digest || !is_ordinary(file).ok()? {
@@ -141,10 +142,6 @@ fn answer_in(file: &Path) -> Option<Answer> {
     }
     let kept = read_at_most(file, MAX_ANSWER).ok()?;
     serde_json::from_slice(unsealed(&name, &kept)?).ok()
-}
-
-fn name_of(file: &Path) -> String {
-    file.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 impl Solver for Kept<'_> {

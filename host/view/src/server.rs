@@ -284,7 +284,7 @@ mod tests {
     const TOKEN: &str = "0123456789abcdef";
 
     fn status(method: &str, url: &str, headers: [Option<&str>; 3]) -> u16 {
-        check(8000, TOKEN, method, url, headers).map_or_else(|answer| answer.status(), |_| 200)
+        check(8000, TOKEN, method, url, headers).map_or_else(|answer| answer.status, |_| 200)
     }
 
     #[test]
