@@ -30,19 +30,7 @@ use viewfuse_weighting::OpenedChoice;
 
 const PROTOCOLS: &str = "Options of protocols";
 /// Options that change no number, or that the settings hold in another form.
-const NO_SETTINGS: [&str; 11] = [
-    "output",
-    "shard",
-    "threads",
-    "pictures",
-    "time-limit",
-    "weights",
-    "protocol",
-    "targets",
-    "json",
-    "latex",
-    "verbose",
-];
+const NO_SETTINGS: &str = "output shard threads pictures time-limit weights protocol targets json latex verbose";
 /// Missing jobs and notes that are told; of more, how many there are.
 const NAMED: usize = 8;
 
@@ -93,7 +81,7 @@ pub(super) fn run(
     };
     let plan = protocol.plan(&scenes, draws, about.least_sources)?;
     let (scene_options, sizes) = options_of(&scenes, protocol, &render_options, about.longest_side)?;
-    options.retain(|option, _| !NO_SETTINGS.contains(&option.as_str()));
+    options.retain(|option, _| !NO_SETTINGS.split(' ').any(|known| known == option));
     let files = digests(arguments, weightings)?;
     let settings = Settings {
         viewfuse: env!("CARGO_PKG_VERSION").to_owned(),
