@@ -159,7 +159,7 @@ impl AttentionModel {
     pub fn learned_cross<E>(tensors: &mut TensorSource<'_, E>) -> Result<AttentionModel, E> {
         let mut layer = |name: &str| {
             let weight = tensors(name, &[POSE_FEATURES, POSE_FEATURES])?;
-            Ok(square(&weight, &[0.0; POSE_FEATURES]))
+            Ok(assemble(&weight, &[0.0; POSE_FEATURES]))
         };
         Ok(AttentionModel::LearnedCross(LearnedCrossAttention {
             query: layer("query_layer.weight")?,
@@ -175,7 +175,7 @@ impl AttentionModel {
         const N: usize = POSE_FEATURES;
         let weight = tensors("multihead_attention.in_proj_weight", &[3 * N, N])?;
         let bias = tensors("multihead_attention.in_proj_bias", &[3 * N])?;
-        let part = |k: usize| square(&weight[k * N * N..(k + 1) * N * N], &bias[k * N..(k + 1) * N]);
+        let part = |k: usize| assemble(&weight[k * N * N..(k + 1) * N * N], &bias[k * N..(k + 1) * N]);
         Ok(AttentionModel::PoseSelf(PoseSelfAttention {
             query: part(0),
             key: part(1),
@@ -200,10 +200,6 @@ fn linear<const I: usize, const O: usize, E>(tensors: &mut TensorSource<'_, E>, 
     let weight = tensors(&format!("{name}.weight"), &[O, I])?;
     let bias = tensors(&format!("{name}.bias"), &[O])?;
     Ok(assemble(&weight, &bias))
-}
-
-fn square(weight: &[f32], bias: &[f32]) -> Linear<POSE_FEATURES, POSE_FEATURES> {
-    assemble(weight, bias)
 }
 
 /// Row-major `[O][I]` weights and `[O]` biases as a layer.
