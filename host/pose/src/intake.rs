@@ -334,12 +334,6 @@ enum Refused {
     Work(IntakeError),
 }
 
-impl From<IntakeError> for Refused {
-    fn from(error: IntakeError) -> Refused {
-        Refused::Work(error)
-    }
-}
-
 /// Reads one, and writes its copies.
 fn photo(path: &Path, root: &Path, scratch: &Path) -> Result<Photo, Refused> {
     let unreadable = |error: SceneError| Refused::Photograph(error.fault.to_string());
@@ -350,7 +344,7 @@ fn photo(path: &Path, root: &Path, scratch: &Path) -> Result<Photo, Refused> {
     let mut upright = path.to_path_buf();
     if header.orientation() != Orientation::NoTransforms {
         upright = scratch.join(format!("{name}.png"));
-        put(&upright, &picture)?;
+        put(&upright, &picture).map_err(Refused::Work)?;
     }
     let size = [picture.width(), picture.height()];
     let grey = picture.to_luma8();
@@ -361,9 +355,9 @@ fn photo(path: &Path, root: &Path, scratch: &Path) -> Result<Photo, Refused> {
     let [width, height] = scaled(size, COPY_SIDE, 1.0);
     let copy = imageops::thumbnail(&picture.into_rgb8(), width, height);
     let folder = scratch.join("grey");
-    fs::create_dir_all(&folder).map_err(|cause| IntakeError::Io(folder.clone(), cause))?;
+    fs::create_dir_all(&folder).map_err(|cause| Refused::Work(IntakeError::Io(folder.clone(), cause)))?;
     let working = folder.join(format!("{name}.png"));
-    put(&working, &DynamicImage::ImageLuma8(resized))?;
+    put(&working, &DynamicImage::ImageLuma8(resized)).map_err(Refused::Work)?;
     Ok(Photo { name, path: path.to_path_buf(), file, upright, size, exif, working, working_size, copy, sharpness })
 }
 
