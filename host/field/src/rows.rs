@@ -23,13 +23,9 @@ pub fn row_of(checkpoint: &Checkpoint) -> Result<&'static Row, CheckpointError> 
     let holds = |prefix: &str| checkpoint.shapes().keys().any(|name| name.starts_with(prefix));
     ROWS.into_iter().find(|row| row.prefix().is_some_and(holds)).ok_or_else(|| {
         let prefixes = ROWS.iter().filter_map(|row| Some(format!("'{}' ({})", row.prefix()?, row.title)));
-        CheckpointError::Tensors {
-            path: checkpoint.path().to_path_buf(),
-            detail: format!(
-                "holds no supported network: no tensor's name begins with {}",
-                prefixes.collect::<Vec<_>>().join(" or ")
-            ),
-        }
+        let prefixes = prefixes.collect::<Vec<_>>().join(" or ");
+        let detail = format!("holds no supported network: no tensor's name begins with {prefixes}");
+        CheckpointError::Tensors(checkpoint.path().to_path_buf(), detail)
     })
 }
 

@@ -65,10 +65,7 @@ impl WholeFile {
     /// [`WriteError::Io`].
     pub fn create(path: &Path) -> Result<WholeFile, WriteError> {
         let failed = |cause| WriteError::Io { path: path.to_path_buf(), cause };
-        let folder = match path.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        };
+        let folder = folder_of(path);
         std::fs::create_dir_all(folder).map_err(failed)?;
         let make = |builder: &mut tempfile::Builder<'_, '_>| {
             // The default is readable by the owner only, which is wrong for a result.
@@ -110,6 +107,11 @@ impl WholeFile {
         });
         finished.map(drop).map_err(|cause| WriteError::Io { path, cause })
     }
+}
+
+/// The folder that a file or folder lies in.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|parent| *parent != "").unwrap_or(Path::new("."))
 }
 
 /// Writes `bytes` to a temporary file beside `path` and renames it into place. Missing folders are created.

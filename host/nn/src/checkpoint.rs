@@ -218,7 +218,7 @@ impl Checkpoint {
     pub fn check(&self, expected: &[TensorShape], optional: impl Fn(&str) -> bool) -> Result<(), CheckpointError> {
         match check::compare(&self.shapes, expected, optional) {
             None => Ok(()),
-            Some(detail) => Err(CheckpointError::Tensors { path: self.path.clone(), detail }),
+            Some(detail) => Err(CheckpointError::Tensors(self.path.clone(), detail)),
         }
     }
 
@@ -237,9 +237,10 @@ impl Checkpoint {
         }
         let count = self.shapes.get(name).and_then(|shape| element_count(shape)).unwrap_or(0);
         let mut values = Vec::new();
-        values.try_reserve_exact(count as usize).map_err(|_| CheckpointError::Content {
-            path: self.path.clone(),
-            what: format!("tensor '{}' takes {} bytes, which this machine does not have", shortened(name), 4 * count),
+        values.try_reserve_exact(count as usize).map_err(|_| {
+            let name = shortened(name);
+            let what = format!("tensor '{name}' takes {} bytes, which this machine does not have", 4 * count);
+            CheckpointError::Content(self.path.clone(), what)
         })?;
         self.read(name, |element, bytes| {
             let first = values.len();
@@ -271,11 +272,7 @@ impl Checkpoint {
             Content::File(file, places) => {
                 let place = places.get(name).ok_or_else(|| self.no_tensor(name))?;
                 let file = file.lock().unwrap_or_else(PoisonError::into_inner);
-                let read = place.read(&file, |bytes| take(place.element, bytes).map_err(ReadError::Checkpoint));
-                read.map_err(|error| match error {
-                    ReadError::Checkpoint(error) => error,
-                    ReadError::Problem(problem) => problem.of(&self.path),
-                })
+                place.read(&file, &self.path, |bytes| take(place.element, bytes))
             }
         }
     }
@@ -286,29 +283,17 @@ impl Checkpoint {
         let values = compute(&TensorShape { name: name.to_owned(), shape: shape.clone() });
         if element_count(shape) != Some(values.len() as u64) {
             let what = format!("tensor '{}' has {} values, not those of its shape", shortened(name), values.len());
-            return Err(CheckpointError::Content { path: self.path.clone(), what });
+            return Err(CheckpointError::Content(self.path.clone(), what));
         }
         Ok(values)
     }
 
     fn no_tensor(&self, name: &str) -> CheckpointError {
-        CheckpointError::NoTensor { path: self.path.clone(), tensor: shortened(name) }
+        CheckpointError::NoTensor(self.path.clone(), shortened(name))
     }
 
     fn not_finite(&self, name: &str, index: u64, value: f64) -> CheckpointError {
         let problem = if value.is_finite() { "which f32 cannot hold" } else { "not a finite number" };
         CheckpointError::Value { path: self.path.clone(), tensor: shortened(name), index, value, problem }
-    }
-}
-
-/// Why reading a tensor stopped: an error of the file, or of the receiver of its pieces.
-enum ReadError {
-    Problem(Problem),
-    Checkpoint(CheckpointError),
-}
-
-impl From<Problem> for ReadError {
-    fn from(problem: Problem) -> ReadError {
-        ReadError::Problem(problem)
     }
 }

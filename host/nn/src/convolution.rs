@@ -113,7 +113,7 @@ impl<D: Device> Convolution<D> {
             Residual::Channels(values, first) => (Some(values), 0, first),
         };
         let block = ConvolveBlock { residual_pitch, residual_first, ..block };
-        self.dispatch(scratch.device(), scratch.precision(), &block, image, residual, output)
+        self.dispatch(scratch.device(), scratch.precision, &block, image, residual, output)
     }
 
     /// The same for some rows alone, exact; its windows are single pixels.
@@ -207,8 +207,19 @@ impl<D: Device> DepthwiseConvolution<D> {
         options: ConvolutionOptions,
         image: &Image<D>,
     ) -> Result<Image<D>, DeviceError> {
+        self.run_leading(scratch, options, image, image.size.channels)
+    }
+
+    /// The same on the first `channels` channels of the image.
+    fn run_leading(
+        &self,
+        scratch: &mut Scratch<'_, D>,
+        options: ConvolutionOptions,
+        image: &Image<D>,
+        channels: u32,
+    ) -> Result<Image<D>, DeviceError> {
         debug_assert_eq!((options.scale, options.upsampling, options.relu), (1.0, 1, false));
-        let size = options.out_size(image.size, self.size, image.size.channels);
+        let size = options.out_size(image.size, self.size, channels);
         let mut output = scratch.image(size)?;
         let block = DepthwiseBlock {
             in_height: image.size.height,
@@ -239,25 +250,9 @@ pub fn leading_channels<D: Device>(
     image: &Image<D>,
     channels: u32,
 ) -> Result<Image<D>, DeviceError> {
-    let size = image.size.with_channels(channels);
     let weights = scratch.device().upload(&[1.0])?;
-    let mut output = scratch.image(size)?;
-    let block = DepthwiseBlock {
-        in_height: size.height,
-        in_width: size.width,
-        in_pitch: image.pitch,
-        in_first: image.first,
-        out_height: size.height,
-        out_width: size.width,
-        channels,
-        size: 1,
-        stride: 1,
-        dilation: 1,
-        padding: 0,
-        is_shared: 1,
-    };
-    scratch.device().convolve_depthwise(&block, &image.values, &weights, &mut output.values)?;
-    Ok(output)
+    let single = DepthwiseConvolution { weights, size: 1, is_shared: true };
+    single.run_leading(scratch, ConvolutionOptions::PLAIN, image, channels)
 }
 
 /// A transposed convolution with bias whose stride is its window's size, on a device.

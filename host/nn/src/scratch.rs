@@ -8,7 +8,8 @@ use viewfuse_device::{Device, DeviceError, Precision};
 /// Dropping it frees them.
 pub struct Scratch<'a, D: Device> {
     device: &'a D,
-    precision: Precision,
+    /// The precision of convolutions that run with it from now on, on devices that have another than the exact one.
+    pub precision: Precision,
     free: Vec<(usize, D::Buffer<f32>)>,
     /// Statistics of parts of an image, and for how many there is room.
     partials: Option<(usize, D::Buffer<[f32; 2]>)>,
@@ -18,16 +19,6 @@ impl<'a, D: Device> Scratch<'a, D> {
     /// Without any buffers. Convolutions are exact.
     pub fn new(device: &'a D) -> Scratch<'a, D> {
         Scratch { device, precision: Precision::Exact, free: Vec::new(), partials: None }
-    }
-
-    /// Convolutions that run with it have this precision from now on, on devices that have another than the exact one.
-    pub fn set_precision(&mut self, precision: Precision) {
-        self.precision = precision;
-    }
-
-    /// The precision of convolutions that run with it.
-    pub fn precision(&self) -> Precision {
-        self.precision
     }
 
     /// The device.

@@ -19,18 +19,12 @@ const SAME_POSE: f64 = 1.0e-9;
 /// Why pictures cannot be written to a folder.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
-    /// The folder belongs to something else.
-    #[error("{}: is not the record of a render and would be replaced; give another folder", path.display())]
-    OtherRecord {
-        /// The file in the way.
-        path: PathBuf,
-    },
+    /// The file in the way is that of something else.
+    #[error("{0}: is not the record of a render and would be replaced; give another folder")]
+    OtherRecord(PathBuf),
     /// A file that no run wrote is in the way.
-    #[error("{}: no earlier run wrote this file, which would be replaced; give another folder, or move it", path.display())]
-    NotWritten {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error("{0}: no earlier run wrote this file, which would be replaced; give another folder, or move it")]
+    NotWritten(PathBuf),
     /// An earlier run wrote other pictures there.
     #[error(
         "{}: has {count} files of an earlier run, {example} for one, which are not of these targets, and cannot be added \
@@ -46,16 +40,9 @@ pub enum OutputError {
         /// Why the new pictures cannot stand beside them.
         reason: &'static str,
     },
-    /// Two targets have files of one name.
-    #[error("the targets '{first}' and '{second}' would both be written to {file}; render them to different folders")]
-    SameFile {
-        /// A target.
-        first: String,
-        /// Another one.
-        second: String,
-        /// The file's name.
-        file: String,
-    },
+    /// Two targets have files of one name, which comes last.
+    #[error("the targets '{0}' and '{1}' would both be written to {2}; render them to different folders")]
+    SameFile(String, String, String),
 }
 
 impl Hinted for OutputError {
@@ -99,13 +86,13 @@ pub fn check_folder(folder: &Path, planned: &Planned<'_>) -> Result<Vec<FrameRec
         for suffix in SUFFIXES {
             let file = format!("{name}{suffix}.png");
             if let Some(first) = owners.insert(file.clone(), name) {
-                return Err(OutputError::SameFile { first: first.to_owned(), second: name.clone(), file });
+                return Err(OutputError::SameFile(first.to_owned(), name.clone(), file));
             }
         }
     }
     let path = folder.join(RECORD);
     if path.exists() && recorded_targets(folder).is_none() {
-        return Err(OutputError::OtherRecord { path });
+        return Err(OutputError::OtherRecord(path));
     }
     let written: BTreeSet<String> = targets.iter().flat_map(|target| files_of(&target.name)).collect();
     let earlier = earlier_files(folder);
@@ -114,7 +101,7 @@ pub fn check_folder(folder: &Path, planned: &Planned<'_>) -> Result<Vec<FrameRec
         let videos = videos.iter().map(|format| format!("video.{format}"));
         let is_in_the_way = |file: &String| !earlier.contains(file) && folder.join(file).symlink_metadata().is_ok();
         if let Some(file) = written.iter().cloned().chain(videos).find(is_in_the_way) {
-            return Err(OutputError::NotWritten { path: folder.join(file) });
+            return Err(OutputError::NotWritten(folder.join(file)));
         }
     }
     // A video is of the whole run, and goes with its record.

@@ -19,6 +19,7 @@ use viewfuse_field::optimise::EndedOptimisation;
 use viewfuse_job::files::{WriteError, write_whole};
 use viewfuse_scene::Scene;
 use viewfuse_scene::gaussians::{Gaussian, GaussianScene};
+use viewfuse_scene::reader::has_extension;
 use viewfuse_scene::rig::Rig;
 
 use crate::ring::{RingPlace, ring};
@@ -60,16 +61,12 @@ pub struct GaussianPage<'a> {
 /// The formats that Gaussians are written in, by extension.
 const FORMATS: [&str; 4] = ["ply", "splat", "spz", "html"];
 
-fn is_of(path: &Path, format: &str) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(format))
-}
-
 /// Whether a file of this name can be written.
 ///
 /// # Errors
 /// For a format that is none.
 pub fn check_name(path: &Path) -> Result<(), &'static str> {
-    match FORMATS.iter().any(|format| is_of(path, format)) {
+    match has_extension(path, &FORMATS) {
         true => Ok(()),
         false => Err("scenes of Gaussians are written as .ply or .html, and smaller as .splat or .spz"),
     }
@@ -77,12 +74,12 @@ pub fn check_name(path: &Path) -> Result<(), &'static str> {
 
 /// Whether a file of this name is a page.
 pub fn is_page(path: &Path) -> bool {
-    is_of(path, "html")
+    has_extension(path, &["html"])
 }
 
 /// Whether a file of this name holds colours that depend on the direction: pages and `.splat` have one for all.
 pub fn holds_harmonics(path: &Path) -> bool {
-    !is_page(path) && !is_of(path, "splat")
+    !is_page(path) && !has_extension(path, &["splat"])
 }
 
 /// Writes what an optimisation of a scene from these sources ended with: as a page if the file is called so, otherwise

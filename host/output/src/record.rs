@@ -8,7 +8,6 @@ use viewfuse_field::budget::Kept;
 use viewfuse_field::render::{Frame, RenderOptions, Seen, StageCosts};
 use viewfuse_field::{Denoising, LeftOut, Mixture, Setting};
 use viewfuse_scene::coverage::Coverage;
-use viewfuse_scene::few_shot::FewShot;
 use viewfuse_scene::{Scene, SceneFrame};
 
 /// Name of the file.
@@ -302,9 +301,9 @@ impl FrameRecord {
     }
 }
 
-/// Names of a job's sources.
-pub fn source_names(scene: &Scene, job: &FewShot) -> Vec<String> {
-    job.sources.iter().map(|&view| scene.views[view].name.clone()).collect()
+/// Names of views of a scene.
+pub fn view_names(scene: &Scene, views: &[usize]) -> Vec<String> {
+    views.iter().map(|&view| scene.views[view].name.clone()).collect()
 }
 
 /// The times of the stages that frames share, with those that the caller measured.

@@ -9,7 +9,7 @@ use crate::journal::{FrameJournal, files_of};
 use crate::png::{without_background, write_png};
 use crate::rate::FrameRate;
 use crate::record::{
-    ChosenRecord, DepthUnits, FrameRecord, RunRecord, background_record, kernel_records, source_names, times_record,
+    ChosenRecord, DepthUnits, FrameRecord, RunRecord, background_record, kernel_records, times_record, view_names,
 };
 pub use crate::record::{RECORD, SUFFIXES};
 use crate::sheet::{Sheet, SheetSource, depth_picture};
@@ -54,7 +54,8 @@ pub struct RunWriter {
     // Dropped before the lock: what it began to write is written then.
     frames: Frames,
     folder: PathBuf,
-    outputs: Outputs,
+    /// What is written for the frames that follow.
+    pub outputs: Outputs,
     /// Whether a frame was given to be written.
     has_begun: bool,
     /// From the beginning if the folder is there, otherwise from the first file.
@@ -73,8 +74,9 @@ pub struct RunWriter {
     /// The photographs, once a contact sheet has shown them: those of all frames are the same.
     source_pictures: Vec<Arc<RgbImage>>,
     coverage: Coverage,
-    /// Of earlier runs, which stay.
-    earlier: Vec<FrameRecord>,
+    /// Frames of the record of an earlier run of the same settings, which is added to: they and their files stay
+    /// ([`crate::folder::check_folder`]).
+    pub earlier: Vec<FrameRecord>,
     size: [u32; 2],
     background: [f32; 3],
     /// About the scene and the whole run, before those about the photographs.
@@ -120,7 +122,7 @@ impl RunWriter {
             scene_name: scene.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
             space: scene.frame,
             weighting: weighting.to_string(),
-            source_names: source_names(scene, job),
+            source_names: view_names(scene, &job.sources),
             source_pictures: Vec::new(),
             coverage: Coverage::of(&job.source_cameras(scene)),
             earlier: Vec::new(),
@@ -133,20 +135,9 @@ impl RunWriter {
         }
     }
 
-    /// Adds to an earlier run of the same settings: these frames of its record, and their files, stay
-    /// ([`crate::folder::check_folder`]).
-    pub fn add_to(&mut self, earlier: Vec<FrameRecord>) {
-        self.earlier = earlier;
-    }
-
     /// Adds a warning to the record.
     pub fn warn(&mut self, warning: String) {
         self.given.push(warning);
-    }
-
-    /// Writes this for the frames that follow, instead of the defaults.
-    pub fn set_outputs(&mut self, outputs: Outputs) {
-        self.outputs = outputs;
     }
 
     /// Lets no other process write to the folder, as soon as it is there.

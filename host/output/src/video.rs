@@ -83,30 +83,21 @@ pub enum VideoError {
     /// A frame could not be read.
     #[error(transparent)]
     Frame(#[from] SceneError),
-    /// The frames differ in size.
-    #[error("{}: has {}x{} pixels, the first frame {}x{}; the frames of a video have one size", path.display(), size[0], size[1], first[0], first[1])]
-    Sizes {
-        /// The frame's file.
-        path: PathBuf,
-        /// Its width and height.
-        size: [u32; 2],
-        /// Those of the first frame.
-        first: [u32; 2],
-    },
+    /// The frames differ in size: a frame's file, its width and height, and those of the first frame.
+    #[error(
+        "{}: has {}x{} pixels, the first frame {}x{}; the frames of a video have one size",
+        .0.display(), .1[0], .1[1], .2[0], .2[1]
+    )]
+    Sizes(PathBuf, [u32; 2], [u32; 2]),
     /// There is no frame.
     #[error("a video needs at least one frame")]
     NoFrames,
     /// There is no `ffmpeg` on this machine.
     #[error("there is no {FFMPEG} on the path, which mp4 needs")]
     NoProgram,
-    /// `ffmpeg` failed.
-    #[error("{}: {FFMPEG} could not write it: {said}", path.display())]
-    Program {
-        /// The file to write.
-        path: PathBuf,
-        /// What it said.
-        said: String,
-    },
+    /// `ffmpeg` failed: the file to write, and what it said.
+    #[error("{0}: {FFMPEG} could not write it: {1}")]
+    Program(PathBuf, String),
     /// The person stopped the work.
     #[error(transparent)]
     Interrupted(#[from] Interrupted),
@@ -190,7 +181,7 @@ impl Frames<'_> {
                     let frame = read_picture(&path)?;
                     let size = [frame.width(), frame.height()];
                     if size != first {
-                        return Err(VideoError::Sizes { path, size, first });
+                        return Err(VideoError::Sizes(path, size, first));
                     }
                     Ok(encode(frame))
                 });
@@ -284,7 +275,7 @@ fn compress(path: &Path, frames: &Frames<'_>, rate: FrameRate) -> Result<(), Vid
         (sent, Ok(status)) if status.success() => sent,
         (_, Ok(status)) => {
             let said = if said.trim().is_empty() { status.to_string() } else { said.trim().replace('\n', "; ") };
-            Err(VideoError::Program { path: path.to_path_buf(), said })
+            Err(VideoError::Program(path.to_path_buf(), said))
         }
     };
     outcome.and_then(|()| Ok(draft.finish()?))

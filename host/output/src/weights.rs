@@ -12,7 +12,7 @@ use viewfuse_scene::unit::RigUnit;
 use viewfuse_weighting::Weighting;
 use viewfuse_weighting::sources::SourcePoses;
 
-use crate::record::source_names;
+use crate::record::view_names;
 
 /// Weights `[scheme][target][source]`; those of a scheme for a target sum to 1.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,7 +66,7 @@ impl WeightTable {
             schemes: weightings.iter().map(Weighting::to_string).collect(),
             targets: job.targets.iter().map(|target| target.name.clone()).collect(),
             poses: job.targets.iter().map(|target| scene.frame.file_from_camera(&target.camera.pose)).collect(),
-            sources: source_names(scene, job),
+            sources: view_names(scene, &job.sources),
             values,
         })
     }

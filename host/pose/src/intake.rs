@@ -324,7 +324,7 @@ fn place_in(root: &Path, path: &Path) -> String {
     inside.map(|part| part.as_os_str().to_string_lossy()).collect::<Vec<_>>().join("/")
 }
 
-fn file_name(path: &Path) -> String {
+pub(crate) fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
@@ -332,12 +332,6 @@ fn file_name(path: &Path) -> String {
 enum Refused {
     Photograph(String),
     Work(IntakeError),
-}
-
-impl From<IntakeError> for Refused {
-    fn from(error: IntakeError) -> Refused {
-        Refused::Work(error)
-    }
 }
 
 /// Reads one, and writes its copies.
@@ -350,7 +344,7 @@ fn photo(path: &Path, root: &Path, scratch: &Path) -> Result<Photo, Refused> {
     let mut upright = path.to_path_buf();
     if header.orientation() != Orientation::NoTransforms {
         upright = scratch.join(format!("{name}.png"));
-        put(&upright, &picture)?;
+        put(&upright, &picture).map_err(Refused::Work)?;
     }
     let size = [picture.width(), picture.height()];
     let grey = picture.to_luma8();
@@ -361,9 +355,9 @@ fn photo(path: &Path, root: &Path, scratch: &Path) -> Result<Photo, Refused> {
     let [width, height] = scaled(size, COPY_SIDE, 1.0);
     let copy = imageops::thumbnail(&picture.into_rgb8(), width, height);
     let folder = scratch.join("grey");
-    fs::create_dir_all(&folder).map_err(|cause| IntakeError::Io(folder.clone(), cause))?;
+    fs::create_dir_all(&folder).map_err(|cause| Refused::Work(IntakeError::Io(folder.clone(), cause)))?;
     let working = folder.join(format!("{name}.png"));
-    put(&working, &DynamicImage::ImageLuma8(resized))?;
+    put(&working, &DynamicImage::ImageLuma8(resized)).map_err(Refused::Work)?;
     Ok(Photo { name, path: path.to_path_buf(), file, upright, size, exif, working, working_size, copy, sharpness })
 }
 

@@ -4,6 +4,7 @@
 //! An answer is kept under a digest of all that it depends on: the photographs' pixels, the cameras, the features, the
 //! seed, the program that is asked, and this crate's version.
 
+use crate::intake::file_name;
 use crate::solution::{Features, MAX_ANSWER, PoseJob, Solution, Solver, SolverError};
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -113,7 +114,7 @@ impl<'a> Kept<'a> {
     /// Keeps a text. A disk that cannot be written to costs no more than that: the scene's own files will tell.
     fn keep(&self, file: &Path, text: &[u8]) {
         if Kept::check(self.folder).is_ok() && (fs::create_dir(self.folder).is_ok() || self.folder.is_dir()) {
-            let _ = write_whole(file, &sealed(&name_of(file), text));
+            let _ = write_whole(file, &sealed(&file_name(file), text));
         }
     }
 
@@ -133,7 +134,7 @@ impl<'a> Kept<'a> {
 
 /// The answer in a file of this program.
 fn answer_in(file: &Path) -> Option<Answer> {
-    let name = name_of(file);
+    let name = file_name(file);
     let digest = name.strip_suffix(SUFFIX)?;
     let is_digest = digest.len() == SEAL && digest.bytes().all(|byte| byte.is_ascii_hexdigit());
     if !is_digest || !is_ordinary(file).ok()? {
@@ -141,10 +142,6 @@ fn answer_in(file: &Path) -> Option<Answer> {
     }
     let kept = read_at_most(file, MAX_ANSWER).ok()?;
     serde_json::from_slice(unsealed(&name, &kept)?).ok()
-}
-
-fn name_of(file: &Path) -> String {
-    file.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 impl Solver for Kept<'_> {
@@ -235,12 +232,24 @@ mod tests {
         }
     }
 
+    fn folder_with_photograph() -> (tempfile::TempDir, PathBuf) {
+        let scratch = tempfile::tempdir().expect("a folder");
+        let photograph = scratch.path().join("a.png");
+        fs::write(&photograph, "pixels").expect("a file");
+        (scratch, photograph)
+    }
+
+    /// The focal length that is found for a photograph with seed 0, and kept in a folder.
+    fn focal(solver: &Counting, folder: &Path, photograph: &Path) -> Option<f64> {
+        let solution = Kept::new(solver, folder).solve(&job(photograph, 0), &Silent);
+        solution.ok().map(|solution| solution.cameras[0].focal)
+    }
+
     #[test]
     fn the_same_question_is_asked_once() {
-        let scratch = tempfile::tempdir().expect("a folder");
-        let [photograph, moved] = ["a.png", "b.png"].map(|name| scratch.path().join(name));
-        fs::write(&photograph, "pixels").expect("a file");
-        fs::write(&moved, "pixels").expect("a file");
+        let (scratch, photograph) = folder_with_photograph();
+        let moved = scratch.path().join("b.png");
+        fs::copy(&photograph, &moved).expect("a file");
         let folder = Kept::folder_beside(&scratch.path().join("posed")).expect("a name");
         let solver = Counting::default();
         let focal = |path: &Path, seed| {
@@ -281,9 +290,7 @@ mod tests {
     /// A folder of the right name, with answers and with what is no answer by its name, its content or its kind.
     #[test]
     fn only_answers_are_removed() {
-        let scratch = tempfile::tempdir().expect("a folder");
-        let photograph = scratch.path().join("a.png");
-        fs::write(&photograph, "pixels").expect("a file");
+        let (scratch, photograph) = folder_with_photograph();
         let folder = scratch.path().join(".posed.attempts");
         let solver = Counting::default();
         let kept = Kept::new(&solver, &folder);
@@ -302,33 +309,25 @@ mod tests {
     #[cfg(unix)]
     #[test]
     fn nothing_is_kept_or_removed_through_a_link() {
-        let scratch = tempfile::tempdir().expect("a folder");
-        let photograph = scratch.path().join("a.png");
-        fs::write(&photograph, "pixels").expect("a file");
+        let (scratch, photograph) = folder_with_photograph();
         let [folder, target] = [".posed.attempts", "elsewhere"].map(|name| scratch.path().join(name));
         fs::create_dir(&target).expect("a folder");
         let solver = Counting::default();
         assert!(Kept::new(&solver, &target).solve(&job(&photograph, 0), &Silent).is_ok());
         std::os::unix::fs::symlink(&target, &folder).expect("a link");
         assert!(Kept::check(&folder).is_err() && Kept::check(&target).is_ok());
-        let focal = || {
-            Kept::new(&solver, &folder).solve(&job(&photograph, 0), &Silent).map(|solution| solution.cameras[0].focal)
-        };
-        assert_eq!((focal().ok(), focal().ok()), (Some(2.0), Some(3.0)), "asked each time");
+        let focal = || focal(&solver, &folder, &photograph);
+        assert_eq!((focal(), focal()), (Some(2.0), Some(3.0)), "asked each time");
         Kept::remove(&folder).expect("left alone");
         assert_eq!((fs::read_dir(&target).expect("a folder").count(), folder.is_symlink()), (1, true));
     }
 
     #[test]
     fn without_a_place_nothing_is_kept() {
-        let scratch = tempfile::tempdir().expect("a folder");
-        let photograph = scratch.path().join("a.png");
-        fs::write(&photograph, "pixels").expect("a file");
+        let (scratch, photograph) = folder_with_photograph();
         let (solver, folder) = (Counting::default(), scratch.path().join("not/there/.posed.attempts"));
-        let focal = || {
-            Kept::new(&solver, &folder).solve(&job(&photograph, 0), &Silent).map(|solution| solution.cameras[0].focal)
-        };
-        assert_eq!((focal().ok(), focal().ok()), (Some(1.0), Some(2.0)));
+        let focal = || focal(&solver, &folder, &photograph);
+        assert_eq!((focal(), focal()), (Some(1.0), Some(2.0)));
         assert!(!scratch.path().join("not").exists());
         assert_eq!(Kept::folder_beside(Path::new("..")), None);
     }

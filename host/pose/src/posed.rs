@@ -48,13 +48,12 @@ impl Posed<'_> {
         let matrix = [x, y, z, [0.0, 0.0, 0.0, 1.0]];
         let (scale, place) = (self.scale(index), FilePlace::file(&photo.path));
         let lens = Lens::new(Projection::Perspective, [camera.k1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        let focal = scale.map(|scale| scale * camera.focal);
+        let principal = [0, 1].map(|axis| scale[axis] * camera.principal[axis]);
         let intrinsics = RawIntrinsics {
-            focal: scale.map(|scale| scale * camera.focal),
-            principal: [0, 1].map(|axis| scale[axis] * camera.principal[axis]),
             size: Some(photo.size),
             lens: lens.ok().filter(|lens| !lens.is_pinhole()),
-            place: place.clone(),
-            size_place: place.clone(),
+            ..RawIntrinsics::of_photograph(focal, principal, place.clone())
         };
         let pose = RawPose { matrix, form: PoseForm::OpenCvFromWorld, place };
         Ok(RawView::new(photo.name.clone(), Some(ImageFile::open(&photo.upright)?), pose, Some(intrinsics)))

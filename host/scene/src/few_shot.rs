@@ -39,16 +39,9 @@ pub enum SelectionError {
 /// Why a selection of views does not fit a scene.
 #[derive(Debug, thiserror::Error)]
 pub enum SelectionFault {
-    /// A name in a list is no view of the scene.
-    #[error("has no view '{name}'{nearest}; its {views}")]
-    NoSuchView {
-        /// The given name.
-        name: String,
-        /// The names that it may have meant, in words.
-        nearest: String,
-        /// The scene's views, in words.
-        views: String,
-    },
+    /// A name in a list is no view of the scene: the names that it may have meant, and the scene's views, in words.
+    #[error("has no view '{0}'{1}; its {2}")]
+    NoSuchView(String, String, String),
     /// A number in a list is the number that one view's name ends in and another's index, or ends several names: the
     /// names of the views, and the first one's index.
     #[error("'{0}' may be the view {1}: write the name, or the index as '#{2}'")]
@@ -278,7 +271,7 @@ fn view_of(scene: &Scene, name: &str) -> Result<usize, SelectionError> {
     let (first, last) = (names().next().unwrap_or_default(), names().next_back().unwrap_or_default());
     let count = scene.views.len();
     let views = format!("{count} views are {first} .. {last}, or by index #0 .. #{}", count.saturating_sub(1));
-    Err(SelectionFault::NoSuchView { name: name.to_owned(), nearest, views }.in_scene(scene))
+    Err(SelectionFault::NoSuchView(name.to_owned(), nearest, views).in_scene(scene))
 }
 
 /// The views that a list names, in the order of the scene, each once.

@@ -109,7 +109,7 @@ pub fn inspect(
     let [near, far] = depth_range(&cameras, &rig, object.as_ref());
     let distance = |camera: &Camera| camera.pose.centre_world().distance(rig.focus);
     let pinhole = cameras[0].pinhole;
-    let photograph_count = scene.views.iter().filter(|view| view.image.is_some()).count();
+    let photograph_count = photographed.len();
     Ok(Inspection {
         path: scene.path.display().to_string(),
         layout: scene.layout,

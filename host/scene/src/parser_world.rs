@@ -19,7 +19,8 @@ pub(crate) const PARSER: &str = "dataparser_transforms.json";
 pub(crate) struct ParserWorld {
     rotation: DMat3,
     offset: DVec3,
-    scale: f64,
+    /// A length of the scene's files in the parser's world.
+    pub(crate) scale: f64,
 }
 
 impl ParserWorld {
@@ -59,11 +60,6 @@ impl ParserWorld {
     /// The rotation from the parser's world to the scene's files.
     pub(crate) fn file_from_parser(&self) -> DMat3 {
         self.rotation.inverse()
-    }
-
-    /// A length of the scene's files in the parser's world.
-    pub(crate) fn scale(&self) -> f64 {
-        self.scale
     }
 }
 

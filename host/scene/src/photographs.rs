@@ -277,7 +277,7 @@ impl<'a> Album<'a> {
             borders = in_order(views.par_iter().map(look))?;
         }
         let backdrop = matte::Backdrop::of(borders.iter().flatten(), choice);
-        let (background, mut warnings) = (backdrop.colour(), Vec::new());
+        let (background, mut warnings) = (backdrop.colour, Vec::new());
         if ignores && self.scene.mask_choice == MaskChoice::Auto {
             warnings.push(format!(
                 "{transparent_count} photographs have an alpha channel that is opaque along the border: it is taken for pixels \

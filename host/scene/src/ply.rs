@@ -85,7 +85,8 @@ impl PlyElement {
 #[derive(Debug)]
 pub(crate) struct PlyHeader<'a> {
     path: &'a Path,
-    elements: Vec<PlyElement>,
+    /// In the order of the file.
+    pub(crate) elements: Vec<PlyElement>,
     /// What `comment` and `obj_info` say, each with its line.
     pub(crate) comments: Vec<(usize, String)>,
     length: usize,
@@ -154,11 +155,6 @@ impl<'a> PlyHeader<'a> {
             rest = behind;
         }
         Err(fault(PlyFault::NoSuchElement(name)))
-    }
-
-    /// The elements in the order of the file.
-    pub(crate) fn elements(&self) -> &[PlyElement] {
-        &self.elements
     }
 }
 

@@ -169,8 +169,7 @@ pub fn write_with(
     let unfit = |reason| WriteSceneError::Unfit(scene.path.clone(), layout, reason);
     scene.views.iter().try_for_each(|view| check_name(layout, &view.name)).map_err(unfit)?;
     match layout {
-        Layout::Transforms => all_photographed(scene),
-        Layout::Colmap | Layout::ColmapBinary | Layout::Middlebury => all_photographed(scene),
+        Layout::Transforms | Layout::Colmap | Layout::ColmapBinary | Layout::Middlebury => all_photographed(scene),
         Layout::Neus => all_photographed(scene).and_then(|()| neus::fits(scene)),
         Layout::Srn => srn::fits(scene),
         Layout::Llff => all_photographed(scene).and_then(|()| llff::fits(scene)),

@@ -4,10 +4,9 @@ use crate::Viewed;
 use viewfuse_field::auto::Chosen;
 
 /// What is known of the choice.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) enum Choice {
     /// The weighting was given.
-    #[default]
     None,
     /// It is still to be made.
     Due,

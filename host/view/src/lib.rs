@@ -104,7 +104,8 @@ pub struct Viewer<'a> {
     pinhole: Pinhole,
     /// Width and height of full pictures.
     size: [u32; 2],
-    device_name: String,
+    /// The device that renders.
+    pub device_name: String,
     /// The unit of weightings.
     unit: RigUnit,
     /// In that unit.
@@ -141,11 +142,6 @@ impl<'a> Viewer<'a> {
     /// The address of the page, with its token. Who knows it can look at the scene.
     pub fn address(&self) -> String {
         self.server.address()
-    }
-
-    /// The device that renders.
-    pub fn device_name(&self) -> &str {
-        &self.device_name
     }
 
     /// Renders on this thread and answers on others, one of each connection, until the progress says that it is

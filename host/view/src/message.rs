@@ -92,7 +92,7 @@ mod tests {
     use super::{MAX_HEAD, Message};
 
     fn read(text: &str) -> Result<Option<(Message, usize)>, u16> {
-        Message::read(text.as_bytes()).map_err(|answer| answer.status())
+        Message::read(text.as_bytes()).map_err(|answer| answer.status)
     }
 
     #[test]

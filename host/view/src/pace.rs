@@ -20,7 +20,7 @@ pub(crate) struct Pace {
     /// Time of a picture that is aimed at.
     aim: Duration,
     /// Longest side of the largest pictures.
-    largest: u32,
+    pub(crate) largest: u32,
     /// Index into [`SIXTEENTHS`].
     step: usize,
     /// Times of the last pictures of that size.
@@ -39,11 +39,6 @@ impl Pace {
     /// the picture.
     pub(crate) fn is_live(&self) -> bool {
         self.aim == TIME_OF_A_LIVE_PICTURE
-    }
-
-    /// Longest side of the largest pictures.
-    pub(crate) fn largest(&self) -> u32 {
-        self.largest
     }
 
     /// Longest side for the next picture, of at most `most` pixels; at least 1.

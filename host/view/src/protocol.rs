@@ -18,7 +18,7 @@ pub struct FirstRequest {
 /// # Errors
 /// The status code of the answer to bytes that are no request, or too long a one: the connection ends with it.
 pub fn first_request(bytes: &[u8]) -> Result<Option<FirstRequest>, u16> {
-    let read = Message::read(bytes).map_err(|answer| answer.status())?;
+    let read = Message::read(bytes).map_err(|answer| answer.status)?;
     Ok(read.map(|(message, length)| {
         let asks = Request::read(&message.body, &Weighting::default_scheme()).is_ok();
         FirstRequest { length, asks }

@@ -5,7 +5,7 @@ use crate::Viewed;
 use serde::Serialize;
 use viewfuse_field::auto::Chosen;
 use viewfuse_field::render::Frame;
-use viewfuse_output::record::{BackgroundRecord, ChosenRecord, DepthUnits, FrameRecord, background_record};
+use viewfuse_output::record::{BackgroundRecord, ChosenRecord, DepthUnits, FrameRecord, background_record, view_names};
 use viewfuse_scene::coverage::Coverage;
 
 /// What the page writes as `run.json`.
@@ -38,7 +38,7 @@ impl PictureRecord {
         background: [f32; 3],
     ) -> PictureRecord {
         let Viewed { scene, sources, field, options, .. } = *viewed;
-        let sources: Vec<String> = sources.iter().map(|&view| scene.views[view].name.clone()).collect();
+        let sources = view_names(scene, sources);
         PictureRecord {
             viewfuse: env!("CARGO_PKG_VERSION"),
             scene: scene.path.display().to_string(),

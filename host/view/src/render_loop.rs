@@ -444,9 +444,9 @@ mod tests {
         let size = RenderError::Size { width: 0, height: 0, error: PinholeError::Size };
         for error in [unsuitable, size, RenderError::Sources(SourcesError::Empty)] {
             let answer = refusal(&error);
-            assert_eq!(answer.status(), 422, "{error}");
+            assert_eq!(answer.status, 422, "{error}");
         }
         let device = RenderError::Field(FieldError::Device(DeviceError::Other("lost".into())));
-        assert_eq!(refusal(&device).status(), 503);
+        assert_eq!(refusal(&device).status, 503);
     }
 }

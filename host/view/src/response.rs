@@ -21,17 +21,12 @@ const NO_CONTENT: u16 = 204;
 /// An answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Answer {
-    status: u16,
+    pub(crate) status: u16,
     media_type: &'static str,
     body: Vec<u8>,
 }
 
 impl Answer {
-    /// Its status code.
-    pub(crate) fn status(&self) -> u16 {
-        self.status
-    }
-
     pub(crate) fn of(media_type: &'static str, body: impl Into<Vec<u8>>) -> Answer {
         Answer { status: 200, media_type, body: body.into() }
     }

@@ -48,14 +48,9 @@ pub(crate) struct Server {
 /// Why the server cannot listen.
 #[derive(Debug, thiserror::Error)]
 pub enum ListenError {
-    /// The port is taken, or may not be used.
-    #[error("cannot listen on 127.0.0.1, port {port}: {cause}")]
-    Port {
-        /// The port; 0 for any.
-        port: u16,
-        /// The system's error.
-        cause: std::io::Error,
-    },
+    /// The port (0 for any) is taken, or may not be used.
+    #[error("cannot listen on 127.0.0.1, port {0}: {1}")]
+    Port(u16, std::io::Error),
     /// The system gives no random numbers.
     #[error("the system gives no random numbers: {0}")]
     Random(getrandom::Error),
@@ -87,7 +82,7 @@ enum Route<'a> {
 impl Server {
     /// Listens on a port of the loopback interface; 0 for any.
     pub(crate) fn listen(port: u16) -> Result<Server, ListenError> {
-        let failed = |cause| ListenError::Port { port, cause };
+        let failed = |cause| ListenError::Port(port, cause);
         let listener = TcpListener::bind(SocketAddr::from((Ipv4Addr::LOCALHOST, port))).map_err(failed)?;
         let port = listener.local_addr().map_err(failed)?.port();
         let mut token = [0; TOKEN_BYTES];
@@ -284,7 +279,7 @@ mod tests {
     const TOKEN: &str = "0123456789abcdef";
 
     fn status(method: &str, url: &str, headers: [Option<&str>; 3]) -> u16 {
-        check(8000, TOKEN, method, url, headers).map_or_else(|answer| answer.status(), |_| 200)
+        check(8000, TOKEN, method, url, headers).map_or_else(|answer| answer.status, |_| 200)
     }
 
     #[test]

@@ -119,7 +119,7 @@ impl Subject {
             field: about.name,
             device,
             size: [full.pinhole.width(), full.pinhole.height()],
-            moving_side: Pace::of(viewed.field.about().is_live).largest(),
+            moving_side: Pace::of(viewed.field.about().is_live).largest,
             lens: Intrinsics::of(full),
             start: start(&cameras, &rig).to_opencv(),
             focus: rig.focus.to_array(),

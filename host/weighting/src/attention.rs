@@ -31,36 +31,20 @@ use viewfuse_job::text::in_line;
 #[derive(Debug, thiserror::Error)]
 pub enum AttentionError {
     /// The file could not be read.
-    #[error("{}: cannot be read: {cause}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The system's error.
-        cause: std::io::Error,
-    },
+    #[error("{0}: cannot be read: {1}")]
+    Io(PathBuf, std::io::Error),
     /// The file is not in the safetensors format.
-    #[error("{}: not a safetensors file: {}", path.display(), in_line(cause))]
-    Format {
-        /// The file.
-        path: PathBuf,
-        /// The reader's error.
-        cause: safetensors::SafeTensorError,
-    },
+    #[error("{0}: not a safetensors file: {cause}", cause = in_line(.1))]
+    Format(PathBuf, safetensors::SafeTensorError),
     /// No known variant has these tensors.
-    #[error("{}: holds no attention weighting: none of the tensors paper.0.weight, paper_flat.0.weight, \
-             query_layer.weight, multihead_attention.in_proj_weight is there", path.display())]
-    UnknownVariant {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error(
+        "{0}: holds no attention weighting: none of the tensors paper.0.weight, paper_flat.0.weight, \
+             query_layer.weight, multihead_attention.in_proj_weight is there"
+    )]
+    UnknownVariant(PathBuf),
     /// A tensor of the variant is missing.
-    #[error("{}: tensor '{tensor}' is missing", path.display())]
-    Missing {
-        /// The file.
-        path: PathBuf,
-        /// The tensor.
-        tensor: String,
-    },
+    #[error("{0}: tensor '{1}' is missing")]
+    Missing(PathBuf, String),
     /// A tensor has another type or shape than the variant needs.
     #[error("{}: tensor '{tensor}' must be F32 {expected:?}, but is {dtype:?} {shape:?}", path.display())]
     Shape {
@@ -75,27 +59,16 @@ pub enum AttentionError {
         /// The file's shape.
         shape: Vec<usize>,
     },
-    /// Its finite parameters give logits that are not.
-    #[error("{}: the parameters are too large: logits reach {bound:.1e}, beyond what 32-bit numbers hold, and all weights would \
-             be equal; the largest parameter is in tensor '{tensor}'", path.display())]
-    Overflow {
-        /// The file.
-        path: PathBuf,
-        /// The tensor with the largest parameter.
-        tensor: String,
-        /// A bound on the logits of all poses.
-        bound: f64,
-    },
-    /// A tensor holds NaN or infinity.
-    #[error("{}: tensor '{tensor}' is not finite at flat index {index}", path.display())]
-    NotFinite {
-        /// The file.
-        path: PathBuf,
-        /// The tensor.
-        tensor: String,
-        /// The first such element, flat.
-        index: usize,
-    },
+    /// Its finite parameters give logits that are not: the tensor with the largest parameter, and a bound on the logits
+    /// of all poses.
+    #[error(
+        "{0}: the parameters are too large: logits reach {2:.1e}, beyond what 32-bit numbers hold, and all weights \
+             would be equal; the largest parameter is in tensor '{1}'"
+    )]
+    Overflow(PathBuf, String, f64),
+    /// A tensor holds NaN or infinity: the index of the first such element, flat.
+    #[error("{0}: tensor '{1}' is not finite at flat index {2}")]
+    NotFinite(PathBuf, String, usize),
 }
 
 /// Attention weighting with its parameters.
@@ -124,10 +97,9 @@ impl AttentionModel {
     /// # Errors
     /// [`AttentionError`], always with the file and the tensor.
     pub fn open(path: &Path) -> Result<AttentionModel, AttentionError> {
-        let bytes =
-            read_at_most(path, LONGEST_FILE).map_err(|cause| AttentionError::Io { path: path.to_path_buf(), cause })?;
-        let file = SafeTensors::deserialize(&bytes)
-            .map_err(|cause| AttentionError::Format { path: path.to_path_buf(), cause })?;
+        let bytes = read_at_most(path, LONGEST_FILE).map_err(|cause| AttentionError::Io(path.to_path_buf(), cause))?;
+        let file =
+            SafeTensors::deserialize(&bytes).map_err(|cause| AttentionError::Format(path.to_path_buf(), cause))?;
         let has = |name: &str| file.tensor(name).is_ok();
         let mut largest: Option<(String, f32)> = None;
         let mut read = |name: &str, shape: &[usize]| {
@@ -147,12 +119,12 @@ impl AttentionModel {
         } else if has("multihead_attention.in_proj_weight") {
             AttentionModel::pose_self(&mut read)
         } else {
-            Err(AttentionError::UnknownVariant { path: path.to_path_buf() })
+            Err(AttentionError::UnknownVariant(path.to_path_buf()))
         }?;
         let bound = range::largest_logit(&model);
         if bound >= range::MAX_LOGIT {
             let tensor = largest.map_or_else(String::new, |(name, _)| name);
-            return Err(AttentionError::Overflow { path: path.to_path_buf(), tensor, bound });
+            return Err(AttentionError::Overflow(path.to_path_buf(), tensor, bound));
         }
         Ok(model)
     }
@@ -187,7 +159,7 @@ impl AttentionModel {
     pub fn learned_cross<E>(tensors: &mut TensorSource<'_, E>) -> Result<AttentionModel, E> {
         let mut layer = |name: &str| {
             let weight = tensors(name, &[POSE_FEATURES, POSE_FEATURES])?;
-            Ok(square(&weight, &[0.0; POSE_FEATURES]))
+            Ok(assemble(&weight, &[0.0; POSE_FEATURES]))
         };
         Ok(AttentionModel::LearnedCross(LearnedCrossAttention {
             query: layer("query_layer.weight")?,
@@ -203,7 +175,7 @@ impl AttentionModel {
         const N: usize = POSE_FEATURES;
         let weight = tensors("multihead_attention.in_proj_weight", &[3 * N, N])?;
         let bias = tensors("multihead_attention.in_proj_bias", &[3 * N])?;
-        let part = |k: usize| square(&weight[k * N * N..(k + 1) * N * N], &bias[k * N..(k + 1) * N]);
+        let part = |k: usize| assemble(&weight[k * N * N..(k + 1) * N * N], &bias[k * N..(k + 1) * N]);
         Ok(AttentionModel::PoseSelf(PoseSelfAttention {
             query: part(0),
             key: part(1),
@@ -230,10 +202,6 @@ fn linear<const I: usize, const O: usize, E>(tensors: &mut TensorSource<'_, E>, 
     Ok(assemble(&weight, &bias))
 }
 
-fn square(weight: &[f32], bias: &[f32]) -> Linear<POSE_FEATURES, POSE_FEATURES> {
-    assemble(weight, bias)
-}
-
 /// Row-major `[O][I]` weights and `[O]` biases as a layer.
 fn assemble<const I: usize, const O: usize>(weight: &[f32], bias: &[f32]) -> Linear<I, O> {
     let mut layer = Linear::ZERO;
@@ -251,7 +219,7 @@ fn read_tensor(
     expected: &[usize],
 ) -> Result<Vec<f32>, AttentionError> {
     let path = || path.to_path_buf();
-    let view = file.tensor(name).map_err(|_| AttentionError::Missing { path: path(), tensor: name.to_owned() })?;
+    let view = file.tensor(name).map_err(|_| AttentionError::Missing(path(), name.to_owned()))?;
     if view.dtype() != Dtype::F32 || view.shape() != expected {
         return Err(AttentionError::Shape {
             path: path(),
@@ -263,7 +231,7 @@ fn read_tensor(
     }
     let values: Vec<f32> = view.data().chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
     match values.iter().position(|value| !value.is_finite()) {
-        Some(index) => Err(AttentionError::NotFinite { path: path(), tensor: name.to_owned(), index }),
+        Some(index) => Err(AttentionError::NotFinite(path(), name.to_owned(), index)),
         None => Ok(values),
     }
 }

@@ -69,21 +69,11 @@ pub enum WeightingError {
         or_auto: bool,
     },
     /// The scheme has no such parameter.
-    #[error("weighting scheme '{scheme}' has no parameter '{key}'; there are: {}", grammar())]
-    UnknownParameter {
-        /// The scheme.
-        scheme: String,
-        /// The given text.
-        key: String,
-    },
-    /// A parameter is given twice.
-    #[error("weighting scheme '{scheme}': {key} is given twice")]
-    Repeated {
-        /// The scheme.
-        scheme: String,
-        /// The parameter.
-        key: String,
-    },
+    #[error("weighting scheme '{0}' has no parameter '{1}'; there are: {schemes}", schemes = grammar())]
+    UnknownParameter(String, String),
+    /// In a scheme, a parameter is given twice.
+    #[error("weighting scheme '{0}': {1} is given twice")]
+    Repeated(String, String),
     /// The parameter's value is invalid.
     #[error("weighting scheme '{scheme}': {key} must be {range}, not '{value}'")]
     BadValue {
@@ -97,17 +87,11 @@ pub enum WeightingError {
         value: String,
     },
     /// A label that could not stand in a table.
-    #[error("'{label}' is not a label of a weighting: letters, digits, '-', '_', '.' and blanks")]
-    BadLabel {
-        /// The given text.
-        label: String,
-    },
+    #[error("'{0}' is not a label of a weighting: letters, digits, '-', '_', '.' and blanks")]
+    BadLabel(String),
     /// A label that would be read as another weighting.
-    #[error("'{label}' is a weighting itself, and no label of one")]
-    TakenLabel {
-        /// The given text.
-        label: String,
-    },
+    #[error("'{0}' is a weighting itself, and no label of one")]
+    TakenLabel(String),
     /// Learned attention without its parameters.
     #[error("weighting scheme '{ATTENTION}' needs a file of parameters: {ATTENTION}:FILE")]
     NoFile,
@@ -180,15 +164,15 @@ impl FromStr for WeightingSpec {
         if let Some(label) = label {
             let is_label = |byte: u8| byte.is_ascii_alphanumeric() || b"-_. ".contains(&byte);
             if label.is_empty() || !label.bytes().all(is_label) {
-                return Err(WeightingError::BadLabel { label: label.to_owned() });
+                return Err(WeightingError::BadLabel(label.to_owned()));
             }
             if label == AUTO || label.parse::<WeightingSpec>().is_ok() {
-                return Err(WeightingError::TakenLabel { label: label.to_owned() });
+                return Err(WeightingError::TakenLabel(label.to_owned()));
             }
             let rest = &text[label.len() + 1..];
             let spec: WeightingSpec = rest.parse()?;
             if spec.text != rest {
-                return Err(WeightingError::BadLabel { label: text[..text.len() - spec.text.len()].to_owned() });
+                return Err(WeightingError::BadLabel(text[..text.len() - spec.text.len()].to_owned()));
             }
             return Ok(WeightingSpec { text: label.to_owned(), ..spec });
         }
@@ -230,10 +214,7 @@ impl<'a> Pairs<'a> {
         let is_repeated =
             |(place, (key, _)): &(usize, &(&str, &str))| self.pairs[..*place].iter().any(|(earlier, _)| earlier == key);
         match self.pairs.iter().enumerate().find(is_repeated) {
-            Some((_, (key, _))) => {
-                let [scheme, key] = [self.scheme, key].map(str::to_owned);
-                Err(WeightingError::Repeated { scheme, key })
-            }
+            Some((_, (key, _))) => Err(WeightingError::Repeated(self.scheme.to_owned(), (*key).to_owned())),
             None => Ok(()),
         }
     }
@@ -275,10 +256,7 @@ impl<'a> Pairs<'a> {
     fn finish(self) -> Result<(), WeightingError> {
         match self.pairs.first() {
             None => Ok(()),
-            Some((key, _)) => {
-                let [scheme, key] = [self.scheme, key].map(str::to_owned);
-                Err(WeightingError::UnknownParameter { scheme, key })
-            }
+            Some((key, _)) => Err(WeightingError::UnknownParameter(self.scheme.to_owned(), (*key).to_owned())),
         }
     }
 }

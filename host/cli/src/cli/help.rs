@@ -7,33 +7,8 @@ use std::ffi::OsString;
 use viewfuse_field::rows::ROWS;
 
 /// Options that `-h` shows of the commands that have dozens, by their identifiers.
-const FIRST: [&str; 25] = [
-    "scene",
-    "scenes",
-    "targets",
-    "orbit",
-    "camera_path",
-    "sources",
-    "weights",
-    "fast",
-    "size",
-    "background",
-    "model",
-    "device",
-    "video",
-    "replace",
-    "output",
-    "port",
-    "no_browser",
-    "protocol",
-    "split",
-    "verbose",
-    "json",
-    "latex",
-    "shard",
-    "help",
-    "version",
-];
+const FIRST: &str = "scene scenes targets orbit camera_path sources weights fast size background model device video \
+                     replace output port no_browser protocol split verbose json latex shard help version";
 
 /// An option of all networks.
 const COMPUTE: &str = "compute";
@@ -46,7 +21,7 @@ pub(crate) fn shortened(mut commands: Command) -> Command {
     for name in LONG {
         commands = commands.mut_subcommand(name, |command| {
             command.mut_args(|argument| {
-                let is_first = FIRST.contains(&argument.get_id().as_str());
+                let is_first = FIRST.split(' ').any(|first| first == argument.get_id().as_str());
                 if is_first { argument } else { argument.hide_short_help(true) }
             })
         });

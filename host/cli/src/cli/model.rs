@@ -37,7 +37,7 @@ pub(crate) struct NetworkOptions {
 #[derive(Args)]
 pub(crate) struct ModelOptions {
     #[command(flatten)]
-    network: NetworkOptions,
+    pub(crate) network: NetworkOptions,
     /// The exact effort: leave nothing out, compute every view, layer and sample, and with GeNVS every call of the
     /// published run, heun over 25 levels, unless --sampler, --steps or --tolerance are given
     #[arg(long, conflicts_with_all = ["compute", "leave_out", "early_termination"], help_heading = EFFORTS)]
@@ -72,7 +72,7 @@ pub(crate) fn chosen_scheme(
 ) -> anyhow::Result<Option<Weighting>> {
     Ok(match given {
         Some(WeightingChoice::Given(spec)) => Some(spec.open()?),
-        None if model.label().is_some() || gaussians.is_some() => Some(Weighting::default_scheme()),
+        None if model.network.label().is_some() || gaussians.is_some() => Some(Weighting::default_scheme()),
         Some(WeightingChoice::Auto) | None => None,
     })
 }
@@ -109,16 +109,6 @@ impl NetworkOptions {
 }
 
 impl ModelOptions {
-    /// The source of the network, if there is one.
-    pub(crate) fn label(&self) -> Option<String> {
-        self.network.label()
-    }
-
-    /// The file of the network's parameters, if there is one.
-    pub(crate) fn file(&self) -> Option<&Path> {
-        self.network.file()
-    }
-
     /// Whether options say what is omitted: no bound is to choose it.
     pub(crate) fn says_omissions(&self) -> bool {
         self.exact || !self.compute.is_empty() || !self.flags.is_empty()

@@ -120,21 +120,8 @@ mod tests {
     use std::path::PathBuf;
 
     /// What the others name: files and folders that are read.
-    const READ: [&str; 13] = [
-        "photographs",
-        "scene",
-        "scenes",
-        "gaussians",
-        "camera_path",
-        "files",
-        "resume",
-        "fid",
-        "prediction",
-        "truth",
-        "input",
-        "help",
-        "version",
-    ];
+    const READ: &str = "photographs scene scenes gaussians camera_path files resume fid prediction truth input help \
+                        version";
 
     /// Whoever adds an option for a path says here whether it is read or written.
     #[test]
@@ -146,7 +133,7 @@ mod tests {
         let mut count = 0;
         for (command, argument) in arguments.filter(|(_, argument)| is_path(argument)) {
             let id = argument.get_id().as_str();
-            assert!(WRITTEN.contains(&id) != READ.contains(&id), "{}: {id}", command.get_name());
+            assert!(WRITTEN.contains(&id) != READ.split(' ').any(|read| read == id), "{}: {id}", command.get_name());
             count += 1;
         }
         assert!(count > 25, "{count} paths");

@@ -24,7 +24,7 @@ use viewfuse_field::variant::EXACT;
 use viewfuse_field::{AnyField, LeftOut};
 use viewfuse_job::files::{check_writable, write_whole};
 use viewfuse_job::progress::{Part, Progress};
-use viewfuse_output::record::source_names;
+use viewfuse_output::record::view_names;
 use viewfuse_scene::photographs::Album;
 use viewfuse_vulkan::GpuOptions;
 use viewfuse_weighting::WeightingSpec;
@@ -116,7 +116,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         weighting: weighting.to_string(),
         seed: arguments.seed,
         size: [0, 0],
-        sources: source_names(&scene, &job),
+        sources: view_names(&scene, &job.sources),
         targets: job.targets.iter().map(|target| target.name.clone()).collect(),
         round_count: arguments.repeat,
         devices: Vec::new(),

@@ -5,6 +5,7 @@ use super::outputs::keep_file_apart;
 use super::printing::{say, warn_of};
 use super::terminal::Terminal;
 use super::threads::on_threads;
+use super::weighting::scheme_help;
 use anyhow::bail;
 use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};
@@ -18,7 +19,7 @@ use viewfuse_job::files::check_writable;
 use viewfuse_job::progress::{Part, Progress};
 use viewfuse_output::ply::write_ply;
 use viewfuse_scene::photographs::Album;
-use viewfuse_weighting::{WeightingSpec, grammar};
+use viewfuse_weighting::WeightingSpec;
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  viewfuse points photos/ -o photos.ply\n  \
@@ -42,10 +43,6 @@ pub(crate) struct Arguments {
     /// The .ply file
     #[arg(short, long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(ply_file))]
     output: PathBuf,
-}
-
-fn scheme_help() -> String {
-    format!("Weighting scheme: {}", grammar())
 }
 
 /// A file of the one format that is written.

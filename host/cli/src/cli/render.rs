@@ -102,7 +102,7 @@ impl Arguments {
 
     /// The files of the field.
     fn files(&self) -> impl Iterator<Item = &Path> {
-        self.model.file().into_iter().chain(self.gaussians.as_deref())
+        self.model.network.file().into_iter().chain(self.gaussians.as_deref())
     }
 }
 

@@ -6,6 +6,7 @@ use super::parse::parse_count;
 use super::path::PathOptions;
 use super::printing::{say, warn_of};
 use super::table::table;
+use super::weighting::scheme_help;
 use super::wrong::wrong;
 use anyhow::Context;
 use clap::Args;
@@ -14,7 +15,7 @@ use std::process::ExitCode;
 use viewfuse_job::files::write_whole;
 use viewfuse_output::selected::SelectedSources;
 use viewfuse_scene::Scene;
-use viewfuse_weighting::{WeightingSpec, grammar};
+use viewfuse_weighting::WeightingSpec;
 
 /// Targets that are printed; of more, how many there are.
 const PRINTED: usize = 32;
@@ -52,10 +53,6 @@ pub(crate) struct Arguments {
     /// Write to this file instead of standard output
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-}
-
-fn scheme_help() -> String {
-    format!("Weighting scheme: {}", grammar())
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {

@@ -86,7 +86,7 @@ pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> 
         let commands = commands(&folder, given, &viewed);
         let viewer = Viewer::listen(viewed, commands, arguments.port).map_err(plain)?;
         let (count, path) = (sources.len(), folder.display());
-        say(format_args!("{path}: {count} sources, {} on {}, {reason}", about.name, viewer.device_name()))?;
+        say(format_args!("{path}: {count} sources, {} on {}, {reason}", about.name, viewer.device_name))?;
         say(format_args!("{}", viewer.address()))?;
         if !arguments.no_browser && !start_browser(&viewer.address().to_string()) {
             say("no browser could be started: open this address")?;

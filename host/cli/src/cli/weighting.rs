@@ -10,6 +10,11 @@ pub(crate) fn choice_help() -> String {
     format!("Weighting scheme: {} [default: auto; {network} with --model]", choice_grammar())
 }
 
+/// Help of an option that takes one scheme.
+pub(crate) fn scheme_help() -> String {
+    format!("Weighting scheme: {}", grammar())
+}
+
 /// Help of an option that can be given several times.
 pub(crate) fn many_help() -> String {
     let grammar = grammar();

@@ -33,7 +33,7 @@ pub fn published_dists() -> Result<Checkpoint, CheckpointError> {
 }
 
 fn own(label: &str, bytes: &[u8]) -> Result<Checkpoint, CheckpointError> {
-    let damaged = |error| CheckpointError::Content { path: PathBuf::from(label), what: format!("is damaged: {error}") };
+    let damaged = |error| CheckpointError::Content(PathBuf::from(label), format!("is damaged: {error}"));
     let file = SafeTensors::deserialize(bytes).map_err(damaged)?;
     let tensor = |(name, view): (&str, safetensors::tensor::TensorView<'_>)| {
         let values = view.data().as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();

@@ -151,7 +151,7 @@ impl<D: Device> Parts<D> {
         let finer = if precision == Precision::Half { Precision::TwoHalves } else { Precision::Exact };
         let mut estimates = Vec::new();
         for precision in [precision, finer] {
-            scratch.set_precision(precision);
+            scratch.precision = precision;
             let mut denoised = device.zeros(count)?;
             self.denoise(device, scratch, &noisy, &condition, level, &mut denoised)?;
             estimates.push(download_finite(device, &denoised, "trying a precision", "denoised picture")?);

@@ -214,11 +214,11 @@ impl<D: Device> Prepared for Views<'_, D> {
             _ => Start::Noise,
         };
         let mut precision = self.overflow.limit(self.options.precision);
-        scratch.set_precision(precision);
+        scratch.precision = precision;
         let mut sampled = self.parts.picture(device, &mut scratch, &features, &plan, start(), progress);
         if Overflow::is_repeated(&sampled, precision) {
             precision = Precision::Exact;
-            scratch.set_precision(precision);
+            scratch.precision = precision;
             sampled = self.parts.picture(device, &mut scratch, &features, &plan, start(), progress);
             if sampled.is_ok() {
                 self.overflow.tell(progress);

@@ -1,5 +1,6 @@
 //! Output folders that appear completely or not at all.
 
+use super::folder_of;
 use super::unfinished::{PREFIX, Unfinished, clean};
 use std::fs;
 use std::io;
@@ -22,10 +23,7 @@ impl WholeFolder {
     /// If `path` does not end in a name, or the system reports an error.
     pub fn create(path: &Path) -> io::Result<WholeFolder> {
         let name = path.file_name().ok_or_else(|| io::Error::other("it does not name a folder"))?;
-        let parent = match path.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        };
+        let parent = folder_of(path);
         fs::create_dir_all(parent)?;
         clean(parent);
         let make = |builder: &mut tempfile::Builder<'_, '_>| builder.tempdir_in(parent);

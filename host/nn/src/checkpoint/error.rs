@@ -10,37 +10,17 @@ use viewfuse_job::files::WriteError;
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
     /// The operating system reported an error while reading it.
-    #[error("{}: cannot be read: {cause}", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The system's error.
-        cause: std::io::Error,
-    },
-    /// It is not a checkpoint.
-    #[error("{}: not a checkpoint: {what}", path.display())]
-    NoCheckpoint {
-        /// The file.
-        path: PathBuf,
-        /// What it appears to be, and what to do.
-        what: String,
-    },
-    /// It is a checkpoint with invalid content.
-    #[error("{}: {what}", path.display())]
-    Content {
-        /// The file.
-        path: PathBuf,
-        /// The problem, with the entry or tensor.
-        what: String,
-    },
-    /// Its description of its tensors cannot be read.
-    #[error("{}: {fault}", path.display())]
-    Pickle {
-        /// The file.
-        path: PathBuf,
-        /// The problem and its position.
-        fault: PickleError,
-    },
+    #[error("{0}: cannot be read: {1}")]
+    Read(PathBuf, std::io::Error),
+    /// It is not a checkpoint: what it appears to be, and what to do.
+    #[error("{0}: not a checkpoint: {1}")]
+    NoCheckpoint(PathBuf, String),
+    /// It is a checkpoint with invalid content: the problem, with the entry or tensor.
+    #[error("{0}: {1}")]
+    Content(PathBuf, String),
+    /// Its description of its tensors cannot be read: the problem and its position.
+    #[error("{0}: {1}")]
+    Pickle(PathBuf, PickleError),
     /// It would take more memory than the supported networks.
     #[error(
         "{}: {what} would take {bytes} bytes of memory, at most {limit} are allowed; the file is damaged, malicious, or \
@@ -56,22 +36,12 @@ pub enum CheckpointError {
         /// The limit.
         limit: u64,
     },
-    /// Its tensors are not those of the architecture.
-    #[error("{}: {detail}", path.display())]
-    Tensors {
-        /// The file.
-        path: PathBuf,
-        /// Those that are missing, unexpected, or of another shape.
-        detail: String,
-    },
+    /// Its tensors are not those of the architecture: those that are missing, unexpected, or of another shape.
+    #[error("{0}: {1}")]
+    Tensors(PathBuf, String),
     /// There is no tensor of this name.
-    #[error("{}: has no tensor '{tensor}'", path.display())]
-    NoTensor {
-        /// The file.
-        path: PathBuf,
-        /// The name.
-        tensor: String,
-    },
+    #[error("{0}: has no tensor '{1}'")]
+    NoTensor(PathBuf, String),
     /// NaN, infinity, or a value out of the requested type's range.
     #[error("{}: tensor '{tensor}': element {index} is {value:?}, {problem}", path.display())]
     Value {
@@ -124,10 +94,10 @@ impl Problem {
     pub(super) fn of(self, path: &Path) -> CheckpointError {
         let path = path.to_path_buf();
         match self {
-            Problem::Read(cause) => CheckpointError::Read { path, cause },
-            Problem::Pickle(fault) => CheckpointError::Pickle { path, fault },
-            Problem::NoCheckpoint(what) => CheckpointError::NoCheckpoint { path, what },
-            Problem::Content(what) => CheckpointError::Content { path, what },
+            Problem::Read(cause) => CheckpointError::Read(path, cause),
+            Problem::Pickle(fault) => CheckpointError::Pickle(path, fault),
+            Problem::NoCheckpoint(what) => CheckpointError::NoCheckpoint(path, what),
+            Problem::Content(what) => CheckpointError::Content(path, what),
             Problem::TooLarge { what, bytes, limit } => CheckpointError::TooLarge { path, what, bytes, limit },
         }
     }

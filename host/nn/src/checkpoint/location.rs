@@ -1,11 +1,12 @@
 //! The position of a tensor's elements in a file, and reading them.
 
 use super::element::Element;
-use super::error::Problem;
+use super::error::{CheckpointError, Problem};
 use super::state_dict::{Claim, Storage};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
+use std::path::Path;
 
 /// The most memory of one tensor as `f32`, in bytes.
 pub const MAX_TENSOR_BYTES: u64 = 4 << 30;
@@ -117,13 +118,15 @@ impl TensorLocation {
         window + CHUNK_BYTES as u64
     }
 
-    /// Calls `take` with its elements as bytes, row-major, whole elements in each piece.
-    pub(super) fn read<E: From<Problem>>(
+    /// Calls `take` with its elements as bytes, row-major, whole elements in each piece. `path` is the file's, for
+    /// errors.
+    pub(super) fn read(
         &self,
         mut file: &File,
-        mut take: impl FnMut(&[u8]) -> Result<(), E>,
-    ) -> Result<(), E> {
-        let failed = |cause: std::io::Error| E::from(Problem::from(cause));
+        path: &Path,
+        mut take: impl FnMut(&[u8]) -> Result<(), CheckpointError>,
+    ) -> Result<(), CheckpointError> {
+        let failed = |cause: std::io::Error| Problem::from(cause).of(path);
         let size = self.element.size();
         file.seek(SeekFrom::Start(self.start)).map_err(failed)?;
         let Some(strides) = &self.strides else {

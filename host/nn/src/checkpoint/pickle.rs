@@ -63,14 +63,9 @@ pub enum Fault {
     /// A text is not UTF-8.
     #[error("a text is not UTF-8; the file is damaged")]
     Text,
-    /// A limit is exceeded.
-    #[error("more than {limit} {what}, which no checkpoint needs; the file is damaged or malicious")]
-    TooMany {
-        /// The limited quantity.
-        what: &'static str,
-        /// The limit.
-        limit: u64,
-    },
+    /// The limit of a quantity is exceeded.
+    #[error("more than {1} {0}, which no checkpoint needs; the file is damaged or malicious")]
+    TooMany(&'static str, u64),
 }
 
 impl From<io::Error> for Fault {
@@ -172,7 +167,7 @@ impl Pickle {
                 return Ok(Pickle { values: machine.values, texts: machine.texts, wide: machine.wide, root });
             }
         }
-        let fault = Fault::TooMany { what: "opcodes", limit: MAX_STEPS };
+        let fault = Fault::TooMany("opcodes", MAX_STEPS);
         Err(PickleError { at: input.position(), fault })
     }
 

@@ -26,7 +26,7 @@ impl<'a> Sizes<'a> {
     /// The error that it is not of the family, for this reason.
     pub fn refuse(&self, detail: String) -> CheckpointError {
         let detail = format!("is no {}: {detail}", self.family);
-        CheckpointError::Tensors { path: self.checkpoint.path().to_path_buf(), detail }
+        CheckpointError::Tensors(self.checkpoint.path().to_path_buf(), detail)
     }
 
     /// The shape of an optional tensor.

@@ -79,7 +79,7 @@ pub(super) type StorageOf<'a> = dyn Fn(Id) -> Result<Storage<'a>, String> + 'a;
 pub(super) fn find(pickle: &Pickle, storage_of: &StorageOf<'_>) -> Result<StateDict, String> {
     let root = pickle.root();
     let holds_tensors = |id: Id| {
-        entries(pickle, id).is_some_and(|table| table.iter().any(|&(_, value)| is_tensor(pickle, value)))
+        entries(pickle, id).is_some_and(|table| table.iter().any(|&(_, value)| tensor_call(pickle, value).is_some()))
             || modules::is_module(pickle, id)
     };
     let table = entries(pickle, root).unwrap_or_default();
@@ -213,10 +213,6 @@ fn tensor_call(pickle: &Pickle, id: Id) -> Option<(&Object, &str)> {
         }
         tensor => Some(tensor),
     }
-}
-
-fn is_tensor(pickle: &Pickle, id: Id) -> bool {
-    tensor_call(pickle, id).is_some()
 }
 
 fn claim(pickle: &Pickle, id: Id, name: &str, storage_of: &StorageOf<'_>) -> Result<Option<Claim>, String> {

@@ -77,19 +77,17 @@ impl Checkpoint {
         let mut tensors: Vec<(String, Element, Vec<usize>, u64)> = Vec::new();
         for (name, shape) in self.shapes() {
             if name == METADATA {
-                return Err(CheckpointError::Content {
-                    path: self.path().to_path_buf(),
-                    what: format!("a tensor is called '{METADATA}', a name that safetensors reserve"),
-                });
+                let what = format!("a tensor is called '{METADATA}', a name that safetensors reserve");
+                return Err(CheckpointError::Content(self.path().to_path_buf(), what));
             }
             let element = target(self.element(name).unwrap_or(Element::F32));
             let bytes = element_count(shape).unwrap_or(0) * element.size() as u64;
             tensors.push((name.clone(), element, shape.clone(), bytes));
         }
         tensors.sort_by_key(|(_, element, _, _)| Reverse(element.size()));
-        let header = header(&tensors, self.metadata()).map_err(|error| CheckpointError::Content {
-            path: self.path().to_path_buf(),
-            what: format!("its names cannot be written as JSON: {error}"),
+        let header = header(&tensors, self.metadata()).map_err(|error| {
+            let what = format!("its names cannot be written as JSON: {error}");
+            CheckpointError::Content(self.path().to_path_buf(), what)
         })?;
         let mut file = WholeFile::create(path).map_err(CheckpointError::Write)?;
         let mut write = |bytes: &[u8]| file.write(bytes).map_err(CheckpointError::Write);

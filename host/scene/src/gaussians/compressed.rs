@@ -24,7 +24,7 @@ const AXES: [[&str; 3]; 3] = [["x", "y", "z"], ["x", "y", "z"], ["r", "g", "b"]]
 /// Whether a header is that of such a file.
 pub(super) fn is_of(header: &PlyHeader<'_>) -> bool {
     let is_packed = |element: &PlyElement| element.property(WORDS[0]).is_some();
-    header.elements().iter().any(|element| element.name == "vertex" && is_packed(element))
+    header.elements.iter().any(|element| element.name == "vertex" && is_packed(element))
 }
 
 /// Where a number is in a row.
@@ -88,7 +88,7 @@ pub(super) fn read(
 
 /// The element `sh`: a byte a coefficient, from -4 to 4, in the order of `f_rest`.
 fn harmonics(path: &Path, bytes: &[u8], header: &PlyHeader<'_>, count: usize) -> Result<(u32, Vec<f32>), SceneError> {
-    if !header.elements().iter().any(|element| element.name == "sh") {
+    if !header.elements.iter().any(|element| element.name == "sh") {
         return Ok((0, Vec::new()));
     }
     let (element, rows) = header.rows(bytes, "sh")?;

@@ -36,7 +36,7 @@ pub(super) struct GaussianPlace<'a> {
 impl<'a> GaussianPlace<'a> {
     pub(super) fn new(path: &'a Path, frame: &'a SceneFrame, world: Option<&'a ParserWorld>) -> GaussianPlace<'a> {
         let turned = world.map(ParserWorld::file_from_parser).map(|axes| (axes, DQuat::from_mat3(&axes).normalize()));
-        let log_unit = frame.scale.ln() + world.map_or(0.0, |world| world.scale().ln());
+        let log_unit = frame.scale.ln() + world.map_or(0.0, |world| world.scale.ln());
         GaussianPlace { path, frame, world, origin: DVec3::ZERO, turned, log_unit }
     }
 

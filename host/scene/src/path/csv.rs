@@ -143,14 +143,8 @@ impl PoseRow<'_> {
             return Ok(None);
         }
         let [fx, fy, cx, cy, width, height] = self.numbers(INTRINSICS)?;
-        Ok(Some(RawIntrinsics {
-            focal: [fx, fy],
-            principal: [cx, cy],
-            size: Some(size(&self.place(), width, height)?),
-            lens: None,
-            place: self.place(),
-            size_place: self.place(),
-        }))
+        let size = Some(size(&self.place(), width, height)?);
+        Ok(Some(RawIntrinsics { size, ..RawIntrinsics::of_photograph([fx, fy], [cx, cy], self.place()) }))
     }
 }
 

@@ -93,7 +93,8 @@ impl Border {
 /// The background of all photographs of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Backdrop {
-    colour: [f32; 3],
+    /// Red, green, blue in `[0, 1]`.
+    pub(super) colour: [f32; 3],
     /// Pixels nearer to their background's colour than this can be background.
     threshold: f32,
     /// Whether each photograph's own border colour is its background.
@@ -124,11 +125,6 @@ impl Backdrop {
     /// Whether an object can be separated from it: the noise of the borders is small enough for a threshold.
     pub(super) fn can_be_told(&self) -> bool {
         NOISE_FACTOR * self.noise <= THRESHOLD.1
-    }
-
-    /// Red, green, blue in `[0, 1]`.
-    pub(super) fn colour(&self) -> [f32; 3] {
-        self.colour
     }
 }
 

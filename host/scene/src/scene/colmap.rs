@@ -247,13 +247,11 @@ impl Reader for Colmap {
                 continue;
             };
             missing.found();
+            let Parameters { focal, principal, lens } = camera.parameters;
             let intrinsics = RawIntrinsics {
-                focal: camera.parameters.focal,
-                principal: camera.parameters.principal,
                 size: Some(camera.size),
-                lens: camera.parameters.lens,
-                place: camera.place.clone(),
-                size_place: camera.place.clone(),
+                lens,
+                ..RawIntrinsics::of_photograph(focal, principal, camera.place.clone())
             };
             let (matrix, place) = (camera_from_world(image), image.place.clone());
             let pose = RawPose { matrix, form: PoseForm::OpenCvFromWorld, place };

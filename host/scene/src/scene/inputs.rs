@@ -12,21 +12,9 @@ const FOLDERS: [&str; 9] = ["mask", "masks", "pose", "target_pose", "sparse", "d
 /// Extensions of lists of cameras, depths and points beside the folders.
 const LISTS: [&str; 6] = ["json", "txt", "npy", "npz", "bin", "ply"];
 /// Names by which layouts are recognised, besides `NAME_par.txt`: a new file of such a name would make another scene of it.
-const RECOGNISED: [&str; 13] = [
-    "transforms.json",
-    "transforms_train.json",
-    "transforms_val.json",
-    "transforms_test.json",
-    "poses_bounds.npy",
-    "cameras_sphere.npz",
-    "cameras.npz",
-    "cameras_large.npz",
-    "intrinsics.txt",
-    "cameras.txt",
-    "cameras.bin",
-    "images.txt",
-    "images.bin",
-];
+const RECOGNISED: &str = "transforms.json transforms_train.json transforms_val.json transforms_test.json \
+                          poses_bounds.npy cameras_sphere.npz cameras.npz cameras_large.npz intrinsics.txt \
+                          cameras.txt cameras.bin images.txt images.bin";
 
 impl Scene {
     /// Whether pictures written into `folder`, which need not exist, would replace files of the scene or be read as
@@ -40,7 +28,7 @@ impl Scene {
         let (root, path) = (self.root(), absolute(path));
         let pictures = self.views.iter().flat_map(|view| view.image.iter().chain(&view.mask));
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let is_recognised = RECOGNISED.contains(&&*name) || name.ends_with("_par.txt");
+        let is_recognised = RECOGNISED.split(' ').any(|known| known == name) || name.ends_with("_par.txt");
         let is_list = path.parent() == Some(&root) && (is_recognised || path.is_file() && has_extension(&path, &LISTS));
         is_list
             || path.parent().is_some_and(|folder| folder != root && is_inside(&root, folder))

@@ -92,13 +92,6 @@ fn read_view(list: &Path, line: usize, content: &str) -> Result<RawView, SceneEr
         return Err(place.fault(SceneFault::PoseWithoutImage(image)));
     }
     let image = ImageFile::open(&image)?;
-    let intrinsics = RawIntrinsics {
-        focal: [k[0], k[4]],
-        principal: [k[2] + 0.5, k[5] + 0.5],
-        size: None,
-        lens: None,
-        place: place.clone(),
-        size_place: place,
-    };
+    let intrinsics = RawIntrinsics::of_photograph([k[0], k[4]], [k[2] + 0.5, k[5] + 0.5], place);
     Ok(RawView::new(files::stem(image.path()), Some(image), pose, Some(intrinsics)))
 }

@@ -181,14 +181,8 @@ fn view(
     let r = camera_from_world.transpose();
     let row = |row: usize| [r.col(0)[row], r.col(1)[row], r.col(2)[row], centre[row]];
     let matrix = [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]];
-    let intrinsics = RawIntrinsics {
-        focal: [k.x_axis.x, k.y_axis.y],
-        principal: [k.z_axis.x + 0.5, k.z_axis.y + 0.5],
-        size: None,
-        lens: None,
-        place: place.clone(),
-        size_place: place.clone(),
-    };
+    let (focal, principal) = ([k.x_axis.x, k.y_axis.y], [k.z_axis.x + 0.5, k.z_axis.y + 0.5]);
+    let intrinsics = RawIntrinsics::of_photograph(focal, principal, place.clone());
     let pose = RawPose { matrix, form: PoseForm::WorldFromOpenCv, place };
     let mut view = RawView::new(files::stem(image), Some(ImageFile::open(image)?), pose, Some(intrinsics));
     let depth = -centre.dot(r.z_axis);

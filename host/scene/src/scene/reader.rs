@@ -187,6 +187,11 @@ impl RawIntrinsics {
     /// One focal length for both axes, the principal point in the centre of images of this size, no lens distortion.
     pub fn centred(focal: f64, size: [u32; 2], place: FilePlace) -> RawIntrinsics {
         let principal = size.map(|side| f64::from(side) / 2.0);
-        RawIntrinsics { focal: [focal; 2], principal, size: Some(size), lens: None, size_place: place.clone(), place }
+        RawIntrinsics { size: Some(size), ..RawIntrinsics::of_photograph([focal; 2], principal, place) }
+    }
+
+    /// Focal lengths and principal point for images whose size only the photograph itself states, no lens distortion.
+    pub fn of_photograph(focal: [f64; 2], principal: [f64; 2], place: FilePlace) -> RawIntrinsics {
+        RawIntrinsics { focal, principal, size: None, lens: None, size_place: place.clone(), place }
     }
 }

@@ -195,8 +195,6 @@ fn matrix_intrinsics(path: &Path, line: usize, k: &[[f64; 4]; 4]) -> Result<Intr
     if *k != expected || skew != 0.0 {
         return Err(place.fault(if *k == expected { IntrinsicsFault::Skew(skew) } else { IntrinsicsFault::Form }));
     }
-    let size_place = place.clone();
-    let (focal, principal) = ([focal_x, focal_y], [x, y]);
-    let intrinsics = RawIntrinsics { focal, principal, size: None, lens: None, place, size_place };
+    let intrinsics = RawIntrinsics::of_photograph([focal_x, focal_y], [x, y], place);
     Ok(IntrinsicsFile { intrinsics, form: PoseForm::WorldFromOpenCv, is_matrix: true })
 }

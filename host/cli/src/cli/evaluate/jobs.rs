@@ -11,6 +11,7 @@ use viewfuse_evaluate::{Evaluator, Subject, without_masks};
 use viewfuse_field::AnyField;
 use viewfuse_field::render::{RenderOptions, open_album};
 use viewfuse_job::progress::{Part, Progress};
+use viewfuse_output::record::view_names;
 use viewfuse_scene::Scene;
 use viewfuse_weighting::OpenedChoice;
 
@@ -62,7 +63,7 @@ impl Jobs<'_> {
             let (scene, options) = (&shown[job.scene], &self.options[job.scene]);
             let name = format!("job {} of {}, {}", index + 1, open.len(), scene.name());
             let progress = &Part::begin(progress, name, index..index + 1, open.len());
-            let sources = names(scene, &job.sources);
+            let sources = view_names(scene, &job.sources);
             let views = job.sources.iter().chain(&job.targets).copied();
             progress.stage("reading photographs", 0..1, 10);
             let album = open_album(scene, views, renderer, options, progress)?;
@@ -103,15 +104,11 @@ impl Jobs<'_> {
 
     /// A finished job must be the one that would be done now.
     fn check(&self, number: usize, done: &Finished) -> Result<(), FolderError> {
-        let same = |job: &Job| done.scene == job.scene && done.sources == names(&self.scenes[job.scene], &job.sources);
+        let same =
+            |job: &Job| done.scene == job.scene && done.sources == view_names(&self.scenes[job.scene], &job.sources);
         match (self.plan.jobs.get(number), self.path) {
             (Some(job), _) if same(job) => Ok(()),
             (_, path) => Err(FolderError::OtherJob { path: path.unwrap_or(Path::new("")).to_path_buf(), job: number }),
         }
     }
-}
-
-/// The names of views.
-pub(super) fn names(scene: &Scene, views: &[usize]) -> Vec<String> {
-    views.iter().map(|&view| scene.views[view].name.clone()).collect()
 }

@@ -3,7 +3,7 @@
 use super::super::terminal::Terminal;
 use super::Arguments;
 use super::files::{csv_of, json_of};
-use super::jobs::{Jobs, names};
+use super::jobs::Jobs;
 use super::tables::{counted, print_published, print_table};
 use crate::cli::outputs::keep_folder_apart;
 use crate::cli::printing::{say, warn_of};
@@ -23,25 +23,14 @@ use viewfuse_evaluate::summary::{Table, tables};
 use viewfuse_field::render::{RenderError, RenderOptions, working_side};
 use viewfuse_job::digest::sha256_of;
 use viewfuse_job::files::{check_writable, write_whole};
+use viewfuse_output::record::view_names;
 use viewfuse_scene::Scene;
 use viewfuse_scene::photographs::reduced_size;
 use viewfuse_weighting::OpenedChoice;
 
 const PROTOCOLS: &str = "Options of protocols";
 /// Options that change no number, or that the settings hold in another form.
-const NO_SETTINGS: [&str; 11] = [
-    "output",
-    "shard",
-    "threads",
-    "pictures",
-    "time-limit",
-    "weights",
-    "protocol",
-    "targets",
-    "json",
-    "latex",
-    "verbose",
-];
+const NO_SETTINGS: &str = "output shard threads pictures time-limit weights protocol targets json latex verbose";
 /// Missing jobs and notes that are told; of more, how many there are.
 const NAMED: usize = 8;
 
@@ -92,7 +81,7 @@ pub(super) fn run(
     };
     let plan = protocol.plan(&scenes, draws, about.least_sources)?;
     let (scene_options, sizes) = options_of(&scenes, protocol, &render_options, about.longest_side)?;
-    options.retain(|option, _| !NO_SETTINGS.contains(&option.as_str()));
+    options.retain(|option, _| !NO_SETTINGS.split(' ').any(|known| known == option));
     let files = digests(arguments, weightings)?;
     let settings = Settings {
         viewfuse: env!("CARGO_PKG_VERSION").to_owned(),
@@ -154,7 +143,7 @@ pub(super) fn run(
 
 /// The digests of the files that a run's figures depend on, by path.
 fn digests(arguments: &Arguments, weightings: &[OpenedChoice]) -> anyhow::Result<BTreeMap<String, String>> {
-    let networks = arguments.model.file().into_iter().chain(arguments.metrics.files());
+    let networks = arguments.model.network.file().into_iter().chain(arguments.metrics.files());
     let files = networks.chain(weightings.iter().filter_map(OpenedChoice::file));
     let digest =
         |path: &Path| Ok((path.display().to_string(), sha256_of(path).with_context(|| path.display().to_string())?));
@@ -268,8 +257,8 @@ impl Outcome<'_> {
         json!({
             "scene": scene.name(),
             "trial": job.trial,
-            "sources": names(scene, &job.sources),
-            "targets": names(scene, &job.targets),
+            "sources": view_names(scene, &job.sources),
+            "targets": view_names(scene, &job.targets),
         })
     }
 
@@ -299,7 +288,7 @@ impl Outcome<'_> {
     fn print_views(&self) -> anyhow::Result<()> {
         for job in self.plan.jobs.iter().take(NAMED) {
             let (scene, [width, height]) = (&self.scenes[job.scene], self.sizes[job.scene]);
-            let [sources, targets] = [&job.sources, &job.targets].map(|views| names(scene, views).join(", "));
+            let [sources, targets] = [&job.sources, &job.targets].map(|views| view_names(scene, views).join(", "));
             say(format_args!("{}, {width}x{height}: targets {targets} from {sources}", scene.name()))?;
         }
         if self.plan.jobs.len() > NAMED {

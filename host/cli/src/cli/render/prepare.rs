@@ -15,7 +15,7 @@ use viewfuse_job::files::check_writable;
 use viewfuse_job::progress::Progress;
 use viewfuse_output::folder::{Planned, check_folder};
 use viewfuse_output::rate::FrameRate;
-use viewfuse_output::record::{FrameRecord, RECORD, source_names};
+use viewfuse_output::record::{FrameRecord, RECORD, view_names};
 use viewfuse_scene::Scene;
 use viewfuse_scene::coverage::Coverage;
 use viewfuse_scene::few_shot::FewShot;
@@ -83,7 +83,7 @@ impl Prepared {
             }
             let planned = Planned {
                 targets: &job.targets,
-                sources: &source_names(&scene, &job),
+                sources: &view_names(&scene, &job.sources),
                 videos: &arguments.outputs.video,
                 settings: identity.as_deref(),
                 frame: &scene.frame,
@@ -120,7 +120,7 @@ impl Prepared {
         progress.aside(|| arguments.path.tell_arc(&cameras));
         let new = self.job.targets.iter().filter(|target| target.truth.is_none());
         let pictures = new.map(|target| (target.name.as_str(), &target.camera));
-        let is_learned = arguments.model.label().is_some();
+        let is_learned = arguments.model.network.label().is_some();
         let warning = if is_learned { None } else { Coverage::of(&cameras).warning(pictures) };
         warning.iter().for_each(|warning| progress.warn(warning));
         warning

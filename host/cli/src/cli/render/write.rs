@@ -29,9 +29,9 @@ pub(super) fn to_folder(
     let label = prepared.folder.display().to_string();
     let mut writer = RunWriter::new(&arguments.output, &prepared.scene, label, &prepared.job, &before);
     writer.lock()?;
-    writer.set_outputs(arguments.outputs.outputs());
+    writer.outputs = arguments.outputs.outputs();
     warning.into_iter().for_each(|warning| writer.warn(warning));
-    writer.add_to(std::mem::take(&mut prepared.earlier));
+    writer.earlier = std::mem::take(&mut prepared.earlier);
     if let Some(settings) = &prepared.settings {
         let finished = writer.resume(&run_identity(settings, &prepared.job.targets)?)?;
         prepared.job.targets.retain(|target| !finished.contains(&target.name));
@@ -67,7 +67,7 @@ fn written(
     let circumstances = Circumstances {
         program: env!("CARGO_PKG_VERSION"),
         device_reason: prepared.device.reason.clone(),
-        model: arguments.model.label(),
+        model: arguments.model.network.label(),
         exact: arguments.model.exact,
         settings: prepared.settings.clone(),
         seed: arguments.seed,

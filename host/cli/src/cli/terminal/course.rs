@@ -30,8 +30,8 @@ pub(super) struct Course {
     place: Range<f64>,
     /// Pieces of the stage that are done, of those that are known.
     pieces: (usize, usize),
-    /// The greatest share so far.
-    share: f64,
+    /// The share that is done, from 0 to 1: more pieces than were known do not lower it.
+    pub(super) share: f64,
     /// When the work began.
     start: Instant,
     /// Where the measurement of the next rate began.
@@ -92,11 +92,6 @@ impl Course {
     pub(super) fn step(&mut self, now: Instant) {
         self.pieces.0 += 1;
         self.rise(now);
-    }
-
-    /// The share that is done, from 0 to 1: more pieces than were known do not lower it.
-    pub(super) fn share(&self) -> f64 {
-        self.share
     }
 
     fn rise(&mut self, now: Instant) {
@@ -185,8 +180,8 @@ mod tests {
             for pieces in [1, 3, 10] {
                 course.expect(pieces);
                 course.step(now);
-                assert!(course.share() >= before && course.share() <= (stage + 1) as f64 / 4.0);
-                before = course.share();
+                assert!(course.share >= before && course.share <= (stage + 1) as f64 / 4.0);
+                before = course.share;
             }
         }
         // The only piece that was known was done: the further ones do not lower it.
@@ -195,17 +190,17 @@ mod tests {
         course.begin("again", 1..2, 4, now);
         course.expect(2);
         course.step(now);
-        assert_eq!(course.share(), before);
+        assert_eq!(course.share, before);
         // Pieces without stages.
         let mut course = Course::new("pieces", now);
         course.step(now);
-        assert_eq!(course.share(), 0.0);
+        assert_eq!(course.share, 0.0);
         course.expect(4);
         course.step(now);
-        assert_eq!(course.share(), 0.5);
+        assert_eq!(course.share, 0.5);
         course.expect(400);
         course.step(now);
-        assert_eq!(course.share(), 0.5);
+        assert_eq!(course.share, 0.5);
     }
 
     /// A clock that is moved by hand, and the times that were told, in seconds.

@@ -82,7 +82,7 @@ impl ProgressDisplay {
     pub(super) fn show(&self) {
         let Ok(mut style) = self.style.lock() else { return };
         let now = Instant::now();
-        let Ok((share, words)) = self.course.lock().map(|mut course| (course.share(), course.words(now))) else {
+        let Ok((share, words)) = self.course.lock().map(|mut course| (course.share, course.words(now))) else {
             return;
         };
         match &mut *style {

@@ -276,7 +276,7 @@ impl Machine {
         if length > room as u64 {
             // A length beyond the end of the file is damage.
             input.check(length)?;
-            return Err(Fault::TooMany { what: "bytes of text", limit: LONGEST_TEXTS as u64 });
+            return Err(Fault::TooMany("bytes of text", LONGEST_TEXTS as u64));
         }
         Ok(input.take(length)?)
     }
@@ -301,11 +301,11 @@ impl Machine {
             match input.byte()? {
                 b'\n' => break,
                 byte if line.len() < LONGEST_NAME => line.push(byte),
-                _ => return Err(Fault::TooMany { what: "bytes of a name", limit: LONGEST_NAME as u64 }),
+                _ => return Err(Fault::TooMany("bytes of a name", LONGEST_NAME as u64)),
             }
         }
         if line.len() > LONGEST_TEXTS - self.texts.len() - self.wide.len() {
-            return Err(Fault::TooMany { what: "bytes of text", limit: LONGEST_TEXTS as u64 });
+            return Err(Fault::TooMany("bytes of text", LONGEST_TEXTS as u64));
         }
         self.keep(&line)
     }
@@ -317,5 +317,5 @@ fn span(start: usize, end: usize) -> Span {
 }
 
 fn bounded(what: &'static str, count: usize) -> Result<(), Fault> {
-    if count < MAX_VALUES { Ok(()) } else { Err(Fault::TooMany { what, limit: MAX_VALUES as u64 }) }
+    if count < MAX_VALUES { Ok(()) } else { Err(Fault::TooMany(what, MAX_VALUES as u64)) }
 }
