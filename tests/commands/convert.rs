@@ -12,10 +12,7 @@ use viewfuse_tests::places::{data, repository};
 use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![
-    a_training_checkpoint,
-    in_half_precision,
-    refusals,
-    an_unknown_max_pool_is_told,
+    a_training_checkpoint, in_half_precision, refusals, an_unknown_max_pool_is_told,
     learned_attention_becomes_a_header,
 ];
 

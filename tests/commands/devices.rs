@@ -9,10 +9,7 @@ use viewfuse_tests::scenes::Folder;
 use viewfuse_vulkan::{Adapter, Missing};
 
 viewfuse_tests::trials![
-    devices_lists_what_is_there,
-    devices_as_json,
-    devices_that_are_not_there_are_refused,
-    the_device_is_in_the_record,
+    devices_lists_what_is_there, devices_as_json, devices_that_are_not_there_are_refused, the_device_is_in_the_record,
 ];
 
 /// Every Vulkan device, or why there is none.

@@ -7,21 +7,10 @@ use viewfuse_tests::command::{change_poses, f32_bytes, safetensors, toy};
 use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![
-    no_scene,
-    nothing_but_background,
-    silhouettes_with_nothing_in_common,
-    sources_too_few,
-    views_that_do_not_fit,
-    schemes_that_are_none,
-    attention_parameters_that_are_none,
-    sizes_that_do_not_fit,
-    wrong_arguments_of_networks,
-    arguments_of_another_network,
-    wrong_arguments_of_genvs,
-    wrong_arguments,
-    outputs_that_cannot_be_written,
-    references_that_are_none,
-    an_evaluation_of_nothing,
+    no_scene, nothing_but_background, silhouettes_with_nothing_in_common, sources_too_few, views_that_do_not_fit,
+    schemes_that_are_none, attention_parameters_that_are_none, sizes_that_do_not_fit, wrong_arguments_of_networks,
+    arguments_of_another_network, wrong_arguments_of_genvs, wrong_arguments, outputs_that_cannot_be_written,
+    references_that_are_none, an_evaluation_of_nothing,
 ];
 
 const RENDER: &str = "render toy --targets 20 --size 32x32 -o out";

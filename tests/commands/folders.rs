@@ -32,12 +32,7 @@ fn a_file_with_the_name_of_a_journal_is_left_alone() {
         let folder = toy();
         let path = format!("out/{name}");
         for text in [
-            "my notes\n",
-            "my notes",
-            "{\"frame\": 1}\n",
-            "{\"job\": \"all\"}\n",
-            "{\"jo",
-            "\n",
+            "my notes\n", "my notes", "{\"frame\": 1}\n", "{\"job\": \"all\"}\n", "{\"jo", "\n",
             "[1, 2]\n{\"run\":\"a\"}\n",
         ] {
             // The beginning of a line of its own is what a kill leaves.

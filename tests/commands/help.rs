@@ -8,9 +8,7 @@ use viewfuse_tests::command::{self, names_in, toy};
 use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![
-    the_short_help_has_what_is_needed_first,
-    what_was_nearly_written_is_suggested,
-    commands_of_the_laboratory_are_told,
+    the_short_help_has_what_is_needed_first, what_was_nearly_written_is_suggested, commands_of_the_laboratory_are_told,
     shells_complete_and_pages_tell,
 ];
 

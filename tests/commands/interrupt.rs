@@ -11,9 +11,7 @@ use viewfuse_tests::patience::wait_while_running;
 use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![
-    ctrl_c_leaves_whole_files_and_no_record,
-    a_signal_ends_what_waits_for_a_pipe,
-    a_signal_ends_long_pieces_of_work,
+    ctrl_c_leaves_whole_files_and_no_record, a_signal_ends_what_waits_for_a_pipe, a_signal_ends_long_pieces_of_work,
 ];
 
 /// Starts a render that would take minutes, sends a signal when its second picture is there, and looks at what is left.

@@ -6,12 +6,8 @@ use std::fs;
 use viewfuse_tests::command::toy;
 
 viewfuse_tests::trials![
-    weights_of_many_targets,
-    the_few_sources_of_a_target,
-    the_few_sources_of_a_path,
-    labels_name_schemes,
-    nothing_counts_twice_in_a_table,
-    tables_for_papers,
+    weights_of_many_targets, the_few_sources_of_a_target, the_few_sources_of_a_path, labels_name_schemes,
+    nothing_counts_twice_in_a_table, tables_for_papers,
 ];
 
 fn json(text: &str) -> Value {

@@ -9,11 +9,8 @@ use viewfuse::evaluate::pareto::front::best_for_their_time;
 use viewfuse_tests::command::{names_in, toy};
 
 viewfuse_tests::trials![
-    sweeps_what_a_network_omits,
-    sweeps_the_field_without_a_network,
-    targets_without_photographs_have_no_loss,
-    bad_input_is_refused,
-    ctrl_c_leaves_what_was_there,
+    sweeps_what_a_network_omits, sweeps_the_field_without_a_network, targets_without_photographs_have_no_loss,
+    bad_input_is_refused, ctrl_c_leaves_what_was_there,
 ];
 
 const NETWORK: &str =

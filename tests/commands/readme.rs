@@ -9,10 +9,7 @@ use viewfuse_tests::places::{links, readmes, repository};
 use viewfuse_tests::source::files;
 
 viewfuse_tests::trials![
-    every_command_runs,
-    links_lead_somewhere,
-    every_package_can_stand_alone,
-    core_depends_on_mathematics_only,
+    every_command_runs, links_lead_somewhere, every_package_can_stand_alone, core_depends_on_mathematics_only,
 ];
 
 fn read(path: &Path) -> String {

@@ -6,12 +6,8 @@ use viewfuse_tests::command::safetensors;
 use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![
-    right_weights_pass,
-    wrong_weights_do_not,
-    a_weight_that_is_no_number_does_not_pass,
-    metrics_right_and_wrong,
-    scores_of_the_official_codes,
-    scores_that_are_not_the_official_codes,
+    right_weights_pass, wrong_weights_do_not, a_weight_that_is_no_number_does_not_pass, metrics_right_and_wrong,
+    scores_of_the_official_codes, scores_that_are_not_the_official_codes,
 ];
 
 /// Scores and distances by the official codes; see `tests/data/metrics.md`.

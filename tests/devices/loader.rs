@@ -9,11 +9,8 @@ use viewfuse_tests::command::{self, Outcome, assert_command_refused, names_in, t
 use viewfuse_vulkan::{Instance, InstanceOptions, VulkanError};
 
 viewfuse_tests::trials![
-    a_missing_loader_is_named,
-    a_file_that_is_no_loader_is_named,
-    without_a_loader_commands_say_so,
-    without_a_driver_commands_say_so,
-    automatic_without_a_driver_is_the_cpu,
+    a_missing_loader_is_named, a_file_that_is_no_loader_is_named, without_a_loader_commands_say_so,
+    without_a_driver_commands_say_so, automatic_without_a_driver_is_the_cpu,
 ];
 
 const NO_LOADER: &str = "/nonexistent/libvulkan.so.1";

@@ -7,9 +7,7 @@ use std::fmt::Debug;
 use viewfuse_vulkan::{Gpu, GpuOptions, Limits, VulkanError};
 
 tests!(
-    arrays_of_any_length_come_back,
-    arrays_larger_than_a_transfer_come_back,
-    arrays_in_pieces_come_back,
+    arrays_of_any_length_come_back, arrays_larger_than_a_transfer_come_back, arrays_in_pieces_come_back,
     uploads_do_not_wait_for_one_another,
 );
 

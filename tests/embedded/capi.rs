@@ -17,12 +17,8 @@ use viewfuse_core::weighting::{ROWS, Row};
 use viewfuse_tests::places::repository;
 
 viewfuse_tests::trials![
-    the_header_is_fresh,
-    learned_attention_gives_the_same_bits,
-    a_c_program_gets_the_same_bits_as_core,
-    every_mistake_has_its_status,
-    nothing_that_is_linked_can_panic,
-    the_example_of_the_readme_runs,
+    the_header_is_fresh, learned_attention_gives_the_same_bits, a_c_program_gets_the_same_bits_as_core,
+    every_mistake_has_its_status, nothing_that_is_linked_can_panic, the_example_of_the_readme_runs,
 ];
 
 /// The programs in C.

@@ -8,12 +8,7 @@ use viewfuse_tests::source::files;
 
 /// Thousands of parameters, which nobody logs.
 const PARAMETERS: [&str; 7] = [
-    "Linear",
-    "FourierEmbedding",
-    "FlatEmbedding",
-    "LearnedCrossAttention",
-    "PoseSelfAttention",
-    "QuantisedLinear",
+    "Linear", "FourierEmbedding", "FlatEmbedding", "LearnedCrossAttention", "PoseSelfAttention", "QuantisedLinear",
     "QuantisedAttention",
 ];
 const DERIVED: &str = "derive(defmt::Format)";

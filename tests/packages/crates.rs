@@ -6,23 +6,9 @@ use std::collections::BTreeSet;
 
 /// The crates along the data: one uses only those before it.
 const ORDER: [&str; 17] = [
-    "viewfuse-core",
-    "viewfuse-kernels",
-    "viewfuse-vulkan",
-    "viewfuse-job",
-    "viewfuse-device",
-    "viewfuse-weighting",
-    "viewfuse-scene",
-    "viewfuse-nn",
-    "viewfuse-field",
-    "viewfuse-output",
-    "viewfuse-evaluate",
-    "viewfuse-check",
-    "viewfuse-pose",
-    "viewfuse-view",
-    "viewfuse-cli",
-    "viewfuse-lab",
-    "viewfuse",
+    "viewfuse-core", "viewfuse-kernels", "viewfuse-vulkan", "viewfuse-job", "viewfuse-device", "viewfuse-weighting",
+    "viewfuse-scene", "viewfuse-nn", "viewfuse-field", "viewfuse-output", "viewfuse-evaluate", "viewfuse-check",
+    "viewfuse-pose", "viewfuse-view", "viewfuse-cli", "viewfuse-lab", "viewfuse",
 ];
 
 /// What reads arguments, catches signals and erases the types of errors: for programs alone.

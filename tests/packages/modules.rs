@@ -14,21 +14,8 @@ use viewfuse_tests::source::{Source, files};
 
 /// Crates whose modules have an order.
 const CRATES: [&str; 15] = [
-    "core",
-    "vulkan",
-    "host/job",
-    "host/device",
-    "host/weighting",
-    "host/scene",
-    "host/nn",
-    "host/field",
-    "host/output",
-    "host/evaluate",
-    "host/check",
-    "host/pose",
-    "host/view",
-    "host/lab",
-    "host/python",
+    "core", "vulkan", "host/job", "host/device", "host/weighting", "host/scene", "host/nn", "host/field",
+    "host/output", "host/evaluate", "host/check", "host/pose", "host/view", "host/lab", "host/python",
 ];
 
 /// A crate whose modules are in one of its modules, and that module.

@@ -330,12 +330,7 @@ mod tests {
         let headers = [Some("127.0.0.1:8000"), None, None];
         let get = |url: &str| status("GET", url, headers);
         for url in [
-            "",
-            "/",
-            "/view.js",
-            "/0123456789abcdee/",
-            "/0123456789abcde/",
-            "/0123456789abcdef0/",
+            "", "/", "/view.js", "/0123456789abcdee/", "/0123456789abcde/", "/0123456789abcdef0/",
             "//0123456789abcdef/",
         ] {
             assert_eq!(get(url), 403, "{url}");

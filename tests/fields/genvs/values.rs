@@ -75,17 +75,8 @@ fn another_member_is_refused() {
 fn what_is_missing_or_misshapen_is_named() {
     let small = Some("small");
     for name in [
-        "images",
-        "src_poses",
-        "tgt_pose",
-        "focal_normalized",
-        "latents",
-        "mlp_in",
-        "mlp_out",
-        "volume_index",
-        "feature_image_index",
-        "denoise_index",
-        "feature_image_full.error_alpha1_half",
+        "images", "src_poses", "tgt_pose", "focal_normalized", "latents", "mlp_in", "mlp_out", "volume_index",
+        "feature_image_index", "denoise_index", "feature_image_full.error_alpha1_half",
     ] {
         assert_refused(small, name, |tensors| drop(tensors.remove(name)));
     }
@@ -97,11 +88,7 @@ fn what_is_missing_or_misshapen_is_named() {
         *shape = vec![count];
     };
     for name in [
-        "latents",
-        "volume_value",
-        "mlp_out",
-        "denoise_value.0.05",
-        "sample_4_steps",
+        "latents", "volume_value", "mlp_out", "denoise_value.0.05", "sample_4_steps",
         "feature_image_full.error_alpha1_half",
     ] {
         assert_refused(small, name, |tensors| short(tensors, name));

@@ -60,22 +60,7 @@ impl Checkpoints {
     /// The description of the tensors, in a container that is right.
     pub(crate) fn pickles() -> Checkpoints {
         let words = &[
-            "\u{0}",
-            "(",
-            ")",
-            ".",
-            "]",
-            "}",
-            "R",
-            "a",
-            "b",
-            "e",
-            "h\u{0}",
-            "q\u{1}",
-            "s",
-            "u",
-            "t",
-            "cos\nsystem\n",
+            "\u{0}", "(", ")", ".", "]", "}", "R", "a", "b", "e", "h\u{0}", "q\u{1}", "s", "u", "t", "cos\nsystem\n",
             "K\u{1}",
         ];
         Checkpoints::new(pickles_of(&claims()).to_vec(), words, true)

@@ -28,15 +28,8 @@ impl Target for Gaussians {
 
     fn words(&self) -> &'static [&'static str] {
         &[
-            "property float ",
-            "property list uchar int ",
-            "element vertex ",
-            "double",
-            "uchar",
-            "end_header\n",
-            "f_rest_9",
-            "-1",
-            "4294967296",
+            "property float ", "property list uchar int ", "element vertex ", "double", "uchar", "end_header\n",
+            "f_rest_9", "-1", "4294967296",
         ]
     }
 

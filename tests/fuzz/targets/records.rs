@@ -15,22 +15,9 @@ use viewfuse_lab::report::{Evaluation, Report, ReportError, Sweep, Training, pag
 const MAX_PAGE: usize = 64 << 20;
 
 const WORDS: &[&str] = &[
-    "\"inf\"",
-    "\"NaN\"",
-    "null",
-    "[]",
-    "{}",
-    "\"job_count\":1000000000000000000",
-    "\"scene\":18446744073709551615",
-    "\"mean\"",
-    "\"PSNR\"",
-    "\"../../x.png\"",
-    "\"/etc/passwd\"",
-    "\"count:sources=2+4\"",
-    "\"random:sources=3\"",
-    "\"source_count\":0",
-    "1e308",
-    "\n",
+    "\"inf\"", "\"NaN\"", "null", "[]", "{}", "\"job_count\":1000000000000000000", "\"scene\":18446744073709551615",
+    "\"mean\"", "\"PSNR\"", "\"../../x.png\"", "\"/etc/passwd\"", "\"count:sources=2+4\"", "\"random:sources=3\"",
+    "\"source_count\":0", "1e308", "\n",
 ];
 
 /// Records of a run, and the page that shows them.

@@ -27,16 +27,8 @@ impl Target for Requests {
 
     fn words(&self) -> &'static [&'static str] {
         &[
-            "\r\n",
-            "\r\n\r\n",
-            "Content-Length: ",
-            "Transfer-Encoding: chunked\r\n",
-            "Expect: 100-continue\r\n",
-            "Connection: ",
-            "HTTP/1.0",
-            "keep-alive",
-            "\"scheme\":",
-            "attention:/etc/passwd",
+            "\r\n", "\r\n\r\n", "Content-Length: ", "Transfer-Encoding: chunked\r\n", "Expect: 100-continue\r\n",
+            "Connection: ", "HTTP/1.0", "keep-alive", "\"scheme\":", "attention:/etc/passwd",
         ]
     }
 

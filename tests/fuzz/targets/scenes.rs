@@ -109,27 +109,9 @@ impl Target for Broken {
 
     fn words(&self) -> &'static [&'static str] {
         &[
-            "\"k1\":0.5,",
-            "\"camera_model\":\"OPENCV_FISHEYE\",",
-            "\"fl_x\":",
-            "\"w\":",
-            "\"frames\":[",
-            "../",
-            "/dev/null",
-            "null",
-            "[]",
-            "{}",
-            "\n",
-            " ",
-            "#",
-            "SIMPLE_RADIAL",
-            "FULL_OPENCV",
-            "FOV",
-            "'<f4'",
-            "'>f8'",
-            "True",
-            "(1000000000, 17)",
-            "..",
+            "\"k1\":0.5,", "\"camera_model\":\"OPENCV_FISHEYE\",", "\"fl_x\":", "\"w\":", "\"frames\":[", "../",
+            "/dev/null", "null", "[]", "{}", "\n", " ", "#", "SIMPLE_RADIAL", "FULL_OPENCV", "FOV", "'<f4'", "'>f8'",
+            "True", "(1000000000, 17)", "..",
         ]
     }
 

@@ -31,15 +31,9 @@ pub const MANIFESTS: [&str; 3] = ["core/Cargo.toml", "core/kernels/Cargo.toml", 
 pub const CORE: &str = "core/src";
 /// Source files, and folders with all their Rust files.
 pub const SOURCES: [&str; 9] = [
-    "core/kernels/src",
-    "vulkan/compiler/src/compile.rs",
-    "vulkan/compiler/src/legalise.rs",
-    "vulkan/compiler/src/loops.rs",
-    "vulkan/compiler/src/phis.rs",
-    "vulkan/compiler/src/refine.rs",
-    "vulkan/compiler/src/share.rs",
-    "vulkan/compiler/src/split.rs",
-    "vulkan/shaders/src",
+    "core/kernels/src", "vulkan/compiler/src/compile.rs", "vulkan/compiler/src/legalise.rs",
+    "vulkan/compiler/src/loops.rs", "vulkan/compiler/src/phis.rs", "vulkan/compiler/src/refine.rs",
+    "vulkan/compiler/src/share.rs", "vulkan/compiler/src/split.rs", "vulkan/shaders/src",
 ];
 /// Libraries with code in the modules.
 pub const LIBRARIES: [&str; 6] = ["bytemuck", "bytemuck_derive", "glam", "libm", "spirv-std", "spirv-std-macros"];

@@ -26,17 +26,8 @@ pub(crate) fn is_of_arguments(error: &anyhow::Error) -> bool {
 
 /// The errors that may have hints, and that reach the command as they are.
 const HINTED: [fn(&(dyn Error + 'static)) -> Option<Hint>; 11] = [
-    of::<SelectionError>,
-    of::<PhotographsError>,
-    of::<SceneError>,
-    of::<RenderError>,
-    of::<OptimiseError>,
-    of::<OutputError>,
-    of::<FolderError>,
-    of::<EvaluateError>,
-    of::<ProtocolError>,
-    of::<PoseError>,
-    of::<ListenError>,
+    of::<SelectionError>, of::<PhotographsError>, of::<SceneError>, of::<RenderError>, of::<OptimiseError>,
+    of::<OutputError>, of::<FolderError>, of::<EvaluateError>, of::<ProtocolError>, of::<PoseError>, of::<ListenError>,
 ];
 
 fn hinted(cause: &(dyn Error + 'static)) -> Option<Hint> {

@@ -246,13 +246,7 @@ impl Architecture {
             .and_then(|rest| rest.split('.').next()?.parse::<usize>().ok())
             .is_some_and(|level| level > self.levels.len());
         const BUFFERS: [&str; 8] = [
-            "code._freqs",
-            "code._phases",
-            "poses",
-            "image_shape",
-            "focal",
-            "c",
-            "encoder.latent",
+            "code._freqs", "code._phases", "poses", "image_shape", "focal", "c", "encoder.latent",
             "encoder.latent_scaling",
         ];
         unused_level

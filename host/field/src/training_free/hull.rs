@@ -246,16 +246,7 @@ impl<D: Device> Prepared for Views<'_, D> {
             let HullScene { object_buffer: object, views, footprints, texels, .. } = scene;
             let Pixels { colours, depths: pixel_depths } = &mut pixels;
             device.march_rays(
-                &target,
-                first_row,
-                row_count,
-                object,
-                views,
-                footprints,
-                texels,
-                &depths.maps,
-                &weights,
-                colours,
+                &target, first_row, row_count, object, views, footprints, texels, &depths.maps, &weights, colours,
                 pixel_depths,
             )?;
             progress.step();

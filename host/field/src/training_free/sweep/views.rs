@@ -137,16 +137,8 @@ impl<D: Device> Prepared for Views<'_, D> {
         let (mut colours, mut depths, mut confidences) =
             (device.zeros::<[f32; 4]>(count)?, device.zeros::<f32>(count)?, device.zeros::<f32>(count)?);
         device.blend_planes(
-            &block,
-            0,
-            height,
-            &blend_views,
-            &self.scene.pictures.texels,
-            &target.maps,
-            &costs,
-            &mut colours,
-            &mut depths,
-            &mut confidences,
+            &block, 0, height, &blend_views, &self.scene.pictures.texels, &target.maps, &costs, &mut colours,
+            &mut depths, &mut confidences,
         )?;
         let mut colours = device.download(&colours)?;
         for colour in &mut colours {
