@@ -36,7 +36,7 @@ fn from_bare_photographs_to_a_picture() {
 fn what_is_posed_already_stays() {
     let toy = viewfuse_tests::command::toy();
     let before = files_below(&toy);
-    done_with_warnings(&toy, "inspect toy --pose").stdout;
+    done_with_warnings(&toy, "inspect toy --pose");
     assert_eq!(files_below(&toy), before);
     // Errors of other kinds are the command's own.
     assert_refused(&toy, "inspect nowhere --pose", &["nowhere"]);

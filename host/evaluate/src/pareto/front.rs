@@ -52,8 +52,10 @@ mod tests {
 
     #[test]
     fn what_no_other_point_beats_is_marked() {
+        /// What it shows, points, and which of them are marked.
+        type Case<'a> = (&'a str, &'a [[f64; 2]], &'a [bool]);
         let nan = f64::NAN;
-        let cases: [(&str, &[[f64; 2]], &[bool]); 6] = [
+        let cases: [Case<'_>; 6] = [
             ("none", &[], &[]),
             ("one", &[[3.0, 7.0]], &[true]),
             (
