@@ -144,8 +144,21 @@ pub fn image_axes(gaussian: &GaussianBlock, camera: &CameraBlock, place: Vec3) -
 /// which loses nothing for a long and thin Gaussian, where the difference of two products would.
 #[inline]
 pub fn project(gaussian: &GaussianBlock, camera: &CameraBlock, near: f32) -> ProjectedGaussian {
+    project_as(gaussian, camera, near, false)
+}
+
+/// The same; if it is antialiased, fainter by as much as [`DILATION`] widens it, so that its integral over the image
+/// remains. The opacity is multiplied by the square root of the covariance's determinant before the dilation over that
+/// after it: the 2D filter of "Mip-Splatting" (Yu et al. 2024, section 5.2), with the published dilation.
+#[inline]
+pub fn project_as(
+    gaussian: &GaussianBlock,
+    camera: &CameraBlock,
+    near: f32,
+    is_antialiased: bool,
+) -> ProjectedGaussian {
     let hidden = ProjectedGaussian::default();
-    let opacity = opacity(gaussian.opacity);
+    let mut opacity = opacity(gaussian.opacity);
     let [x, y, z] = gaussian.position;
     let offset = Vec3::new(x, y, z) - camera.centre_world();
     let place = camera.pose.rotate_to_camera(offset);
@@ -159,6 +172,13 @@ pub fn project(gaussian: &GaussianBlock, camera: &CameraBlock, near: f32) -> Pro
     let cross = u.cross(v);
     let (u_square, v_square, uv) = (u.dot(u), v.dot(v), u.dot(v));
     let determinant = cross.dot(cross) + DILATION * (u_square + v_square) + DILATION * DILATION;
+    if is_antialiased {
+        opacity *= sqrt(cross.dot(cross) / determinant);
+        // Also for NaN.
+        if !(opacity >= MIN_ALPHA) {
+            return hidden;
+        }
+    }
     // `opacity >= 1 / 255`: the logarithm is at least 0, also after rounding.
     let reach = max(2.0 * ln(255.0 * opacity), 0.0);
     let extent = [sqrt(reach * (u_square + DILATION)), sqrt(reach * (v_square + DILATION))];

@@ -2,7 +2,9 @@
 
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock, Pinhole};
-use viewfuse_core::gaussian::{DILATION, GaussianBlock, ProjectedGaussian, axes, colour_along, opacity, project};
+use viewfuse_core::gaussian::{
+    DILATION, GaussianBlock, ProjectedGaussian, axes, colour_along, opacity, project, project_as,
+};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::random::uniform;
 
@@ -57,8 +59,8 @@ fn what_can_not_be_drawn_covers_nothing() {
         GaussianBlock { log_scales: [80.0; 3], ..good },
         GaussianBlock { log_scales: [f32::INFINITY, 0.0, 0.0], ..good },
     ];
-    for gaussian in broken {
-        let projected = project(&gaussian, &camera, NEAR);
+    for (gaussian, is_antialiased) in broken.iter().flat_map(|gaussian| [(gaussian, false), (gaussian, true)]) {
+        let projected = project_as(gaussian, &camera, NEAR, is_antialiased);
         assert_eq!((projected, projected.pixels(160, 90)), (ProjectedGaussian::default(), [0; 4]), "{gaussian:?}");
         assert_eq!(projected.alpha(70.0, 40.0), 0.0);
     }

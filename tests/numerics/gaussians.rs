@@ -7,9 +7,9 @@ use viewfuse::device::cpu::Cpu;
 use viewfuse::field::gaussians::{Splatter, Tiles};
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::pose::Pose;
-use viewfuse_kernels::gaussians::TileBlock;
 use viewfuse_kernels::gaussians::lanes::falloff;
 use viewfuse_kernels::gaussians::shown::{bytes_of_pixel, shown_pixel, surface_depth};
+use viewfuse_kernels::gaussians::{SplatBlock, TileBlock};
 use viewfuse_kernels::rows::{GaussianBlock, ProjectedGaussian};
 
 const SIZE: [u32; 2] = [21, 18];
@@ -49,9 +49,9 @@ fn by_pixel(column: u32, row: u32) -> [f32; 4] {
 
 /// The loss, a sum over pixels and channels, in `f64`. The opacity at which splats begin to count is a step of the
 /// loss: pixels where a splat's is near it are excluded, the same for all evaluations.
-fn loss(gaussians: &[GaussianBlock], counted: &[bool]) -> f64 {
+fn loss(gaussians: &[GaussianBlock], counted: &[bool], is_antialiased: bool) -> f64 {
     let [width, height] = SIZE;
-    let splats: Vec<ProjectedGaussian> = gaussians.iter().map(rounded).collect();
+    let splats: Vec<ProjectedGaussian> = gaussians.iter().map(|gaussian| rounded(gaussian, is_antialiased)).collect();
     let list: Vec<u32> = (0..splats.len() as u32).collect();
     let block = TileBlock::new(width, height, BACKGROUND);
     let pixels = (0..width * height).filter(|pixel| counted[*pixel as usize]);
@@ -66,9 +66,10 @@ fn loss(gaussians: &[GaussianBlock], counted: &[bool]) -> f64 {
 }
 
 /// A splat of the evaluation in `f64`, rounded.
-fn rounded(gaussian: &GaussianBlock) -> ProjectedGaussian {
-    let values =
-        project(gaussian, &camera(), NEAR).expect("no Gaussian at a threshold").map(|bounded| bounded.value as f32);
+fn rounded(gaussian: &GaussianBlock, is_antialiased: bool) -> ProjectedGaussian {
+    let is_antialiased = u32::from(is_antialiased);
+    let block = SplatBlock { camera: camera(), near: NEAR, gaussian_count: 1, is_antialiased, padding: 0 };
+    let values = project(&block, gaussian).expect("no Gaussian at a threshold").map(|bounded| bounded.value as f32);
     let [x, y, depth, opacity, xx, xy, yy, _, red, green, blue, _, right, down, ..] = values;
     ProjectedGaussian {
         mean: [x, y],
@@ -82,8 +83,8 @@ fn rounded(gaussian: &GaussianBlock) -> ProjectedGaussian {
 }
 
 /// Pixels where no splat's opacity is near the least that counts.
-fn counted(gaussians: &[GaussianBlock]) -> Vec<bool> {
-    let splats: Vec<ProjectedGaussian> = gaussians.iter().map(rounded).collect();
+fn counted(gaussians: &[GaussianBlock], is_antialiased: bool) -> Vec<bool> {
+    let splats: Vec<ProjectedGaussian> = gaussians.iter().map(|gaussian| rounded(gaussian, is_antialiased)).collect();
     let [width, height] = SIZE;
     let is_far = |splat: &ProjectedGaussian, column: u32, row: u32| {
         let (dx, dy) = (column as f32 + 0.5 - splat.mean[0], row as f32 + 0.5 - splat.mean[1]);
@@ -114,10 +115,25 @@ fn the_fast_exponential_is_within_its_error() {
 
 #[test]
 fn derivatives_are_those_of_differences() {
-    let (gaussians, [width, height]) = (gaussians(), SIZE);
-    let counted = counted(&gaussians);
+    derivatives_of(&gaussians(), false);
+}
+
+/// Also of Gaussians as thin as a pixel, whose opacities follow from their sizes.
+#[test]
+fn antialiased_derivatives_are_those_of_differences() {
+    derivatives_of(&gaussians(), true);
+    let thin = |gaussian: GaussianBlock| {
+        let [first, second, third] = gaussian.log_scales;
+        GaussianBlock { log_scales: [first, second - 0.7, third - 0.7], ..gaussian }
+    };
+    derivatives_of(&gaussians().into_iter().map(thin).collect::<Vec<_>>(), true);
+}
+
+fn derivatives_of(gaussians: &[GaussianBlock], is_antialiased: bool) {
+    let (gaussians, [width, height]) = (gaussians.to_vec(), SIZE);
+    let counted = counted(&gaussians, is_antialiased);
     assert!(counted.iter().filter(|counted| **counted).count() > counted.len() / 2, "most pixels are compared");
-    let splatter = Splatter { device: &Cpu, near: NEAR, background: BACKGROUND };
+    let splatter = Splatter { device: &Cpu, near: NEAR, background: BACKGROUND, is_antialiased };
     let uploaded = Cpu.upload(&gaussians).expect("memory");
     let picture = splatter.picture(&uploaded, gaussians.len(), &camera()).expect("a picture");
     let pixels = 0..width * height;
@@ -134,7 +150,7 @@ fn derivatives_are_those_of_differences() {
                 let mut moved = gaussians.clone();
                 let value = &mut *parameters(&mut moved[index])[parameter];
                 *value += offset;
-                (f64::from(*value), loss(&moved, &counted))
+                (f64::from(*value), loss(&moved, &counted, is_antialiased))
             };
             let ((low, before), (high, after)) = (at(-4.0e-3), at(4.0e-3));
             let difference = (after - before) / (high - low);
@@ -151,7 +167,7 @@ fn derivatives_are_those_of_differences() {
 #[test]
 fn tiles_list_splats_front_to_back() {
     let own = gaussians();
-    let splats: Vec<ProjectedGaussian> = own.iter().rev().map(rounded).collect();
+    let splats: Vec<ProjectedGaussian> = own.iter().rev().map(|gaussian| rounded(gaussian, false)).collect();
     let block = TileBlock::new(SIZE[0], SIZE[1], BACKGROUND);
     let Tiles { starts, entries, in_sight } = Tiles::of(&block, &splats);
     assert!(in_sight.iter().all(|in_sight| *in_sight));
@@ -188,7 +204,7 @@ fn pictures_do_not_depend_on_the_number_of_threads() {
     let picture = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         pool.install(|| {
-            let splatter = Splatter { device: &Cpu, near: NEAR, background: BACKGROUND };
+            let splatter = Splatter { device: &Cpu, near: NEAR, background: BACKGROUND, is_antialiased: false };
             let uploaded = Cpu.upload(&own).expect("memory");
             let picture = splatter.picture(&uploaded, own.len(), &camera()).expect("a picture");
             let by_pixels = vec![[0.3, -0.2, 0.1, 0.4]; (SIZE[0] * SIZE[1]) as usize];

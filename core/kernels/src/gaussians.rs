@@ -49,8 +49,10 @@ pub struct SplatBlock {
     pub near: f32,
     /// Number of Gaussians.
     pub gaussian_count: u32,
+    /// 1 if splats keep their integral when they are dilated, otherwise 0.
+    pub is_antialiased: u32,
     /// Zero.
-    pub padding: [u32; 2],
+    pub padding: u32,
 }
 
 const _: () = assert!(size_of::<SplatBlock>() == 96);

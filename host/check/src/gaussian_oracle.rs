@@ -5,7 +5,7 @@ use super::camera_oracle::{Vector, axes as camera_axes, centre, dot};
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::gaussian::{DILATION, MARGIN, MAX_ALPHA, MIN_ALPHA};
 use viewfuse_kernels::gaussians::{MIN_TRANSMITTANCE, SPLAT_TILE};
-use viewfuse_kernels::rows::{GaussianBlock, ProjectedGaussian, SplatGradient, TileBlock};
+use viewfuse_kernels::rows::{GaussianBlock, ProjectedGaussian, SplatBlock, SplatGradient, TileBlock};
 
 /// Relative error of [`falloff`](viewfuse_kernels::gaussians::lanes::falloff).
 pub const FALLOFF_ERROR: f64 = 4.0e-6;
@@ -29,6 +29,10 @@ fn scaled(vector: Vector, factor: Bounded) -> Vector {
 
 fn plus(a: Vector, b: Vector) -> Vector {
     [0, 1, 2].map(|axis| a[axis] + b[axis])
+}
+
+fn cross(a: Vector, b: Vector) -> Vector {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 fn joined(rows: [[Bounded; 4]; 4]) -> [Bounded; 16] {
@@ -95,15 +99,16 @@ impl Ellipse {
 }
 
 /// What `project` gives, in the order of its fields; `None` where that depends on rounding.
-pub fn project(gaussian: &GaussianBlock, camera: &CameraBlock, near: f32) -> Option<[Bounded; 16]> {
+pub fn project(block: &SplatBlock, gaussian: &GaussianBlock) -> Option<[Bounded; 16]> {
+    let SplatBlock { camera, near, .. } = block;
     let odds = Bounded::from(gaussian.opacity).exp();
-    let opacity = odds / (Bounded::ONE + odds);
+    let mut opacity = odds / (Bounded::ONE + odds);
     let offset = {
         let origin = centre(camera);
         [0, 1, 2].map(|axis| Bounded::from(gaussian.position[axis]) - origin[axis])
     };
     let depth = dot(camera_axes(camera)[2], offset);
-    if opacity.below(MIN_ALPHA.into())? || depth.below(near.into())? {
+    if opacity.below(MIN_ALPHA.into())? || depth.below((*near).into())? {
         return Some([Bounded::ZERO; 16]);
     }
     let Ellipse { place, image_axes: [u, v], .. } = Ellipse::of(gaussian, camera);
@@ -111,8 +116,14 @@ pub fn project(gaussian: &GaussianBlock, camera: &CameraBlock, near: f32) -> Opt
     let mean = [focal_x * (place[0] / place[2]) + principal_x, focal_y * (place[1] / place[2]) + principal_y];
     let dilation = Bounded::from(DILATION);
     let (uu, vv, uv) = (dot(u, u), dot(v, v), dot(u, v));
-    let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-    let determinant = dot(cross, cross) + dilation * (uu + vv) + dilation * dilation;
+    let area = cross(u, v);
+    let determinant = dot(area, area) + dilation * (uu + vv) + dilation * dilation;
+    if block.is_antialiased != 0 {
+        opacity = opacity * (dot(area, area) / determinant).square_root();
+        if opacity.below(MIN_ALPHA.into())? {
+            return Some([Bounded::ZERO; 16]);
+        }
+    }
     let reach = (two() * (Bounded::from(255.0_f32) * opacity).ln()).greater(Bounded::ZERO);
     let extent = [(reach * (uu + dilation)).square_root(), (reach * (vv + dilation)).square_root()];
     let conic = [(vv + dilation) / determinant, -uv / determinant, (uu + dilation) / determinant, Bounded::ZERO];
@@ -261,17 +272,28 @@ pub fn sums_of(parts: &[SplatGradient]) -> [Bounded; 9] {
 
 /// The derivative by a Gaussian's parameters, in the order of its fields; `None` where it depends on rounding.
 pub fn project_gradient(
+    block: &SplatBlock,
     gaussian: &GaussianBlock,
-    camera: &CameraBlock,
     splat: &ProjectedGaussian,
     sums: &[Bounded; 9],
 ) -> Option<[Bounded; 16]> {
-    let zero = Bounded::ZERO;
+    let (zero, camera) = (Bounded::ZERO, &block.camera);
     if splat.opacity <= 0.0 {
         return Some([zero; 16]);
     }
     let ellipse = Ellipse::of(gaussian, camera);
-    let by_axes = by_axes(&ellipse, splat, sums);
+    let mut by_axes = by_axes(&ellipse, splat, sums);
+    if block.is_antialiased != 0 {
+        let [a, b, c] = splat.conic.map(Bounded::from);
+        let [u, v] = ellipse.image_axes;
+        let area = cross(u, v);
+        let inverse = Bounded::ONE / dot(area, area);
+        let by = [
+            plus(scaled(cross(v, area), inverse), scaled(plus(scaled(u, a), scaled(v, b)), -Bounded::ONE)),
+            plus(scaled(cross(area, u), inverse), scaled(plus(scaled(u, b), scaled(v, c)), -Bounded::ONE)),
+        ];
+        by_axes = [0, 1].map(|row| plus(by_axes[row], scaled(by[row], sums[0])));
+    }
     let across = [0, 1, 2].map(|axis| {
         let [first, second] = [by_axes[0][axis], by_axes[1][axis]];
         let sum = plus(scaled(ellipse.jacobian[0], first), scaled(ellipse.jacobian[1], second));
@@ -286,7 +308,8 @@ pub fn project_gradient(
     let [right, down, forward] = camera_axes(camera);
     let position = plus(plus(scaled(right, x), scaled(down, y)), scaled(forward, z));
     let rotation = by_quaternion(&ellipse, across.map(|(by_axis, _)| by_axis));
-    let opacity = sums[0] * (Bounded::ONE - splat.opacity.into());
+    let odds = Bounded::from(gaussian.opacity).exp();
+    let opacity = sums[0] * (Bounded::ONE - odds / (Bounded::ONE + odds));
     let scales = across.map(|(_, by_scale)| by_scale);
     let four = |[a, b, c]: Vector, last| [a, b, c, last];
     Some(joined([four(position, opacity), four(scales, zero), rotation, [sums[6], sums[7], sums[8], zero]]))

@@ -167,6 +167,7 @@ impl<'a> SceneOptimisation<'a> {
         progress.stage("finding surfaces", surfaces, 30);
         let points = point_cloud(&mut stage, &self.weighting, Recipe::cloud(self.sources.len()), &Silent)?;
         let mut recipe = self.recipe.recipe(stage.images.has_silhouettes);
+        recipe.is_antialiased |= self.before.as_ref().is_some_and(|before| before.scene.is_antialiased);
         if is_sharp && self.before.is_none() {
             progress.stage("trying recipes on sources left out", trial, 30);
             recipe = self.tried(device, &album, recipe, progress)?;

@@ -7,7 +7,7 @@ use crate::gaussians::shown::{shown_pixel, surface_depth};
 use crate::gaussians::{SPLAT_TILE, SplatBlock, TileBlock};
 use crate::store::Store;
 use viewfuse_core::fetch::Fetch;
-use viewfuse_core::gaussian::{GaussianBlock, ProjectedGaussian, project};
+use viewfuse_core::gaussian::{GaussianBlock, ProjectedGaussian, project_as};
 
 /// A Gaussian as the camera sees it.
 #[inline(always)]
@@ -18,7 +18,8 @@ pub fn project_gaussians(
     gaussian: u32,
 ) {
     let at = gaussian as usize;
-    splats.store(at, project(&gaussians.fetch(at), &block.camera, block.near));
+    let is_antialiased = block.is_antialiased != 0;
+    splats.store(at, project_as(&gaussians.fetch(at), &block.camera, block.near, is_antialiased));
 }
 
 /// The pixels of a tile.
@@ -110,6 +111,6 @@ pub fn project_gradients(
         all.add(&sums.fetch(uses[index as usize] as usize));
         index += 1;
     }
-    let gradient = project_gradient::project_gradient(&gaussians.fetch(at), &block.camera, &splats.fetch(at), &all);
+    let gradient = project_gradient::project_gradient(block, &gaussians.fetch(at), &splats.fetch(at), &all);
     gradients.store(at, gradient);
 }

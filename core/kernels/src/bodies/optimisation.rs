@@ -14,7 +14,7 @@ use crate::gaussians::windows::{GainBlock, LossBlock, SHARE_RUN, pixel_gradient,
 use crate::gaussians::{SPLAT_TILE, SplatBlock};
 use crate::store::Store;
 use viewfuse_core::fetch::Fetch;
-use viewfuse_core::gaussian::{GaussianBlock, ProjectedGaussian, REST_COUNTS, harmonics, project};
+use viewfuse_core::gaussian::{GaussianBlock, ProjectedGaussian, REST_COUNTS, harmonics, project_as};
 use viewfuse_core::math::{has_finite_bits, ln};
 
 /// A Gaussian as the camera sees it, with its colour along the direction.
@@ -34,7 +34,7 @@ pub fn project_particles(
         let count = if count < block.term_count { count } else { block.term_count };
         seen.colour = colour_along(seen.colour, terms, gaussian * block.term_count, count, unit);
     }
-    splats.store(at, project(&seen, &block.camera, block.near));
+    splats.store(at, project_as(&seen, &block.camera, block.near, block.is_antialiased != 0));
 }
 
 /// Which splats' boxes reach a bin.
@@ -304,7 +304,7 @@ pub fn gather_gradients(
         }
         row += 1;
     }
-    let gradient = project_gradient::project_gradient(&gaussians.fetch(at), &block.camera, &splat, &all);
+    let gradient = project_gradient::project_gradient(block, &gaussians.fetch(at), &splat, &all);
     gradients.store(at, gradient);
 }
 

@@ -1,17 +1,18 @@
 //! Derivatives of splats by the Gaussians that they are projections of.
 
+use super::SplatBlock;
 use super::blend_gradient::SplatGradient;
 use super::footprint::Footprint;
 use glam::Vec3;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::gaussian::{GaussianBlock, ProjectedGaussian};
+use viewfuse_core::gaussian::{GaussianBlock, ProjectedGaussian, opacity};
 
 /// The derivative of a loss by a Gaussian's parameters, in their own places, from what all tiles say of its splat. Zero
 /// if nothing of it is seen.
 #[inline(always)]
 pub fn project_gradient(
+    block: &SplatBlock,
     gaussian: &GaussianBlock,
-    camera: &CameraBlock,
     splat: &ProjectedGaussian,
     sums: &SplatGradient,
 ) -> GaussianBlock {
@@ -26,8 +27,13 @@ pub fn project_gradient(
             padding_end: 0.0,
         };
     }
+    let camera = &block.camera;
     let footprint = Footprint::of(gaussian, camera);
-    let by_axes = by_axes(&footprint, splat, sums);
+    let mut by_axes = by_axes(&footprint, splat, sums);
+    if block.is_antialiased != 0 {
+        let [right, down] = by_fading(&footprint, splat);
+        by_axes = [by_axes[0] + right * sums.opacity, by_axes[1] + down * sums.opacity];
+    }
     let Footprint { jacobian, axes, scales, image_axes, .. } = &footprint;
     let across = |axis: usize| {
         // The derivatives by the projection of this axis, and what follows for the axis itself.
@@ -44,7 +50,7 @@ pub fn project_gradient(
     let by_place = by_place(&footprint, camera, splat, sums, [by_jacobian(0), by_jacobian(1)]);
     GaussianBlock {
         position: camera.pose.rotate_to_world(by_place.x, by_place.y, by_place.z).to_array(),
-        opacity: sums.opacity * (1.0 - splat.opacity),
+        opacity: sums.opacity * (1.0 - opacity(gaussian.opacity)),
         log_scales: [by_first, by_second, by_third],
         padding: 0.0,
         rotation: by_quaternion(&footprint, [first, second, third]),
@@ -75,6 +81,17 @@ fn by_axes(footprint: &Footprint, splat: &ProjectedGaussian, sums: &SplatGradien
     let covariance = [-(left * a + middle * b), -(left * b + middle * c), -(lower * b + last * c)];
     let [right, down] = footprint.image_axes;
     [(right * covariance[0] + down * covariance[1]) * 2.0, (right * covariance[1] + down * covariance[2]) * 2.0]
+}
+
+/// Derivatives by [`Footprint::image_axes`] of the logarithm of what an antialiased splat's opacity is multiplied by:
+/// half of the covariance's inverse before the dilation less that after it, times the derivatives of the covariance. The
+/// first is that of the axes' cross product, whose square is the determinant; it is above 0 for what is seen.
+#[inline(always)]
+fn by_fading(footprint: &Footprint, splat: &ProjectedGaussian) -> [Vec3; 2] {
+    let ([a, b, c], [right, down]) = (splat.conic, footprint.image_axes);
+    let cross = right.cross(down);
+    let inverse = 1.0 / cross.dot(cross);
+    [down.cross(cross) * inverse - (right * a + down * b), cross.cross(right) * inverse - (right * b + down * c)]
 }
 
 /// Derivative by the centre in camera coordinates.

@@ -70,8 +70,8 @@ pub struct ParticleBlock {
     pub gaussian_count: u32,
     /// Terms of a Gaussian in the array of all, at most 15.
     pub term_count: u32,
-    /// Zero.
-    pub padding: u32,
+    /// 1 if splats keep their integral when they are dilated, otherwise 0.
+    pub is_antialiased: u32,
 }
 
 const _: () = assert!(size_of::<ParticleBlock>() == 96);

@@ -5,6 +5,7 @@ use super::*;
 use crate::gaussian_oracle;
 use crate::world::{Numbers, World};
 use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::gaussian::project_as;
 use viewfuse_kernels::gaussians::SPLAT_TILE;
 
 /// Depth from which on Gaussians are seen.
@@ -31,8 +32,16 @@ pub(super) fn gaussians(numbers: &mut Numbers, count: u32) -> Vec<GaussianBlock>
     (0..count).map(gaussian).collect()
 }
 
-pub(super) fn block(camera: CameraBlock, gaussian_count: u32) -> SplatBlock {
-    SplatBlock { camera: CameraBlock { first_texel: 0, ..camera }, near: NEAR, gaussian_count, padding: [0; 2] }
+/// Without and with antialiasing.
+pub(super) fn blocks(camera: CameraBlock, gaussian_count: u32) -> [SplatBlock; 2] {
+    let camera = CameraBlock { first_texel: 0, ..camera };
+    [0, 1].map(|is_antialiased| SplatBlock { camera, near: NEAR, gaussian_count, is_antialiased, padding: 0 })
+}
+
+/// Gaussians as the camera sees them.
+pub(super) fn splats(block: &SplatBlock, gaussians: &[GaussianBlock]) -> Vec<ProjectedGaussian> {
+    let SplatBlock { camera, near, is_antialiased, .. } = block;
+    gaussians.iter().map(|gaussian| project_as(gaussian, camera, *near, *is_antialiased != 0)).collect()
 }
 
 /// Splats on a picture, the nearest first, and the lists of its tiles.
@@ -120,12 +129,15 @@ impl Case for ProjectGaussians {
     fn inputs(seed: u64, size: u32) -> Vec<ProjectGaussians> {
         let target = World::new(seed).target;
         let gaussians = gaussians(&mut Numbers::new(seed), size);
-        vec![ProjectGaussians { block: block(target, size), splats: Output::Zeros(gaussians.len()), gaussians }]
+        let splats = || Output::Zeros(gaussians.len());
+        blocks(target, size)
+            .map(|block| ProjectGaussians { block, splats: splats(), gaussians: gaussians.clone() })
+            .to_vec()
     }
 
     fn expected(&self) -> Vec<Option<Bounded>> {
         let project = |index: usize| {
-            let splat = gaussian_oracle::project(&self.gaussians[index], &self.block.camera, self.block.near);
+            let splat = gaussian_oracle::project(&self.block, &self.gaussians[index]);
             splat.map_or([None; 16], |splat| splat.map(Some))
         };
         map(self.gaussians.len(), 16, project).into_iter().flatten().collect()
@@ -224,19 +236,21 @@ impl Case for ProjectGradients {
 
     fn inputs(seed: u64, size: u32) -> Vec<ProjectGradients> {
         let numbers = &mut Numbers::new(seed);
-        let block = block(World::new(seed).target, size);
         let gaussians = gaussians(numbers, size);
-        let splats = gaussians.iter().map(|gaussian| viewfuse_core::gaussian::project(gaussian, &block.camera, NEAR));
-        let splats: Vec<ProjectedGaussian> = splats.collect();
         let (mut use_starts, mut uses) = (vec![0], Vec::new());
         for gaussian in 0..size {
             // Entries of each Gaussian are neighbours here, and not of the last one.
             uses.extend(3 * gaussian..3 * gaussian + 1 + gaussian % 3);
             use_starts.push(uses.len() as u32);
         }
-        let sums = (0..3 * size).map(|_| tile_sums(numbers)).collect();
-        let gradients = Output::Zeros(gaussians.len());
-        vec![ProjectGradients { block, gaussians, splats, use_starts, uses, sums, gradients }]
+        let sums: Vec<SplatGradient> = (0..3 * size).map(|_| tile_sums(numbers)).collect();
+        let dispatch = |block: SplatBlock| {
+            let (gaussians, splats) = (gaussians.clone(), splats(&block, &gaussians));
+            let (use_starts, uses, sums) = (use_starts.clone(), uses.clone(), sums.clone());
+            let gradients = Output::Zeros(gaussians.len());
+            ProjectGradients { block, gaussians, splats, use_starts, uses, sums, gradients }
+        };
+        blocks(World::new(seed).target, size).map(dispatch).to_vec()
     }
 
     fn expected(&self) -> Vec<Option<Bounded>> {
@@ -245,7 +259,7 @@ impl Case for ProjectGradients {
             let entries = &uses[use_starts[index] as usize..use_starts[index + 1] as usize];
             let parts: Vec<SplatGradient> = entries.iter().map(|entry| sums[*entry as usize]).collect();
             let sums = gaussian_oracle::sums_of(&parts);
-            let gradient = gaussian_oracle::project_gradient(&gaussians[index], &block.camera, &splats[index], &sums);
+            let gradient = gaussian_oracle::project_gradient(block, &gaussians[index], &splats[index], &sums);
             gradient.map_or([None; 16], |gradient| gradient.map(Some))
         };
         map(gaussians.len(), 16, gradient).into_iter().flatten().collect()

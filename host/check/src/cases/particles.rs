@@ -1,7 +1,7 @@
 //! [`Kernel::ProjectParticles`] and [`Kernel::GatherGradients`]: Gaussians before a camera and beside it, with and
 //! without spherical harmonics, in the lists of the tiles that show them.
 
-use super::gaussians::{NEAR, block, gaussians, tile_sums};
+use super::gaussians::{NEAR, blocks, gaussians, splats, tile_sums};
 use super::*;
 use crate::gaussian_oracle;
 use crate::list_oracle::{is_reached, lists};
@@ -61,21 +61,24 @@ impl Case for ProjectParticles {
         let mut states: Vec<ParticleState> = gaussians.iter().map(|_| state(numbers)).collect();
         states[0].rest_count = TERMS;
         let count = gaussians.len() as u32;
-        let dispatch = |term_count: u32| ProjectParticles {
-            block: ParticleBlock { camera: camera(seed), near: NEAR, gaussian_count: count, term_count, padding: 0 },
+        let (camera, near) = (camera(seed), NEAR);
+        let dispatch = |(term_count, is_antialiased): (u32, u32)| ProjectParticles {
+            block: ParticleBlock { camera, near, gaussian_count: count, term_count, is_antialiased },
             gaussians: gaussians.clone(),
             states: states.clone(),
             terms: terms(numbers, (count * term_count).max(1)),
             splats: Output::Zeros(gaussians.len()),
         };
-        [TERMS, 0].map(dispatch).to_vec()
+        [(TERMS, 0), (0, 0), (TERMS, 1)].map(dispatch).to_vec()
     }
 
     fn expected(&self) -> Vec<Option<Bounded>> {
         let ProjectParticles { block, gaussians, states, terms, .. } = self;
         let project = |index: usize| {
             let gaussian = &gaussians[index];
-            let Some(mut splat) = gaussian_oracle::project(gaussian, &block.camera, block.near) else {
+            let ParticleBlock { camera, near, is_antialiased, .. } = *block;
+            let seen = SplatBlock { camera, near, is_antialiased, ..SplatBlock::default() };
+            let Some(mut splat) = gaussian_oracle::project(&seen, gaussian) else {
                 return [None; 16];
             };
             let count = states[index].rest_count.min(block.term_count) as usize;
@@ -111,17 +114,18 @@ impl Case for GatherGradients {
 
     fn inputs(seed: u64, size: u32) -> Vec<GatherGradients> {
         let numbers = &mut Numbers::new(seed);
-        let block = block(camera(seed), size.max(24));
         let gaussians = gaussians(numbers, size.max(24));
-        let project = |gaussian: &GaussianBlock| viewfuse_core::gaussian::project(gaussian, &block.camera, NEAR);
-        let splats: Vec<ProjectedGaussian> = gaussians.iter().map(project).collect();
-        let CameraBlock { width, height, .. } = block.camera;
-        let listed = ListBlock { width, height, splat_count: block.gaussian_count, capacity: 0 };
-        let (starts, mut entries) = lists(&listed, &splats);
-        entries.push(0);
-        let sums = (0..entries.len()).map(|_| tile_sums(numbers)).collect();
-        let gradients = Output::Zeros(gaussians.len());
-        vec![GatherGradients { block, gaussians, splats, starts, entries, sums, gradients }]
+        let dispatch = |block: SplatBlock| {
+            let splats = splats(&block, &gaussians);
+            let CameraBlock { width, height, .. } = block.camera;
+            let listed = ListBlock { width, height, splat_count: block.gaussian_count, capacity: 0 };
+            let (starts, mut entries) = lists(&listed, &splats);
+            entries.push(0);
+            let sums = (0..entries.len()).map(|_| tile_sums(numbers)).collect();
+            let gradients = Output::Zeros(gaussians.len());
+            GatherGradients { block, gaussians: gaussians.clone(), splats, starts, entries, sums, gradients }
+        };
+        blocks(camera(seed), size.max(24)).map(dispatch).to_vec()
     }
 
     fn expected(&self) -> Vec<Option<Bounded>> {
@@ -143,7 +147,7 @@ impl Case for GatherGradients {
                 }
             }
             let sums = gaussian_oracle::sums_of(&parts);
-            gaussian_oracle::project_gradient(&gaussians[index], &block.camera, &splats[index], &sums)
+            gaussian_oracle::project_gradient(block, &gaussians[index], &splats[index], &sums)
         };
         let all = map(gaussians.len(), 16, |index| gradient(index).map_or([None; 16], |gradient| gradient.map(Some)));
         all.into_iter().flatten().collect()

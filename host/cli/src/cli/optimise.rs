@@ -65,6 +65,10 @@ pub(crate) struct Arguments {
     /// Go on from the Gaussians of this file, at the finest size
     #[arg(long, value_name = "FILE")]
     resume: Option<PathBuf>,
+    /// Each Gaussian is fainter by as much as a pixel widens it, in the file's pictures too: for sizes other than the
+    /// photographs'; .ply and .spz say so
+    #[arg(long)]
+    antialias: bool,
     /// Seed of the random draws
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -130,7 +134,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     if max_time.is_some() && quality == Quality::Fast {
         return Err(wrong("--max-time is for --quality standard and high: fast has a few hundred iterations"));
     }
-    let recipe = RecipeOptions { quality, iterations, count, is_of_one_colour: !holds_harmonics(output), seed };
+    let is_antialiased = arguments.antialias || before.as_ref().is_some_and(|before| before.scene.is_antialiased);
+    let is_of_one_colour = !holds_harmonics(output);
+    if is_antialiased && is_of_one_colour {
+        return Err(wrong("no .html and no .splat says that Gaussians are antialiased; write a .ply or a .spz"));
+    }
+    let recipe = RecipeOptions { quality, iterations, count, is_of_one_colour, is_antialiased, seed };
     let optimisation = SceneOptimisation { options, weighting, recipe, max_time, before, ..of_scene };
     let Chosen { device, reason } = arguments.device.open()?;
     let progress = Terminal::new("optimising");

@@ -42,12 +42,15 @@ pub struct Optimised {
     pub background: [f32; 3],
     /// How much brighter each source is than the Gaussians: red, green, blue.
     pub gains: Vec<[f32; 3]>,
+    /// Whether their splats keep their integral when they are dilated.
+    pub is_antialiased: bool,
 }
 
 impl Optimised {
     /// The Gaussians as a scene that can be written.
     pub fn scene(&self) -> GaussianScene {
-        GaussianScene { degree: self.degree, f_rest: self.f_rest.clone(), ..scene_of(&self.gaussians) }
+        let Optimised { degree, is_antialiased, .. } = *self;
+        GaussianScene { degree, is_antialiased, f_rest: self.f_rest.clone(), ..scene_of(&self.gaussians) }
     }
 }
 
@@ -225,6 +228,7 @@ impl Course {
             near: self.near,
             background: self.background,
             gains: self.gains.iter().map(|gain| gain.value).collect(),
+            is_antialiased: self.recipe.is_antialiased,
         }
     }
 

@@ -6,7 +6,7 @@ use crate::{About, Encoding, Field, FieldError, Prepared, Rendered, Request, Rou
 use std::path::Path;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::gaussian::{DILATION, SH_0, image_axes, opacity};
+use viewfuse_core::gaussian::SH_0;
 use viewfuse_core::random::uniform;
 use viewfuse_device::{Device, DeviceError};
 use viewfuse_job::progress::Progress;
@@ -45,8 +45,8 @@ struct Prepare<'a, D: Device> {
 struct Uploaded<D: Device> {
     gaussians: D::Buffer<GaussianBlock>,
     count: usize,
-    /// What their colours, or opacities, are for; those of degree 0 are the same for all cameras.
-    camera: CameraBlock,
+    /// The camera's centre that their colours are for; those of degree 0 are the same for all cameras.
+    centre: Vec3,
 }
 
 /// Those of a picture, in the order of their first use.
@@ -114,51 +114,31 @@ impl<'d, D: Device> Prepare<'d, D> {
     /// The Gaussians on the device as this camera sees them. Those that all cameras see alike are taken there once.
     fn uploaded(&mut self, camera: &CameraBlock) -> Result<&Uploaded<D>, DeviceError> {
         let scene = self.scene;
-        let is_there = |uploaded: &Uploaded<D>| match scene.is_antialiased {
-            true => uploaded.camera == *camera,
-            false => scene.degree == 0 || uploaded.camera.centre_world() == camera.centre_world(),
-        };
+        let is_there = |uploaded: &Uploaded<D>| scene.degree == 0 || uploaded.centre == camera.centre_world();
         let kept = self.uploaded.take().filter(is_there);
         let uploaded = match kept {
             Some(uploaded) => uploaded,
             None => {
                 let mut blocks = scene.blocks(camera.centre_world());
-                if scene.is_antialiased {
-                    blocks.iter_mut().for_each(|block| fade(block, camera));
-                }
                 if blocks.is_empty() {
                     // No device has empty buffers.
                     blocks.push(GaussianBlock { opacity: -80.0, ..GaussianBlock::default() });
                 }
-                Uploaded { gaussians: self.device.upload(&blocks)?, count: blocks.len(), camera: *camera }
+                Uploaded { gaussians: self.device.upload(&blocks)?, count: blocks.len(), centre: camera.centre_world() }
             }
         };
         Ok(self.uploaded.insert(uploaded))
     }
 
     fn splatter(&self) -> Splatter<'d, D> {
-        Splatter { device: self.device, near: self.near, background: self.background }
+        let Prepare { device, near, background, scene, .. } = *self;
+        Splatter { device, near, background, is_antialiased: scene.is_antialiased }
     }
 
     fn picture(&mut self, camera: &CameraBlock) -> Result<Rendered, FieldError> {
         let splatter = self.splatter();
         let Uploaded { gaussians, count, .. } = self.uploaded(camera)?;
         Ok(splatter.rendered(gaussians, *count, camera, MIN_OPACITY)?)
-    }
-}
-
-/// Makes a Gaussian fainter by as much as [`DILATION`] widens it in the image: its integral remains.
-fn fade(block: &mut GaussianBlock, camera: &CameraBlock) {
-    let place = camera.pose.rotate_to_camera(Vec3::from(block.position) - camera.centre_world());
-    if !(place.z > 0.0) {
-        return;
-    }
-    let [u, v] = image_axes(block, camera, place);
-    let area = u.cross(v).length_squared();
-    let dilated = area + DILATION * (u.length_squared() + v.length_squared()) + DILATION * DILATION;
-    let fainter = opacity(block.opacity) * (area / dilated).max(0.0).sqrt();
-    if fainter.is_finite() {
-        block.opacity = (fainter / (1.0 - fainter)).ln().clamp(-80.0, 80.0);
     }
 }
 

@@ -17,6 +17,8 @@ pub struct Splatter<'d, D> {
     pub near: f32,
     /// What is seen where nothing is: red, green, blue.
     pub background: [f32; 3],
+    /// Whether splats keep their integral when they are dilated.
+    pub is_antialiased: bool,
 }
 
 /// Most masks of a picture's bins, 256 MiB: where there are more, the host makes the lists.
@@ -56,6 +58,11 @@ pub struct Drawn<D: Device> {
 }
 
 impl<'d, D: Device> Splatter<'d, D> {
+    fn block(&self, camera: CameraBlock, gaussian_count: u32) -> SplatBlock {
+        let (near, is_antialiased) = (self.near, u32::from(self.is_antialiased));
+        SplatBlock { camera, near, gaussian_count, is_antialiased, padding: 0 }
+    }
+
     /// The picture of these Gaussians from a camera.
     ///
     /// # Errors
@@ -69,7 +76,7 @@ impl<'d, D: Device> Splatter<'d, D> {
         let device = self.device;
         let gaussian_count = gaussian_count as u32;
         let camera = CameraBlock { first_texel: 0, ..*camera };
-        let block = SplatBlock { camera, near: self.near, gaussian_count, padding: [0; 2] };
+        let block = self.block(camera, gaussian_count);
         let mut splats = device.zeros(gaussian_count as usize)?;
         device.project_gaussians(&block, gaussians, &mut splats)?;
         let tiles = TileBlock::new(camera.width, camera.height, self.background);
@@ -104,7 +111,7 @@ impl<'d, D: Device> Splatter<'d, D> {
         let CameraBlock { width, height, .. } = camera;
         let gaussian_count = gaussian_count as u32;
         let mut splats = device.zeros(gaussian_count.max(1) as usize)?;
-        let projected = SplatBlock { camera, near: self.near, gaussian_count, padding: [0; 2] };
+        let projected = self.block(camera, gaussian_count);
         device.project_gaussians(&projected, gaussians, &mut splats)?;
 
         let block = ListBlock { width, height, splat_count: gaussian_count, capacity: u32::MAX };

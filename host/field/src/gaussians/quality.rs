@@ -70,6 +70,8 @@ pub struct RecipeOptions {
     pub count: Option<u32>,
     /// Whether colours are the same from everywhere, as some files have them: sources have gains then.
     pub is_of_one_colour: bool,
+    /// Whether splats keep their integral when they are dilated: for pictures of other sizes than the sources'.
+    pub is_antialiased: bool,
     /// Seed of what is drawn at random.
     pub seed: u64,
 }
@@ -78,7 +80,7 @@ impl RecipeOptions {
     /// The recipe, for sources with silhouettes or for whole photographs.
     pub fn recipe(&self, has_silhouettes: bool) -> Recipe {
         let recipe = self.quality.recipe(has_silhouettes).with(self.iterations, self.count);
-        let recipe = Recipe { seed: self.seed, ..recipe };
+        let recipe = Recipe { seed: self.seed, is_antialiased: self.is_antialiased, ..recipe };
         if !self.is_of_one_colour {
             return recipe;
         }

@@ -81,13 +81,14 @@ impl<'d, D: Device> Resident<'d, D> {
     /// Dispatches an iteration.
     fn dispatch(&mut self, plan: &Plan) -> Result<(), DeviceError> {
         let (device, near, background) = (self.device, self.course.near, self.course.background);
+        let is_antialiased = u32::from(self.course.recipe.is_antialiased);
         let (Some(level), Some(particles)) = (&mut self.level, &mut self.particles) else { return Ok(()) };
         let (Some(entries), Some(status)) = (&mut self.entries, &mut self.status) else { return Ok(()) };
         let Particles { count: gaussian_count, term_count, gaussians, states, terms, gains, .. } = particles;
         let (gaussian_count, term_count) = (*gaussian_count, *term_count);
         let (splats, gradients, masks) = (&mut particles.splats, &mut particles.gradients, &mut particles.masks);
         let camera = CameraBlock { first_texel: 0, ..plan.step.camera };
-        let projected = ParticleBlock { camera, near, gaussian_count, term_count, padding: 0 };
+        let projected = ParticleBlock { camera, near, gaussian_count, term_count, is_antialiased };
         device.project_particles(&projected, &gaussians.now, &states.now, &terms.now, splats)?;
 
         let lists = list_block(&camera, gaussian_count, entries.capacity as u32);
@@ -112,7 +113,7 @@ impl<'d, D: Device> Resident<'d, D> {
         device.compare_pixels(&loss, colours, photographs, &level.by_windows, &gains.now, by_pixels, shares)?;
 
         device.blend_gradient(&tiles, starts, &entries.sorted, splats, colours, by_pixels, &mut entries.sums)?;
-        let projected = SplatBlock { camera, near, gaussian_count, padding: [0; 2] };
+        let projected = SplatBlock { camera, near, gaussian_count, is_antialiased, padding: 0 };
         let (sorted, sums) = (&entries.sorted, &entries.sums);
         device.gather_gradients(&projected, &gaussians.now, splats, starts, sorted, sums, gradients)?;
         let step = StepBlock { camera, ..plan.step }.with_counts(gaussian_count, term_count);

@@ -98,6 +98,7 @@ pub(super) struct Splats<D: Device> {
     count: usize,
     near: f32,
     background: [f32; 3],
+    is_antialiased: bool,
     /// How much brighter each source is than they are: red, green, blue.
     gains: Vec<[f32; 3]>,
     residuals: Residuals,
@@ -106,9 +107,9 @@ pub(super) struct Splats<D: Device> {
 impl<D: Device> Splats<D> {
     /// Those of a recipe.
     pub(super) fn upload(device: &D, optimised: Optimised, recipe: &Recipe) -> Result<Splats<D>, FieldError> {
-        let Optimised { gaussians, near, background, gains, .. } = optimised;
+        let Optimised { gaussians, near, background, gains, is_antialiased, .. } = optimised;
         let (count, residuals) = (gaussians.len(), Residuals::new(gains.len(), recipe.residual_share));
-        Ok(Splats { gaussians: device.upload(&gaussians)?, count, near, background, gains, residuals })
+        Ok(Splats { gaussians: device.upload(&gaussians)?, count, near, background, is_antialiased, gains, residuals })
     }
 
     /// Their picture of a target, as bright as the sources that count for it, as the other pictures are.
@@ -118,8 +119,8 @@ impl<D: Device> Splats<D> {
         images: &SourceImages,
         request: &Request<'_>,
     ) -> Result<Rendered, FieldError> {
-        let Splats { gaussians, count, near, background, gains, residuals } = self;
-        let splatter = Splatter { device, near: *near, background: *background };
+        let Splats { gaussians, count, near, background, is_antialiased, gains, residuals } = self;
+        let splatter = Splatter { device, near: *near, background: *background, is_antialiased: *is_antialiased };
         let mut picture = splatter.rendered(gaussians, *count, &request.camera.block(0), MIN_OPACITY)?;
         let weights: Vec<(usize, f32)> = request.views.iter().copied().zip(request.view_weights()).collect();
         let gain = common_gain(gains, &weights);
