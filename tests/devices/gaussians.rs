@@ -64,7 +64,8 @@ fn score(made: &Optimised) -> f64 {
     let splatter = splatter(&Cpu, made);
     let score = |index: usize| {
         let camera = images.images[index].camera.block(0);
-        let rendered = splatter.rendered(&made.gaussians, made.gaussians.len(), &camera, 0.5).expect("a picture");
+        let rendered =
+            splatter.rendered(&made.gaussians, made.gaussians.len(), &[camera], 0.5).expect("a picture").remove(0);
         let picture = to_rgb8(&rendered.colours, [rendered.width, rendered.height]);
         psnr(picture.as_raw(), images.picture(index).as_raw())
     };

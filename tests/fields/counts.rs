@@ -2,11 +2,16 @@
 //! matrix product has. The same counts are in `host/results/vulkan.md`.
 
 mod device;
+mod gpu;
 
 use device::{Counted, Counting};
+use viewfuse::device::Memory;
 use viewfuse::field::genvs::sampling::{Plan, Steps};
-use viewfuse::field::{Field, genvs, pixelnerf};
+use viewfuse::field::render::{RenderError, RenderOptions, RenderRun};
+use viewfuse::field::training_free::TrainingFree;
+use viewfuse::field::{Field, On, auto, genvs, pixelnerf};
 use viewfuse::job::progress::Silent;
+use viewfuse::scene::few_shot::Selection;
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::weights::Weights;
 use viewfuse_kernels::rows::{Form, Kernel};
@@ -102,4 +107,24 @@ fn a_call_of_the_denoiser_is_few_dispatches() {
     assert!(long.transfers.downloads - short.transfers.downloads <= 1, "a call waits more than once");
     let (share, small) = filling(&long);
     assert!(share > 0.8, "{share}: {small:?}");
+}
+
+/// `render tests/data/room` with its three targets under what is chosen for it, in small pictures: transfers do not
+/// depend on their size.
+#[test]
+fn a_choice_and_three_pictures_are_few_transfers() {
+    let (device, field, scene) = (gpu::CpuAsGpu::default(), TrainingFree::default(), fields::sample("room"));
+    let (renderer, options) =
+        (On { device: &device, field: &field }, RenderOptions { size: Some([64, 48]), ..RenderOptions::default() });
+    let targets = Selection { targets: Some("2,5,8".to_owned()), ..Selection::default() };
+    let job = targets.resolve(&scene, 2).expect("a job");
+    let run = RenderRun { scene: &scene, job: &job, renderer: &renderer, options: &options, progress: &Silent };
+    auto::render(&run, None, |_, frame, _| {
+        assert_eq!(frame.shares.len(), 4, "three depths of the sweep and Gaussians");
+        Ok::<(), RenderError>(())
+    })
+    .expect("three pictures");
+    let transfers = device.transfers();
+    println!("room, three targets: {transfers:?}");
+    assert!(transfers.uploads <= 410 && transfers.downloads <= 105, "{transfers:?}");
 }

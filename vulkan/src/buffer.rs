@@ -37,6 +37,15 @@ impl<T> Buffer<T> {
     }
 }
 
+/// Values of an array on their way to the host; see [`Gpu::download_later`](crate::Gpu::download_later).
+pub struct Coming<T> {
+    /// On the host, of one chunk.
+    pub(crate) array: Arc<Array>,
+    /// The last submission that writes there.
+    pub(crate) submission: u64,
+    pub(crate) kind: PhantomData<fn() -> T>,
+}
+
 /// An array as an argument of a kernel.
 #[derive(Clone, Copy)]
 pub struct Bound<'a>(pub(crate) &'a Arc<Array>);

@@ -260,6 +260,11 @@ impl Memory {
     pub(crate) fn mapped(&mut self) -> Option<&mut [u8]> {
         self.allocation.as_mut().and_then(Allocation::mapped_slice_mut)
     }
+
+    /// The same, to be read.
+    pub(crate) fn seen(&self) -> Option<&[u8]> {
+        self.allocation.as_ref().and_then(Allocation::mapped_slice)
+    }
 }
 
 impl Drop for Memory {

@@ -49,7 +49,7 @@ mod trust;
 mod verdicts;
 
 pub use adapter::{Adapter, AdapterKind, Limits};
-pub use buffer::{Bound, Buffer};
+pub use buffer::{Bound, Buffer, Coming};
 pub use error::{Missing, VulkanError, version};
 pub use gpu::{Faults, Gpu, GpuOptions, Tally};
 pub use instance::{Instance, InstanceOptions};

@@ -1,6 +1,6 @@
 //! Arrays between host and device.
 
-use crate::buffer::{Array, Buffer, Stretch};
+use crate::buffer::{Array, Buffer, Coming, Stretch};
 use crate::error::VulkanError;
 use crate::gpu::{Gpu, State};
 use crate::handle::Memory;
@@ -9,6 +9,7 @@ use crate::staging::{Places, Ring};
 use ash::vk;
 use bytemuck::Pod;
 use gpu_allocator::MemoryLocation;
+use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -126,6 +127,52 @@ impl Gpu {
         Ok(values)
     }
 
+    /// Begins to copy the values that an array has after all earlier dispatches to the host; nobody waits. `None` for an
+    /// array that is larger than staging memory.
+    ///
+    /// # Errors
+    /// As [`Gpu::upload`]; [`VulkanError::OtherDevice`].
+    pub fn download_later<T: Pod>(&self, buffer: &Buffer<T>) -> Result<Option<Coming<T>>, VulkanError> {
+        let from = &buffer.array;
+        from.check_owner(&self.handle)?;
+        let (len, stride) = (from.len, from.stride);
+        if len * stride > self.staging_bytes() {
+            return Ok(None);
+        }
+        let bytes = ((len * stride) as u64).next_multiple_of(4).max(4);
+        let chunks = vec![self.handle.memory(bytes, MemoryLocation::GpuToCpu)?];
+        let (read_in, written_in) = (Stretch::default(), Stretch::default());
+        let to = Arc::new(Array { chunks, chunk_len: len.max(1), len, stride, read_in, written_in });
+        let mut submission = 0;
+        self.with_state(|gpu, state| {
+            for_each_stretch(from, len, usize::MAX, |memory, offset, range| {
+                submission = state.submissions.next();
+                let (source, target, size) = (memory.buffer, to.chunks[0].buffer, range.len() as u64);
+                let copy = vk::BufferCopy { src_offset: offset, dst_offset: range.start as u64, size };
+                gpu.record(state, &[(from, Access::Read), (&to, Access::Write)], |device, submission, _| {
+                    copy_to_host(device, submission.commands, source, target, copy);
+                    Ok(())
+                })
+            })
+        })?;
+        Ok(Some(Coming { array: to, submission, kind: PhantomData }))
+    }
+
+    /// The values of [`Gpu::download_later`]; waits for them where they are not there yet.
+    ///
+    /// # Errors
+    /// As [`Gpu::download`].
+    pub fn arrived<T: Pod>(&self, coming: Coming<T>) -> Result<Vec<T>, VulkanError> {
+        let Coming { array, submission, .. } = coming;
+        array.check_owner(&self.handle)?;
+        self.with_state(|_, state| state.wait_for(submission))?;
+        let mut values = vec![T::zeroed(); array.len];
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut values);
+        let seen = array.chunks[0].seen().ok_or_else(|| self.hidden())?;
+        bytes.copy_from_slice(&seen[..bytes.len()]);
+        Ok(values)
+    }
+
     /// Reads the first bytes of an array, whole elements.
     fn read(&self, array: &Arc<Array>, bytes: &mut [u8]) -> Result<(), VulkanError> {
         let count = bytes.len() / array.stride;
@@ -149,19 +196,10 @@ impl Gpu {
             state.download = Some(self.handle.memory(self.staging_bytes() as u64, MemoryLocation::GpuToCpu)?);
         }
         let (to, _) = self.mapped(state.download.as_mut())?;
-        let copy = [vk::BufferCopy::default().src_offset(offset).size(bytes.len() as u64)];
+        let copy = vk::BufferCopy::default().src_offset(offset).size(bytes.len() as u64);
         let from = memory.buffer;
         self.record(state, &[(array, Access::Read)], |device, submission, _| {
-            let seen = [vk::MemoryBarrier::default()
-                .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
-                .dst_access_mask(vk::AccessFlags::HOST_READ)];
-            let (transfer, host) = (vk::PipelineStageFlags::TRANSFER, vk::PipelineStageFlags::HOST);
-            // SAFETY: both ranges exist; the submission is waited for before staging is read.
-            unsafe {
-                device.cmd_copy_buffer(submission.commands, from, to, &copy);
-                let none = vk::DependencyFlags::empty();
-                device.cmd_pipeline_barrier(submission.commands, transfer, host, none, &seen, &[], &[]);
-            }
+            copy_to_host(device, submission.commands, from, to, copy);
             Ok(())
         })?;
         state.wait()?;
@@ -262,8 +300,31 @@ impl Gpu {
     /// Staging memory and its mapping on the host.
     fn mapped<'a>(&self, staging: Option<&'a mut Memory>) -> Result<(vk::Buffer, &'a mut [u8]), VulkanError> {
         let mapped = staging.and_then(|memory| Some((memory.buffer, memory.mapped()?)));
-        let hidden = || "staging memory is not visible to the host".to_owned();
-        mapped.ok_or_else(|| VulkanError::Memory(self.handle.name.clone(), hidden()))
+        mapped.ok_or_else(|| self.hidden())
+    }
+
+    fn hidden(&self) -> VulkanError {
+        VulkanError::Memory(self.handle.name.clone(), "staging memory is not visible to the host".to_owned())
+    }
+}
+
+/// Records a copy between ranges that exist, to memory that the host reads after it waited for the submission.
+fn copy_to_host(
+    device: &ash::Device,
+    commands: vk::CommandBuffer,
+    from: vk::Buffer,
+    to: vk::Buffer,
+    copy: vk::BufferCopy,
+) {
+    let seen = [vk::MemoryBarrier::default()
+        .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
+        .dst_access_mask(vk::AccessFlags::HOST_READ)];
+    let (transfer, host) = (vk::PipelineStageFlags::TRANSFER, vk::PipelineStageFlags::HOST);
+    // SAFETY: both ranges exist, and both buffers live until the submission is done.
+    unsafe {
+        device.cmd_copy_buffer(commands, from, to, &[copy]);
+        let none = vk::DependencyFlags::empty();
+        device.cmd_pipeline_barrier(commands, transfer, host, none, &seen, &[], &[]);
     }
 }
 

@@ -21,17 +21,35 @@ pub struct KernelTime {
     pub time: Duration,
 }
 
-/// Transfers between host and device.
+/// Transfers between host and device. Arrays of [`Memory::download_later`] that are waited for together are one download.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Transfers {
     /// Arrays that were uploaded.
     pub uploads: u64,
     /// Their bytes.
     pub uploaded_bytes: u64,
-    /// Arrays that were downloaded.
+    /// How often the host waited for arrays from the device.
     pub downloads: u64,
     /// Their bytes.
     pub downloaded_bytes: u64,
+}
+
+/// Values on their way from a device.
+pub struct Later<'d, T>(Box<dyn FnOnce() -> Result<Vec<T>, DeviceError> + 'd>);
+
+impl<'d, T> Later<'d, T> {
+    /// What has these values when they are needed.
+    pub fn new(values: impl FnOnce() -> Result<Vec<T>, DeviceError> + 'd) -> Later<'d, T> {
+        Later(Box::new(values))
+    }
+
+    /// The values; waits for them, and for all others that were asked for, where they are not there yet.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub fn get(self) -> Result<Vec<T>, DeviceError> {
+        (self.0)()
+    }
 }
 
 /// Memory that kernels work on.
@@ -100,5 +118,14 @@ pub trait Memory {
     /// If the device is lost.
     fn download<T: Element>(&self, buffer: &Self::Buffer<T>) -> Result<Vec<T>, DeviceError> {
         self.download_first(buffer, usize::MAX)
+    }
+
+    /// The values that a buffer has now, to be waited for later: one wait serves all that were asked for before it.
+    ///
+    /// # Errors
+    /// If the device is lost, or there is no memory left.
+    fn download_later<T: Element>(&self, buffer: &Self::Buffer<T>) -> Result<Later<'_, T>, DeviceError> {
+        let values = self.download(buffer)?;
+        Ok(Later::new(move || Ok(values)))
     }
 }

@@ -2,7 +2,7 @@
 
 use super::error::DeviceError;
 use super::kernels::{Device, LayerShape};
-use super::memory::{Element, KernelTime, Memory, Transfers};
+use super::memory::{Element, KernelTime, Later, Memory, Transfers};
 use super::precision::Precision;
 use crate::argument;
 use bytemuck::bytes_of;
@@ -18,10 +18,18 @@ use viewfuse_vulkan::{Adapter, AdapterKind, Buffer, Gpu, GpuOptions, Instance, T
 /// there is enough of it.
 pub struct Vulkan {
     gpu: Gpu,
-    transfers: Mutex<Transfers>,
+    counted: Mutex<Counted>,
     is_software: bool,
     /// Where it remembers what it measured and compiled.
     memory: Option<PathBuf>,
+}
+
+/// Transfers, and how many arrays were asked for to be there later, of which so many are.
+#[derive(Default)]
+struct Counted {
+    transfers: Transfers,
+    asked: u64,
+    arrived: u64,
 }
 
 /// The kernels that have forms of rounded factors.
@@ -43,7 +51,7 @@ impl Vulkan {
     /// [`VulkanError`].
     pub fn open(instance: &Arc<Instance>, adapter: &Adapter, options: &GpuOptions) -> Result<Vulkan, VulkanError> {
         let (gpu, is_software) = (Gpu::open(instance, adapter, options)?, adapter.kind == AdapterKind::Software);
-        Ok(Vulkan { gpu, transfers: Mutex::default(), is_software, memory: None })
+        Ok(Vulkan { gpu, counted: Mutex::default(), is_software, memory: None })
     }
 
     /// As [`Vulkan::open`], with a folder where the device remembers compiled pipelines and which forms of its kernels
@@ -78,8 +86,8 @@ impl Vulkan {
         self.gpu.has_timestamps()
     }
 
-    fn counted(&self) -> MutexGuard<'_, Transfers> {
-        self.transfers.lock().unwrap_or_else(PoisonError::into_inner)
+    fn counted(&self) -> MutexGuard<'_, Counted> {
+        self.counted.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// A layer in a form of rounded factors. `parameters` say whether there is a residual.
@@ -128,7 +136,7 @@ impl Memory for Vulkan {
 
     fn upload<T: Element>(&self, values: &[T]) -> Result<Buffer<T>, DeviceError> {
         let buffer = self.gpu.upload(values)?;
-        let mut transfers = self.counted();
+        let transfers = &mut self.counted().transfers;
         transfers.uploads += 1;
         transfers.uploaded_bytes += size_of_val(values) as u64;
         Ok(buffer)
@@ -166,15 +174,37 @@ impl Memory for Vulkan {
     }
 
     fn transfers(&self) -> Transfers {
-        *self.counted()
+        self.counted().transfers
     }
 
     fn download_first<T: Element>(&self, buffer: &Buffer<T>, count: usize) -> Result<Vec<T>, DeviceError> {
         let values = self.gpu.download_first(buffer, count)?;
-        let mut transfers = self.counted();
-        transfers.downloads += 1;
-        transfers.downloaded_bytes += size_of_val(&values[..]) as u64;
+        let mut counted = self.counted();
+        counted.arrived = counted.asked;
+        counted.transfers.downloads += 1;
+        counted.transfers.downloaded_bytes += size_of_val(&values[..]) as u64;
         Ok(values)
+    }
+
+    fn download_later<T: Element>(&self, buffer: &Buffer<T>) -> Result<Later<'_, T>, DeviceError> {
+        let Some(coming) = self.gpu.download_later(buffer)? else {
+            let values = self.download(buffer)?;
+            return Ok(Later::new(move || Ok(values)));
+        };
+        let mut counted = self.counted();
+        counted.asked += 1;
+        let number = counted.asked;
+        Ok(Later::new(move || {
+            let mut counted = self.counted();
+            if number > counted.arrived {
+                self.gpu.wait()?;
+                counted.arrived = counted.asked;
+                counted.transfers.downloads += 1;
+            }
+            let values = self.gpu.arrived(coming)?;
+            counted.transfers.downloaded_bytes += size_of_val(&values[..]) as u64;
+            Ok(values)
+        }))
     }
 }
 

@@ -39,7 +39,7 @@ use crate::standing::Measure;
 pub use crate::standing::Standing;
 use crate::{AnyOptions, Mixture, Renderer, Setting, Variant};
 use expectation::decibels;
-use gain::{is_better, is_better_near, is_lost, is_worth_mixing, mean_score, median_gain};
+use gain::{fewest_to_lose, is_better, is_better_near, is_lost, is_worth_mixing, mean_score, median_gain};
 use held_out::{HeldOutSources, Outcome, coarse, coarse_side};
 use regions::Mixed;
 use serde::Serialize;
@@ -341,14 +341,15 @@ impl Search<'_, '_> {
         options: &AnyOptions,
         replaced: &[Outcome],
     ) -> Result<Vec<Outcome>, RenderError> {
+        let count = self.held_out.len();
         let mut outcomes = Vec::new();
-        for source in 0..self.held_out.len() {
-            if is_lost(&outcomes, replaced) {
-                self.progress.step();
-            } else {
-                outcomes.extend(self.held_out.outcomes(source..source + 1, weighting, options, self.progress)?);
-            }
+        while outcomes.len() < count && !is_lost(&outcomes, replaced) {
+            // The fewest that can decide against it are waited for together.
+            let more = if replaced.is_empty() { count } else { fewest_to_lose(&outcomes, replaced) };
+            let next = outcomes.len()..count.min(outcomes.len() + more);
+            outcomes.extend(self.held_out.outcomes(next, weighting, options, self.progress)?);
         }
+        (outcomes.len()..count).for_each(|_| self.progress.step());
         let scores: Vec<f64> = outcomes.iter().map(|outcome| outcome.psnr).collect();
         let psnr = (outcomes.len() == self.held_out.len()).then(|| mean_score(&outcomes));
         let (weighting, options) = (weighting.to_string(), options.clone());

@@ -42,6 +42,9 @@ pub trait Field {
     ) -> Result<Box<dyn Prepared + 'a>, FieldError>;
 }
 
+/// A picture that is begun; it is waited for when it is called.
+pub type Drawing<'p> = Box<dyn FnOnce() -> Result<Rendered, FieldError> + 'p>;
+
 /// Source views on a device, with their encodings so far. What not every field can do is a capability: a value that is
 /// there or not.
 pub trait Prepared {
@@ -61,6 +64,15 @@ pub trait Prepared {
     /// # Errors
     /// [`FieldError`].
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError>;
+
+    /// As [`Prepared::render`], begun: several pictures can be waited for together.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    fn draw<'p>(&'p mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Drawing<'p>, FieldError> {
+        let rendered = self.render(request, progress)?;
+        Ok(Box::new(move || Ok(rendered)))
+    }
 
     /// As [`Prepared::render`], rounded where the picture is made, so that less of it comes from a device; `None` from
     /// fields that do not.

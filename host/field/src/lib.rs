@@ -63,8 +63,8 @@ pub mod variant;
 pub use any::AnyField;
 pub use error::FieldError;
 pub use field::{
-    About, Check, DepthMap, Encoding, Field, Geometry, LONGEST_DEFAULT_SIDE, Prepared, Purpose, Rendered, Request,
-    Rounded, SourceSide, Surfaces,
+    About, Check, DepthMap, Drawing, Encoding, Field, Geometry, LONGEST_DEFAULT_SIDE, Prepared, Purpose, Rendered,
+    Request, Rounded, SourceSide, Surfaces,
 };
 pub use mixture::Mixture;
 pub use record::{Denoising, LeftOut, Omission, Record, VIEWS};

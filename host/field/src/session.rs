@@ -1,7 +1,7 @@
 //! The life cycle of source views, the same for all fields: prepared, encoded when needed, used for rendering.
 
 use super::error::FieldError;
-use super::field::{Encoding, Prepared, Purpose, Rendered, Request, Rounded};
+use super::field::{Drawing, Encoding, Prepared, Purpose, Rendered, Request, Rounded};
 use super::mixture::{Mixture, between};
 use super::record::{Record, VIEWS};
 use super::renderer::Renderer;
@@ -174,6 +174,20 @@ impl<'a> Session<'a> {
         let rendered = self.render_encoded(camera, weights, early_termination, progress)?;
         self.tell_faults(progress);
         Ok(rendered)
+    }
+
+    /// As [`Session::render`] without a mixture, begun.
+    pub(crate) fn draw(
+        &mut self,
+        camera: &Camera,
+        weights: &SourceWeights,
+        early_termination: f32,
+        progress: &dyn Progress,
+    ) -> Result<Drawing<'_>, FieldError> {
+        self.encode(weights, progress)?;
+        self.tell_faults(progress);
+        let views = &self.views(weights);
+        self.prepared.draw(&Request { camera, weights, views, early_termination }, progress)
     }
 
     /// As [`Session::render`], rounded by the field; `None` if it does not round, and for mixtures.

@@ -73,7 +73,8 @@ impl Optimisation {
         let iterations = given("iterations", self.iterations, MAX_ITERATIONS)?;
         let quality = self.quality.parse::<Quality>().map_err(Failure::Input)?;
         let is_of_one_colour = !holds_harmonics(output);
-        let recipe = RecipeOptions { quality, iterations, count, is_of_one_colour, is_antialiased: false, seed: self.seed };
+        let recipe =
+            RecipeOptions { quality, iterations, count, is_of_one_colour, is_antialiased: false, seed: self.seed };
         let of_scene =
             SceneOptimisation::new(scene, &self.selection, self.left_out.as_deref(), self.towards.as_deref())?;
         check_writable(output)?;

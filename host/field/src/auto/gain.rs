@@ -5,8 +5,14 @@ use super::{MAX_LOSS, MIN_GAIN};
 
 /// Whether more than half of the sources gain too little for [`is_better`]'s median, by the first ones' results.
 pub(super) fn is_lost(first: &[Outcome], replaced: &[Outcome]) -> bool {
-    let gains_little = |(replaced, new): (&Outcome, &Outcome)| new.psnr - replaced.psnr <= 0.5 * MIN_GAIN;
-    replaced.iter().zip(first).map(gains_little).filter(|little| *little).count() > replaced.len() / 2
+    fewest_to_lose(first, replaced) == 0
+}
+
+/// How many further sources it takes at the least until it [is lost](is_lost); 0 if it is.
+pub(super) fn fewest_to_lose(first: &[Outcome], replaced: &[Outcome]) -> usize {
+    let gains_little = |(replaced, new): &(&Outcome, &Outcome)| new.psnr - replaced.psnr <= 0.5 * MIN_GAIN;
+    let lost = replaced.iter().zip(first).filter(gains_little).count();
+    (replaced.len() / 2 + 1).saturating_sub(lost)
 }
 
 /// Whether a candidate beats the best one so far, and the one it replaces by more than the noise: in the mean, and by

@@ -9,7 +9,7 @@ use crate::held_out::{HeldOut, HoldOut, Photographs};
 use crate::render::{RenderError, RenderOptions, SceneSources, Stage};
 use crate::renderer::Renderer;
 use crate::standing::{Measure, Standing};
-use crate::{AnyOptions, Check, Purpose, Rendered};
+use crate::{AnyOptions, Check, Drawing, Purpose, Rendered};
 use bytemuck::{bytes_of, cast_slice};
 use image::{Rgb, RgbImage};
 use std::ops::Range;
@@ -179,19 +179,23 @@ impl<'a> HeldOutSources<'a> {
         options: &AnyOptions,
         progress: &dyn Progress,
     ) -> Result<Vec<Rendered>, RenderError> {
-        let mut frames = Vec::with_capacity(which.len());
-        for index in which {
+        // All of them are begun before the first one is waited for.
+        let mut begun = Vec::with_capacity(which.len());
+        for (index, source) in self.sources.iter_mut().enumerate().take(which.end).skip(which.start) {
             progress.check().map_err(stopped)?;
             let name = Kept::name(index, weighting, options);
-            let frame = match self.kept.picture(&name) {
-                Some(known) => known.clone(),
-                None => {
-                    let frame = self.sources[index].frame(&self.weighting, weighting, options, progress)?;
-                    self.kept.add(name, &frame);
-                    frame
-                }
+            let drawing = match self.kept.picture(&name) {
+                Some(_) => None,
+                None => Some(source.draw(&self.weighting, weighting, options, progress)?),
             };
-            frames.push(frame);
+            begun.push((name, drawing));
+        }
+        let mut frames = Vec::with_capacity(which.len());
+        for (name, drawing) in begun {
+            if let Some(drawing) = drawing {
+                self.kept.add(name.clone(), drawing().map_err(RenderError::Field)?);
+            }
+            frames.extend(self.kept.picture(&name).cloned());
             progress.step();
         }
         Ok(frames)
@@ -225,14 +229,14 @@ impl<'a> HeldOutSources<'a> {
 }
 
 impl Source<'_> {
-    /// Its picture from the others, which are encoded under the `first` weighting.
-    fn frame(
+    /// Begins its picture from the others, which are encoded under the `first` weighting.
+    fn draw(
         &mut self,
         first: &Weighting,
         weighting: &Weighting,
         options: &AnyOptions,
         progress: &dyn Progress,
-    ) -> Result<Rendered, RenderError> {
+    ) -> Result<Drawing<'_>, RenderError> {
         let (stage, quiet) = (&mut self.held_out.stage, &Quiet(progress));
         if !self.is_encoded {
             stage.weigh(first, quiet)?;
@@ -240,9 +244,7 @@ impl Source<'_> {
             self.is_encoded = true;
         }
         stage.vary(Some(options), None, progress)?;
-        let frame = stage.trial(weighting, &self.target, quiet)?;
-        let (width, height) = frame.picture.dimensions();
-        Ok(Rendered { colours: frame.colours, depths: frame.depths, confidences: frame.confidences, width, height })
+        stage.draw(weighting, &self.target, quiet)
     }
 }
 

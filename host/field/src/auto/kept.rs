@@ -62,8 +62,8 @@ impl Kept {
     }
 
     /// Adds a picture.
-    pub(super) fn add(&mut self, name: String, picture: &Rendered) {
-        self.pictures.insert(name, picture.clone());
+    pub(super) fn add(&mut self, name: String, picture: Rendered) {
+        self.pictures.insert(name, picture);
         self.is_new = true;
     }
 

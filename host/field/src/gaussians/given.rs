@@ -138,7 +138,7 @@ impl<'d, D: Device> Prepare<'d, D> {
     fn picture(&mut self, camera: &CameraBlock) -> Result<Rendered, FieldError> {
         let splatter = self.splatter();
         let Uploaded { gaussians, count, .. } = self.uploaded(camera)?;
-        Ok(splatter.rendered(gaussians, *count, camera, MIN_OPACITY)?)
+        Ok(splatter.rendered(gaussians, *count, &[*camera], MIN_OPACITY)?.remove(0))
     }
 }
 

@@ -3,7 +3,7 @@
 use super::tiles::Tiles;
 use crate::{Rendered, Rounded};
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_device::{Device, DeviceError};
+use viewfuse_device::{Device, DeviceError, Later};
 use viewfuse_kernels::gaussians::shown::bytes_of_pixel;
 use viewfuse_kernels::gaussians::{SplatBlock, TileBlock};
 use viewfuse_kernels::rows::{GaussianBlock, ListBlock, ProjectedGaussian, STATUS_NUMBERS, TILE_RUN};
@@ -26,10 +26,14 @@ const MAX_MASKS: u64 = 1 << 26;
 
 /// Whether a device's memory takes the masks from which it makes the lists of a camera's picture.
 pub(super) fn can_be_listed<D: Device>(device: &D, camera: &CameraBlock, gaussian_count: usize) -> bool {
+    mask_count(camera, gaussian_count) <= MAX_MASKS.min(device.most_elements::<u32>() as u64)
+}
+
+/// Masks of a picture's bins.
+fn mask_count(camera: &CameraBlock, gaussian_count: usize) -> u64 {
     let CameraBlock { width, height, .. } = *camera;
     let block = ListBlock { width, height, splat_count: gaussian_count as u32, capacity: 0 };
-    let masks = u64::from(block.bin_count()) * u64::from(block.mask_count());
-    masks <= MAX_MASKS.min(device.most_elements::<u32>() as u64)
+    u64::from(block.bin_count()) * u64::from(block.mask_count())
 }
 
 /// A picture on the device, with what its derivatives need.
@@ -46,6 +50,17 @@ pub struct Splatted<D: Device> {
     pub colours: D::Buffer<[f32; 4]>,
     /// `[row][column]`: weighted sums of depths; over the opacity, the depth along the principal axis.
     pub depths: D::Buffer<f32>,
+}
+
+/// What the lists of a picture are made from.
+struct Listed<'d, D: Device> {
+    block: ListBlock,
+    splats: D::Buffer<ProjectedGaussian>,
+    masks: D::Buffer<u32>,
+    before: D::Buffer<u32>,
+    starts: D::Buffer<u32>,
+    /// The last number is how many entries they have.
+    status: Later<'d, u32>,
 }
 
 /// A picture on the device, alone.
@@ -106,6 +121,16 @@ impl<'d, D: Device> Splatter<'d, D> {
             let Splatted { colours, depths, .. } = self.picture(gaussians, gaussian_count, camera)?;
             return Ok(Drawn { colours, depths });
         }
+        self.blended(self.listed(gaussians, gaussian_count, camera)?)
+    }
+
+    /// Counts the entries of a picture's lists on the device.
+    fn listed(
+        &self,
+        gaussians: &D::Buffer<GaussianBlock>,
+        gaussian_count: usize,
+        camera: &CameraBlock,
+    ) -> Result<Listed<'d, D>, DeviceError> {
         let device = self.device;
         let camera = CameraBlock { first_texel: 0, ..*camera };
         let CameraBlock { width, height, .. } = camera;
@@ -124,32 +149,53 @@ impl<'d, D: Device> Splatter<'d, D> {
         device.count_entries(&block, &splats, &masks, &mut counts)?;
         device.sum_entries(&block, &counts, &mut before, &mut sums)?;
         device.start_tiles(&block, &sums, &earlier, &mut starts, &mut status)?;
-        let entry_count = device.download(&status)?.last().copied().unwrap_or(0);
+        let status = device.download_later(&status)?;
+        Ok(Listed { block, splats, masks, before, starts, status })
+    }
+
+    /// Makes the lists, and the picture.
+    fn blended(&self, listed: Listed<'d, D>) -> Result<Drawn<D>, DeviceError> {
+        let Listed { block, splats, masks, before, starts, status } = listed;
+        let device = self.device;
+        let entry_count = status.get()?.last().copied().unwrap_or(0);
         let block = ListBlock { capacity: entry_count, ..block };
-        let (mut keys, mut entries) = (device.zeros(entry_count.max(1) as usize)?, zeros(entry_count)?);
+        let entry_len = entry_count.max(1) as usize;
+        let (mut keys, mut entries) = (device.zeros(entry_len)?, device.zeros(entry_len)?);
         device.list_entries(&block, &splats, &masks, &starts, &before, &mut keys)?;
         device.sort_entries(&block, &starts, &keys, &mut entries)?;
 
-        let pixel_count = (width * height) as usize;
+        let pixel_count = (block.width * block.height) as usize;
         let (mut colours, mut depths) = (device.zeros(pixel_count)?, device.zeros(pixel_count)?);
         let tiles = block.tiles(self.background);
         device.blend_splats(&tiles, &starts, &entries, &splats, &mut colours, &mut depths)?;
         Ok(Drawn { colours, depths })
     }
 
-    /// The picture alone, its lists made where that is faster.
+    /// Pictures alone, their lists made where that is faster; on the device the host waits once for all their lists.
     fn drawn_usually(
         &self,
         gaussians: &D::Buffer<GaussianBlock>,
         gaussian_count: usize,
-        camera: &CameraBlock,
-    ) -> Result<Drawn<D>, DeviceError> {
-        let are_lists_on_device = !self.device.is_software() && can_be_listed(self.device, camera, gaussian_count);
-        self.drawn(gaussians, gaussian_count, camera, are_lists_on_device)
+        cameras: &[CameraBlock],
+    ) -> Result<Vec<Drawn<D>>, DeviceError> {
+        let is_listed = |camera: &CameraBlock| can_be_listed(self.device, camera, gaussian_count);
+        if self.device.is_software() || !cameras.iter().all(is_listed) {
+            return cameras.iter().map(|camera| self.drawn(gaussians, gaussian_count, camera, false)).collect();
+        }
+        let mut drawn = Vec::with_capacity(cameras.len());
+        let largest = cameras.iter().map(|camera| mask_count(camera, gaussian_count)).max().unwrap_or(1);
+        for cameras in cameras.chunks((MAX_MASKS / largest.max(1)).max(1) as usize) {
+            let listed = cameras.iter().map(|camera| self.listed(gaussians, gaussian_count, camera));
+            let listed = listed.collect::<Result<Vec<_>, _>>()?;
+            for listed in listed {
+                drawn.push(self.blended(listed)?);
+            }
+        }
+        Ok(drawn)
     }
 
-    /// The same as a field gives it: depths where the opacity is at least `least_opacity`, 0 elsewhere; confidences are
-    /// the opacities.
+    /// Pictures as a field gives them, waited for together: depths where the opacity is at least `least_opacity`, 0
+    /// elsewhere; confidences are the opacities.
     ///
     /// # Errors
     /// [`DeviceError`].
@@ -157,20 +203,27 @@ impl<'d, D: Device> Splatter<'d, D> {
         &self,
         gaussians: &D::Buffer<GaussianBlock>,
         gaussian_count: usize,
-        camera: &CameraBlock,
+        cameras: &[CameraBlock],
         least_opacity: f32,
-    ) -> Result<Rendered, DeviceError> {
-        let Drawn { colours, depths } = self.drawn_usually(gaussians, gaussian_count, camera)?;
-        let (mut colours, mut depths) = (self.device.download(&colours)?, self.device.download(&depths)?);
-        let confidences: Vec<f32> = colours.iter().map(|colour| colour[3]).collect();
-        for (depth, opacity) in depths.iter_mut().zip(&confidences) {
-            *depth = if *opacity >= least_opacity { *depth / opacity } else { 0.0 };
-        }
-        for colour in &mut colours {
-            (0..3).for_each(|channel| colour[channel] = colour[channel].clamp(0.0, 1.0));
-        }
-        let CameraBlock { width, height, .. } = *camera;
-        Ok(Rendered { colours, depths, confidences, width, height })
+    ) -> Result<Vec<Rendered>, DeviceError> {
+        let drawn = self.drawn_usually(gaussians, gaussian_count, cameras)?;
+        let later = |Drawn { colours, depths }: &Drawn<D>| {
+            Ok((self.device.download_later(colours)?, self.device.download_later(depths)?))
+        };
+        let later = drawn.iter().map(later).collect::<Result<Vec<_>, DeviceError>>()?;
+        let rendered = |((colours, depths), camera): ((Later<'_, [f32; 4]>, Later<'_, f32>), &CameraBlock)| {
+            let (mut colours, mut depths) = (colours.get()?, depths.get()?);
+            let confidences: Vec<f32> = colours.iter().map(|colour| colour[3]).collect();
+            for (depth, opacity) in depths.iter_mut().zip(&confidences) {
+                *depth = if *opacity >= least_opacity { *depth / opacity } else { 0.0 };
+            }
+            for colour in &mut colours {
+                (0..3).for_each(|channel| colour[channel] = colour[channel].clamp(0.0, 1.0));
+            }
+            let CameraBlock { width, height, .. } = *camera;
+            Ok(Rendered { colours, depths, confidences, width, height })
+        };
+        later.into_iter().zip(cameras).map(rendered).collect()
     }
 
     /// The same, rounded on the device.
@@ -185,13 +238,14 @@ impl<'d, D: Device> Splatter<'d, D> {
         least_opacity: f32,
     ) -> Result<Rounded, DeviceError> {
         let device = self.device;
-        let Drawn { colours, depths } = self.drawn_usually(gaussians, gaussian_count, camera)?;
+        let Drawn { colours, depths } = self.drawn_usually(gaussians, gaussian_count, &[*camera])?.remove(0);
         let CameraBlock { width, height, .. } = *camera;
         let pixel_count = width * height;
         let (mut shown, mut surfaces) = (device.zeros(pixel_count as usize)?, device.zeros(pixel_count as usize)?);
         device.show_pixels(&least_opacity, pixel_count, &colours, &depths, &mut shown, &mut surfaces)?;
-        let pixels = device.download(&shown)?.into_iter().map(bytes_of_pixel).collect();
-        Ok(Rounded { pixels, depths: device.download(&surfaces)?, width, height })
+        let (shown, surfaces) = (device.download_later(&shown)?, device.download_later(&surfaces)?);
+        let pixels = shown.get()?.into_iter().map(bytes_of_pixel).collect();
+        Ok(Rounded { pixels, depths: surfaces.get()?, width, height })
     }
 
     /// Derivatives of a loss by the Gaussians' parameters, in the places of these, from those by the picture's pixels,

@@ -143,18 +143,20 @@ impl<'d, D: Device> Resident<'d, D> {
     }
 
     /// Sees to it that all iterations so far are done: those from the first one on whose lists had no room are
-    /// dispatched again, with longer lists.
-    fn settle(&mut self) -> Result<(), DeviceError> {
+    /// dispatched again, with longer lists. Returns whether there were some.
+    fn settle(&mut self) -> Result<bool, DeviceError> {
+        let mut changes = false;
         while !self.pending.is_empty() {
-            let Some(status) = &mut self.status else { return Ok(()) };
+            let Some(status) = &mut self.status else { break };
             let numbers = self.device.download(&status.now)?;
             let [is_over, done, most] = [0, 1, 2].map(|number| numbers.get(number).copied().unwrap_or(0));
             status.now = self.device.zeros(STATUS_NUMBERS as usize)?;
             let status = ListStatus::of([is_over, done, most]);
             if !status.is_over {
                 self.pending.clear();
-                return Ok(());
+                break;
             }
+            changes = true;
             self.pending.drain(..(status.done as usize).min(self.pending.len()));
             let most = status.most as usize;
             self.entries = None;
@@ -163,15 +165,20 @@ impl<'d, D: Device> Resident<'d, D> {
                 self.dispatch(&plan)?;
             }
         }
-        Ok(())
+        Ok(changes)
     }
 
     /// The Gaussians and gains to the host. They stay on the device, too.
     fn bring(&mut self) -> Result<(), DeviceError> {
-        self.settle()?;
-        if let Some(particles) = &self.particles {
-            self.course.particles = particles.download(self.device)?;
-            self.course.gains = self.device.download(&particles.gains.now)?;
+        // They come with the status, and a second time where that says that they are not there yet.
+        let device = self.device;
+        let later = |particles: &Option<Particles<D>>| particles.as_ref().map(|now| now.later(device)).transpose();
+        let mut coming = later(&self.particles)?;
+        if self.settle()? {
+            coming = later(&self.particles)?;
+        }
+        if let Some(arrived) = coming {
+            (self.course.particles, self.course.gains) = arrived()?;
         }
         Ok(())
     }
@@ -185,7 +192,10 @@ impl<'d, D: Device> Resident<'d, D> {
         self.load(&plan)?;
         self.pending.push(plan);
         self.dispatch(&plan)?;
-        if self.pending.len() >= ROUND { self.settle() } else { Ok(()) }
+        if self.pending.len() >= ROUND {
+            self.settle()?;
+        }
+        Ok(())
     }
 }
 

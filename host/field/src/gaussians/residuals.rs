@@ -10,14 +10,11 @@
 //! of the source for the target. Gaussians of a few hundred iterations are softer than the photographs; what they lack
 //! there is what they lack beside it. Where no source sees the point nothing is added.
 
-use super::picture::Splatter;
-use crate::{FieldError, Rendered};
+use crate::Rendered;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::lookup::bilinear;
-use viewfuse_device::Device;
 use viewfuse_device::parallel::for_each_row;
-use viewfuse_kernels::rows::GaussianBlock;
 use viewfuse_scene::photographs::{SourceImage, SourceImages};
 
 /// Relative difference of the depths of a point and of the surface that a source sees, at which the source counts by `1
@@ -53,26 +50,16 @@ impl Residuals {
         Residuals { views: vec![None; count], share }
     }
 
-    /// Makes that of a source, if it is not there yet: `gain` is how much brighter the source is than the Gaussians,
-    /// and depths count from an opacity of `least_opacity` on.
-    ///
-    /// # Errors
-    /// [`FieldError`].
-    pub fn find<D: Device>(
-        &mut self,
-        view: usize,
-        splatter: &Splatter<'_, D>,
-        (gaussians, count): (&D::Buffer<GaussianBlock>, usize),
-        (images, gain): (&SourceImages, [f32; 3]),
-        least_opacity: f32,
-    ) -> Result<(), FieldError> {
-        let (Some(place), Some(image)) = (self.views.get_mut(view), images.images.get(view)) else { return Ok(()) };
-        if place.is_none() {
-            let camera = image.camera.block(0);
-            let Rendered { colours, depths, .. } = splatter.rendered(gaussians, count, &camera, least_opacity)?;
-            *place = Some(View { camera, residual: residual(&colours, image, images, gain), depths });
-        }
-        Ok(())
+    /// Whether that of a source is not there yet.
+    pub fn is_missing(&self, view: usize) -> bool {
+        self.views.get(view).is_some_and(Option::is_none)
+    }
+
+    /// Makes that of a source from the Gaussians' picture of it: `gain` is how much brighter the source is than they are.
+    pub fn add_source(&mut self, view: usize, picture: Rendered, images: &SourceImages, gain: [f32; 3]) {
+        let (Some(place), Some(image)) = (self.views.get_mut(view), images.images.get(view)) else { return };
+        let residual = residual(&picture.colours, image, images, gain);
+        *place = Some(View { camera: image.camera.block(0), residual, depths: picture.depths });
     }
 
     /// Adds what these sources, by their weights, show and the Gaussians do not; `picture` is theirs from the camera.

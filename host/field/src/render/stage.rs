@@ -7,14 +7,14 @@ use super::{Frame, RenderError, RenderOptions, Truth, working_side};
 use crate::budget::{Controller, View};
 use crate::session::Session;
 use crate::{
-    AnyOptions, DepthMap, Encoding, FieldError, Geometry, Mixture, Purpose, Record, Rendered, Renderer, Rounded,
-    Surfaces, Variant,
+    AnyOptions, DepthMap, Drawing, Encoding, FieldError, Geometry, Mixture, Purpose, Record, Rendered, Renderer,
+    Rounded, Surfaces, Variant,
 };
 use image::RgbImage;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::Camera;
-use viewfuse_core::weights::Weights;
+use viewfuse_core::weights::{Omission, Weights};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::Target;
@@ -287,9 +287,9 @@ impl<'a> Stage<'a> {
         target: &Target,
         progress: &dyn Progress,
     ) -> Result<Frame, RenderError> {
-        let mut frame = self.trial(weighting, target, progress)?;
+        let camera = self.at_working_size(&target.camera)?;
+        let mut frame = self.frame_at(weighting, target, &camera, progress)?;
         if !frame.depths.is_empty() {
-            let camera = self.at_working_size(&target.camera)?;
             let maps = self.source_depths()?;
             let is_used = |(source, _): &(usize, DepthMap)| frame.omission.weights.get(*source as u32) > 0.0;
             let used: Vec<DepthMap> = maps.into_iter().enumerate().filter(is_used).map(|(_, map)| map).collect();
@@ -298,18 +298,43 @@ impl<'a> Stage<'a> {
         Ok(frame)
     }
 
-    /// As [`Stage::frame`], without how much of it photographs show: for pictures that are only compared.
-    ///
-    /// # Errors
-    /// [`RenderError`].
-    pub fn trial(
+    /// The picture of [`Stage::frame`] alone, begun where it has no bound.
+    pub(crate) fn draw(
         &mut self,
         weighting: &Weighting,
         target: &Target,
         progress: &dyn Progress,
-    ) -> Result<Frame, RenderError> {
+    ) -> Result<Drawing<'_>, RenderError> {
         let camera = self.at_working_size(&target.camera)?;
-        self.frame_at(weighting, target, &camera, progress)
+        if self.controller.is_some() {
+            let frame = self.frame_at(weighting, target, &camera, progress)?;
+            let (width, height) = frame.picture.dimensions();
+            let Frame { colours, depths, confidences, .. } = frame;
+            return Ok(Box::new(move || Ok(Rendered { colours, depths, confidences, width, height })));
+        }
+        let (_, omission, _) = self.weighed(weighting, target);
+        let early_termination = self.options.early_termination;
+        // An error of the scene is told with its name.
+        let scene = self.scene.as_ref().map(|of| of.scene);
+        let drawn = self.session.draw(&camera, &omission.weights, early_termination, progress);
+        drawn.map_err(|error| match scene {
+            Some(scene) => RenderError::of(error, scene),
+            None => RenderError::Field(error),
+        })
+    }
+
+    /// The weights of the sources for a target, without those that are omitted by the options, and without any that need
+    /// not be.
+    fn weighed(&self, weighting: &Weighting, target: &Target) -> (SourceWeights, Omission<MAX_SOURCES>, SourceWeights) {
+        let pose = self.unit.pose(&target.camera.pose);
+        let weights = weighting.weigh(&self.sources, &pose);
+        let compares = matches!(self.session.prepared.encoding(), Encoding::Greatest(_));
+        let omitting = |total: f32| match weights.without_least(total) {
+            omission if compares => comparable(&weights, omission, &self.sources, &pose),
+            omission => omission,
+        };
+        let (omission, all) = (omitting(self.left_out_total(&weights)), omitting(0.0).weights);
+        (weights, omission, all)
     }
 
     /// As [`Stage::frame`] without a truth, with a picture of another size than the options': for coarse pictures.
@@ -338,14 +363,7 @@ impl<'a> Stage<'a> {
         progress: &dyn Progress,
     ) -> Result<Frame, RenderError> {
         let start = Instant::now();
-        let pose = self.unit.pose(&target.camera.pose);
-        let weights = weighting.weigh(&self.sources, &pose);
-        let compares = matches!(self.session.prepared.encoding(), Encoding::Greatest(_));
-        let omitting = |total: f32| match weights.without_least(total) {
-            omission if compares => comparable(&weights, omission, &self.sources, &pose),
-            omission => omission,
-        };
-        let (omission, all) = (omitting(self.left_out_total(&weights)), omitting(0.0).weights);
+        let (weights, omission, all) = self.weighed(weighting, target);
         let early_termination = self.options.early_termination;
         let is_rounded = self.options.is_rounded;
         let (pixels, kept, encode) = match &mut self.controller {

@@ -10,7 +10,7 @@ use super::splats::{SourceDepths, Splats};
 use crate::gaussians::Recipe;
 use crate::variant::erased;
 use crate::{
-    AnyOptions, Encoding, FieldError, Geometry, Prepared, Purpose, Record, Rendered, Request, Setting, Variant,
+    AnyOptions, Drawing, Encoding, FieldError, Geometry, Prepared, Purpose, Record, Rendered, Request, Setting, Variant,
 };
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::Device;
@@ -160,6 +160,14 @@ impl<D: Device> Prepared for Mixed<'_, D> {
                 Ok(picture)
             }
         }
+    }
+
+    fn draw<'p>(&'p mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Drawing<'p>, FieldError> {
+        if self.shown == Shown::Depths && !self.depths.images.has_silhouettes {
+            return self.depths.views.draw(request, progress);
+        }
+        let rendered = self.render(request, progress)?;
+        Ok(Box::new(move || Ok(rendered)))
     }
 
     fn record(&self) -> Record {

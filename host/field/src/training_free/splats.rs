@@ -6,6 +6,7 @@ use crate::gaussians::{Optimisation, Optimised, Recipe, Residuals, Splatter, opt
 use crate::point_cloud::cloud_of;
 use crate::{AnyOptions, DepthMap, FieldError, Geometry, Prepared, Rendered, Request, Surfaces};
 use std::sync::Arc;
+use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::Device;
 use viewfuse_job::progress::{Progress, Quiet};
 use viewfuse_kernels::rows::GaussianBlock;
@@ -121,14 +122,19 @@ impl<D: Device> Splats<D> {
     ) -> Result<Rendered, FieldError> {
         let Splats { gaussians, count, near, background, is_antialiased, gains, residuals } = self;
         let splatter = Splatter { device, near: *near, background: *background, is_antialiased: *is_antialiased };
-        let mut picture = splatter.rendered(gaussians, *count, &request.camera.block(0), MIN_OPACITY)?;
         let weights: Vec<(usize, f32)> = request.views.iter().copied().zip(request.view_weights()).collect();
+        let used = weights.iter().filter(|(_, weight)| *weight > 0.0).map(|(view, _)| *view);
+        let missing: Vec<usize> = used.filter(|view| residuals.is_missing(*view)).collect();
+        let sources = missing.iter().map(|view| images.images[*view].camera.block(0));
+        let cameras: Vec<CameraBlock> = [request.camera.block(0)].into_iter().chain(sources).collect();
+        let mut pictures = splatter.rendered(gaussians, *count, &cameras, MIN_OPACITY)?;
+        let mut picture = pictures.remove(0);
         let gain = common_gain(gains, &weights);
         for colour in &mut picture.colours {
             (0..3).for_each(|channel| colour[channel] = (colour[channel] * gain[channel]).clamp(0.0, 1.0));
         }
-        for (view, _) in weights.iter().filter(|(_, weight)| *weight > 0.0) {
-            residuals.find(*view, &splatter, (gaussians, *count), (images, gains[*view]), MIN_OPACITY)?;
+        for (view, picture) in missing.iter().zip(pictures) {
+            residuals.add_source(*view, picture, images, gains[*view]);
         }
         residuals.add(&request.camera.block(0), &weights, &mut picture);
         Ok(picture)

@@ -8,7 +8,7 @@ use super::super::picture::can_be_listed;
 use super::ENTRIES_A_GAUSSIAN;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::gaussian::REST_COUNTS;
-use viewfuse_device::{Device, DeviceError, Element};
+use viewfuse_device::{Device, DeviceError, Element, Later};
 use viewfuse_kernels::gaussians::blend_gradient::SplatGradient;
 use viewfuse_kernels::rows::{
     GainBlock, GaussianBlock, HarmonicTerm, ListBlock, ParticleState, ProjectedGaussian, SHARE_RUN, TILE_RUN,
@@ -34,6 +34,9 @@ pub(in crate::gaussians) fn fits<D: Device>(device: &D, course: &Course) -> bool
 fn pixel_count(view: &LevelView) -> usize {
     (view.camera.width * view.camera.height) as usize
 }
+
+/// Gaussians and gains on the host.
+pub(super) type Brought = (Vec<Particle>, Vec<GainBlock>);
 
 /// An array before and after a step.
 pub(super) struct Stepped<B> {
@@ -184,17 +187,26 @@ impl<D: Device> Particles<D> {
         })
     }
 
-    /// As they are now.
-    pub(super) fn download(&self, device: &D) -> Result<Vec<Particle>, DeviceError> {
-        let gaussians = device.download(&self.gaussians.now)?;
-        let states = device.download(&self.states.now)?;
-        let terms = if self.term_count > 0 { device.download(&self.terms.now)? } else { Vec::new() };
-        let particle = |(index, (gaussian, state)): (usize, (GaussianBlock, ParticleState))| {
-            let first = index * self.term_count as usize;
-            let count = state.rest_count.min(self.term_count) as usize;
-            Particle { gaussian, harmonics: Harmonics(terms[first..first + count].to_vec()), state }
-        };
-        let all = gaussians.into_iter().zip(states).take(self.count as usize);
-        Ok(all.enumerate().map(particle).collect())
+    /// As they are now, with the gains, to be waited for later.
+    pub(super) fn later<'d>(
+        &self,
+        device: &'d D,
+    ) -> Result<impl FnOnce() -> Result<Brought, DeviceError> + use<'d, D>, DeviceError> {
+        let (term_count, count) = (self.term_count, self.count as usize);
+        let (gaussians, states) =
+            (device.download_later(&self.gaussians.now)?, device.download_later(&self.states.now)?);
+        let terms = if term_count > 0 { Some(device.download_later(&self.terms.now)?) } else { None };
+        let gains = device.download_later(&self.gains.now)?;
+        Ok(move || {
+            let (gaussians, states) = (gaussians.get()?, states.get()?);
+            let terms = terms.map_or_else(|| Ok(Vec::new()), Later::get)?;
+            let particle = |(index, (gaussian, state)): (usize, (GaussianBlock, ParticleState))| {
+                let first = index * term_count as usize;
+                let count = state.rest_count.min(term_count) as usize;
+                Particle { gaussian, harmonics: Harmonics(terms[first..first + count].to_vec()), state }
+            };
+            let all = gaussians.into_iter().zip(states).take(count);
+            Ok((all.enumerate().map(particle).collect(), gains.get()?))
+        })
     }
 }

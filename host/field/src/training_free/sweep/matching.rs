@@ -127,7 +127,7 @@ impl<D: Device> Matching<'_, D> {
         let FrustumBlock { camera: CameraBlock { width, height, .. }, group_count, .. } = *whole;
         let matched = &swept[..whole.view_count as usize];
         let row_len = (width * group_count) as usize;
-        let (views, pairs) = (device.upload(matched)?, device.upload(&pairs(swept))?);
+        let (views, pairs) = (scratch.views.of(device, matched)?, scratch.pairs.of(device, &pairs(swept))?);
         let band_rows = self.band_rows(row_len * matched.len().max(4)).min(height);
         let rows = (band_rows + REACH).min(height) as usize;
         let grey = scratch.grey.of_len(device, rows * row_len * matched.len())?;
@@ -137,8 +137,8 @@ impl<D: Device> Matching<'_, D> {
             let halo = first.min(REACH);
             let kept = band_rows.min(height - first);
             let band = FrustumBlock { first_row: first - halo, row_count: halo + kept, ..*whole };
-            device.compare_views(&band, &views, &pairs, texels, maps, grey, evidence)?;
-            device.census_cost(&band, halo, kept, &pairs, grey, evidence, costs)?;
+            device.compare_views(&band, views, pairs, texels, maps, grey, evidence)?;
+            device.census_cost(&band, halo, kept, pairs, grey, evidence, costs)?;
         }
         Ok(())
     }
@@ -206,7 +206,7 @@ impl<D: Device> Matching<'_, D> {
         if self.front_share > 0.0 && voters.iter().any(|view| view.disparity_step > 0.0) {
             let opacities = scratch.opacities.of_len(device, volume)?;
             let frustum = FrustumBlock { view_count: voters.len() as u32, ..whole };
-            device.plane_opacity(&frustum, &device.upload(voters)?, maps, opacities)?;
+            device.plane_opacity(&frustum, scratch.views.of(device, voters)?, maps, opacities)?;
             let block = FrontBlock { width, height, group_count, front_share: self.front_share };
             let costs = scratch.costs.of_len(device, volume)?;
             device.front_cost(&block, opacities, means, costs)?;

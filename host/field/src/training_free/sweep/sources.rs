@@ -6,6 +6,7 @@ use super::matching::swept;
 use super::views::{Matched, Views};
 use super::{DEFAULT, Sweep};
 use crate::FieldError;
+use std::cell::OnceCell;
 use std::ops::Range;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::Device;
@@ -23,6 +24,8 @@ pub(super) struct SourceMaps<D: Device> {
     pub(super) relevance: Vec<SourceWeights>,
     /// `[view][row][column]` of the matched ones: disparity and confidence.
     disparities: D::Buffer<[f32; 2]>,
+    /// The same on the host, from when it first needs them.
+    on_host: OnceCell<Vec<[f32; 2]>>,
     /// Those found the second time.
     settled: Option<Settled<D>>,
     /// From a plane's disparity to the next one's, of each view; 0 if it is not encoded.
@@ -42,6 +45,7 @@ struct Settled<D: Device> {
     /// Of each view, by which others and with which weights; none where it was not found.
     voters: Vec<Option<Vec<(usize, f32)>>>,
     maps: D::Buffer<[f32; 2]>,
+    on_host: OnceCell<Vec<[f32; 2]>>,
 }
 
 impl<D: Device> SourceMaps<D> {
@@ -54,6 +58,7 @@ impl<D: Device> SourceMaps<D> {
         Ok(SourceMaps {
             relevance,
             disparities: device.zeros(matched.texels.len())?,
+            on_host: OnceCell::new(),
             settled: None,
             steps: vec![0.0; matched.images.cameras.len()],
             found: Vec::new(),
@@ -82,10 +87,16 @@ impl<D: Device> SourceMeans<D> {
 
 impl<D: Device> Views<'_, D> {
     /// The sources' disparities and confidences, each from the costs of its planes alone.
-    pub(super) fn found(&self) -> &D::Buffer<[f32; 2]> {
+    pub(super) fn found(&self) -> Result<Vec<[f32; 2]>, FieldError> {
         let is_settled = self.settings.second_share > 0.0;
         let settled = self.maps.settled.as_ref().filter(|_| is_settled);
-        settled.map_or(&self.maps.disparities, |settled| &settled.maps)
+        let first = (&self.maps.disparities, &self.maps.on_host);
+        let (maps, on_host) = settled.map_or(first, |settled| (&settled.maps, &settled.on_host));
+        if let Some(known) = on_host.get() {
+            return Ok(known.clone());
+        }
+        let found = self.scene.device.download(maps)?;
+        Ok(on_host.get_or_init(|| found).clone())
     }
 
     /// Finds the disparities of these views the second time, if the settings ask for it, where others say something of
@@ -99,11 +110,12 @@ impl<D: Device> Views<'_, D> {
         let Sweep { dissent_share, temperature, .. } = DEFAULT;
         let settings = Sweep { front_share: self.settings.second_share, dissent_share, temperature, ..self.settings };
         let known = self.maps.settled.take().filter(|known| known.settings == settings);
-        let Settled { mut voters, mut maps, .. } = match known {
+        let Settled { mut voters, mut maps, mut on_host, .. } = match known {
             Some(known) => known,
             None => {
                 let voters = vec![None; self.maps.steps.len()];
-                Settled { settings, voters, maps: self.scene.device.zeros(self.matched.texels.len())? }
+                let maps = self.scene.device.zeros(self.matched.texels.len())?;
+                Settled { settings, voters, maps, on_host: OnceCell::new() }
             }
         };
         for &view in views {
@@ -116,11 +128,12 @@ impl<D: Device> Views<'_, D> {
                 let (frustum, swept) = self.source_frustum(view, settings);
                 let costs = self.source_costs(frustum, swept, &voting, settings, progress)?;
                 self.scene.device.pick_disparity(&frustum, &costs, &mut maps)?;
+                on_host = OnceCell::new();
                 voters[view] = Some(others);
                 self.target = None;
             }
         }
-        self.maps.settled = Some(Settled { settings, voters, maps });
+        self.maps.settled = Some(Settled { settings, voters, maps, on_host });
         Ok(())
     }
 
@@ -190,7 +203,8 @@ impl<D: Device> Views<'_, D> {
         self.maps.unkept.clear();
         if !self.maps.found.is_empty() {
             self.maps.found.clear();
-            self.maps.disparities = self.scene.device.upload_owned(maps)?;
+            self.maps.disparities = self.scene.device.upload(&maps)?;
+            self.maps.on_host = maps.into();
         }
         Ok(())
     }
@@ -223,6 +237,7 @@ impl<D: Device> Views<'_, D> {
         }
         let costs = self.source_costs(frustum, swept, &[], settings, progress)?;
         self.scene.device.pick_disparity(&frustum, &costs, &mut self.maps.disparities)?;
+        self.maps.on_host = OnceCell::new();
         self.maps.unkept.extend(key.map(|key| (view, key)));
         Ok(())
     }

@@ -20,9 +20,10 @@ pub(super) struct TargetViews<D: Device> {
     by_second: bool,
     /// Gain of each view: red, green, blue, 1.
     gains: Vec<[f32; 4]>,
-    /// `[view][row][column]`: disparity and confidence, on the device and on the host.
+    /// `[view][row][column]`: disparity and confidence.
     pub(super) maps: D::Buffer<[f32; 2]>,
-    pub(super) host_maps: Vec<[f32; 2]>,
+    /// The same on the host.
+    pub(super) maps_on_host: Vec<[f32; 2]>,
     /// Of the last picture, for another one of the same target under other settings.
     compared: Option<Compared<D>>,
 }
@@ -60,15 +61,14 @@ impl<D: Device> Views<'_, D> {
         if let Some(known) = known {
             return Ok(known);
         }
-        let device = self.scene.device;
-        let mut host_maps = device.download(self.found())?;
-        self.confirm(views, &mut host_maps);
+        let mut on_host = self.found()?;
+        self.confirm(views, &mut on_host);
         let steps = &self.maps.steps;
         let used: Vec<f32> =
             steps.iter().enumerate().map(|(view, step)| if views.contains(&view) { *step } else { 0.0 }).collect();
-        let gains = exposure::gains(&self.matched.images.cameras, &self.matched.texels, &host_maps, &used);
-        let maps = device.upload(&host_maps)?;
-        Ok(TargetViews { views: views.to_vec(), by_second, gains, maps, host_maps, compared: None })
+        let gains = exposure::gains(&self.matched.images.cameras, &self.matched.texels, &on_host, &used);
+        let (views, maps) = (views.to_vec(), self.scene.device.upload(&on_host)?);
+        Ok(TargetViews { views, by_second, gains, maps, maps_on_host: on_host, compared: None })
     }
 
     /// The costs of a target's planes, and what its pixels are blended from.

@@ -10,7 +10,8 @@ use super::{Sweep, holes, search, unseen};
 use crate::training_free::space::Space;
 use crate::variant::erased;
 use crate::{
-    AnyOptions, DepthMap, Encoding, FieldError, Geometry, Prepared, Purpose, Rendered, Request, Surfaces, Variant,
+    AnyOptions, DepthMap, Drawing, Encoding, FieldError, Geometry, Prepared, Purpose, Rendered, Request, Surfaces,
+    Variant,
 };
 use std::borrow::Cow;
 use viewfuse_core::camera::CameraBlock;
@@ -128,32 +129,48 @@ impl<D: Device> Prepared for Views<'_, D> {
     }
 
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
+        self.draw(request, progress)?()
+    }
+
+    fn draw<'p>(&'p mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Drawing<'p>, FieldError> {
         let mut target = self.target_views(request.views, progress)?;
         let Volume { block, views: blended, costs } = self.volume(&mut target, request, progress)?;
         let device = self.scene.device;
         let (width, height) = (block.target.width, block.target.height);
         let count = (width * height) as usize;
-        let blend_views = device.upload(&blended)?;
         let (mut colours, mut depths, mut confidences) =
             (device.zeros::<[f32; 4]>(count)?, device.zeros::<f32>(count)?, device.zeros::<f32>(count)?);
         device.blend_planes(
-            &block, 0, height, &blend_views, &self.scene.pictures.texels, &target.maps, &costs, &mut colours,
-            &mut depths, &mut confidences,
+            &block,
+            0,
+            height,
+            self.scratch.views.of(device, &blended)?,
+            &self.scene.pictures.texels,
+            &target.maps,
+            &costs,
+            &mut colours,
+            &mut depths,
+            &mut confidences,
         )?;
-        let mut colours = device.download(&colours)?;
-        for colour in &mut colours {
-            let behind = 1.0 - colour[3];
-            (0..3).for_each(|channel| colour[channel] += behind * self.scene.background[channel]);
-        }
-        let (depths, confidences) = (device.download(&depths)?, device.download(&confidences)?);
-        let mut rendered = Rendered { colours, depths, confidences, width, height };
-        if !self.scene.has_silhouettes {
-            let used: Vec<DepthMap> =
-                request.views.iter().map(|view| self.depth_map(*view, &target.host_maps)).collect();
-            holes::fill(&mut rendered, &block.target, &used);
-        }
+        let colours = device.download_later(&colours)?;
+        let (depths, confidences) = (device.download_later(&depths)?, device.download_later(&confidences)?);
+        let (background, has_silhouettes) = (self.scene.background, self.scene.has_silhouettes);
+        let used = if has_silhouettes { &[] } else { request.views };
+        let used: Vec<DepthMap> = used.iter().map(|view| self.depth_map(*view, &target.maps_on_host)).collect();
         self.target = Some(target);
-        Ok(rendered)
+        Ok(Box::new(move || {
+            let mut colours = colours.get()?;
+            for colour in &mut colours {
+                let behind = 1.0 - colour[3];
+                (0..3).for_each(|channel| colour[channel] += behind * background[channel]);
+            }
+            let (depths, confidences) = (depths.get()?, confidences.get()?);
+            let mut rendered = Rendered { colours, depths, confidences, width, height };
+            if !has_silhouettes {
+                holes::fill(&mut rendered, &block.target, &used);
+            }
+            Ok(rendered)
+        }))
     }
 
     fn is_weighted(&self) -> bool {
@@ -205,7 +222,7 @@ impl<D: Device> Geometry for Views<'_, D> {
     }
 
     fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError> {
-        let mut maps = self.scene.device.download(self.found())?;
+        let mut maps = self.found()?;
         self.add_kept(&mut maps);
         let view_count = self.maps.steps.len();
         let encoded: Vec<usize> = (0..view_count).filter(|view| self.maps.steps[*view] > 0.0).collect();
