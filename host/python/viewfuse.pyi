@@ -144,6 +144,7 @@ class Scene:
         count: Optional[int] = None,
         iterations: Optional[int] = None,
         resume: Union[None, str, PathLike[str]] = None,
+        antialias: bool = False,
         size: Optional[tuple[int, int]] = None,
         device: str = "auto",
         background: str = "auto",
@@ -160,6 +161,7 @@ class Scene:
         quality: "fast", or "standard" and "high" for minutes and some twenty photographs and more.
         count: most Gaussians. iterations: at each size of the sources.
         resume: a file of Gaussians to go on from, at the finest size.
+        antialias: for pictures smaller than the photographs; a .ply or a .spz says so.
         """
     def __len__(self) -> int:
         """The number of views."""

@@ -48,6 +48,7 @@ pub(crate) struct Optimisation {
     pub(crate) count: Option<u32>,
     pub(crate) iterations: Option<u32>,
     pub(crate) resume: Option<PathBuf>,
+    pub(crate) antialias: bool,
     pub(crate) size: Option<(u32, u32)>,
     pub(crate) device: String,
     pub(crate) background: String,
@@ -73,18 +74,23 @@ impl Optimisation {
         let iterations = given("iterations", self.iterations, MAX_ITERATIONS)?;
         let quality = self.quality.parse::<Quality>().map_err(Failure::Input)?;
         let is_of_one_colour = !holds_harmonics(output);
-        let recipe =
-            RecipeOptions { quality, iterations, count, is_of_one_colour, is_antialiased: false, seed: self.seed };
         let of_scene =
             SceneOptimisation::new(scene, &self.selection, self.left_out.as_deref(), self.towards.as_deref())?;
         check_writable(output)?;
         self.keep_inputs(scene)?;
         GaussianScene::check_place(output, &scene.frame)?;
+        let before = self.resume.as_ref().map(|path| GaussianFile::open(path, scene)).transpose()?;
+        let is_antialiased = self.antialias || before.as_ref().is_some_and(|before| before.scene.is_antialiased);
+        if is_antialiased && is_of_one_colour {
+            let problem = "no .html and no .splat says that Gaussians are antialiased; write a .ply or a .spz";
+            return Err(Failure::Input(problem.to_owned()));
+        }
+        let recipe = RecipeOptions { quality, iterations, count, is_of_one_colour, is_antialiased, seed: self.seed };
         let optimisation = SceneOptimisation {
             weighting,
             options: render_options(self.size, &self.background)?,
             recipe,
-            before: self.resume.as_ref().map(|path| GaussianFile::open(path, scene)).transpose()?,
+            before,
             ..of_scene
         };
         let device = device(&self.device)?;

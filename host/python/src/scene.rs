@@ -174,7 +174,7 @@ impl PyScene {
 
     /// Optimises Gaussians for the photographs, and writes them: as .ply, smaller as .spz or .splat, or as an .html
     /// page. Ctrl-C ends it, and what there is so far is written.
-    #[pyo3(signature = (output, *, weights=None, left_out=None, towards=None, quality="fast", sources=None, views=None, count=None, iterations=None, resume=None, size=None, device="auto", background="auto", seed=0, progress=None))]
+    #[pyo3(signature = (output, *, weights=None, left_out=None, towards=None, quality="fast", sources=None, views=None, count=None, iterations=None, resume=None, antialias=false, size=None, device="auto", background="auto", seed=0, progress=None))]
     #[allow(clippy::too_many_arguments)]
     fn optimise(
         &self,
@@ -189,6 +189,7 @@ impl PyScene {
         count: Option<u32>,
         iterations: Option<u32>,
         resume: Option<PathBuf>,
+        antialias: bool,
         size: Option<(u32, u32)>,
         device: &str,
         background: &str,
@@ -207,6 +208,7 @@ impl PyScene {
             count,
             iterations,
             resume,
+            antialias,
             size,
             device,
             background,
