@@ -1,11 +1,10 @@
-//! Gaussians of the sample scene on each device: lists of tiles, and pictures of a scene that is optimised.
+//! Gaussians of the sample scene on each device: derivatives, and pictures of a scene that is optimised.
 
 use crate::candidate::{Candidate, tests};
 use libtest_mimic::Failed;
 use std::sync::OnceLock;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::device::vulkan::Vulkan;
-use viewfuse::device::{Device, DeviceError, Memory};
+use viewfuse::device::{Device, Memory};
 use viewfuse::field::gaussians::{
     Drawn, Optimised, Recipe, Splatter, Tiles, optimisation_by_host, optimisation_on_device, optimised,
 };
@@ -14,13 +13,16 @@ use viewfuse::scene::photographs::to_rgb8;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::metrics::psnr;
 use viewfuse_core::random::uniform;
-use viewfuse_kernels::gaussians::TileBlock;
-use viewfuse_kernels::rows::{ListBlock, ProjectedGaussian, TILE_RUN, WORKGROUP};
+use viewfuse_kernels::gaussians::lists::ListStatus;
+use viewfuse_kernels::gaussians::{SplatBlock, TileBlock};
+use viewfuse_kernels::rows::{GaussianBlock, ListBlock, ProjectedGaussian, TILE_RUN, WORKGROUP};
 use viewfuse_tests::cloud::toy_cloud;
 use viewfuse_vulkan::GpuOptions;
 
 tests!(
+    derivatives_of_a_scene_are_the_cpus,
     a_scene_is_as_good_as_the_cpus,
+    lists_of_tiles_are_the_hosts,
     lists_of_a_large_picture_are_the_hosts,
     iterations_of_a_device_are_the_hosts,
     a_devices_scene_depends_on_no_capacity_and_no_run,
@@ -28,6 +30,11 @@ tests!(
     a_picture_has_the_same_bits_with_lists_of_the_device,
 );
 
+/// Most splats of a tile: fewer than those whose loops Mesa's llvmpipe ends (`viewfuse_field::gaussians::optimised`).
+const MAX_LISTED: u32 = 100;
+/// Largest difference of derivatives, as a share of the norm of all: sums of at most 64 pixels and some 50 splats, in
+/// another order and with other last digits of the exponential, differ by some 1e-5.
+const MAX_DIFFERENCE: f64 = 1.0e-3;
 /// Largest difference of scores, decibels: on another device the last digits differ, and the steps make them grow.
 const MAX_LOSS: f64 = 0.5;
 
@@ -53,9 +60,66 @@ fn camera() -> CameraBlock {
     toy_cloud().0.images[0].camera.block(0)
 }
 
+/// The longest list of splats of a tile.
+fn longest_list(made: &Optimised) -> u32 {
+    let (camera, gaussian_count) = (camera(), made.gaussians.len() as u32);
+    let block = SplatBlock { camera, near: made.near, gaussian_count, ..SplatBlock::default() };
+    let mut splats = Cpu.zeros(made.gaussians.len()).expect("memory");
+    Cpu.project_gaussians(&block, &made.gaussians, &mut splats).expect("splats");
+    let lists = Tiles::of(&TileBlock::new(camera.width, camera.height, made.background), &splats);
+    lists.starts.windows(2).map(|part| part[1] - part[0]).max().unwrap_or(0)
+}
+
+/// Every so many Gaussians of the CPU's scene, so that no list is too long.
+fn thinned() -> Optimised {
+    let all = cpus_scene();
+    let every =
+        |step: usize| Optimised { gaussians: all.gaussians.iter().copied().step_by(step).collect(), ..all.clone() };
+    (1..all.gaussians.len()).map(every).find(|cloud| longest_list(cloud) <= MAX_LISTED).expect("a step")
+}
+
 fn splatter<'d, D>(device: &'d D, made: &Optimised) -> Splatter<'d, D> {
     let Optimised { near, background, is_antialiased, .. } = *made;
     Splatter { device, near, background, is_antialiased }
+}
+
+/// Derivatives by the Gaussians of a loss whose derivatives by the first source's pixels have all signs.
+fn derivatives<D: Device>(device: &D, made: &Optimised) -> Vec<GaussianBlock> {
+    let splatter = splatter(device, made);
+    let camera = camera();
+    let uploaded = device.upload(&made.gaussians).expect("Gaussians");
+    let picture = splatter.picture(&uploaded, made.gaussians.len(), &camera).expect("a picture");
+    let by = |index: usize| [0, 1, 2, 3].map(|channel| ((index * 7 + channel * 5) % 11) as f32 / 5.0 - 1.0);
+    let by_pixels: Vec<[f32; 4]> = (0..(camera.width * camera.height) as usize).map(by).collect();
+    splatter.gradients(&uploaded, &picture, &by_pixels).expect("derivatives")
+}
+
+/// Some of a Gaussian's parameters.
+type Part = fn(&GaussianBlock) -> Vec<f32>;
+
+fn derivatives_of_a_scene_are_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
+    let device = candidate.vulkan(&GpuOptions::default())?;
+    let made = thinned();
+    let (cpu, ours) = (derivatives(&Cpu, &made), derivatives(&device, &made));
+    let groups: [(&str, Part); 5] = [
+        ("position", |gaussian| gaussian.position.to_vec()),
+        ("opacity", |gaussian| vec![gaussian.opacity]),
+        ("scales", |gaussian| gaussian.log_scales.to_vec()),
+        ("rotation", |gaussian| gaussian.rotation.to_vec()),
+        ("colour", |gaussian| gaussian.colour.to_vec()),
+    ];
+    let norm = |values: &[f32]| values.iter().map(|value| f64::from(*value).powi(2)).sum::<f64>().sqrt();
+    for (name, part) in groups {
+        let [a, b] = [&cpu, &ours].map(|all| all.iter().flat_map(part).collect::<Vec<f32>>());
+        let apart: Vec<f32> = a.iter().zip(&b).map(|(a, b)| a - b).collect();
+        let (difference, all) = (norm(&apart), norm(&a));
+        assert!(
+            all > 0.0 && difference <= MAX_DIFFERENCE * all,
+            "{name}: {difference:e} of {all:e}, {} Gaussians",
+            made.gaussians.len()
+        );
+    }
+    Ok(())
 }
 
 /// The PSNR of the Gaussians at the sources, decibels.
@@ -83,22 +147,57 @@ fn a_scene_is_as_good_as_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
     Ok(())
 }
 
-/// A device's lists of a picture's tiles: where each begins, and the entries of all.
-fn lists_on(device: &Vulkan, block: ListBlock, splats: &[ProjectedGaussian]) -> Result<[Vec<u32>; 2], DeviceError> {
-    let zeros = |count: u32| device.zeros(count as usize);
-    let splats = device.upload(splats)?;
-    let mut masks = zeros(block.bin_count() * block.mask_count())?;
-    let (mut counts, mut before) = (zeros(block.most_counts())?, zeros(block.most_counts())?);
-    let mut sums = zeros(block.run_count() * TILE_RUN)?;
-    let (mut starts, status, mut after) = (zeros(block.tile_count() + 1)?, zeros(3)?, zeros(3)?);
-    let (mut keys, mut entries) = (device.zeros(block.capacity as usize)?, zeros(block.capacity)?);
-    device.mark_bins(&block, &splats, &mut masks)?;
-    device.count_entries(&block, &splats, &masks, &mut counts)?;
-    device.sum_entries(&block, &counts, &mut before, &mut sums)?;
-    device.start_tiles(&block, &sums, &status, &mut starts, &mut after)?;
-    device.list_entries(&block, &splats, &masks, &starts, &before, &mut keys)?;
-    device.sort_entries(&block, &starts, &keys, &mut entries)?;
-    Ok([device.download(&starts)?, device.download(&entries)?])
+/// A device's lists of a picture's tiles.
+fn lists_on<D: Device>(device: &D, block: ListBlock, splats: &[ProjectedGaussian]) -> (Vec<u32>, Vec<u32>, ListStatus) {
+    let zeros = |count: u32| device.zeros(count as usize).expect("memory");
+    let splats = device.upload(splats).expect("splats");
+    let mut masks = zeros(block.bin_count() * block.mask_count());
+    let (mut counts, mut before) = (zeros(block.most_counts()), zeros(block.most_counts()));
+    let mut sums = zeros(block.run_count() * TILE_RUN);
+    let (mut starts, status, mut after) = (zeros(block.tile_count() + 1), zeros(3), zeros(3));
+    let (mut keys, mut entries) = (device.zeros(block.capacity as usize).expect("memory"), zeros(block.capacity));
+    let mut run = || {
+        device.mark_bins(&block, &splats, &mut masks)?;
+        device.count_entries(&block, &splats, &masks, &mut counts)?;
+        device.sum_entries(&block, &counts, &mut before, &mut sums)?;
+        device.start_tiles(&block, &sums, &status, &mut starts, &mut after)?;
+        device.list_entries(&block, &splats, &masks, &starts, &before, &mut keys)?;
+        device.sort_entries(&block, &starts, &keys, &mut entries)?;
+        let status = device.download(&after)?;
+        Ok::<_, viewfuse::device::DeviceError>((device.download(&starts)?, device.download(&entries)?, status))
+    };
+    let (starts, mut entries, status) = run().expect("lists");
+    entries.truncate(starts[starts.len() - 1] as usize);
+    (starts, entries, ListStatus::of([status[0], status[1], status[2]]))
+}
+
+/// Of all Gaussians of the CPU's scene from several places, and of none of them.
+fn lists_of_tiles_are_the_hosts(candidate: &Candidate) -> Result<(), Failed> {
+    let device = candidate.vulkan(&GpuOptions::default())?;
+    let made = cpus_scene();
+    for image in toy_cloud().0.images.iter().step_by(3) {
+        let camera = image.camera.block(0);
+        for gaussians in [&made.gaussians[..], &made.gaussians[..1]] {
+            let gaussian_count = gaussians.len() as u32;
+            let block = SplatBlock { camera, near: made.near, gaussian_count, ..SplatBlock::default() };
+            let mut splats = Cpu.zeros(gaussians.len())?;
+            Cpu.project_gaussians(&block, &gaussians.to_vec(), &mut splats)?;
+            let expected = Tiles::of(&TileBlock::new(camera.width, camera.height, made.background), &splats);
+            let total = expected.entries.len() as u32;
+            let CameraBlock { width, height, .. } = camera;
+            let block = ListBlock { width, height, splat_count: gaussian_count, capacity: total.max(1) };
+            let on_cpu = lists_on(&Cpu, block, &splats);
+            let status = ListStatus { is_over: false, done: 1, most: total };
+            assert_eq!(on_cpu, (expected.starts.clone(), expected.entries.clone(), status), "on the CPU");
+            assert!(lists_on(&device, block, &splats) == on_cpu, "{gaussian_count} Gaussians");
+            if total > 1 {
+                let (starts, entries, status) = lists_on(&device, ListBlock { capacity: total - 1, ..block }, &splats);
+                assert!(starts.iter().all(|start| *start == 0) && entries.is_empty());
+                assert_eq!(status, ListStatus { is_over: true, done: 0, most: total });
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Of so many splats on so large a picture that a part of them has more masks than a workgroup has invocations.
@@ -123,7 +222,7 @@ fn lists_of_a_large_picture_are_the_hosts(candidate: &Candidate) -> Result<(), F
     let expected = Tiles::of(&TileBlock::new(width, height, [0.0; 3]), &splats);
     let block = ListBlock { width, height, splat_count: COUNT, capacity: expected.entries.len() as u32 };
     assert!(block.mask_count() / block.part_count() > WORKGROUP, "parts of few masks");
-    let [starts, entries] = lists_on(&device, block, &splats)?;
+    let (starts, entries, _) = lists_on(&device, block, &splats);
     assert!(starts == expected.starts && entries == expected.entries);
     Ok(())
 }
@@ -197,7 +296,9 @@ fn an_iteration_needs_no_transfer(candidate: &Candidate) -> Result<(), Failed> {
         let mut optimisation = optimisation.expect("enough points");
         // From here on there are harmonics, if there are any at all.
         optimisation.run_to(64, &Silent)?;
-        let dispatches = |device: &Vulkan| device.kernel_times().iter().map(|time| time.dispatches).sum::<u64>();
+        let dispatches = |device: &viewfuse::device::vulkan::Vulkan| {
+            device.kernel_times().iter().map(|time| time.dispatches).sum::<u64>()
+        };
         let (before, dispatched) = (device.transfers(), dispatches(&device));
         optimisation.run_to(64 + 31, &Silent)?;
         assert_eq!(device.transfers(), before, "no transfer in 31 iterations");

@@ -82,7 +82,7 @@ fn validation_says_nothing_about_check(candidate: &Candidate) -> Result<(), Fail
 }
 
 /// All other trials of this device: cut work, memory that runs out, transfers. A device that is left alone is another
-/// process, and is wrong by the letter; a whole scene of Gaussians is what its iterations are, many times.
+/// process, and is wrong by the letter; a whole scene of Gaussians is what its derivatives are, a thousand times.
 fn validation_says_nothing_about_these_tests(candidate: &Candidate) -> Result<(), Failed> {
     let mut command = validated(&fs::canonicalize(env::current_exe()?)?)?;
     command.arg(&candidate.adapter.name);

@@ -23,7 +23,7 @@ pub(super) fn names(scene: &Scene) -> Vec<&str> {
 #[track_caller]
 pub(super) fn assert_pixel(scene: &Scene, view: usize, expected: [f64; 2]) {
     let seen = scene.views[view].camera.project(Vec3::from_array(POINT_WORLD));
-    assert!(seen.in_front && (f64::from(seen.depth) - 2.0).abs() < 1e-5, "{seen:?}");
+    assert!(seen.in_front && (f64::from(seen.depth) - 2.0).abs() < 1e-6, "{seen:?}");
     let error = (f64::from(seen.x) - expected[0]).abs().max((f64::from(seen.y) - expected[1]).abs());
     assert!(error < 1e-4, "{seen:?} instead of {expected:?}");
 }
