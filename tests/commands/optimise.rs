@@ -2,7 +2,7 @@
 //! files.
 #![cfg(unix)]
 
-use super::{assert_refused, assert_wrong_arguments, done, killed_when, run, start};
+use super::{assert_refused, assert_wrong_arguments, done, done_with_warnings, killed_when, run, start};
 use std::fs;
 use std::path::Path;
 use viewfuse::scene::SceneFrame;
@@ -18,6 +18,7 @@ viewfuse_tests::trials![
     after_a_kill_it_goes_on_from_the_file,
     options_of_the_field_are_those_of_the_command,
     what_it_refuses,
+    an_antialiased_file_says_so_and_is_shown_so,
     a_page_holds_what_the_file_holds,
     more_quality_is_tried_on_sources_and_has_colours_by_direction,
     few_photographs_and_a_short_time_have_fewer_iterations,
@@ -60,6 +61,28 @@ fn held_out_views_are_scored_on_the_way() {
     assert!(read("a.ply") == read("b.ply"), "one thread makes another scene");
     done(&folder, &format!("{OPTIMISE} --left-out 20,21 --seed 5 -o c.ply"));
     assert!(read("a.ply") != read("c.ply"), "the seed changes nothing");
+}
+
+fn an_antialiased_file_says_so_and_is_shown_so() {
+    let folder = toy();
+    done(&folder, &format!("{OPTIMISE} --iterations 10 --left-out 20 --antialias -o a.ply"));
+    done_with_warnings(&folder, &format!("{OPTIMISE} --iterations 1 --left-out 20 --resume a.ply -o b.spz"));
+    assert!(["a.ply", "b.spz"].iter().all(|file| gaussians(&folder.join(file)).is_antialiased));
+    for output in ["c.html", "c.splat"] {
+        assert_wrong_arguments(&folder, &format!("{OPTIMISE} --antialias -o {output}"), &["antialiased", ".ply"]);
+        let Outcome { code, stderr, .. } = run(&folder, &format!("{OPTIMISE} --resume a.ply -o {output}"));
+        assert!(code == Some(2) && stderr.contains("antialiased; write a .ply"), "{stderr}");
+        assert!(!folder.join(output).exists());
+    }
+    // The same Gaussians in a file that does not say so are another picture.
+    let unsaid = GaussianScene { is_antialiased: false, ..gaussians(&folder.join("a.ply")) };
+    unsaid.write(&folder.join("c.ply"), &SceneFrame::FILE).expect("a file");
+    let picture = |file: &str| {
+        let arguments = format!("render toy --gaussians {file} --targets 20 --size 16x16 --device cpu -o {file}-out");
+        done_with_warnings(&folder, &arguments);
+        fs::read(folder.join(format!("{file}-out/000020.png"))).expect("a picture")
+    };
+    assert!(picture("a.ply") != picture("c.ply"), "what the file says changes nothing");
 }
 
 fn it_ends_with_the_weights_of_a_view() {
