@@ -31,7 +31,7 @@ fn put(folder: &Folder, name: &str, picture: impl Into<DynamicImage>) {
 
 /// The score of view 5 from the others, and what was said.
 fn rendered(folder: &Folder, more: &str) -> (f64, String) {
-    let render = "render room --targets 5 --size 160x120 --weights error:alpha=1 --device cpu --no-sheets -o out";
+    let render = "render room --targets 5 --size 112x84 --weights error:alpha=1 --device cpu --no-sheets -o out";
     let Outcome { code, stderr, .. } = run(folder, &format!("{render} --replace {more}"));
     assert_eq!(code, Some(0), "{stderr}");
     let record = read_json(folder.join("out/run.json"));

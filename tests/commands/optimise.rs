@@ -116,21 +116,21 @@ fn the_number_follows_the_pixels() {
 fn ctrl_c_keeps_what_there_is() {
     let folder = toy();
     let path = folder.join("toy.ply");
-    let mut child = start(&folder, &format!("{OPTIMISE} --iterations 100000 -o toy.ply"));
+    let mut child = start(&folder, &format!("{OPTIMISE} --iterations 4000 -o toy.ply"));
     wait_while_running(&mut child, || path.exists());
     send("-INT", &child);
     assert_eq!(end(&mut child).expect("an end").code(), Some(130));
     let text = String::from_utf8(child.wait_with_output().expect("its output").stdout).expect("text");
     let count = gaussians(&path).gaussians.len();
     assert!(count > 100 && text.contains(&format!("toy.ply: {count} Gaussians after ")), "{text}");
-    assert!(text.contains(" of 300000 iterations\n"), "{text}");
+    assert!(text.contains(" of 12000 iterations\n"), "{text}");
     assert_eq!(names_in(&folder), ["toy", "toy.ply"]);
 }
 
 fn after_a_kill_it_goes_on_from_the_file() {
     let folder = toy();
     let path = folder.join("toy.ply");
-    killed_when(&folder, &format!("{OPTIMISE} --iterations 100000 --left-out 20 -o toy.ply"), || path.exists());
+    killed_when(&folder, &format!("{OPTIMISE} --iterations 4000 --left-out 20 -o toy.ply"), || path.exists());
     let before = fs::read(&path).expect("a file");
     assert!(gaussians(&path).gaussians.len() > 100);
     let resumed = |output: &str| {

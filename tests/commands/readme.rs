@@ -66,8 +66,15 @@ fn ours(line: &str) -> Option<(&'static str, &str)> {
     }
 }
 
+/// Half the size of the pictures of a scene.
+const HALF_SIZES: [(&str, &str); 2] = [("tests/data/room", "160x120"), ("tests/data/toy", "48x48")];
+
 /// The same arguments for one target, or a path of three pictures, of half the size, and a fifth of the steps of training.
 pub(super) fn with_few_pictures(words: impl Iterator<Item = String>) -> Vec<String> {
+    let words: Vec<String> = words.collect();
+    let half = HALF_SIZES.iter().find(|(scene, _)| words.get(1).is_some_and(|word| word == scene));
+    let takes_size = ["render", "evaluate"].contains(&words[0].as_str()) && !words.iter().any(|word| word == "--size");
+    let smaller = half.filter(|_| takes_size).map(|(_, size)| ["--size".to_owned(), (*size).to_owned()]);
     let mut option = String::new();
     let few = |word: String| {
         let few = match option.as_str() {
@@ -82,7 +89,7 @@ pub(super) fn with_few_pictures(words: impl Iterator<Item = String>) -> Vec<Stri
         option = word;
         few
     };
-    words.map(few).collect()
+    words.into_iter().map(few).chain(smaller.into_iter().flatten()).collect()
 }
 
 /// Half of `WIDTHxHEIGHT`.

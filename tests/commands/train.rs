@@ -25,9 +25,10 @@ viewfuse_tests::trials![
 
 /// Small enough for a second a run.
 const PIXELNERF: &str = "train pixelnerf learn/cars --width 16 --objects 2 --rays 12 --coarse 8 --fine 4 --steps 30 \
-    --sources 1,2,3,5 --sides 32,64 --least-crop 0.7 --weights mean --weights error:alpha=1 --validate-every 10 --write-every 0";
-const GENVS: &str = "train genvs learn/cars --width 4 --objects 1 --samples 8 --steps 3 --sources 1,3 --least-crop 0.7 \
-    --weights error:alpha=1 --weights mean --validate-every 3 --write-every 0";
+    --sources 1,2,3,5 --side 32 --sides 16,32 --least-crop 0.7 --weights mean --weights error:alpha=1 --validate-every 10 \
+    --write-every 0";
+const GENVS: &str = "train genvs learn/cars --width 4 --objects 1 --samples 8 --side 32 --steps 3 --sources 1,3 \
+    --least-crop 0.7 --weights error:alpha=1 --weights mean --validate-every 3 --write-every 0";
 
 fn scenes() -> Folder {
     let folder = Folder::new();
@@ -122,8 +123,8 @@ fn genvs_goes_on_too() {
     let from = GENVS.replace("--width 4", &format!("--from {model} --rate 0"));
     done(&folder, &format!("{from} -o more"));
     assert_eq!(bytes(&folder, "more/model.safetensors"), bytes(&folder, model));
-    let small = from.replace("--samples 8", "--samples 8 --side 32");
-    assert_refused(&folder, &format!("{small} -o out"), &[model, "for pictures of 64x64 pixels", "not of 32x32"]);
+    let small = from.replace("--side 32", "--side 16");
+    assert_refused(&folder, &format!("{small} -o out"), &[model, "for pictures of 32x32 pixels", "not of 16x16"]);
     assert_wrong_arguments(&folder, &format!("{from} --width 4 -o out"), &["--from", "--width"]);
 }
 

@@ -1,7 +1,7 @@
 //! Work that needs a process of its own, done by this program started again: the validation layers may want another C
 //! library, and a device that is left alone must let its process end.
 
-use crate::time::{add_again, times_that_take};
+use crate::time::Additions;
 use bytemuck::bytes_of;
 use libtest_mimic::Failed;
 use std::error::Error;
@@ -57,10 +57,10 @@ fn do_work(work: &str, instance: &std::sync::Arc<Instance>, adapter: &Adapter) -
             dependent_kernels(&Gpu::open(instance, adapter, &GpuOptions { barriers: false, ..usual })?)?
         }
         LEFT_ALONE => {
-            let times = times_that_take(&Gpu::open(instance, adapter, &usual)?, Duration::from_millis(500))?;
+            let additions = Additions::that_take(&Gpu::open(instance, adapter, &usual)?, Duration::from_millis(500))?;
             let limit = Duration::from_millis(1);
             let gpu = Gpu::open(instance, adapter, &GpuOptions { time_limit: Some(limit), closing: limit, ..usual })?;
-            match add_again(&gpu, times).and_then(|_| gpu.wait()) {
+            match additions.send(&gpu).and_then(|_| gpu.wait()) {
                 Err(VulkanError::TimeLimit { .. }) => {}
                 outcome => return Err(format!("it was in time: {outcome:?}").into()),
             }

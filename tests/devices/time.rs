@@ -13,40 +13,52 @@ use viewfuse_vulkan::{AdapterKind, Gpu, GpuOptions, VulkanError};
 tests!(a_time_limit_expires, a_busy_machine_is_no_failure, a_device_that_works_on_is_left_alone);
 
 const LIMIT: Duration = Duration::from_millis(5);
-/// Elements of the long kernel.
-const COUNT: u32 = 1 << 12;
-
-/// Sends a kernel on its way that takes as long as one likes: it adds the same number again and again. Returns when
-/// that was.
-pub(crate) fn add_again(gpu: &Gpu, times: u32) -> Result<Instant, VulkanError> {
-    let [weights, latents, fused] =
-        [gpu.zeros::<f32>(times as usize)?, gpu.zeros(COUNT as usize)?, gpu.zeros(COUNT as usize)?];
-    // What was asked for before has the time limit as well.
-    gpu.wait()?;
-    let arrays = [weights.bind(), latents.bind(), fused.bind()];
-    let sent = Instant::now();
-    gpu.dispatch(
-        Kernel::FuseViews,
-        bytes_of(&FuseBlock { view_count: times, ..FuseBlock::default() }),
-        0..COUNT,
-        &arrays,
-    )?;
-    Ok(sent)
+/// Additions of a kernel that takes as long as one likes: how often each element adds the same number, and elements.
+#[derive(Clone, Copy)]
+pub(crate) struct Additions {
+    times: u32,
+    elements: u32,
 }
 
-/// So many additions as take at least this long.
-pub(crate) fn times_that_take(gpu: &Gpu, time: Duration) -> Result<u32, VulkanError> {
-    // The first dispatch compiles the kernel, which may take longer than it runs.
-    add_again(gpu, 1)?;
-    gpu.wait()?;
-    let mut times = 1 << 10;
-    loop {
-        let sent = add_again(gpu, times)?;
+impl Additions {
+    const ONE: Additions = Additions { times: 1, elements: 1 << 12 };
+
+    /// Sends them on their way. Returns when that was.
+    pub(crate) fn send(self, gpu: &Gpu) -> Result<Instant, VulkanError> {
+        let Additions { times, elements } = self;
+        let [weights, latents, fused] =
+            [gpu.zeros::<f32>(times as usize)?, gpu.zeros(elements as usize)?, gpu.zeros(elements as usize)?];
+        // What was asked for before has the time limit as well.
         gpu.wait()?;
-        if sent.elapsed() >= time || times >= 1 << 27 {
-            return Ok(times);
+        let arrays = [weights.bind(), latents.bind(), fused.bind()];
+        let sent = Instant::now();
+        gpu.dispatch(
+            Kernel::FuseViews,
+            bytes_of(&FuseBlock { view_count: times, ..FuseBlock::default() }),
+            0..elements,
+            &arrays,
+        )?;
+        Ok(sent)
+    }
+
+    /// So many as take at least this long. Mesa's llvmpipe ends loops after 65,535 rounds: from there on there are more
+    /// elements, and behind so many that fill a GPU more rounds again.
+    pub(crate) fn that_take(gpu: &Gpu, time: Duration) -> Result<Additions, VulkanError> {
+        // The first dispatch compiles the kernel, which may take longer than it runs.
+        Additions::ONE.send(gpu)?;
+        gpu.wait()?;
+        let mut all = Additions { times: 1 << 10, ..Additions::ONE };
+        loop {
+            let sent = all.send(gpu)?;
+            gpu.wait()?;
+            if sent.elapsed() >= time || all.times >= 1 << 24 {
+                return Ok(all);
+            }
+            match all.times >= 1 << 15 && all.elements < 1 << 20 {
+                true => all.elements *= 2,
+                false => all.times *= 2,
+            }
         }
-        times *= 2;
     }
 }
 
@@ -55,8 +67,8 @@ pub(crate) fn times_that_take(gpu: &Gpu, time: Duration) -> Result<u32, VulkanEr
 fn a_time_limit_expires(candidate: &Candidate) -> Result<(), Failed> {
     let mut limit = LIMIT;
     while limit < PATIENCE {
-        let times = times_that_take(&candidate.gpu(&GpuOptions::default())?, 50 * limit)?;
-        if expires_in_the_kernel(candidate, times, limit)? {
+        let additions = Additions::that_take(&candidate.gpu(&GpuOptions::default())?, 50 * limit)?;
+        if expires_in_the_kernel(candidate, additions, limit)? {
             return Ok(());
         }
         limit *= 2;
@@ -64,12 +76,12 @@ fn a_time_limit_expires(candidate: &Candidate) -> Result<(), Failed> {
     Err("it was never the kernel that took too long".into())
 }
 
-fn expires_in_the_kernel(candidate: &Candidate, times: u32, own_limit: Duration) -> Result<bool, Failed> {
+fn expires_in_the_kernel(candidate: &Candidate, additions: Additions, own_limit: Duration) -> Result<bool, Failed> {
     // Closing waits for the kernel, however long it takes.
     let options = GpuOptions { time_limit: Some(own_limit), closing: PATIENCE, ..GpuOptions::default() };
     let gpu = candidate.gpu(&options)?;
     let kept = gpu.zeros::<f32>(4)?;
-    let outcome = add_again(&gpu, times).and_then(|_| gpu.wait());
+    let outcome = additions.send(&gpu).and_then(|_| gpu.wait());
     let Err(error) = outcome else { return Err("it was in time".into()) };
     let VulkanError::TimeLimit { device, work, limit } = &error else { return Err(format!("{error}").into()) };
     assert_eq!((device.as_str(), *limit), (gpu.name(), own_limit));
@@ -80,7 +92,7 @@ fn expires_in_the_kernel(candidate: &Candidate, times: u32, own_limit: Duration)
     assert_eq!(gpu.upload(&[1.0_f32]).err().as_ref(), Some(&error));
     assert_eq!(gpu.zeros::<f32>(1).err().as_ref(), Some(&error));
     assert_eq!(gpu.download(&kept).err().as_ref(), Some(&error));
-    assert_eq!(add_again(&gpu, 1).err().as_ref(), Some(&error));
+    assert_eq!(Additions::ONE.send(&gpu).err().as_ref(), Some(&error));
     let is_of_the_kernel = work == "kernel fuse_views";
     drop(gpu);
     drop(kept);

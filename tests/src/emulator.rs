@@ -131,8 +131,8 @@ impl Emulator {
     /// As [`Emulator::run`], or if the trace is not what it should be.
     pub fn trace(&self, program: &Path, image: &Image) -> Result<Vec<Call>, String> {
         let mut machine = self.machine(program);
-        // One instruction a block, and none without its line: what ran and the registers before it.
-        machine.args(["-accel", "tcg,one-insn-per-tb=on", "-d", "exec,cpu,nochain"]);
+        // The instructions of a block once, and each run of it with the registers before it.
+        machine.args(["-d", "in_asm,exec,cpu,nochain"]);
         // The trace would go to the standard error otherwise, which has no buffer: that takes thirty times as long.
         machine.args(["-D", "/dev/stdout"]).stdout(Stdio::piped());
         let registers = self.board.registers;

@@ -178,7 +178,7 @@ fn a_page_follows_a_hand_and_a_finger() {
     let browser = &Browser::needed();
     let (_folder, address) = written();
     let chromium = Chromium::start(browser);
-    let tab = chromium.open(&address, [1000, 900], false);
+    let tab = chromium.open(&address, [560, 600], false);
     tab.wait_for(STILL);
     let [x, y] = tab.middle_of("#picture");
     let before = tab.picture();

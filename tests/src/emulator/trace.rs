@@ -1,13 +1,13 @@
 //! What measured calls took, from the emulator's trace.
 //!
-//! The trace has, for each instruction, the registers before it, its address among them. A call is counted from
-//! the first instruction of a function named `measured_...` to the one that returns from it, both included, by
-//! comparing addresses with the return address that the processor held at the start. Nothing in the program
-//! measures, so nothing is to be subtracted.
+//! The trace has each block of instructions, which nothing enters but at its beginning and nothing leaves but at its
+//! end, when it is translated, and the registers before every run of a block, its address among them. A call is counted
+//! from the block that begins a function named `measured_...` to the last one before the address that the processor held
+//! as its return address then. Nothing in the program measures, so nothing is to be subtracted.
 
 use super::board::Registers;
 use super::image::Image;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::BufRead;
 
 /// What names of measured functions begin with.
@@ -35,7 +35,15 @@ struct Open {
     functions: BTreeSet<usize>,
 }
 
-/// What the registers say before an instruction.
+/// A block of instructions: how many, and how far they lower the stack pointer, bytes. What is still lowered behind the
+/// block the registers say; this is for functions of one block, which raise it again.
+#[derive(Clone, Copy, Default)]
+struct Block {
+    instructions: u64,
+    lowered: u32,
+}
+
+/// What the registers say before a block.
 #[derive(Clone, Copy, Default)]
 struct State {
     address: u32,
@@ -74,46 +82,83 @@ impl Registers {
     }
 }
 
+/// How far an instruction lowers the stack pointer, bytes.
+fn lowered(line: &str) -> u32 {
+    let number = |text: &str| match text.strip_prefix("0x") {
+        Some(digits) => u32::from_str_radix(digits, 16).unwrap_or(0),
+        None => text.parse().unwrap_or(0),
+    };
+    let of_list = |list: &str| list.split(',').count() as u32 * if list.starts_with('d') { 8 } else { 4 };
+    if let Some((_, list)) = line.split_once('{')
+        && (line.contains("push") || line.contains("stmdb") && line.contains("sp!"))
+    {
+        return of_list(list);
+    }
+    // `sub sp, #8`, `sub.w sp, sp, #0x10`, `str r0, [sp, #-4]!`, `addi sp,sp,-16`.
+    let behind = match line.contains("sub") && line.contains(" sp, ") {
+        true => line.rsplit_once('#'),
+        false => line.split_once("[sp, #-").or_else(|| line.split_once(" sp,sp,-")),
+    };
+    behind.map_or(0, |(_, text)| number(text.trim_end_matches([']', '!'])))
+}
+
 /// The measured calls of a trace, in their order.
 ///
 /// # Errors
-/// A line that is not understood, an instruction outside any function, a call that does not return.
+/// A line that is not understood, a block that was not listed or lies outside any function, a call that does not return.
 pub fn calls(mut trace: impl BufRead, registers: Registers, image: &Image) -> Result<Vec<Call>, String> {
     let mut calls = Vec::new();
     let mut open: Option<Open> = None;
+    let mut blocks: BTreeMap<u32, Block> = BTreeMap::new();
     let (mut line, mut state) = (String::new(), State::default());
+    // The block that is being listed.
+    let mut listed = 0;
     loop {
         line.clear();
         if trace.read_line(&mut line).map_err(|error| error.to_string())? == 0 {
             break;
         }
-        if !registers.take(&line, &mut state).ok_or_else(|| format!("not understood: {line}"))? {
+        let text = line.trim_end();
+        if text.starts_with("IN:") {
+            listed = 0;
+        } else if let Some(instruction) = text.strip_prefix("0x") {
+            let address = instruction.get(..8).and_then(|digits| u32::from_str_radix(digits, 16).ok());
+            let address = address.ok_or_else(|| format!("not understood: {text}"))?;
+            if listed == 0 {
+                listed = address;
+                blocks.insert(address, Block::default());
+            }
+            let block = blocks.entry(listed).or_default();
+            block.instructions += 1;
+            block.lowered += lowered(text);
+        }
+        if !registers.take(text, &mut state).ok_or_else(|| format!("not understood: {text}"))? {
             continue;
         }
         let State { address, stack, link } = state;
         if open.as_ref().is_some_and(|call| call.return_address == address && call.stack_before == stack) {
             calls.extend(open.take().map(|call| call.closed(image)));
         }
-        let function = || image.function_at(address).ok_or_else(|| format!("no function at {address:#x}"));
+        let index = image.function_at(address);
+        if open.is_none()
+            && let Some(function) = index.map(|index| &image.functions[index])
+            && function.address == address
+            && let Some(name) = function.name.strip_prefix(MEASURED)
+        {
+            open = Some(Open {
+                name: name.to_owned(),
+                return_address: link,
+                instructions: 0,
+                stack_before: stack,
+                lowest_stack: stack,
+                functions: BTreeSet::new(),
+            });
+        }
         if let Some(call) = &mut open {
-            call.instructions += 1;
-            call.lowest_stack = call.lowest_stack.min(stack);
-            call.functions.insert(function()?);
-        } else {
-            let Some(index) = image.function_at(address) else { continue };
-            let entered = &image.functions[index];
-            if entered.address == address
-                && let Some(name) = entered.name.strip_prefix(MEASURED)
-            {
-                open = Some(Open {
-                    name: name.to_owned(),
-                    return_address: link,
-                    instructions: 1,
-                    stack_before: stack,
-                    lowest_stack: stack,
-                    functions: BTreeSet::from([index]),
-                });
-            }
+            let block = blocks.get(&address).ok_or_else(|| format!("no block at {address:#x}"))?;
+            call.instructions += block.instructions;
+            call.lowest_stack = call.lowest_stack.min(stack - block.lowered);
+            call.functions.insert(index.ok_or_else(|| format!("no function at {address:#x}"))?);
         }
     }
     match open {
