@@ -80,6 +80,12 @@ impl Chromium {
     /// Calls a method of the browser, or of a tab, and returns its result.
     #[track_caller]
     pub(super) fn call(&self, session: Option<&str>, method: &str, parameters: Value) -> Value {
+        let number = self.send(session, method, parameters);
+        self.answer(number, method)
+    }
+
+    /// Sends a call, and returns its number.
+    fn send(&self, session: Option<&str>, method: &str, parameters: Value) -> u64 {
         let number = self.calls.get() + 1;
         self.calls.set(number);
         let mut message = json!({"id": number, "method": method, "params": parameters});
@@ -89,15 +95,23 @@ impl Chromium {
         let mut text = message.to_string().into_bytes();
         text.push(0);
         self.input.borrow_mut().write_all(&text).expect("a browser that listens");
+        number
+    }
+
+    /// Waits for the result of a call.
+    #[track_caller]
+    fn answer(&self, number: u64, method: &str) -> Value {
         let end = Instant::now() + PATIENCE;
         loop {
-            let rest = end.saturating_duration_since(Instant::now());
-            let mut answer = self.messages.recv_timeout(rest).unwrap_or_else(|error| panic!("{method}: {error}"));
-            if answer["id"] == number {
+            // It may have come before that of an earlier call.
+            let mut events = self.events.borrow_mut();
+            let known = events.iter().position(|event| event["id"] == number);
+            if let Some(mut answer) = known.map(|place| events.remove(place)) {
                 assert!(answer["error"].is_null(), "{method}: {}", answer["error"]);
                 return answer["result"].take();
             }
-            self.events.borrow_mut().push(answer);
+            let rest = end.saturating_duration_since(Instant::now());
+            events.push(self.messages.recv_timeout(rest).unwrap_or_else(|error| panic!("{method}: {error}")));
         }
     }
 
@@ -211,13 +225,18 @@ impl Tab<'_> {
 
     #[track_caller]
     pub(super) fn key(&self, key: &str) {
-        let text = if key.len() == 1 { json!(key) } else { json!("") };
-        for kind in ["keyDown", "keyUp"] {
-            self.call(
-                "Input.dispatchKeyEvent",
-                json!({"type": kind, "key": key, "text": if kind == "keyDown" { text.clone() } else { json!("") }}),
-            );
-        }
+        self.keys(key, 1);
+    }
+
+    /// Presses a key so many times, faster than pictures follow.
+    #[track_caller]
+    pub(super) fn keys(&self, key: &str, count: usize) {
+        const METHOD: &str = "Input.dispatchKeyEvent";
+        let text = if key.len() == 1 { key } else { "" };
+        let events = [json!({"type": "keyDown", "key": key, "text": text}), json!({"type": "keyUp", "key": key})];
+        let send = |event: &Value| self.chromium.send(Some(&self.session), METHOD, event.clone());
+        let sent: Vec<u64> = (0..count).flat_map(|_| &events).map(send).collect();
+        sent.into_iter().for_each(|number| _ = self.chromium.answer(number, METHOD));
     }
 
     /// The middle of an element, in the window.

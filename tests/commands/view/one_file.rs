@@ -178,7 +178,7 @@ fn a_page_follows_a_hand_and_a_finger() {
     let browser = &Browser::needed();
     let (_folder, address) = written();
     let chromium = Chromium::start(browser);
-    let tab = chromium.open(&address, [560, 600], false);
+    let tab = chromium.open(&address, [400, 600], false);
     tab.wait_for(STILL);
     let [x, y] = tab.middle_of("#picture");
     let before = tab.picture();
@@ -188,7 +188,7 @@ fn a_page_follows_a_hand_and_a_finger() {
     // A quarter turn of keys is 30 of them; the weights are those of the scheme from where the camera is then.
     // On the other side nothing was photographed.
     assert_eq!((tab.text(SAID), tab.text(IS_DIMMED)), (String::new(), "false".to_owned()));
-    (0..60).for_each(|_| tab.key("ArrowRight"));
+    tab.keys("ArrowRight", 60);
     tab.wait_for(STILL);
     let said = "Not photographed from here: the photographs show 0 % of this.";
     assert_eq!((tab.text(SAID).as_str(), tab.text(IS_DIMMED).as_str()), (said, "true"));
