@@ -226,8 +226,8 @@ impl ProjectedGaussian {
 
     /// Whether the opacity may reach [`MIN_ALPHA`] at a pixel's centre of these columns and rows (each first and last):
     /// the least value that the exponent's quadratic form takes in their rectangle, against the one that the opacity at
-    /// the mean allows. Never false where [`ProjectedGaussian::alpha`] is above 0: the comparison has a margin of 1 % of
-    /// [`MIN_ALPHA`], and of eight roundings of the form's greatest terms in the rectangle.
+    /// the mean allows. Never false where [`ProjectedGaussian::alpha`] is above 0: the comparison has a margin of 1 %
+    /// of [`MIN_ALPHA`], and of eight roundings of the form's greatest terms in the rectangle.
     #[inline]
     pub fn reaches(&self, columns: [u32; 2], rows: [u32; 2]) -> bool {
         let [xx, xy, yy] = self.conic;

@@ -134,7 +134,8 @@ schemes! {
     /// `exp(-parameter d^2)` with `d` the distance of the centres; the parameter is finite and at least 0.
     Gaussian = 1 {
         name: "gaussian",
-        parameter: Some(Parameter { key: "beta", least: 0.0, most: f32::MAX, default: 1.0, range: "finite and at least 0" }),
+        parameter: Some(Parameter { key: "beta", least: 0.0, most: f32::MAX, default: 1.0, range: "finite and at least \
+            0" }),
         choice: None,
         tables: ["gaussian:beta=1"],
         weigh: formulas::gaussian,

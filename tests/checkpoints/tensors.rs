@@ -38,7 +38,8 @@ fn the_right_tensors() {
 fn missing_unexpected_and_misshapen() {
     assert_eq!(
         fault(&[("a", &[3, 2]), ("c", &[1]), ("d", &[1])], &[("a", &[2, 3]), ("b", &[])]),
-        "it: not the tensors of this architecture; missing: b; unexpected: c, d; of another shape: a is [3, 2], not [2, 3]"
+        "it: not the tensors of this architecture; missing: b; unexpected: c, d; of another shape: a is [3, 2], not \
+            [2, 3]"
     );
     // The same number of elements, another number of axes.
     let message = fault(&[("a", &[6])], &[("a", &[6, 1])]);

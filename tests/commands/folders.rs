@@ -48,7 +48,8 @@ fn a_file_with_the_name_of_a_journal_is_left_alone() {
     }
     // A run that keeps no journal removes one of an earlier run, and nothing else.
     let folder = toy();
-    let sequence = "render toy --targets 20,21 --sources 0..2 --size 16x16 --model genvs:small --steps 2 --samples 8 --reuse 1 --device cpu -o out";
+    let sequence = "render toy --targets 20,21 --sources 0..2 --size 16x16 --model genvs:small --steps 2 --samples 8 \
+        --reuse 1 --device cpu -o out";
     folder.write("out/frames.jsonl", "my notes\n");
     assert_refused(&folder, sequence, &["frames.jsonl"]);
     assert_eq!(fs::read(folder.join("out/frames.jsonl")).expect("a file"), b"my notes\n");

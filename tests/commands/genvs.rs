@@ -157,7 +157,8 @@ fn files_of_either_network() {
 
 fn sweeps_samplers_and_omissions() {
     let folder = toy();
-    let arguments = "pareto toy --targets 20,21 --views 2 --model genvs:small --size 16x16 --samples 8 --repeat 1 --device cpu -o out";
+    let arguments = "pareto toy --targets 20,21 --views 2 --model genvs:small --size 16x16 --samples 8 --repeat 1 \
+        --device cpu -o out";
     let mut sweep = command(&folder, arguments);
     for words in ["heun, 8", "ipndm, 6", "ipndm, 12", "tolerance 0.03", "all, half", "all, reuse"] {
         sweep.args(["--only", words]);

@@ -83,7 +83,8 @@ fn shells_complete_and_pages_tell() {
         assert_eq!(fs::read_to_string(folder.join("scripts").join(shell)).expect("a script"), script);
     }
     // What bash offers behind `viewfuse render --orb`.
-    let ask = "source scripts/bash; COMP_WORDS=(viewfuse render --orb); COMP_CWORD=2; _viewfuse viewfuse --orb render; echo ${COMPREPLY[@]}";
+    let ask = "source scripts/bash; COMP_WORDS=(viewfuse render --orb); COMP_CWORD=2; _viewfuse viewfuse --orb render; \
+        echo ${COMPREPLY[@]}";
     if let Ok(answer) = Command::new("bash").args(["-c", ask]).current_dir(&folder).output() {
         assert_eq!(
             String::from_utf8_lossy(&answer.stdout).trim(),

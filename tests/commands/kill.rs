@@ -43,7 +43,8 @@ const COMMANDS: [&str; 20] = [
     "convert weighting/model.safetensors OUT/attention.h",
     "train pixelnerf learn/cars --width 8 --objects 1 --rays 8 --coarse 4 --fine 2 --side 16 --steps 12 \
      --validate-every 4 --write-every 0 -o OUT",
-    "train genvs learn/cars --width 4 --objects 1 --samples 4 --side 16 --steps 3 --validate-every 3 --write-every 0 -o OUT",
+    "train genvs learn/cars --width 4 --objects 1 --samples 4 --side 16 --steps 3 --validate-every 3 --write-every 0 \
+        -o OUT",
     "train weighting small/model.safetensors learn/cars --objects 1 --rays 4 --steps 4 --validate-every 4 \
      --write-every 0 -o OUT",
 ];
@@ -64,8 +65,10 @@ fn folder() -> Folder {
         "scenes make cars learn --train 2 --val 1 --test 0 --views 9 --test-views 9 --size 64",
         "train pixelnerf learn/cars --width 8 --objects 1 --rays 8 --coarse 4 --fine 2 --side 16 --steps 4 \
          --validate-every 4 -o small",
-        "train weighting small/model.safetensors learn/cars --objects 1 --rays 4 --steps 1 --validate-every 1 -o weighting",
-        "evaluate toy --protocol random --trials 2 --targets-per-trial 1 --weights mean --size 16x16 --device cpu -o run",
+        "train weighting small/model.safetensors learn/cars --objects 1 --rays 4 --steps 1 --validate-every 1 -o \
+            weighting",
+        "evaluate toy --protocol random --trials 2 --targets-per-trial 1 --weights mean --size 16x16 --device cpu -o \
+            run",
     ] {
         done(&folder, arguments);
     }

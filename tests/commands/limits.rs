@@ -145,7 +145,8 @@ fn narrow_photographs_have_narrow_pictures() {
         image::RgbImage::from_fn(13, 999, level).save(folder.file(&format!("thin/{view}.png"))).expect("a photograph");
         let (sine, cosine) = (0.08 * f64::from(view)).sin_cos();
         frames.push(serde_json::json!({ "file_path": format!("{view}.png"), "transform_matrix": [
-            [cosine, 0.0, sine, 2.0 * sine], [0.0, 1.0, 0.0, 0.0], [-sine, 0.0, cosine, 2.0 * cosine], [0.0, 0.0, 0.0, 1.0]] }));
+            [cosine, 0.0, sine, 2.0 * sine], [0.0, 1.0, 0.0, 0.0], [-sine, 0.0, cosine, 2.0 * cosine], [0.0, 0.0, 0.0,
+                1.0]] }));
     }
     let camera =
         serde_json::json!({ "fl_x": 1000, "fl_y": 1000, "cx": 6.5, "cy": 499.5, "w": 13, "h": 999, "frames": frames });

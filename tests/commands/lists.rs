@@ -129,7 +129,8 @@ fn nothing_counts_twice_in_a_table() {
 
 fn tables_for_papers() {
     let scene = toy();
-    let arguments = "evaluate toy --targets 20,21 --sources 0..5 --size 16x16 --weights mean --weights a_b=error:alpha=1 --device cpu";
+    let arguments = "evaluate toy --targets 20,21 --sources 0..5 --size 16x16 --weights mean --weights \
+        a_b=error:alpha=1 --device cpu";
     let latex = done(&scene, &format!("{arguments} --latex"));
     assert!(latex.starts_with("\\begin{table}\n") && latex.trim_end().ends_with("\\end{table}"), "{latex}");
     let rows: Vec<&str> = latex.lines().filter(|line| line.ends_with("\\\\")).collect();

@@ -22,8 +22,10 @@ const RACES: [[&str; 2]; 3] = [
         "render toy --orbit 4 --size 24x24 --weights distance:power=3 --device cpu -o OUT",
     ],
     [
-        "evaluate toy --protocol random --trials 4 --targets-per-trial 1 --weights mean --size 16x16 --device cpu -o OUT",
-        "evaluate toy --protocol random --trials 4 --targets-per-trial 1 --weights mean --size 16x16 --device cpu -o OUT",
+        "evaluate toy --protocol random --trials 4 --targets-per-trial 1 --weights mean --size 16x16 --device cpu -o \
+            OUT",
+        "evaluate toy --protocol random --trials 4 --targets-per-trial 1 --weights mean --size 16x16 --device cpu -o \
+            OUT",
     ],
     ["points toy --size 32x32 -o OUT/toy.ply", "points toy --size 24x24 -o OUT/toy.ply"],
 ];

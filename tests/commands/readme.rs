@@ -69,7 +69,8 @@ fn ours(line: &str) -> Option<(&'static str, &str)> {
 /// Half the size of the pictures of a scene.
 const HALF_SIZES: [(&str, &str); 2] = [("tests/data/room", "160x120"), ("tests/data/toy", "48x48")];
 
-/// The same arguments for one target, or a path of three pictures, of half the size, and a fifth of the steps of training.
+/// The same arguments for one target, or a path of three pictures, of half the size, and a fifth of the steps of
+/// training.
 pub(super) fn with_few_pictures(words: impl Iterator<Item = String>) -> Vec<String> {
     let words: Vec<String> = words.collect();
     let half = HALF_SIZES.iter().find(|(scene, _)| words.get(1).is_some_and(|word| word == scene));

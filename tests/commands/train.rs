@@ -25,8 +25,8 @@ viewfuse_tests::trials![
 
 /// Small enough for a second a run.
 const PIXELNERF: &str = "train pixelnerf learn/cars --width 16 --objects 2 --rays 12 --coarse 8 --fine 4 --steps 30 \
-    --sources 1,2,3,5 --side 32 --sides 16,32 --least-crop 0.7 --weights mean --weights error:alpha=1 --validate-every 10 \
-    --write-every 0";
+    --sources 1,2,3,5 --side 32 --sides 16,32 --least-crop 0.7 --weights mean --weights error:alpha=1 --validate-every \
+    10 --write-every 0";
 const GENVS: &str = "train genvs learn/cars --width 4 --objects 1 --samples 8 --side 32 --steps 3 --sources 1,3 \
     --least-crop 0.7 --weights error:alpha=1 --weights mean --validate-every 3 --write-every 0";
 

@@ -73,7 +73,8 @@ proptest! {
     }
 
     #[test]
-    fn omission_keeps_its_bound(input in scores(), total in 0.0_f32..0.99, latents in proptest::collection::vec(-3.0_f32..5.0, S)) {
+    fn omission_keeps_its_bound(input in scores(), total in 0.0_f32..0.99,
+        latents in proptest::collection::vec(-3.0_f32..5.0, S)) {
         let weights = Weights::from_scores(&input, S as u32);
         let omission = weights.without_least(total);
         prop_assert!(on_simplex(&omission.weights));

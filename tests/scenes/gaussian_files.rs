@@ -264,8 +264,8 @@ fn supersplat(lines: &[&str]) -> Result<(), String> {
     need(lines.iter().all(is_read), "words")
 }
 
-/// mkkellogg's three.js (PlyParserUtils.js): the degree by the number of coefficients, counted in every line; the format
-/// by words in every line, comments too.
+/// mkkellogg's three.js (PlyParserUtils.js): the degree by the number of coefficients, counted in every line; the
+/// format by words in every line, comments too.
 fn three(lines: &[&str]) -> Result<(), String> {
     let comments = lines.iter().filter(|line| line.starts_with("comment"));
     let words = ["packed_", "f_rest_", "end_header", "element chunk"];

@@ -35,7 +35,8 @@ fn folder(model: &str, lens: &Lens) -> Folder {
     let folder = Folder::new();
     photograph.save(folder.file("images/1.png")).expect("a photograph");
     let mut transforms = json!({
-        "camera_model": model, "fl_x": FOCAL, "fl_y": FOCAL, "cx": CENTRE[0], "cy": CENTRE[1], "w": SIZE[0], "h": SIZE[1],
+        "camera_model": model, "fl_x": FOCAL, "fl_y": FOCAL, "cx": CENTRE[0], "cy": CENTRE[1], "w": SIZE[0],
+        "h": SIZE[1],
         "frames": [{ "file_path": "images/1.png", "transform_matrix": scenes::opengl_matrix() }],
     });
     for (key, value) in ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"].into_iter().zip(lens.coefficients()) {

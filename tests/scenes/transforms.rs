@@ -233,8 +233,8 @@ fn what_is_not_read_is_said() {
         transforms["frames"][1]["colmap_im_id"] = json!(2);
     }));
     assert_eq!((&scene.warnings[..], scene.unused.len()), (&[][..], 1), "{:?}", scene.unused);
-    let keys = "transforms.json: aabb_scale, ply_file_path, rolling_shutter, white_transparent, colmap_im_id of 1 frames, \
-                sharpness of 1 frames";
+    let keys = "transforms.json: aabb_scale, ply_file_path, rolling_shutter, white_transparent, colmap_im_id of 1 \
+                frames, sharpness of 1 frames";
     assert!(scene.unused[0].ends_with(keys), "{}", scene.unused[0]);
     // What changes pictures is a warning.
     let scene = open(&changed(3, |transforms| {

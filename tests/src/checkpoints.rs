@@ -241,7 +241,8 @@ pub fn changed(made: &Checkpoint, change: impl FnOnce(&mut Vec<(TensorShape, Vec
     Checkpoint::in_memory("changed", tensors, made.metadata().clone())
 }
 
-/// Times this, every weight of a made network is finite still; what becomes of numbers that meet several of them is not.
+/// Times this, every weight of a made network is finite still; what becomes of numbers that meet several of them is
+/// not.
 pub const LARGE: f32 = 1.9e38;
 
 /// A checkpoint with all numbers of the tensors of which this is true multiplied; there is one.

@@ -88,8 +88,8 @@ pub fn lacking(is_there: bool, why: &str) -> Option<String> {
 
 /// Makes `trials()` of functions in this module, those with `#[cfg(..)]` before them where that holds. Behind `;` stand
 /// what is missing, if anything, the variable that makes this a failure, if there is one, and the functions that need
-/// it; before all, as `[..];`, the modules within this one that have tests. A test that is not listed is dead code, which
-/// is a warning.
+/// it; before all, as `[..];`, the modules within this one that have tests. A test that is not listed is dead code,
+/// which is a warning.
 #[macro_export]
 macro_rules! trials {
     (

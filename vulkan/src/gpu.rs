@@ -21,8 +21,8 @@ use std::time::Duration;
 /// Bytes of the widest element of an array in pages.
 pub(crate) const WIDEST_PAGED: u64 = 16;
 
-/// [`GpuOptions::min_rounded_work`] where nothing else is said: a twentieth of a second of exact products on the largest
-/// GPUs, half a second on those of a tenth of their rate.
+/// [`GpuOptions::min_rounded_work`] where nothing else is said: a twentieth of a second of exact products on the
+/// largest GPUs, half a second on those of a tenth of their rate.
 const MIN_ROUNDED_WORK: u64 = 1 << 39;
 
 /// Options of an opened device.

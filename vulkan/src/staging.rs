@@ -1,5 +1,5 @@
-//! The memory that uploads pass through: a ring of parts, so that the host fills one of them while the device still copies
-//! from the others, and nobody waits for an upload.
+//! The memory that uploads pass through: a ring of parts, so that the host fills one of them while the device still
+//! copies from the others, and nobody waits for an upload.
 
 use crate::handle::Memory;
 use std::ops::Range;

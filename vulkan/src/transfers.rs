@@ -127,8 +127,8 @@ impl Gpu {
         Ok(values)
     }
 
-    /// Begins to copy the values that an array has after all earlier dispatches to the host; nobody waits. `None` for an
-    /// array that is larger than staging memory.
+    /// Begins to copy the values that an array has after all earlier dispatches to the host; nobody waits. `None` for
+    /// an array that is larger than staging memory.
     ///
     /// # Errors
     /// As [`Gpu::upload`]; [`VulkanError::OtherDevice`].

@@ -16,9 +16,9 @@ const LARGEST: f32 = 65_504.0;
 
 impl Gpu {
     /// As [`Gpu::dispatch`], with a form of rounded factors ([`Form::ROUNDED`]) where this device is trusted with it
-    /// ([`Gpu::trusts`]) and the arrays lie in fours ([`Kernel::is_in_fours`]): other numbers, within that form's bound;
-    /// otherwise as `dispatch`. Of the form's [sizes](Form::sizes) that is taken which suits the product, where the
-    /// device is trusted with it as well as with the largest one.
+    /// ([`Gpu::trusts`]) and the arrays lie in fours ([`Kernel::is_in_fours`]): other numbers, within that form's
+    /// bound; otherwise as `dispatch`. Of the form's [sizes](Form::sizes) that is taken which suits the product, where
+    /// the device is trusted with it as well as with the largest one.
     ///
     /// # Errors
     /// Those of [`Gpu::dispatch`].
@@ -102,8 +102,8 @@ impl Gpu {
 }
 
 /// A product that shows whether a form is right: sizes that no tile divides, several steps, numbers of both signs and
-/// of all magnitudes, small ones and zeros among them, and two that are too large. Outputs are rectified, which must not
-/// hide NaN.
+/// of all magnitudes, small ones and zeros among them, and two that are too large. Outputs are rectified, which must
+/// not hide NaN.
 struct Probe {
     kernel: Kernel,
     parameters: Vec<u8>,

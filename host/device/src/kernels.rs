@@ -65,8 +65,8 @@ macro_rules! device {
                 Precision::ROUNDED.into_iter().filter(|precision| self.rounds(*precision)).collect()
             }
 
-            /// Those of [`Device::precisions`] where pictures of so many multiply-adds of layers gain from them; none where
-            /// their trial would take longer than they save. A matter of the work alone, not of measured times.
+            /// Those of [`Device::precisions`] where pictures of so many multiply-adds of layers gain from them; none
+            /// where their trial would take longer than they save. A matter of the work alone, not of measured times.
             fn precisions_for(&self, _multiply_adds: u64) -> Vec<Precision> {
                 self.precisions()
             }

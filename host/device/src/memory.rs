@@ -21,7 +21,8 @@ pub struct KernelTime {
     pub time: Duration,
 }
 
-/// Transfers between host and device. Arrays of [`Memory::download_later`] that are waited for together are one download.
+/// Transfers between host and device. Arrays of [`Memory::download_later`] that are waited for together are one
+/// download.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Transfers {
     /// Arrays that were uploaded.

@@ -32,7 +32,8 @@ pub enum GalleryError {
         cause: std::io::Error,
     },
     /// A file names something that is no picture in its folder.
-    #[error("{}: names {file:?}, which is no picture in the folder of pictures; nothing of it is shown", path.display())]
+    #[error("{}: names {file:?}, which is no picture in the folder of pictures; nothing of it is \
+        shown", path.display())]
     Outside {
         /// The file.
         path: PathBuf,

@@ -56,7 +56,8 @@ pub enum MetricError {
         height: usize,
     },
     /// Two pictures to compare have different sizes.
-    #[error("a picture of {}x{} cannot be compared with one of {}x{}", prediction[0], prediction[1], truth[0], truth[1])]
+    #[error("a picture of {}x{} cannot be compared with one of \
+        {}x{}", prediction[0], prediction[1], truth[0], truth[1])]
     Sizes {
         /// Width and height of the prediction.
         prediction: [u32; 2],

@@ -216,11 +216,12 @@ impl Protocol {
         match (self.is_masked(), self.hides_masks()) {
             (false, _) => "full: prediction and photograph over the run's background",
             (true, true) => {
-                "full: prediction and whole photograph; masked: both over white by the truth's mask; fields are given no masks"
+                "full: prediction and whole photograph; masked: both over white by the truth's mask; fields are given \
+                    no masks"
             }
             (true, false) => {
-                "full: prediction and photograph over the run's background; masked: both over white by the truth's mask; \
-                 fields are given the sources' masks"
+                "full: prediction and photograph over the run's background; masked: both over white by the truth's \
+                 mask; fields are given the sources' masks"
             }
         }
     }

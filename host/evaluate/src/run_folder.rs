@@ -47,7 +47,8 @@ pub enum FolderError {
     #[error(transparent)]
     Write(#[from] WriteError),
     /// A file, or a line of it, was not written by this program.
-    #[error("{}{}: is not of an evaluation: {cause}", path.display(), line.map_or(String::new(), |line| format!(":{line}")))]
+    #[error("{}{}: is not of an evaluation: {cause}", path.display(), line.map_or(String::new(),
+        |line| format!(":{line}")))]
     Json {
         /// The file.
         path: PathBuf,
@@ -76,7 +77,8 @@ pub enum FolderError {
         count: usize,
     },
     /// A finished job does not belong to this evaluation, although the settings are the same.
-    #[error("{}: job {job} has other views than this version of the program would use; use another folder", path.display())]
+    #[error("{}: job {job} has other views than this version of the program would use; use another \
+        folder", path.display())]
     OtherJob {
         /// The folder.
         path: PathBuf,

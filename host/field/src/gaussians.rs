@@ -21,9 +21,9 @@
 //! ```
 //!
 //! No network and no data but the scene's own photographs. The start is the cloud of the sources' depths
-//! ([`crate::point_cloud`]): gradient descent does not repair wrong surfaces. On a GPU an iteration is the device's own;
-//! on the CPU lists of tiles, the loss and the steps are the host's. All sums run in one order, so that the same seed
-//! gives the same scene in every run, and on the CPU for any number of threads.
+//! ([`crate::point_cloud`]): gradient descent does not repair wrong surfaces. On a GPU an iteration is the device's
+//! own; on the CPU lists of tiles, the loss and the steps are the host's. All sums run in one order, so that the same
+//! seed gives the same scene in every run, and on the CPU for any number of threads.
 //!
 //! Source: "3D Gaussian Splatting for Real-Time Radiance Field Rendering" (Kerbl et al. 2023); the pyramid, the faint
 //! Gaussians at random and the penalty on opacity are for few views.

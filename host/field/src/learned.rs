@@ -8,8 +8,8 @@ use viewfuse_scene::rig::Rig;
 use viewfuse_scene::unit::{RigUnit, SRN_DISTANCE};
 
 /// Help of the flag of near and far bounds.
-pub(super) const NEAR_FAR: &str = "Near and far bounds of rays, world units [default: 8/13 and 18/13 of the cameras' distance \
-    from the point that they look at]";
+pub(super) const NEAR_FAR: &str = "Near and far bounds of rays, world units [default: 8/13 and 18/13 of the cameras' \
+    distance from the point that they look at]";
 
 /// The value of that flag.
 pub(super) fn parse_near_far(text: &str) -> Result<[f32; 2], String> {
@@ -53,14 +53,14 @@ pub(super) fn warn_of_unit(unit: RigUnit, sources: &SourceImages, progress: &dyn
     if unit.is_world() && (distance / SRN_DISTANCE - 1.0).abs() > SAME_DISTANCE {
         progress.warn(&format!(
             "the cameras are {distance:.2} units from what they look at, and the network takes lengths as they are: a \
-             network that learned from cameras at another distance ({SRN_DISTANCE} in SRN's cars) draws something else; \
-             scale the scene to what it learned from"
+             network that learned from cameras at another distance ({SRN_DISTANCE} in SRN's cars) draws something \
+             else; scale the scene to what it learned from"
         ));
     }
     if !unit.is_world() {
         progress.warn(&format!(
-            "the cameras are {:.3e} units from what they look at: for the network all lengths are divided by {:.3e}, so that this \
-             distance is {SRN_DISTANCE}, as in the scenes that published networks learned from",
+            "the cameras are {:.3e} units from what they look at: for the network all lengths are divided by {:.3e}, \
+             so that this distance is {SRN_DISTANCE}, as in the scenes that published networks learned from",
             unit.length() * SRN_DISTANCE,
             unit.length()
         ));

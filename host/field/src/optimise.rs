@@ -176,7 +176,10 @@ impl<'a> SceneOptimisation<'a> {
         if let Some(before) = &self.before {
             before.notes.iter().for_each(|note| progress.warn(note));
             if before.scene.degree > recipe.degree {
-                progress.warn("the colours to go on from depend on the direction; this quality or file has one for all directions");
+                progress.warn(
+                    "the colours to go on from depend on the direction; this quality or file has one for all \
+                    directions",
+                );
             }
             optimisation.resume(&before.scene);
         }

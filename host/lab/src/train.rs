@@ -84,7 +84,8 @@ pub enum TrainError {
     Parameters(#[from] CheckpointError),
     #[error("{}: {reason}", path.display())]
     Checkpoint { path: PathBuf, reason: String },
-    #[error("{}: holds a run with other settings: {difference}; give another folder, or the same settings to continue", path.display())]
+    #[error("{}: holds a run with other settings: {difference}; give another folder, or the same settings to \
+        continue", path.display())]
     OtherRun { path: PathBuf, difference: String },
     #[error("{}: is not the state of a training run: {reason}", path.display())]
     State { path: PathBuf, reason: String },

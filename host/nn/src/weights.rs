@@ -165,7 +165,8 @@ impl BatchNorm {
     }
 }
 
-/// Rows and columns of the squares in which [`reordered`] goes through a matrix: as many numbers as a line of a cache has.
+/// Rows and columns of the squares in which [`reordered`] goes through a matrix: as many numbers as a line of a cache
+/// has.
 const SQUARE: usize = 16;
 /// Numbers that are enough work for a core.
 const LEAST: usize = 1 << 14;

@@ -49,7 +49,8 @@ impl fmt::Display for DepthFormat {
 
 /// The name is not that of a format of depth maps.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{0}' is not a format of depth maps: {all}", all = DepthFormat::ALL.iter().map(|one| one.to_string()).collect::<Vec<_>>().join(", "))]
+#[error("'{0}' is not a format of depth maps: {all}",
+    all = DepthFormat::ALL.iter().map(|one| one.to_string()).collect::<Vec<_>>().join(", "))]
 pub struct UnknownDepthFormat(String);
 
 impl FromStr for DepthFormat {

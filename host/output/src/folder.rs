@@ -27,8 +27,8 @@ pub enum OutputError {
     NotWritten(PathBuf),
     /// An earlier run wrote other pictures there.
     #[error(
-        "{}: has {count} files of an earlier run, {example} for one, which are not of these targets, and cannot be added \
-         to: {reason}", folder.display()
+        "{}: has {count} files of an earlier run, {example} for one, which are not of these targets, and cannot be \
+         added to: {reason}", folder.display()
     )]
     OtherRun {
         /// The folder.

@@ -1,7 +1,8 @@
 //! Finished frames of a run that is not: what an interrupted run continues from. It survives a kill at any time.
 //!
 //! `frames.jsonl` begins with a line that says which run it is of and which targets it has, followed by a line for each
-//! frame whose files are all there; of other targets some files may be there. A last line without a line break is not whole and does not count.
+//! frame whose files are all there; of other targets some files may be there. A last line without a line break is not
+//! whole and does not count.
 
 use crate::depth::DepthFormat;
 use crate::record::{FrameRecord, SUFFIXES};
@@ -96,8 +97,8 @@ impl Reading {
 
 impl FrameJournal {
     /// The journal of a folder for a run, and the frames that an earlier start of the same run has finished: those
-    /// whose files are all there. `run` is any text that differs for runs that would write different frames, which are of
-    /// these targets. Nothing is written yet.
+    /// whose files are all there. `run` is any text that differs for runs that would write different frames, which are
+    /// of these targets. Nothing is written yet.
     ///
     /// # Errors
     /// [`WriteError::Io`] if there is a journal that cannot be read, [`WriteError::Foreign`] if what has its name is

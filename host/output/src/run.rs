@@ -270,7 +270,8 @@ impl RunWriter {
         if self.earlier.is_empty() { remove_if_there(&self.folder.join(RECORD)) } else { Ok(()) }
     }
 
-    /// Writes the pictures of all targets, which were given, as `video.FORMAT`; returns its path. For before the record.
+    /// Writes the pictures of all targets, which were given, as `video.FORMAT`; returns its path. For before the
+    /// record.
     ///
     /// # Errors
     /// [`VideoError`].

@@ -62,7 +62,8 @@ impl fmt::Display for VideoFormat {
 
 /// The name is not that of a format of moving pictures.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{0}' is not a format of moving pictures: {all}", all = VideoFormat::ALL.iter().map(|one| one.to_string()).collect::<Vec<_>>().join(", "))]
+#[error("'{0}' is not a format of moving pictures: {all}",
+    all = VideoFormat::ALL.iter().map(|one| one.to_string()).collect::<Vec<_>>().join(", "))]
 pub struct UnknownVideoFormat(String);
 
 impl FromStr for VideoFormat {

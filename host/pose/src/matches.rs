@@ -50,8 +50,8 @@ impl Matches {
         Matches { names: photos.iter().map(|photo| photo.name.clone()).collect(), pairs: pairs.collect() }
     }
 
-    /// Fewest matches that tie two photographs: by chance, photographs that show nothing in common have up to 50 that one
-    /// geometry explains.
+    /// Fewest matches that tie two photographs: by chance, photographs that show nothing in common have up to 50 that
+    /// one geometry explains.
     pub const MIN_TIE: usize = 50;
 
     /// The photographs that match one, the most matches first.
@@ -151,9 +151,8 @@ mod tests {
         let torn = [(0, 3, 49), (0, 4, 200), (1, 2, 90), (2, 4, 17)];
         parts(
             &torn,
-            &[
-                "into 2 groups (0.jpg, 4.jpg; 1.jpg, 2.jpg) and 1 alone (3.jpg): take some between 0.jpg and 3.jpg first",
-            ],
+            &["into 2 groups (0.jpg, 4.jpg; 1.jpg, 2.jpg) and 1 alone (3.jpg): take some between 0.jpg and 3.jpg \
+                    first"],
         );
     }
 

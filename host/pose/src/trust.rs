@@ -65,8 +65,8 @@ pub(crate) fn trust(passed: &Verified, cameras: &Cameras) -> Result<Trust, Strin
     if ties.points_of_three < MIN_POINTS_OF_THREE || ties.second_shared < MIN_SECOND_SHARED {
         let Ties { points_of_three, second_shared, .. } = ties;
         return Err(format!(
-            "{far}, and it shares few points with others ({points_of_three} with at least two, {second_shared} with its \
-             second neighbour)"
+            "{far}, and it shares few points with others ({points_of_three} with at least two, {second_shared} with \
+             its second neighbour)"
         ));
     }
     Ok(Trust::Doubtful)
@@ -85,8 +85,8 @@ pub(crate) fn doubt(all: &[&Verified], cameras: &Cameras, is_confirmed: impl FnO
     let gains: Vec<f64> = told.map(|passed| passed.held_out.gain()).collect();
     if gains.is_empty() && !is_confirmed() {
         return Some(format!(
-            "all photographs are more than {MAX_TOLD} degrees apart, too far for held-out pictures to tell, and no other \
-             attempt has all their rotations to {MAX_FAR_DIFFERENCE} degree"
+            "all photographs are more than {MAX_TOLD} degrees apart, too far for held-out pictures to tell, and no \
+             other attempt has all their rotations to {MAX_FAR_DIFFERENCE} degree"
         ));
     }
     if all.iter().all(|passed| passed.trust == Trust::Doubtful) {
@@ -106,15 +106,15 @@ pub(crate) fn doubt(all: &[&Verified], cameras: &Cameras, is_confirmed: impl FnO
 fn failure(scores: &HeldOutScores) -> Option<String> {
     if scores.sharpness() < MIN_SHARPNESS {
         return Some(format!(
-            "left out and rendered from the others, it is met no better at its pose ({:.1} dB) than two degrees beside it \
-             ({:.1} dB)",
+            "left out and rendered from the others, it is met no better at its pose ({:.1} dB) than two degrees beside \
+             it ({:.1} dB)",
             scores.score, scores.disturbed
         ));
     }
     if scores.gain() < MIN_GAIN {
         return Some(format!(
-            "left out and rendered from the others, it is met no better or hardly better ({:.1} dB) than by a copy of its \
-             neighbour ({:.1} dB)",
+            "left out and rendered from the others, it is met no better or hardly better ({:.1} dB) than by a copy of \
+             its neighbour ({:.1} dB)",
             scores.score,
             scores.copy.max(scores.warp)
         ));

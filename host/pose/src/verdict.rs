@@ -136,7 +136,8 @@ fn candidates(cameras: &Cameras, attempts: &mut [Attempt]) -> Vec<(usize, Vec<(u
         let confirmed = confirmed(cameras, attempts, index);
         if confirmed.len() < MIN_PHOTOGRAPHS {
             attempts[index].tried.refused = Some(format!(
-                "no other attempt has the same rotations, to {MAX_ROTATION_DIFFERENCE} degrees, for {MIN_PHOTOGRAPHS} photographs"
+                "no other attempt has the same rotations, to {MAX_ROTATION_DIFFERENCE} degrees, for {MIN_PHOTOGRAPHS} \
+                    photographs"
             ));
         } else {
             found.push((index, confirmed));

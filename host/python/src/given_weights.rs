@@ -155,8 +155,8 @@ impl Weigh for Array {
     }
 }
 
-/// A function of the sources' camera-to-world matrices, float64 [source][4][4], and the target's, float64 [4][4], in the
-/// coordinates of the scene's files. It is called for each target, and for each source with the others.
+/// A function of the sources' camera-to-world matrices, float64 [source][4][4], and the target's, float64 [4][4], in
+/// the coordinates of the scene's files. It is called for each target, and for each source with the others.
 struct Function {
     function: Py<PyAny>,
     unit: RigUnit,

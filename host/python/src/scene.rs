@@ -119,7 +119,8 @@ impl PyScene {
 
     /// Renders targets; all frames stay in memory. Ctrl-C ends it. In a notebook a bar shows the progress, where tqdm
     /// is installed.
-    #[pyo3(signature = (weights=None, *, size=None, model=None, device="auto", background="auto", leave_out=0.01, seed=0, progress=None, **selection))]
+    #[pyo3(signature = (weights=None, *, size=None, model=None, device="auto", background="auto", leave_out=0.01,
+        seed=0, progress=None, **selection))]
     #[allow(clippy::too_many_arguments)]
     fn render(
         &self,
@@ -146,7 +147,8 @@ impl PyScene {
 
     /// Scores schemes on photographs that are left out: each target from all other views, or, with sources, all other
     /// views from these. The baselines come first. Ctrl-C ends it.
-    #[pyo3(signature = (weights=None, *, targets=None, sources=None, views=None, size=None, model=None, device="auto", background="auto", leave_out=0.01, seed=0, progress=None))]
+    #[pyo3(signature = (weights=None, *, targets=None, sources=None, views=None, size=None, model=None, device="auto",
+        background="auto", leave_out=0.01, seed=0, progress=None))]
     #[allow(clippy::too_many_arguments)]
     fn evaluate(
         &self,
@@ -174,7 +176,9 @@ impl PyScene {
 
     /// Optimises Gaussians for the photographs, and writes them: as .ply, smaller as .spz or .splat, or as an .html
     /// page. Ctrl-C ends it, and what there is so far is written.
-    #[pyo3(signature = (output, *, weights=None, left_out=None, towards=None, quality="fast", sources=None, views=None, count=None, iterations=None, resume=None, antialias=false, size=None, device="auto", background="auto", seed=0, progress=None))]
+    #[pyo3(signature = (output, *, weights=None, left_out=None, towards=None, quality="fast", sources=None, views=None,
+        count=None, iterations=None, resume=None, antialias=false, size=None, device="auto", background="auto", seed=0,
+        progress=None))]
     #[allow(clippy::too_many_arguments)]
     fn optimise(
         &self,

@@ -78,8 +78,8 @@ impl Coverage {
         let more = if ranges.len() > MAX_RANGES { " and others" } else { "" };
         ranges.truncate(MAX_RANGES);
         Some(format!(
-            "{count} of {} pictures leave what was photographed: {}{more}; of {worst}, {:.0} % is in a photograph taken from \
-             within {REACH_DEGREES:.0} degrees",
+            "{count} of {} pictures leave what was photographed: {}{more}; of {worst}, {:.0} % is in a photograph \
+             taken from within {REACH_DEGREES:.0} degrees",
             shares.len(),
             ranges.join(", "),
             100.0 * least

@@ -33,7 +33,8 @@ pub struct Dataset {
 pub enum DatasetError {
     /// No data set of a split was found at the path, which would abbreviate the folder.
     #[error(
-        "{0}: no data set: looked for a folder {2}, for one folder *_{1} inside, and for folders with intrinsics.txt inside"
+        "{0}: no data set: looked for a folder {2}, for one folder *_{1} inside, and for folders with intrinsics.txt \
+            inside"
     )]
     NotFound(PathBuf, Split, PathBuf),
     /// There is more than one data set: the folders found.

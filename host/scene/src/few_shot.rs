@@ -1,8 +1,9 @@
 //! The selection of source views and target cameras.
 //!
 //! Views are chosen by a list of items separated by commas: a view's name, its index (from 0; `#3` in any scene, 3
-//! where this can be nothing else, [`Scene::views_meant`]), a range `A..B` of these (both ends included), `all`, a split
-//! of the scene (`train`, `val`, `test`, where its files define splits), and `/STEP` after either to take every `STEP`-th.
+//! where this can be nothing else, [`Scene::views_meant`]), a range `A..B` of these (both ends included), `all`, a
+//! split of the scene (`train`, `val`, `test`, where its files define splits), and `/STEP` after either to take every
+//! `STEP`-th.
 
 mod targets;
 

@@ -1,10 +1,10 @@
 //! Scenes of Gaussians, and their files.
 //!
-//! A file in the layout of "3D Gaussian Splatting" (Kerbl et al. 2023) is a binary little-endian PLY file with an element
-//! `vertex` and the properties `x y z` (mean), `f_dc_0..2` and `f_rest_*` (spherical harmonics of the colour), `opacity`
-//! (logit), `scale_0..2` (natural logarithms of the standard deviations) and `rot_0..3` (quaternion `w, x, y, z`), in
-//! any order. Its coordinates are those of the photographs' cameras, that is of the scene's files ([`SceneFrame`]),
-//! unless it lies beside nerfstudio's record of another world.
+//! A file in the layout of "3D Gaussian Splatting" (Kerbl et al. 2023) is a binary little-endian PLY file with an
+//! element `vertex` and the properties `x y z` (mean), `f_dc_0..2` and `f_rest_*` (spherical harmonics of the colour),
+//! `opacity` (logit), `scale_0..2` (natural logarithms of the standard deviations) and `rot_0..3` (quaternion `w, x, y,
+//! z`), in any order. Its coordinates are those of the photographs' cameras, that is of the scene's files
+//! ([`SceneFrame`]), unless it lies beside nerfstudio's record of another world.
 //!
 //! ```text
 //! harmonics   spherical harmonics in other worlds and of other degrees

@@ -173,14 +173,15 @@ fn rig_warnings(scene: &Scene, rig: &Rig) -> Vec<String> {
     }
     if rig.axis_miss > MAX_AXIS_MISS * rig.distance {
         warnings.push(format!(
-            "the cameras do not look at a common point: their axes miss the nearest one by {:.3} at a distance of {:.3}",
+            "the cameras do not look at a common point: their axes miss the nearest one by {:.3} at a distance of \
+                {:.3}",
             rig.axis_miss, rig.distance
         ));
     }
     if !(USUAL_DISTANCES.0..=USUAL_DISTANCES.1).contains(&rig.distance) {
         warnings.push(format!(
-            "the cameras are {:.3e} units from what they look at, usual are {} to {}: weightings and networks measure in units in \
-             which this is {SRN_DISTANCE}",
+            "the cameras are {:.3e} units from what they look at, usual are {} to {}: weightings and networks measure \
+             in units in which this is {SRN_DISTANCE}",
             rig.distance, USUAL_DISTANCES.0, USUAL_DISTANCES.1
         ));
     }

@@ -280,8 +280,8 @@ impl<'a> Album<'a> {
         let (background, mut warnings) = (backdrop.colour, Vec::new());
         if ignores && self.scene.mask_choice == MaskChoice::Auto {
             warnings.push(format!(
-                "{transparent_count} photographs have an alpha channel that is opaque along the border: it is taken for pixels \
-                 that do not count, not for an object"
+                "{transparent_count} photographs have an alpha channel that is opaque along the border: it is taken \
+                 for pixels that do not count, not for an object"
             ));
         }
         let whole_pictures = match choice {
@@ -304,8 +304,8 @@ impl<'a> Album<'a> {
                 "what is cut out may be more or less than the object"
             };
             warnings.push(format!(
-                "the photographs' borders are not of one colour (they deviate by more than {:.0} of 255): {outcome}; for an \
-                 object alone, photograph before a plain background or cut it out (PNG with alpha)",
+                "the photographs' borders are not of one colour (they deviate by more than {:.0} of 255): {outcome}; \
+                 for an object alone, photograph before a plain background or cut it out (PNG with alpha)",
                 matte::MAX_NOISE_LEVEL
             ));
         }
@@ -321,7 +321,8 @@ impl<'a> Album<'a> {
         let images = match cut_out(whole_pictures) {
             Err(PhotographsError::NoSilhouette(path, colour)) if choice == BackgroundChoice::Auto => {
                 warnings.push(format!(
-                    "{path}: shows no object in front of a background of {colour}: nothing is cut out, whole pictures are used"
+                    "{path}: shows no object in front of a background of {colour}: nothing is cut out, whole pictures \
+                        are used"
                 ));
                 has_silhouettes = false;
                 cut_out(true)?

@@ -4,7 +4,8 @@
 //! unchanged if the layout can hold their lens and their mask; otherwise they are written undistorted, with the mask as
 //! the alpha channel. In NeRF's and COLMAP's layouts masks say which pixels do not count: those of an object become the
 //! alpha channel, of photographs that are not undistorted. A layout that cannot hold a scene refuses it with the
-//! reason; data that is lost without changing what the cameras see (points, near and far bounds, splits) is listed in [`Written::lost`].
+//! reason; data that is lost without changing what the cameras see (points, near and far bounds, splits) is listed in
+//! [`Written::lost`].
 //!
 //! The folder appears whole or not at all: it is filled under a temporary name in the same folder, opened as any scene
 //! (`readback`), and renamed.

@@ -21,7 +21,8 @@ fn matched() -> Folder {
         |(a, b, count): (usize, usize, usize)| json!({ "photographs": [a, b], "inliers": count, "is_general": true });
     let pairs = [(0, 1, 310), (0, 2, 75), (3, 4, 120), (2, 3, 31)].map(pair);
     let camera = json!({ "focal": 300, "principal": [160, 120], "k1": 0 });
-    let solution = json!({ "solver": "played 1", "cameras": [camera], "photographs": vec![unposed; 5], "points": [], "pairs": pairs });
+    let solution = json!({ "solver": "played 1", "cameras": [camera], "photographs": vec![unposed; 5], "points": [],
+        "pairs": pairs });
     folder.write("answer.json", json!({ "solution": solution }).to_string() + "\n");
     folder.script("openmvg", "exec cat \"$(dirname \"$0\")/answer.json\"\n");
     folder

@@ -1,5 +1,5 @@
-//! Programs in the place of `viewfuse-openmvg` that stay, say too much, or are left alone: the command ends, and with it
-//! what it started.
+//! Programs in the place of `viewfuse-openmvg` that stay, say too much, or are left alone: the command ends, and with
+//! it what it started.
 
 use super::{bare, no_scripts};
 use crate::command;

@@ -72,8 +72,8 @@ fn llff_takes_every_eighth_view() {
     assert_eq!(names(&fern, &jobs("llff:3", &fern)[0].sources), ["image001", "image010", "image019"]);
 }
 
-/// Twenty photographs, numbered from 1 without zeros in front. `sorted` of Python makes of their names 1, 10, 11 .. 19, 2,
-/// 20, 3 .. 9, so that every eighth is 1, 17 and 6, and `linspace` takes of the others 10, 19 and 9.
+/// Twenty photographs, numbered from 1 without zeros in front. `sorted` of Python makes of their names 1, 10, 11 .. 19,
+/// 2, 20, 3 .. 9, so that every eighth is 1, 17 and 6, and `linspace` takes of the others 10, 19 and 9.
 fn views_are_counted_as_the_published_loaders_sort_them() {
     let sample = scenes::transforms();
     let matrix = &sample["frames"][0]["transform_matrix"];
@@ -303,7 +303,8 @@ fn like_dtu(folder: &Folder, scene: &str, with_masks: bool) {
         let [fx, fy] = view.camera.pinhole.focal();
         let [cx, cy] = view.camera.pinhole.principal();
         let mut frame = json!({
-            "file_path": name, "transform_matrix": view.camera.pose.to_opengl(), "fl_x": fx, "fl_y": fy, "cx": cx, "cy": cy,
+            "file_path": name, "transform_matrix": view.camera.pose.to_opengl(), "fl_x": fx, "fl_y": fy, "cx": cx,
+            "cy": cy,
             "w": photograph.width(), "h": photograph.height(),
         });
         if with_masks {

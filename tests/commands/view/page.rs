@@ -55,7 +55,8 @@ fn followed(tab: &Tab<'_>, act: impl FnOnce()) {
 #[track_caller]
 fn choose(tab: &Tab<'_>, id: &str, value: &str, event: &str) {
     tab.evaluate(&format!(
-        "(() => {{ const own = document.getElementById('{id}'); own.value = '{value}'; own.dispatchEvent(new Event('{event}', {{bubbles: true}})); }})()"
+        "(() => {{ const own = document.getElementById('{id}'); own.value = '{value}'; own.dispatchEvent(new \
+            Event('{event}', {{bubbles: true}})); }})()"
     ));
 }
 
@@ -232,7 +233,8 @@ fn a_phone_shows_all_of_it() {
     assert!(tab.number(distance) < 0.7 * before, "a pinch does not move");
     assert_eq!(tab.number("window.visualViewport.scale"), 1.0, "the page is not enlarged instead");
     weights(&tab);
-    let smallest = "Math.min(...[...document.querySelectorAll('p, label, legend, output, b, pre')].map((own) => parseFloat(getComputedStyle(own).fontSize)))";
+    let smallest = "Math.min(...[...document.querySelectorAll('p, label, legend, output, b, pre')].map((own) => \
+        parseFloat(getComputedStyle(own).fontSize)))";
     assert!(tab.number(smallest) >= 12.0, "{}", tab.number(smallest));
     assert_eq!(tab.console(), [""; 0]);
 }

@@ -1,5 +1,5 @@
-//! A device that computes nothing: it counts what a GPU of a stated size would be asked for. Buffers have lengths and no
-//! content; what is downloaded is zeros, and that all numbers are finite.
+//! A device that computes nothing: it counts what a GPU of a stated size would be asked for. Buffers have lengths and
+//! no content; what is downloaded is zeros, and that all numbers are finite.
 
 use std::marker::PhantomData;
 use std::sync::Mutex;

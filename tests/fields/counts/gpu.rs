@@ -1,4 +1,5 @@
-//! A device that computes as the CPU does and says that it is a GPU: what fields do on GPUs, with its transfers counted.
+//! A device that computes as the CPU does and says that it is a GPU: what fields do on GPUs, with its transfers
+//! counted.
 
 use std::sync::Mutex;
 use viewfuse::device::argument;

@@ -115,7 +115,8 @@ pub(crate) fn sweep() -> Records {
         "viewfuse": "0.1.0", "scene": "toy", "field": "training-free", "model": null, "weighting": "mean", "seed": 0,
         "size": [16, 16], "sources": ["000001"], "targets": ["000020"], "round_count": 1, "failures": [],
         "devices": [{
-            "device": "CPU", "exact_versus_first": difference, "fastest_without_loss": null, "fastest_of_same_look": "all",
+            "device": "CPU", "exact_versus_first": difference, "fastest_without_loss": null,
+            "fastest_of_same_look": "all",
             "points": [point("exact", 2.0, None), point("all", 0.5, Some(42.0))],
         }],
     });

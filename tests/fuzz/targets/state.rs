@@ -10,7 +10,8 @@ pub(crate) struct State(pub(super) OneFile);
 impl Target for State {
     fn seeds(&self) -> Vec<Vec<u8>> {
         let progressed = json!({
-            "steps": 100, "seconds": 1.5, "losses": [[50, 0.5], [100, 0.25]], "pending": [0.0, 0], "scores": [[100, 12.0]],
+            "steps": 100, "seconds": 1.5, "losses": [[50, 0.5], [100, 0.25]], "pending": [0.0, 0], "scores": [[100,
+            12.0]],
         });
         let settings = json!({"model": "pixelnerf", "schedule": {"steps": 100, "rate": 0.001}});
         let header = json!({

@@ -2,8 +2,8 @@
 //!
 //! The trace has each block of instructions, which nothing enters but at its beginning and nothing leaves but at its
 //! end, when it is translated, and the registers before every run of a block, its address among them. A call is counted
-//! from the block that begins a function named `measured_...` to the last one before the address that the processor held
-//! as its return address then. Nothing in the program measures, so nothing is to be subtracted.
+//! from the block that begins a function named `measured_...` to the last one before the address that the processor
+//! held as its return address then. Nothing in the program measures, so nothing is to be subtracted.
 
 use super::board::Registers;
 use super::image::Image;
@@ -105,7 +105,8 @@ fn lowered(line: &str) -> u32 {
 /// The measured calls of a trace, in their order.
 ///
 /// # Errors
-/// A line that is not understood, a block that was not listed or lies outside any function, a call that does not return.
+/// A line that is not understood, a block that was not listed or lies outside any function, a call that does not
+/// return.
 pub fn calls(mut trace: impl BufRead, registers: Registers, image: &Image) -> Result<Vec<Call>, String> {
     let mut calls = Vec::new();
     let mut open: Option<Open> = None;

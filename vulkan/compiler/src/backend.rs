@@ -20,8 +20,9 @@ pub const VERSION: &str = "0.10.0";
 /// The toolchain that this release is made for.
 pub const NIGHTLY: &str = "nightly-2026-07-03";
 /// The advice if there is no compiler.
-const ADVICE: &str = "install the official toolchain, `rustup toolchain install nightly-2026-07-03 --component rust-src,rustc-dev,llvm-tools`, \
-    or let RUST_GPU_HOME name a folder with bin/cargo, bin/rustc and the code generator of rust-gpu 0.10.0 in lib";
+const ADVICE: &str = "install the official toolchain, `rustup toolchain install nightly-2026-07-03 --component \
+    rust-src,rustc-dev,llvm-tools`, or let RUST_GPU_HOME name a folder with bin/cargo, bin/rustc and the code \
+    generator of rust-gpu 0.10.0 in lib";
 
 /// Why no compiler was found.
 #[derive(Debug, thiserror::Error)]

@@ -92,7 +92,10 @@ pub fn split(bytes: &[u8]) -> Result<Modules, RefineError> {
             Some(Operand::Capability(capability)) => part.keeps(*capability),
             _ => true,
         });
-        let is_of_matrices = |extension: &Instruction| matches!(extension.operands.first(), Some(Operand::LiteralString(name)) if name == MATRIX_EXTENSION);
+        let is_of_matrices = |extension: &Instruction| {
+            matches!(extension.operands.first(),
+            Some(Operand::LiteralString(name)) if name == MATRIX_EXTENSION)
+        };
         module.extensions.retain(|extension| part == Part::Matrices || !is_of_matrices(extension));
         module.assemble().iter().flat_map(|word| word.to_le_bytes()).collect()
     };

@@ -168,7 +168,8 @@ impl Stamp {
     /// The file's text.
     pub fn text(&self) -> String {
         let mut text = format!(
-            "# What kernels.spv, subgroups.spv, matrices.spv and stand_ins.spv were made from; written by `cargo shaders`.\n\
+            "# What kernels.spv, subgroups.spv, matrices.spv and stand_ins.spv were made from; written by `cargo \
+                shaders`.\n\
              compiler = {:?}\nmodule = {:?}\nsubgroups = {:?}\nmatrices = {:?}\nstand_ins = {:?}\n",
             self.compiler, self.module, self.subgroups, self.matrices, self.stand_ins
         );

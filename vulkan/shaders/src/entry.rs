@@ -55,7 +55,8 @@ macro_rules! entry {
         entry! {
             { $doc $method $block $elements { together $($mark)* } }
             [$($parameters)*
-                #[spirv(storage_buffer, descriptor_set = 0, binding = $binding)] $array: bound!($kind $Host $(, $entry)?),
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $binding)] $array: bound!($kind $Host $(,
+                    $entry)?),
             ]
             [] [$($arguments)* unchecked!($kind $array $(, $entry)?),] [$($more)*] [$($bindings)*]
         }
@@ -103,7 +104,8 @@ macro_rules! entry {
         entry! {
             $row
             [$($parameters)*
-                #[spirv(storage_buffer, descriptor_set = 0, binding = $binding)] $array: bound!($kind $Host $(, $entry)?),
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $binding)] $array: bound!($kind $Host $(,
+                    $entry)?),
             ]
             $pages [$($arguments)* lent!($kind $array $(, $entry)?),] [$($more)*] [$($bindings)*]
         }

@@ -235,8 +235,8 @@ impl ListBlock {
         if element < self.start_count() { 0 } else { STATUS_NUMBERS }
     }
 
-    /// Which of 32 splats have pixels of their box in a bin: `element` is `mask * bin_count + bin`, and bit `i` is splat
-    /// `32 * mask + i`. Neighbouring elements look at the same splats.
+    /// Which of 32 splats have pixels of their box in a bin: `element` is `mask * bin_count + bin`, and bit `i` is
+    /// splat `32 * mask + i`. Neighbouring elements look at the same splats.
     #[inline(always)]
     pub fn mask(&self, splats: &(impl Fetch<ProjectedGaussian> + ?Sized), element: u32) -> u32 {
         let (bin, first) = (element % self.bin_count(), element / self.bin_count() * MASK_SPLATS);

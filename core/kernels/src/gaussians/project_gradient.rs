@@ -84,8 +84,8 @@ fn by_axes(footprint: &Footprint, splat: &ProjectedGaussian, sums: &SplatGradien
 }
 
 /// Derivatives by [`Footprint::image_axes`] of the logarithm of what an antialiased splat's opacity is multiplied by:
-/// half of the covariance's inverse before the dilation less that after it, times the derivatives of the covariance. The
-/// first is that of the axes' cross product, whose square is the determinant; it is above 0 for what is seen.
+/// half of the covariance's inverse before the dilation less that after it, times the derivatives of the covariance.
+/// The first is that of the axes' cross product, whose square is the determinant; it is above 0 for what is seen.
 #[inline(always)]
 fn by_fading(footprint: &Footprint, splat: &ProjectedGaussian) -> [Vec3; 2] {
     let ([a, b, c], [right, down]) = (splat.conic, footprint.image_axes);

@@ -7,8 +7,8 @@ use bytemuck::{Pod, Zeroable};
 use viewfuse_core::fetch::Fetch;
 use viewfuse_core::math::{exp, has_nan_bits, max};
 
-/// A product of two matrices, as plain data: `outputs[row][column]` are the products along the inner index, summed in its
-/// order, times the scale.
+/// A product of two matrices, as plain data: `outputs[row][column]` are the products along the inner index, summed in
+/// its order, times the scale.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct MatrixBlock {

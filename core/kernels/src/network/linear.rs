@@ -53,8 +53,8 @@ pub fn first_of_sums(bias: &impl Fours, residual: &impl Fours, has_residual: u32
 }
 
 /// `x`, or 0 instead of a negative one if `relu` is not 0. NaN stays NaN: an overflow in one layer is reported behind
-/// the last. Negative numbers are told by their bits, from those of -0 to those of minus infinity: drivers make the larger of `x` and 0
-/// of a comparison, and that hides NaN.
+/// the last. Negative numbers are told by their bits, from those of -0 to those of minus infinity: drivers make the
+/// larger of `x` and 0 of a comparison, and that hides NaN.
 #[inline]
 pub fn rectified(x: f32, relu: u32) -> f32 {
     const MINUS: u32 = (-0.0_f32).to_bits();

@@ -176,8 +176,8 @@ impl<A: Fours> Left for Matrix<A> {
 
 /// How a device computes the tiles of a matrix product together.
 pub trait Tiles {
-    /// Computes an invocation's part of the matrix product of `left` and `right`. All invocations of a workgroup take part, with outputs or without: beyond the
-    /// matrices, the last row or column is read and the sum is not stored.
+    /// Computes an invocation's part of the matrix product of `left` and `right`. All invocations of a workgroup take
+    /// part, with outputs or without: beyond the matrices, the last row or column is read and the sum is not stored.
     fn multiply<L: Left>(self, invocation: u32, shape: Shape, left: L, right: impl Right, outputs: impl Outputs);
 }
 

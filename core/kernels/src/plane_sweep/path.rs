@@ -82,8 +82,9 @@ impl CostBlock {
     }
 }
 
-/// The costs of a group of planes at a pixel, aggregated: `before` are the group's at the pixel before, `[left, right]` those
-/// of the planes beside the group there (the greatest number where there is none), and `least` the least of all planes.
+/// The costs of a group of planes at a pixel, aggregated: `before` are the group's at the pixel before, `[left, right]`
+/// those of the planes beside the group there (the greatest number where there is none), and `least` the least of all
+/// planes.
 #[inline(always)]
 pub fn advanced(before: &Planes, cost: &Planes, [left, right]: [f32; 2], least: f32) -> Planes {
     let jump = least + JUMP_COST;

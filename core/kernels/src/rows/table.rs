@@ -45,7 +45,8 @@ macro_rules! for_each_kernel {
             }
             /// Latents where points appear in a view: its part of `gathered[view][point][channel]`, from the view's
             /// `grid[row][column][channel]`. An element is four channels of a point.
-            GatherLatents gather_latents(block: GatherBlock) for four in [0..block.point_count * block.four_count()], twin {
+            GatherLatents gather_latents(block: GatherBlock)
+                for four in [0..block.point_count * block.four_count()], twin {
                 read views: CameraBlock as vectors,
                 read points: RayPoint as vectors,
                 read grid: f32,
@@ -54,7 +55,8 @@ macro_rules! for_each_kernel {
             }
             /// Features where points lie in a view's volume: its part of `gathered[view][point][feature]`, from the
             /// view's `volume[row][column][depth][feature]`. An element is a feature of a point.
-            GatherVolume gather_volume(block: VolumeBlock) for feature in [0..block.point_count * block.feature_count], twin {
+            GatherVolume gather_volume(block: VolumeBlock)
+                for feature in [0..block.point_count * block.feature_count], twin {
                 read views: CameraBlock as vectors,
                 read points: RayPoint as vectors,
                 read volume: f32,
@@ -84,7 +86,8 @@ macro_rules! for_each_kernel {
             }
             /// Convolutions of an image, summed in an order of the device's choice. An element is an 8x8 part of a tile
             /// of `TILE` pixels and channels.
-            Convolve convolve(block: ConvolveBlock) tiles [block.pixel_count(), block.patch_len(), block.out_channels], twin {
+            Convolve convolve(block: ConvolveBlock)
+                tiles [block.pixel_count(), block.patch_len(), block.out_channels], twin {
                 filled inputs: f32,
                 layer weights: f32,
                 filled bias: f32,
@@ -249,7 +252,8 @@ macro_rules! for_each_kernel {
             }
             /// Where numbers are not finite: `firsts[run]` is the index of the first infinite or NaN number of a run of
             /// 256 (`finite::FINITE_RUN`), or `u32::MAX`. An element is a run.
-            FindNonFinite find_non_finite(value_count: u32) for run in [0..value_count.div_ceil(FINITE_RUN); 256 a core] {
+            FindNonFinite find_non_finite(value_count: u32)
+                for run in [0..value_count.div_ceil(FINITE_RUN); 256 a core] {
                 read values: f32,
                 write firsts: u32,
             }
@@ -261,7 +265,8 @@ macro_rules! for_each_kernel {
                 write weights[ray * block.sample_count]: f32,
             }
             /// Sums of features along rays: `summed[first ray + ray][feature]`. An element is a feature of a ray.
-            SumFeatures sum_features(block: FeatureBlock; ray_count) for feature in [0..ray_count * block.feature_count], twin {
+            SumFeatures sum_features(block: FeatureBlock; ray_count)
+                for feature in [0..ray_count * block.feature_count], twin {
                 read weights: f32,
                 read fused: f32,
                 read raw: f32,
@@ -406,7 +411,8 @@ macro_rules! for_each_kernel {
             /// opacity), `pixel_depths[row][column]` and `confidences[row][column]`. An element is a pixel of the
             /// target.
             BlendPlanes blend_planes(block: BlendBlock; first_row, row_count)
-            for pixel in [first_row * block.target.width..(first_row + row_count) * block.target.width; 64 a core], twin {
+            for pixel in [first_row * block.target.width..(first_row + row_count) * block.target.width; 64 a core],
+                twin {
                 read views: SweptView as vectors,
                 paged texels: [f32; 4] as vectors,
                 read disparities: [f32; 2] as vectors,
@@ -416,7 +422,8 @@ macro_rules! for_each_kernel {
                 write confidences: f32,
             }
             /// Gaussians as a camera sees them. An element is a Gaussian.
-            ProjectGaussians project_gaussians(block: SplatBlock) for gaussian in [0..block.gaussian_count; 128 a core] {
+            ProjectGaussians project_gaussians(block: SplatBlock)
+                for gaussian in [0..block.gaussian_count; 128 a core] {
                 read gaussians: GaussianBlock as vectors,
                 write splats: ProjectedGaussian as vectors,
             }
@@ -430,9 +437,9 @@ macro_rules! for_each_kernel {
                 write colours: [f32; 4] as vectors,
                 write depths: f32,
             }
-            /// Pixels as they are shown, `shown[row][column]`: red, green, blue and opacity in 255ths, red in the lowest
-            /// byte; and `surfaces[row][column]`, depths from `depths`, weighted sums, 0 where the opacity is less than
-            /// this. An element is a pixel.
+            /// Pixels as they are shown, `shown[row][column]`: red, green, blue and opacity in 255ths, red in the
+            /// lowest byte; and `surfaces[row][column]`, depths from `depths`, weighted sums, 0 where the opacity is
+            /// less than this. An element is a pixel.
             ShowPixels show_pixels(least_opacity: f32; pixel_count) for pixel in [0..pixel_count; 1024 a core] {
                 read colours: [f32; 4] as vectors,
                 read depths: f32,
@@ -441,7 +448,8 @@ macro_rules! for_each_kernel {
             }
             /// What the pixels of a tile say of each splat of its list: `sums[entry]`, from the derivatives of a loss
             /// by the pixels, `gradients[row][column]` (by red, green, blue and opacity). An element is a tile.
-            BlendGradient blend_gradient(block: TileBlock) for tile in [0..block.tile_count(); 1 a core], together, wide {
+            BlendGradient blend_gradient(block: TileBlock)
+                for tile in [0..block.tile_count(); 1 a core], together, wide {
                 filled starts: u32,
                 filled entries: u32,
                 filled splats: ProjectedGaussian as vectors,
@@ -452,7 +460,8 @@ macro_rules! for_each_kernel {
             /// Derivatives by the Gaussians' parameters, in the places of these: `gradients[gaussian]`, from the
             /// entries of the tiles' lists that are the Gaussian's, `uses[use_starts[gaussian]..use_starts[gaussian +
             /// 1]]`. An element is a Gaussian.
-            ProjectGradients project_gradients(block: SplatBlock) for gaussian in [0..block.gaussian_count; 128 a core] {
+            ProjectGradients project_gradients(block: SplatBlock)
+                for gaussian in [0..block.gaussian_count; 128 a core] {
                 read gaussians: GaussianBlock as vectors,
                 read splats: ProjectedGaussian as vectors,
                 read use_starts: u32,
@@ -460,8 +469,8 @@ macro_rules! for_each_kernel {
                 read sums: SplatGradient as vectors,
                 write gradients: GaussianBlock as vectors,
             }
-            /// Gaussians whose colours depend on the direction, as a camera sees them: `terms[gaussian][term]` are their
-            /// spherical harmonics. An element is a Gaussian.
+            /// Gaussians whose colours depend on the direction, as a camera sees them: `terms[gaussian][term]` are
+            /// their spherical harmonics. An element is a Gaussian.
             ProjectParticles project_particles(block: ParticleBlock)
             for gaussian in [0..block.gaussian_count; 128 a core] {
                 read gaussians: GaussianBlock as vectors,
@@ -469,8 +478,8 @@ macro_rules! for_each_kernel {
                 read terms: HarmonicTerm as vectors,
                 write splats: ProjectedGaussian as vectors,
             }
-            /// Which splats' boxes reach each bin of 8 by 8 tiles: `masks[bin][mask]`, 32 splats a mask. An element is a
-            /// mask of a bin.
+            /// Which splats' boxes reach each bin of 8 by 8 tiles: `masks[bin][mask]`, 32 splats a mask. An element is
+            /// a mask of a bin.
             MarkBins mark_bins(block: ListBlock) for mask in [0..block.bin_count() * block.mask_count(); 64 a core] {
                 read splats: ProjectedGaussian as vectors,
                 write masks: u32,
@@ -507,15 +516,16 @@ macro_rules! for_each_kernel {
                 write keys: [u32; 2],
             }
             /// The lists that `blend_splats` takes: each tile's keys by depth, and of one depth by index,
-            /// `entries[starts[tile]..starts[tile + 1]]`. An element is an entry; behind the last one nothing is written.
+            /// `entries[starts[tile]..starts[tile + 1]]`. An element is an entry; behind the last one nothing is
+            /// written.
             SortEntries sort_entries(block: ListBlock) for entry in [0..block.capacity], looped {
                 read starts: u32,
                 read keys: [u32; 2],
                 write entries: u32,
             }
-            /// Derivatives of `1 - SSIM` of a picture and a photograph by the means of windows: `by_windows[row][column]`
-            /// (by those of x, x x and x y; red, green, blue). `photographs`, `means` and `variances` are of several
-            /// photographs. An element is a pixel.
+            /// Derivatives of `1 - SSIM` of a picture and a photograph by the means of windows:
+            /// `by_windows[row][column]` (by those of x, x x and x y; red, green, blue). `photographs`, `means` and
+            /// `variances` are of several photographs. An element is a pixel.
             CompareWindows compare_windows(block: LossBlock)
             for pixel in [0..block.width * block.height; 16 a core] {
                 read colours: [f32; 4] as vectors,
@@ -525,8 +535,8 @@ macro_rules! for_each_kernel {
                 read gains: GainBlock,
                 write by_windows[3 * pixel]: [f32; 4] as vectors,
             }
-            /// Derivatives of a loss by the pixels, `by_pixels[row][column]` (by red, green, blue and opacity), and what
-            /// they add to that by the photograph's gain, `shares[row][column]`. An element is a pixel.
+            /// Derivatives of a loss by the pixels, `by_pixels[row][column]` (by red, green, blue and opacity), and
+            /// what they add to that by the photograph's gain, `shares[row][column]`. An element is a pixel.
             ComparePixels compare_pixels(block: LossBlock)
             for pixel in [0..block.width * block.height; 16 a core] {
                 read colours: [f32; 4] as vectors,

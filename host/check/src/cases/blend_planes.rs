@@ -7,8 +7,8 @@ use crate::world::{Numbers, change_texels};
 
 impl Case for BlendPlanes {
     const LIMITS: Limits = Limits { tolerance: 4.0e-3, least: 1.0e-2 };
-    const REASON: &'static str = "running error analysis from the image coordinates to the sum over planes; numbers whose bound \
-        is larger than a step of 8 bits are undecided";
+    const REASON: &'static str = "running error analysis from the image coordinates to the sum over planes; numbers \
+        whose bound is larger than a step of 8 bits are undecided";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("views", |case| case.views[1].camera.intrinsics[0] *= 1.01),
         ("texels", |case| change_texels(&mut case.texels[case.views[1].camera.first_texel as usize..])),

@@ -8,8 +8,8 @@ use viewfuse_kernels::plane_sweep::PLANES;
 
 impl Case for CensusCost {
     const LIMITS: Limits = Limits { tolerance: 2.0e-5, least: 1.0e-2 };
-    const REASON: &'static str = "differences of grey in units of 0.04, each rounded; sums over twelve neighbours of all pairs; \
-        three quotients";
+    const REASON: &'static str = "differences of grey in units of 0.04, each rounded; sums over twelve neighbours of \
+        all pairs; three quotients";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("pairs", |case| case.pairs[0].weight *= 1.01),
         ("grey", |case| increase(case.grey.iter_mut().step_by(2).map(|grey| &mut grey[0]))),

@@ -7,8 +7,8 @@ use crate::world::change_texels;
 
 impl Case for CompareViews {
     const LIMITS: Limits = Limits { tolerance: 4.0e-4, least: 1.0e-2 };
-    const REASON: &'static str = "colours as a look-up (fifteen roundings of an image coordinate, times the image's slope) \
-        over an alpha of at least 0.3; a disparity's error over two steps, times the bell's slope";
+    const REASON: &'static str = "colours as a look-up (fifteen roundings of an image coordinate, times the image's \
+        slope) over an alpha of at least 0.3; a disparity's error over two steps, times the bell's slope";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("views", |case| case.views[1].camera.intrinsics[0] *= 1.01),
         ("pairs", |case| case.pairs[0].weight *= 1.01),

@@ -19,8 +19,8 @@ pub(super) fn optical_depth(random: &mut Random, low: f64, high: f64) -> f64 {
 impl Case for Composite {
     const SEED_COUNT: u64 = 8;
     const LIMITS: Limits = Limits { tolerance: 1.0e-4, least: 1.0e-2 };
-    const REASON: &'static str = "roundings of the optical depth times the transmittance, 2 ULP of the exponential, each as \
-        far as what is seen changes there; depths as 1 / opacity";
+    const REASON: &'static str = "roundings of the optical depth times the transmittance, 2 ULP of the exponential, \
+        each as far as what is seen changes there; depths as 1 / opacity";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("samples", |case| increase(&mut case.samples[0])),
         ("sample_depths", |case| case.sample_depths[0] *= 1.01),

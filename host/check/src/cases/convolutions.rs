@@ -70,8 +70,9 @@ impl Case for Convolve {
     // As many as give every shape every combination of residual and rectification.
     const SEED_COUNT: u64 = 8;
     const LIMITS: Limits = Limits { tolerance: 1.0e-2, least: 1.0e-2 };
-    const REASON: &'static str = "n units (2^-24) of the sum of magnitudes of n summands, in whatever order; of layers for \
-        large images channels + 14 units of the magnitudes in Winograd's transforms, whose factors come to about 10^2";
+    const REASON: &'static str = "n units (2^-24) of the sum of magnitudes of n summands, in whatever order; of layers \
+        for large images channels + 14 units of the magnitudes in Winograd's transforms, whose factors come to about \
+        10^2";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("inputs", |case| increase(&mut case.inputs)),
         ("weights", |case| increase(&mut case.weights.values)),

@@ -47,8 +47,8 @@ impl Case for CoarseDepths {
 impl Case for RandomDraws {
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 1.0e-5, least: 1.0e-2 };
-    const REASON: &'static str = "an addition and a division; for normal numbers 2 ULP of the logarithm, 4.5 ULP of the root, \
-        9e-8 of the cosine, two roundings of its argument of up to a turn";
+    const REASON: &'static str = "an addition and a division; for normal numbers 2 ULP of the logarithm, 4.5 ULP of \
+        the root, 9e-8 of the cosine, two roundings of its argument of up to a turn";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("pixels", |case| change_pixels(&mut case.pixels))];
 
     fn inputs(seed: u64, size: u32) -> Vec<RandomDraws> {

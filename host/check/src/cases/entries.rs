@@ -11,8 +11,8 @@ use viewfuse_kernels::gaussians::SPLAT_TILE;
 use viewfuse_kernels::gaussians::lists::{BIN_TILES, MASK_SPLATS, TILES_OF_BIN};
 
 const EXACT: Limits = Limits { tolerance: 0.0, least: 0.5 };
-const REASON: &str = "whole numbers: exact; undecided where it depends on rounding which pixels a splat's box has, or whether the \
-    least value of the exponent's form in a tile is below what the opacity allows";
+const REASON: &str = "whole numbers: exact; undecided where it depends on rounding which pixels a splat's box has, or \
+    whether the least value of the exponent's form in a tile is below what the opacity allows";
 
 /// A picture's splats, with lists as the kernels before the one under test would make them.
 struct Lists {

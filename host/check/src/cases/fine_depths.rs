@@ -69,8 +69,8 @@ fn fine(random: &mut Random, size: u32, index: usize, counts: [u32; 3]) -> FineD
 impl Case for FineDepths {
     const SEED_COUNT: u64 = 8;
     const LIMITS: Limits = Limits { tolerance: 2.0e-5, least: 1.0e-2 };
-    const REASON: &'static str = "a place in a part: a division, a product, two sums; undecided where the random number \
-        hits the border of a part to within the sums of weights";
+    const REASON: &'static str = "a place in a part: a division, a product, two sums; undecided where the random \
+        number hits the border of a part to within the sums of weights";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("seen", |case| increase(case.seen.iter_mut().step_by(2).map(|[weight, _]| weight))),
         ("rays", |case| case.rays.iter_mut().for_each(|ray| ray.far *= 1.01)),

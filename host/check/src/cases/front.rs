@@ -7,8 +7,8 @@ use crate::world::Numbers;
 
 impl Case for PlaneOpacity {
     const LIMITS: Limits = Limits { tolerance: 2.0e-3, least: 1.0e-2 };
-    const REASON: &'static str = "running error analysis from the image coordinates to a difference of disparities in steps of a \
-        plane, under an exponential; undecided where a coordinate rounds to either of two pixels";
+    const REASON: &'static str = "running error analysis from the image coordinates to a difference of disparities in \
+        steps of a plane, under an exponential; undecided where a coordinate rounds to either of two pixels";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("views", |case| case.views[1].camera.intrinsics[0] *= 1.01),
         ("disparities", |case| increase(case.disparities.iter_mut().map(|[disparity, _]| disparity))),

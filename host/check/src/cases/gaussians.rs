@@ -119,8 +119,8 @@ impl Picture {
 
 impl Case for ProjectGaussians {
     const LIMITS: Limits = Limits { tolerance: 5.0e-2, least: 1.0e-3 };
-    const REASON: &'static str = "running error analysis from the camera's axes through the covariance to its inverse and to the \
-        pixels where the opacity counts";
+    const REASON: &'static str = "running error analysis from the camera's axes through the covariance to its inverse \
+        and to the pixels where the opacity counts";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("gaussians", |case| increase(case.gaussians.iter_mut().flat_map(|gaussian| &mut gaussian.log_scales))),
         ("parameters", |case| case.block.camera.intrinsics[0] *= 1.01),
@@ -146,8 +146,8 @@ impl Case for ProjectGaussians {
 
 impl Case for BlendSplats {
     const LIMITS: Limits = Limits { tolerance: 1.0e-3, least: 1.0e-2 };
-    const REASON: &'static str = "running error analysis from a pixel's distance to its sums of colours and depths; undecided where it \
-        depends on rounding whether a splat counts";
+    const REASON: &'static str = "running error analysis from a pixel's distance to its sums of colours and depths; \
+        undecided where it depends on rounding whether a splat counts";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("starts", |case| case.starts.iter_mut().skip(1).for_each(|start| *start = start.saturating_sub(1))),
         ("entries", |case| case.entries.reverse()),
@@ -177,8 +177,9 @@ impl Case for BlendSplats {
 impl Case for BlendGradient {
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 2.0e-2, least: 1.0e-1 };
-    const REASON: &'static str = "running error analysis of what lies behind a splat, divided by its transmittance, and of sums over the \
-        pixels of a tile; a tile with a pixel where it depends on rounding whether a splat counts is undecided";
+    const REASON: &'static str = "running error analysis of what lies behind a splat, divided by its transmittance, \
+        and of sums over the pixels of a tile; a tile with a pixel where it depends on rounding whether a splat counts \
+        is undecided";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("starts", |case| case.starts.iter_mut().skip(1).for_each(|start| *start = start.saturating_sub(1))),
         ("entries", |case| case.entries.reverse()),
@@ -223,8 +224,9 @@ impl Case for BlendGradient {
 
 impl Case for ProjectGradients {
     const LIMITS: Limits = Limits { tolerance: 1.0, least: 1.0 };
-    const REASON: &'static str = "running error analysis of the chain rule, from sums over tiles through the inverse of the covariance to \
-        scales, rotation and position; undecided where the projection's slope is limited or not by rounding";
+    const REASON: &'static str = "running error analysis of the chain rule, from sums over tiles through the inverse \
+        of the covariance to scales, rotation and position; undecided where the projection's slope is limited or not \
+        by rounding";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("gaussians", |case| increase(case.gaussians.iter_mut().flat_map(|gaussian| &mut gaussian.log_scales))),
         ("splats", |case| increase(case.splats.iter_mut().flat_map(|splat| &mut splat.conic))),

@@ -76,8 +76,8 @@ impl Case for GroupNormPartials {
     // A floor of variances and a length are there for another kernel.
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 2.0, least: 1.0e-2 };
-    const REASON: &'static str = "n units (2^-24) of the sum of n differences from one of the values, a rounding of the \
-        mean; n + 3 units of the sum of squares, which is up to 10^4";
+    const REASON: &'static str = "n units (2^-24) of the sum of n differences from one of the values, a rounding of \
+        the mean; n + 3 units of the sum of squares, which is up to 10^4";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("inputs", |case| increase(&mut case.inputs))];
 
     fn inputs(seed: u64, size: u32) -> Vec<GroupNormPartials> {
@@ -103,9 +103,10 @@ impl Case for GroupNorm {
     // As many as give every shape floors, offsets and distances of all kinds.
     const SEED_COUNT: u64 = 8;
     const LIMITS: Limits = Limits { tolerance: 5.0e-2, least: 1.0e-2 };
-    const REASON: &'static str = "running error analysis of merging one part after the other: a rounding of the mean each, \
-        which is up to 10^3 deviations, and what that makes of the squares between the partials; the reciprocal of a square \
-        root; a difference from the mean, two products and a sum; of SiLU an exponential, a sum and a division";
+    const REASON: &'static str = "running error analysis of merging one part after the other: a rounding of the mean \
+        each, which is up to 10^3 deviations, and what that makes of the squares between the partials; the reciprocal \
+        of a square root; a difference from the mean, two products and a sum; of SiLU an exponential, a sum and a \
+        division";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("inputs", |case| increase(&mut case.inputs)),
         ("partials", |case| case.partials.iter_mut().for_each(|statistics| statistics[1] *= 1.05)),

@@ -84,8 +84,8 @@ fn mean(block: &LossBlock, pixel: usize, at: impl Fn(usize) -> Bounded) -> Bound
 
 impl Case for CompareWindows {
     const LIMITS: Limits = Limits { tolerance: 5.0e-2, least: 1.0e-2 };
-    const REASON: &'static str = "running error analysis from the means over windows through variances, which are differences of them, to \
-        the derivatives of a quotient of products";
+    const REASON: &'static str = "running error analysis from the means over windows through variances, which are \
+        differences of them, to the derivatives of a quotient of products";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("colours", |case| increase(case.colours.as_flattened_mut())),
         ("photographs", |case| increase(case.photographs.as_flattened_mut())),

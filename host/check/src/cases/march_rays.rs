@@ -7,8 +7,8 @@ use crate::world::{World, change_depths, change_texels};
 impl Case for MarchRays {
     const SEED_COUNT: u64 = 3;
     const LIMITS: Limits = Limits { tolerance: 4.0e-3, least: 1.0e-2 };
-    const REASON: &'static str = "running error analysis from the image coordinates to the sum along the ray; numbers whose \
-        bound is larger than a step of 8 bits are undecided";
+    const REASON: &'static str = "running error analysis from the image coordinates to the sum along the ray; numbers \
+        whose bound is larger than a step of 8 bits are undecided";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("object", |case| case.object[0].high[0] *= 1.01),
         ("views", |case| case.views[1].intrinsics[0] *= 1.01),

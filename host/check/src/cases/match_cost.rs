@@ -6,8 +6,8 @@ use crate::world::{World, change_depths, change_texels};
 
 impl Case for MatchCost {
     const LIMITS: Limits = Limits { tolerance: 2.0e-4, least: 1.0e-2 };
-    const REASON: &'static str = "colours as a look-up (ten roundings of an image coordinate, times the image's slope) over \
-        an alpha of at least 0.3, times shares of at most 1 / NO_WITNESS";
+    const REASON: &'static str = "colours as a look-up (ten roundings of an image coordinate, times the image's slope) \
+        over an alpha of at least 0.3, times shares of at most 1 / NO_WITNESS";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("object", |case| case.object[0].radius *= 1.01),
         ("views", |case| case.views[1].intrinsics[0] *= 1.01),

@@ -7,8 +7,8 @@ use crate::matrix_oracle;
 impl Case for MatrixProduct {
     const SEED_COUNT: u64 = 8;
     const LIMITS: Limits = Limits { tolerance: 5.0e-3, least: 1.0e-2 };
-    const REASON: &'static str = "n units (2^-24) of the sum of magnitudes of n products, in whatever order they are summed, \
-        and one more product";
+    const REASON: &'static str = "n units (2^-24) of the sum of magnitudes of n products, in whatever order they are \
+        summed, and one more product";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("left", |case| increase(&mut case.left)),
         ("right", |case| increase(&mut case.right)),
@@ -89,8 +89,8 @@ impl Case for MatrixProduct {
 impl Case for SoftmaxRows {
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 5.0e-5, least: 1.0e-30 };
-    const REASON: &'static str = "a difference from the largest score, of up to some 10^2, is an error of the exponent; two \
-        exponentials, n units (2^-24) of their sum, a division and a product";
+    const REASON: &'static str = "a difference from the largest score, of up to some 10^2, is an error of the \
+        exponent; two exponentials, n units (2^-24) of their sum, a division and a product";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("scores", |case| increase(&mut case.scores))];
 
     fn inputs(seed: u64, size: u32) -> Vec<SoftmaxRows> {

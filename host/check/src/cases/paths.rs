@@ -20,8 +20,8 @@ fn increase_some(costs: &mut [Planes]) {
 impl Case for FollowPaths {
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 4.0e-5, least: 1.0e-2 };
-    const REASON: &'static str = "three roundings of costs below 0.5 a step; their differences among planes add up along a \
-        line";
+    const REASON: &'static str = "three roundings of costs below 0.5 a step; their differences among planes add up \
+        along a line";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("means", |case| increase_some(&mut case.means))];
 
     fn inputs(seed: u64, size: u32) -> Vec<FollowPaths> {

@@ -10,8 +10,8 @@ impl Case for PickDepth {
     // Of the cameras it takes only where their pixels are.
     const SHAPES_ONLY: &'static [&'static str] = &["views"];
     const LIMITS: Limits = Limits { tolerance: 2.0e-4, least: 1.0e-2 };
-    const REASON: &'static str = "running error analysis of costs, of the parabola through the least three and its quotient; \
-        undecided where two planes cost the same to within it";
+    const REASON: &'static str = "running error analysis of costs, of the parabola through the least three and its \
+        quotient; undecided where two planes cost the same to within it";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("object", |case| case.object[0].radius *= 1.01),
         ("means", |case| increase(case.means.iter_mut().step_by(2).filter(|cost| **cost > 0.0))),

@@ -7,8 +7,9 @@ use crate::world::Numbers;
 
 impl Case for PickDisparity {
     const LIMITS: Limits = Limits { tolerance: 5.0e-5, least: 1.0e-2 };
-    const REASON: &'static str = "a difference of costs in units of the temperature, under an exponential; the quotient of two \
-        sums of these; the vertex of a parabola in steps of a plane; undecided where all three costs are nearly equal";
+    const REASON: &'static str = "a difference of costs in units of the temperature, under an exponential; the \
+        quotient of two sums of these; the vertex of a parabola in steps of a plane; undecided where all three costs \
+        are nearly equal";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("costs", |case| increase(case.costs.as_flattened_mut().iter_mut().step_by(2))),
         ("parameters", |case| case.block.disparity_step *= 1.01),

@@ -61,8 +61,8 @@ impl Case for MixPictures {
 impl Case for AddNoise {
     const SEED_COUNT: u64 = 8;
     const LIMITS: Limits = Limits { tolerance: 1.0e-5, least: 1.0e-2 };
-    const REASON: &'static str = "a product and an addition; for normal numbers 2 ULP of the logarithm, 4.5 ULP of the root, \
-        9e-8 of the cosine, two roundings of its argument of up to a turn";
+    const REASON: &'static str = "a product and an addition; for normal numbers 2 ULP of the logarithm, 4.5 ULP of the \
+        root, 9e-8 of the cosine, two roundings of its argument of up to a turn";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] =
         &[("parameters", |case| case.block.scale *= 1.01), ("picture", |case| increase(&mut case.picture))];
 

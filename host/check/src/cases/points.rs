@@ -18,8 +18,8 @@ fn move_points(points: &mut [RayPoint]) {
 
 impl Case for EmbedPoints {
     const LIMITS: Limits = Limits { tolerance: 1.0e-3, least: 1.0e-2 };
-    const REASON: &'static str = "a rotation: three products and their sum; an angle is its product with up to 48, a sine \
-        adds 9e-8";
+    const REASON: &'static str = "a rotation: three products and their sum; an angle is its product with up to 48, a \
+        sine adds 9e-8";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("views", |case| case.views[0].pose.right[0] *= 1.01),
         ("points", |case| move_points(&mut case.points)),
@@ -53,8 +53,8 @@ impl Case for VisibleWeights {
     const SEED_COUNT: u64 = 8;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 2.0e-5, least: 1.0e-3 };
-    const REASON: &'static str = "a sum over views and a division by it; undecided where a point is on a view's plane to \
-        within a rotation's rounding";
+    const REASON: &'static str = "a sum over views and a division by it; undecided where a point is on a view's plane \
+        to within a rotation's rounding";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("views", |case| case.views.iter_mut().for_each(|view| view.pose.right[3] *= 1.01)),
         ("weights", |case| case.weights[0] *= 1.01),

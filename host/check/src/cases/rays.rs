@@ -7,8 +7,8 @@ use crate::ray_oracle;
 
 impl Case for CastRays {
     const LIMITS: Limits = Limits { tolerance: 1.0e-5, least: 1.0e-2 };
-    const REASON: &'static str = "quotients of image coordinates by the focal length, three products with the axes, a norm \
-        (1 where depths are along the axis) and a division by it";
+    const REASON: &'static str = "quotients of image coordinates by the focal length, three products with the axes, a \
+        norm (1 where depths are along the axis) and a division by it";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("pixels", |case| case.pixels.iter_mut().for_each(|pixel| *pixel = *pixel * 101 / 100)),
         ("parameters", |case| case.block.camera.intrinsics[0] *= 1.01),

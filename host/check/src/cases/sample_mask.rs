@@ -13,8 +13,8 @@ const FIRST_RAY: u32 = 2;
 impl Case for WeighSamples {
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 1.0e-4, least: 1.0e-2 };
-    const REASON: &'static str = "roundings of the optical depth times the transmittance, 2 ULP of the exponential, on both \
-        sides of a sample";
+    const REASON: &'static str = "roundings of the optical depth times the transmittance, 2 ULP of the exponential, on \
+        both sides of a sample";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] =
         &[("samples", |case| increase(case.samples.iter_mut().map(|sample| &mut sample[3])))];
 

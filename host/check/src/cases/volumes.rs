@@ -38,8 +38,8 @@ fn jobs(random: &mut Random, size: u32) -> Vec<GatherVolume> {
 impl Case for GatherVolume {
     const SEED_COUNT: u64 = 8;
     const LIMITS: Limits = Limits { tolerance: 5.0e-3, least: 1.0e-2 };
-    const REASON: &'static str = "errors of a projection and of the depth, in nodes, times the change of the volume over a \
-        node; eight products; undecided where a point is on the view's plane to within rounding";
+    const REASON: &'static str = "errors of a projection and of the depth, in nodes, times the change of the volume \
+        over a node; eight products; undecided where a point is on the view's plane to within rounding";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("views", |case| case.views.iter_mut().for_each(|view| view.intrinsics[0] *= 1.01)),
         ("points", |case| case.points.iter_mut().for_each(|point| point.position[1] *= 1.01)),

@@ -22,7 +22,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "DEVICE")]
     device: Vec<DeviceChoice>,
     /// Measure everything so many times, in turns; the medians are printed
-    #[arg(long, value_name = "N", default_value_t = DEFAULT_ROUNDS, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_ROUNDS,
+        value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: u32,
     /// Print JSON
     #[arg(long)]

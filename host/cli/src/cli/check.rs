@@ -25,7 +25,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "DEVICE")]
     device: Vec<DeviceChoice>,
     /// Check each kernel with this many seeds
-    #[arg(long, value_name = "N", default_value_t = DEFAULT_SEED_COUNT, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_SEED_COUNT,
+        value_parser = clap::value_parser!(u32).range(1..=1000))]
     seeds: u32,
     /// Scene whose last view is rendered on each device [default: a synthetic one]
     #[arg(long, value_name = "PATH")]

@@ -29,7 +29,8 @@ use viewfuse_scene::picture_size;
     viewfuse compare out/000020.png car/rgb/000020.png\n      PSNR and SSIM of one picture\n  \
     viewfuse compare out/ car/rgb/ --lpips alex=alexnet.pth --dists vgg16.pth --fid pt_inception-2015-12-05.pth\n      \
     of every picture in out/, with the photograph of the same name\n\n\
-    Transparent pictures are laid over the background of their run, as `render` does when it compares; the last line says over which.")]
+    Transparent pictures are laid over the background of their run, as `render` does when it compares; the last line \
+    says over which.")]
 pub(crate) struct Arguments {
     /// A picture, or a folder of pictures (PNG, JPEG)
     prediction: PathBuf,

@@ -42,16 +42,19 @@ use viewfuse_weighting::{OpenedChoice, WeightingChoice};
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
-    viewfuse evaluate dino/ --targets 1,4,7,10,13,16 --size 160x120\n      each of six views from all others, every scheme\n  \
-    viewfuse evaluate cars/*/ --sources all/3 --weights mean --weights error:alpha=1 -o cars.csv\n      the other views from every third, two schemes\n  \
-    viewfuse evaluate fern/ --protocol llff:3\n      as few-shot papers do on LLFF, with their figures beside\n  \
-    viewfuse evaluate scene/ --protocol nearest:4 --targets 2,5 --json\n      two views, each from the four nearest others\n  \
-    viewfuse evaluate cars/*/ --protocol random --trials 3 -o runs/random\n      the paper's first table, with pictures for a report\n  \
-    viewfuse evaluate cars/*/ --protocol count --shard 2/8 -o runs/count\n      the third of eight parts; the folder is shared, or copied together afterwards\n\n\
-    With --protocol and --output, the same command again goes on with a folder after a kill, and prints the tables once \
-    every job is there, whichever shards did them. Intervals are of 95 % over the scenes, or over the views of one scene; \
-    differences of rows are taken scene by scene, or view by view. The first rows need no field: a copy of the nearest \
-    source, that copy warped by the homography of a plane at the scene's depth, and the mean of the four nearest so warped.")]
+    viewfuse evaluate dino/ --targets 1,4,7,10,13,16 --size 160x120\n      each of six views from all others, every \
+    scheme\n  viewfuse evaluate cars/*/ --sources all/3 --weights mean --weights error:alpha=1 -o cars.csv\n      the \
+    other views from every third, two schemes\n  viewfuse evaluate fern/ --protocol llff:3\n      as few-shot papers \
+    do on LLFF, with their figures beside\n  viewfuse evaluate scene/ --protocol nearest:4 --targets 2,5 --json\n      \
+    two views, each from the four nearest others\n  viewfuse evaluate cars/*/ --protocol random --trials 3 -o \
+    runs/random\n      the paper's first table, with pictures for a report\n  viewfuse evaluate cars/*/ --protocol \
+    count --shard 2/8 -o runs/count\n      the third of eight parts; the folder is shared, or copied together \
+    afterwards\n\n\
+    With --protocol and --output, the same command again goes on with a folder after a kill, and prints the tables \
+    once every job is there, whichever shards did them. Intervals are of 95 % over the scenes, or over the views of \
+    one scene; differences of rows are taken scene by scene, or view by view. The first rows need no field: a copy of \
+    the nearest source, that copy warped by the homography of a plane at the scene's depth, and the mean of the four \
+    nearest so warped.")]
 pub(crate) struct Arguments {
     /// One or more scenes; with --split data sets
     #[arg(required = true)]

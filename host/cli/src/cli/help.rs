@@ -51,7 +51,8 @@ pub(crate) fn explained(error: Error, arguments: impl Iterator<Item = OsString>,
         && IN_THE_LABORATORY.contains(&name.as_str())
     {
         let message = format!(
-            "`{name}` is a command of the laboratory: in the repository, `cargo run --release -p viewfuse-lab -- {name}`"
+            "`{name}` is a command of the laboratory: in the repository, `cargo run --release -p viewfuse-lab -- \
+                {name}`"
         );
         return command.error(ErrorKind::InvalidSubcommand, message);
     }

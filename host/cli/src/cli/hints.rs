@@ -61,8 +61,8 @@ fn sentence(hint: Hint) -> Option<&'static str> {
             "a build with `--features formats` reads it: `cargo install --path host/cli --features formats`"
         }
         Hint::Poses => {
-            "`viewfuse pose FOLDER -o posed` finds poses and writes a scene, and so does --pose on the way of `render`, \
-             `view` and `inspect`; `viewfuse --help` lists the layouts of posed photographs"
+            "`viewfuse pose FOLDER -o posed` finds poses and writes a scene, and so does --pose on the way of \
+             `render`, `view` and `inspect`; `viewfuse --help` lists the layouts of posed photographs"
         }
         Hint::FewerPhotographs => "--every N takes every Nth",
         Hint::Solver("colmap") => {

@@ -24,7 +24,8 @@ use viewfuse_scene::photographs::BackgroundChoice;
 #[derive(Args)]
 #[command(after_help = "Examples:\n  viewfuse inspect photos/ -o cameras.png\n  \
     viewfuse inspect photos/ --quality\n      \
-    how good pictures will be, before they are rendered\n  viewfuse inspect photos/ --views\n      names, and the numbers that stand for them: --targets '#3' is the view of index 3")]
+    how good pictures will be, before they are rendered\n  viewfuse inspect photos/ --views\n      names, and the \
+    numbers that stand for them: --targets '#3' is the view of index 3")]
 pub(crate) struct Arguments {
     /// The scene
     scene: PathBuf,

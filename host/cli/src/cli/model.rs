@@ -43,7 +43,8 @@ pub(crate) struct ModelOptions {
     #[arg(long, conflicts_with_all = ["compute", "leave_out", "early_termination"], help_heading = EFFORTS)]
     pub(crate) exact: bool,
     /// Omit all that can be but this, without a bound on the error: compute what the scene does not need
-    #[arg(long, value_name = "WHAT", value_parser = PossibleValuesParser::new(omissions()), value_delimiter = ',', requires = "model", help_heading = EFFORTS)]
+    #[arg(long, value_name = "WHAT", value_parser = PossibleValuesParser::new(omissions()), value_delimiter = ',',
+        requires = "model", help_heading = EFFORTS)]
     compute: Vec<String>,
     #[command(flatten)]
     flags: Flags<EFFORT>,
@@ -63,8 +64,8 @@ pub(crate) fn scene_help() -> String {
     format!("The scene: {}", looked_for(&READERS))
 }
 
-/// The scheme of `--weights`; `None` where the scene is to decide: a network's pictures take too long to try out schemes
-/// unasked, and Gaussians show the same under all of them.
+/// The scheme of `--weights`; `None` where the scene is to decide: a network's pictures take too long to try out
+/// schemes unasked, and Gaussians show the same under all of them.
 pub(crate) fn chosen_scheme(
     given: Option<&WeightingChoice>,
     model: &ModelOptions,

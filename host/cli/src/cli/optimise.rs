@@ -27,15 +27,16 @@ const SHARP_SOURCES: usize = 20;
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  viewfuse optimise photos/ -o photos.ply\n  \
-    viewfuse optimise dino/ --left-out 3 -o dino.ply\n      view 3 is kept back, and scored as the Gaussians become better\n  \
-    viewfuse optimise dino/ --towards 3 --left-out 3 -o dino.ply\n      at last for view 3: its nearest photographs count most\n  \
-    viewfuse optimise photos/ --quality standard -o photos.ply\n      sharper, in minutes; --max-time 10m says how many\n  \
-    viewfuse optimise photos/ -o photos.html\n      one page for any browser, without a server: to share\n  \
-    viewfuse render photos/ --gaussians photos.ply --orbit 24 -o out\n\n\
+    viewfuse optimise dino/ --left-out 3 -o dino.ply\n      view 3 is kept back, and scored as the Gaussians become \
+    better\n  viewfuse optimise dino/ --towards 3 --left-out 3 -o dino.ply\n      at last for view 3: its nearest \
+    photographs count most\n  viewfuse optimise photos/ --quality standard -o photos.ply\n      sharper, in minutes; \
+    --max-time 10m says how many\n  viewfuse optimise photos/ -o photos.html\n      one page for any browser, without \
+    a server: to share\n  viewfuse render photos/ --gaussians photos.ply --orbit 24 -o out\n\n\
     Begins with the surfaces that the training-free field finds, and takes some ten seconds; --quality standard takes \
-    minutes, and is sharper from some twenty photographs on. Ctrl-C writes what there is so far, and a .ply is written on \
-    the way: --resume goes on from it with the iterations of the finest size. The file has the layout of \"3D Gaussian Splatting\", which other viewers read, in the \
-    coordinates of the scene's files; a .spz has less than a tenth of its bytes, a .splat an eighth.")]
+    minutes, and is sharper from some twenty photographs on. Ctrl-C writes what there is so far, and a .ply is written \
+    on the way: --resume goes on from it with the iterations of the finest size. The file has the layout of \"3D \
+    Gaussian Splatting\", which other viewers read, in the coordinates of the scene's files; a .spz has less than a \
+    tenth of its bytes, a .splat an eighth.")]
 pub(crate) struct Arguments {
     /// The scene
     scene: PathBuf,
@@ -57,7 +58,8 @@ pub(crate) struct Arguments {
     /// As many iterations as fit into this time with standard or high: seconds, or minutes as 10m
     #[arg(long, value_name = "TIME", value_parser = parse_time)]
     max_time: Option<Duration>,
-    #[arg(long, value_name = "N", help = count_help(), value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_COUNT)))]
+    #[arg(long, value_name = "N", help = count_help(),
+        value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_COUNT)))]
     count: Option<u32>,
     /// Iterations at each size of the sources, the finest last
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_ITERATIONS)))]
@@ -154,8 +156,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     say(format_args!("{}: {count} Gaussians after {done} of {of} iterations", output.display()))?;
     if let Some((psnr, count)) = fit {
         say(format_args!(
-            "fit: PSNR {psnr:.2} dB on {count} of the sources themselves, which says nothing of new views: --left-out VIEW keeps \
-             one back and scores it"
+            "fit: PSNR {psnr:.2} dB on {count} of the sources themselves, which says nothing of new views: --left-out \
+             VIEW keeps one back and scores it"
         ))?;
     }
     let loops = match &device {

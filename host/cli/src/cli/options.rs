@@ -50,7 +50,8 @@ pub(crate) struct PictureOptions {
     #[command(flatten)]
     pub(crate) masks: MaskOption,
     /// Leave out the least relevant sources while their weights together stay at or below this
-    #[arg(long, value_name = "TOTAL", default_value_t = DEFAULT_LEAVE_OUT, value_parser = parse_share, help_heading = EFFORTS)]
+    #[arg(long, value_name = "TOTAL", default_value_t = DEFAULT_LEAVE_OUT, value_parser = parse_share,
+        help_heading = EFFORTS)]
     leave_out: f32,
     /// Early termination: leave out samples behind the point where a ray's transmittance falls below this; not with a
     /// GeNVS [default: 1/256]
@@ -87,11 +88,13 @@ pub(crate) struct BoundOptions {
     /// Choose the effort: leave out what the pictures do not need for this root mean square difference from the exact
     /// ones, in decibels (40dB) or with colours from 0 to 1 (0.01) [default with a network: 45dB, unless options say
     /// what is omitted]
-    #[arg(long, value_name = "ERROR", value_parser = parse_error, allow_hyphen_values = true, conflicts_with_all = CHOSEN_BY_A_BOUND, help_heading = EFFORTS)]
+    #[arg(long, value_name = "ERROR", value_parser = parse_error, allow_hyphen_values = true,
+        conflicts_with_all = CHOSEN_BY_A_BOUND, help_heading = EFFORTS)]
     max_error: Option<f32>,
     /// Choose the effort: leave out what does not fit into this time for each picture: seconds, or milliseconds as
     /// 250ms
-    #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, conflicts_with_all = CHOSEN_BY_A_BOUND, conflicts_with = "max_error", help_heading = EFFORTS)]
+    #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true,
+        conflicts_with_all = CHOSEN_BY_A_BOUND, conflicts_with = "max_error", help_heading = EFFORTS)]
     max_time: Option<Duration>,
 }
 

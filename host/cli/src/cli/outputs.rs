@@ -1,5 +1,5 @@
-//! Outputs that would replace inputs are refused before work begins: files that options name by [`keep_inputs`], for all
-//! commands at once, what scenes are read from by the commands that open them.
+//! Outputs that would replace inputs are refused before work begins: files that options name by [`keep_inputs`], for
+//! all commands at once, what scenes are read from by the commands that open them.
 
 use super::wrong::wrong;
 use clap::{Arg, ArgMatches, Command};

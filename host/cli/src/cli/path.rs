@@ -20,15 +20,18 @@ pub(crate) struct PathOptions {
     #[arg(long, value_name = "N[,full]", value_parser = parse_orbit, help_heading = CAMERAS)]
     orbit: Option<PathChoice>,
     /// Targets on the way from a view to another, both included; how many: --frames
-    #[arg(long, num_args = 2, value_names = ["A", "B"], requires = "frames", conflicts_with = "orbit", help_heading = CAMERAS)]
+    #[arg(long, num_args = 2, value_names = ["A", "B"], requires = "frames", conflicts_with = "orbit",
+        help_heading = CAMERAS)]
     between: Option<Vec<String>>,
     /// Number of targets of --between
     #[arg(long, value_name = "N", value_parser = parse_count, requires = "between", help_heading = CAMERAS)]
     frames: Option<usize>,
     /// This many targets on a spiral, for forward-facing cameras
-    #[arg(long, value_name = "N", value_parser = parse_count, conflicts_with_all = ["orbit", "between"], help_heading = CAMERAS)]
+    #[arg(long, value_name = "N", value_parser = parse_count, conflicts_with_all = ["orbit", "between"],
+        help_heading = CAMERAS)]
     spiral: Option<usize>,
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["orbit", "between", "spiral"], help = file_help(), help_heading = CAMERAS)]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["orbit", "between", "spiral"], help = file_help(),
+        help_heading = CAMERAS)]
     camera_path: Option<PathBuf>,
 }
 
@@ -54,7 +57,8 @@ impl PathOptions {
         {
             let degrees = arc.width.to_degrees();
             complain(format_args!(
-                "--orbit: the {degrees:.0} degrees on which there are photographs; `--orbit {count},full` is the whole circle"
+                "--orbit: the {degrees:.0} degrees on which there are photographs; `--orbit {count},full` is the whole \
+                    circle"
             ));
         }
     }

@@ -24,8 +24,9 @@ use viewfuse_weighting::WeightingSpec;
 #[derive(Args)]
 #[command(after_help = "Examples:\n  viewfuse points photos/ -o photos.ply\n  \
     viewfuse points dino/ --size 320x240 --agree 3 -o dino.ply\n\n\
-    The depths of all sources, by the training-free field. A point is kept where enough views agree on it, and is their mean by \
-    the scheme's weights; it has a normal, and a colour without the background. Coordinates are those of the scene's files.")]
+    The depths of all sources, by the training-free field. A point is kept where enough views agree on it, and is \
+    their mean by the scheme's weights; it has a normal, and a colour without the background. Coordinates are those of \
+    the scene's files.")]
 pub(crate) struct Arguments {
     /// The scene
     scene: PathBuf,
@@ -34,7 +35,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "SCHEME", default_value_t = WeightingSpec::default(), help = scheme_help())]
     weights: WeightingSpec,
     /// Keep points on which this many views agree, their own included
-    #[arg(long, value_name = "N", default_value_t = CloudOptions::default().least_views, value_parser = clap::value_parser!(u32).range(1..=256))]
+    #[arg(long, value_name = "N", default_value_t = CloudOptions::default().least_views,
+        value_parser = clap::value_parser!(u32).range(1..=256))]
     agree: u32,
     #[command(flatten)]
     picture: PictureOptions,

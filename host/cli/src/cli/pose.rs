@@ -31,16 +31,18 @@ const MAX_ROWS: usize = 24;
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
-    viewfuse pose photos/ -o posed\n      posed/sparse/0 and posed/images (COLMAP's layout), pose.json, cameras.png; then: viewfuse render posed --orbit 24 -o out\n  \
-    viewfuse pose photos/ --focal 1375 -o posed\n      photographs that do not state their focal length\n  \
-    viewfuse pose photos/ --from openmvg,colmap -o posed\n      with your own COLMAP as a second opinion\n\n\
-    Poses are found several times, with other features and, where the focal length is unknown, other guesses of it. What is \
-    written is what two attempts agree on, and what passes this: each photograph, left out and rendered from the others, is met \
-    at its pose, better than by copies of its neighbours, and not two degrees beside it. Where neighbours are too far away for \
-    that, attempts must agree more closely and over many points, and the pose is doubtful: pose.json and every command that opens\n\
+    viewfuse pose photos/ -o posed\n      posed/sparse/0 and posed/images (COLMAP's layout), pose.json, cameras.png; \
+    then: viewfuse render posed --orbit 24 -o out\n  viewfuse pose photos/ --focal 1375 -o posed\n      photographs \
+    that do not state their focal length\n  viewfuse pose photos/ --from openmvg,colmap -o posed\n      with your own \
+    COLMAP as a second opinion\n\n\
+    Poses are found several times, with other features and, where the focal length is unknown, other guesses of it. \
+    What is written is what two attempts agree on, and what passes this: each photograph, left out and rendered from \
+    the others, is met at its pose, better than by copies of its neighbours, and not two degrees beside it. Where \
+    neighbours are too far away for that, attempts must agree more closely and over many points, and the pose is \
+    doubtful: pose.json and every command that opens\n\
     the scene say so. If nothing passes, no scene is written, and it is said which photographs match which.\n\n\
-    The same command goes on with a run that was stopped or killed: attempts that were finished lie in a hidden folder beside the \
-    output (.posed.attempts) until the command ends by itself.")]
+    The same command goes on with a run that was stopped or killed: attempts that were finished lie in a hidden folder \
+    beside the output (.posed.attempts) until the command ends by itself.")]
 pub(crate) struct Arguments {
     /// The folder of the photographs: JPEG, PNG, WebP
     photographs: PathBuf,
@@ -279,7 +281,8 @@ fn print(found: &Found, verdict: &Verdict, record: &Record<'_>) -> std::io::Resu
     for image in record.accepted {
         let scores = &image.held_out;
         say(format_args!(
-            "left-out   {} rendered from the others {:.1} dB; copies {:.1} dB, two degrees beside {:.1} dB; attempts differ by {:.2} degrees",
+            "left-out   {} rendered from the others {:.1} dB; copies {:.1} dB, two degrees beside {:.1} dB; attempts \
+                differ by {:.2} degrees",
             scores.photograph,
             scores.score,
             scores.copy.max(scores.warp),

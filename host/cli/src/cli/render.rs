@@ -27,18 +27,19 @@ use viewfuse_weighting::{Weighting, WeightingChoice};
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
-    viewfuse render photos/ --orbit 24 -o out\n      24 views around what the cameras look at, from photograph to photograph\n  \
-    viewfuse render dino/ --targets 1,4,7 --size 160x120 -o out\n      views 1, 4 and 7 from the other thirteen, with scores\n  \
-    viewfuse render car/ --targets 5 --sources all/3 --weights mean -o out\n      view 5 from every third view, averaged instead of weighted\n  \
-    viewfuse render photos/ --between 3 7 --frames 120 --video webp,mp4 -o out\n      the way from view 3 to view 7 as a video\n  \
-    viewfuse render photos/ --camera-path camera_path.json -o - | ffplay -\n      a path from nerfstudio's viewer, played as it comes\n  \
-    viewfuse render photos/ --gaussians photos.ply --orbit 24 -o out\n      the Gaussians that `optimise` wrote\n\n\
-    Writes NAME.png, NAME_depth.png (16 bit; scale in run.json; none with a GeNVS), NAME_confidence.png (8 bit; where the field \
-    tells), NAME_sheet.png for each target, and run.json. A run that was interrupted continues where it was when it is started \
-    again. With `-o -` the pictures go to standard output as y4m, and nothing is written.\n\n\
-    Real photographs, seconds of two cores for the first picture, of it the choice: seven of 512x341 pixels 18 and 11, with --fast \
-    6; ten of 320x240 in which Gaussians are mixed 40 and 15, with --fast 6. With --cache the choice is kept for the same sources \
-    and options: the next picture takes 8 and 21.")]
+    viewfuse render photos/ --orbit 24 -o out\n      24 views around what the cameras look at, from photograph to \
+    photograph\n  viewfuse render dino/ --targets 1,4,7 --size 160x120 -o out\n      views 1, 4 and 7 from the other \
+    thirteen, with scores\n  viewfuse render car/ --targets 5 --sources all/3 --weights mean -o out\n      view 5 from \
+    every third view, averaged instead of weighted\n  viewfuse render photos/ --between 3 7 --frames 120 --video \
+    webp,mp4 -o out\n      the way from view 3 to view 7 as a video\n  viewfuse render photos/ --camera-path \
+    camera_path.json -o - | ffplay -\n      a path from nerfstudio's viewer, played as it comes\n  viewfuse render \
+    photos/ --gaussians photos.ply --orbit 24 -o out\n      the Gaussians that `optimise` wrote\n\n\
+    Writes NAME.png, NAME_depth.png (16 bit; scale in run.json; none with a GeNVS), NAME_confidence.png (8 bit; where \
+    the field tells), NAME_sheet.png for each target, and run.json. A run that was interrupted continues where it was \
+    when it is started again. With `-o -` the pictures go to standard output as y4m, and nothing is written.\n\n\
+    Real photographs, seconds of two cores for the first picture, of it the choice: seven of 512x341 pixels 18 and 11, \
+    with --fast 6; ten of 320x240 in which Gaussians are mixed 40 and 15, with --fast 6. With --cache the choice is \
+    kept for the same sources and options: the next picture takes 8 and 21.")]
 pub(crate) struct Arguments {
     #[arg(help = scene_help())]
     scene: PathBuf,

@@ -24,8 +24,8 @@ const PRINTED: usize = 32;
 #[command(after_help = "Examples:\n  viewfuse select photos/ --count 3 --targets 4,9\n  \
     viewfuse select photos/ --count 5 --between 3 7 --frames 60 --json -o views.json\n  \
     viewfuse select photos/ --count 2 --targets test --index -o evaluation_index.json\n\n\
-    Indices count the scene's photographs from 0, in its order. What the chosen views lack of the whole weight bounds how much \
-    a fusion of all views changes without the others, as a share of the range of what is fused.")]
+    Indices count the scene's photographs from 0, in its order. What the chosen views lack of the whole weight bounds \
+    how much a fusion of all views changes without the others, as a share of the range of what is fused.")]
 pub(crate) struct Arguments {
     /// The scene
     scene: PathBuf,
@@ -103,7 +103,8 @@ fn readable(selected: &SelectedSources) -> String {
     let together = &selected.together;
     let [mean, least] = together.share;
     format!(
-        "{}, {}: {} of {} views\n{rows}\n{more}for all together: {} (share of the weight: mean {mean:.3}, least {least:.3})\n",
+        "{}, {}: {} of {} views\n{rows}\n{more}for all together: {} (share of the weight: mean {mean:.3}, least \
+            {least:.3})\n",
         selected.scene,
         selected.weighting,
         together.indices.len(),

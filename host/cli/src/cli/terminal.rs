@@ -39,8 +39,8 @@ pub(crate) fn listen() -> Result<(), ctrlc::Error> {
     })
 }
 
-/// Makes the limit of files' sizes (`ulimit -f`) an error of what is written instead of the end of the process. Programs
-/// that are started have the usual end again.
+/// Makes the limit of files' sizes (`ulimit -f`) an error of what is written instead of the end of the process.
+/// Programs that are started have the usual end again.
 pub(crate) fn survive_full_files() {
     #[cfg(unix)]
     {

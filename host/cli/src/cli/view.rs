@@ -19,10 +19,11 @@ use viewfuse_weighting::{Weighting, WeightingChoice};
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
-    viewfuse view photos/\n      drag to turn around the subject, scroll or pinch to move; see which photographs count\n  \
-    viewfuse view car/ --model genvs.safetensors --sources 1,5,9 --device vulkan\n      a learned field, from three views\n  \
-    viewfuse view photos/ --gaussians photos.ply\n      the Gaussians that `optimise` wrote: thirty pictures a second while the hand drags\n  \
-    viewfuse view photos/ --port 8000 --no-browser\n      only prints the address: for another browser, or through a tunnel (ssh -L 8000:127.0.0.1:8000)\n\n\
+    viewfuse view photos/\n      drag to turn around the subject, scroll or pinch to move; see which photographs \
+    count\n  viewfuse view car/ --model genvs.safetensors --sources 1,5,9 --device vulkan\n      a learned field, from \
+    three views\n  viewfuse view photos/ --gaussians photos.ply\n      the Gaussians that `optimise` wrote: thirty \
+    pictures a second while the hand drags\n  viewfuse view photos/ --port 8000 --no-browser\n      only prints the \
+    address: for another browser, or through a tunnel (ssh -L 8000:127.0.0.1:8000)\n\n\
     The page is for this machine alone, under an address that nobody can guess. Ctrl-C ends it.")]
 pub(crate) struct Arguments {
     #[arg(help = scene_help())]

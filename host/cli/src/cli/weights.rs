@@ -21,8 +21,8 @@ use viewfuse_weighting::WeightingSpec;
 #[command(after_help = "Examples:\n  viewfuse weights dino/ --target 4 --weights error:alpha=0.5 --json\n  \
     viewfuse weights dino/ --orbit 36 --weights mean --weights cars=attention:cars.safetensors --csv\n  \
     viewfuse weights dino/ --targets all/4 --npy weights.npy\n\n\
-    CSV has a line for each scheme, target and source. The array is [scheme][target][source]; what its indices mean is printed as \
-    JSON.")]
+    CSV has a line for each scheme, target and source. The array is [scheme][target][source]; what its indices mean is \
+    printed as JSON.")]
 pub(crate) struct Arguments {
     /// The scene
     scene: PathBuf,
@@ -70,7 +70,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         keep_file_apart([&scene], path)?;
         write_whole(path, &weights.npy())?;
         let axes = json!({
-            "file": path, "shape": weights.shape(), "schemes": weights.schemes, "targets": weights.targets, "sources": weights.sources,
+            "file": path, "shape": weights.shape(), "schemes": weights.schemes, "targets": weights.targets,
+            "sources": weights.sources,
         });
         say(format_args!("{axes:#}"))?;
     } else {
@@ -80,7 +81,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         let unit = RigUnit::of_scene(&scene);
         if !unit.is_world() {
             say(format_args!(
-                "Schemes measure lengths in {:.4e} world units: in these the cameras are {SRN_DISTANCE} from what they look at.",
+                "Schemes measure lengths in {:.4e} world units: in these the cameras are {SRN_DISTANCE} from what they \
+                    look at.",
                 unit.length()
             ))?;
         }

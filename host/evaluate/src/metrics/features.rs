@@ -160,8 +160,8 @@ fn kind_of(checkpoint: &Checkpoint) -> Result<InceptionKind, CheckpointError> {
         1008 => Ok(InceptionKind::Fid),
         1000 => Ok(InceptionKind::Torchvision),
         count => Err(sizes.refuse(format!(
-            "fc.weight has {count} classes; the network of FID has 1008, torchvision's 1000, and which of them it is decides \
-             how it pools"
+            "fc.weight has {count} classes; the network of FID has 1008, torchvision's 1000, and which of them it is \
+             decides how it pools"
         ))),
     }
 }

@@ -1,9 +1,10 @@
 //! Means over scenes with confidence intervals.
 //!
-//! Views of one scene are alike, so a scene's score is one number, the mean over its views, and the sample size is the number of scenes. The interval is Student's: the mean plus and minus the standard error (the
-//! standard deviation of scenes, with their count less one, over the root of their count) times the quantile of the t
-//! distribution. It contains the mean over all scenes of the kind in 95 of 100 evaluations if scenes are drawn at
-//! random and their scores are approximately normal.
+//! Views of one scene are alike, so a scene's score is one number, the mean over its views, and the sample size is the
+//! number of scenes. The interval is Student's: the mean plus and minus the standard error (the standard deviation of
+//! scenes, with their count less one, over the root of their count) times the quantile of the t distribution. It
+//! contains the mean over all scenes of the kind in 95 of 100 evaluations if scenes are drawn at random and their
+//! scores are approximately normal.
 //!
 //! Two schemes are compared by their difference on each scene ([`Interval::of_differences`]): most of the variation
 //! between scenes is common to both.

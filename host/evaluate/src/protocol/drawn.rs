@@ -63,7 +63,8 @@ pub(super) fn close(
     if !others.is_empty() {
         let (count, all, far) = (others.len(), views.len(), source_count - 1);
         notes.push(format!(
-            "{scene_name}: {count} of {all} views are no targets: they lack a view within {degrees} degrees, or {far} beyond"
+            "{scene_name}: {count} of {all} views are no targets: they lack a view within {degrees} degrees, or {far} \
+                beyond"
         ));
     }
     if !fitting.is_empty() && fitting.len() < target_count {

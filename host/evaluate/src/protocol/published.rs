@@ -111,8 +111,8 @@ impl Published {
         let here = scenes.iter().filter(|name| benchmark.has_scene(name)).count();
         let metric = if benchmark.is_masked() { "PSNR masked" } else { "PSNR" };
         let of = format!(
-            "{}, {sources} sources, {width}x{height}, {metric}: means over the benchmark's {} scenes ({}), {here} of the {} \
-             here among them",
+            "{}, {sources} sources, {width}x{height}, {metric}: means over the benchmark's {} scenes ({}), {here} of \
+             the {} here among them",
             benchmark.title(),
             benchmark.scenes().len(),
             benchmark.scenes().join(", "),

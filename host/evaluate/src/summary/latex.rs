@@ -11,7 +11,8 @@ impl Table {
         let format = "r".repeat(columns.len());
         let (caption, intervals) = (text(caption), text(&self.interval_words()));
         format!(
-            "\\begin{{table}}\n  \\centering\n  \\caption{{{caption}. {intervals}}}\n  \\begin{{tabular}}{{l{format}}}\n    \\toprule\n    \
+            "\\begin{{table}}\n  \\centering\n  \\caption{{{caption}. \
+             {intervals}}}\n  \\begin{{tabular}}{{l{format}}}\n    \\toprule\n    \
              Scheme{headings} \\\\\n    \\midrule\n{rows}    \\bottomrule\n  \\end{{tabular}}\n\\end{{table}}\n"
         )
     }

@@ -4,8 +4,8 @@
 //! expected = P + c0 + c1 log2(G / g) + c2 (e - E) + c3 D + c4 n + s (c5 + c6 D), at most M + 3 dB
 //! ```
 //!
-//! `P`, `G`: the means of score and gap over the held-out sources (of the gap, the geometric one); `M`: the best of these
-//! scores, beyond which a run has seen little; `E`: of the scores
+//! `P`, `G`: the means of score and gap over the held-out sources (of the gap, the geometric one); `M`: the best of
+//! these scores, beyond which a run has seen little; `E`: of the scores
 //! that their confidences say by the calibration; `g`, `e`: the target's gap and score by its confidences; `D`: the
 //! decibels that the coarse pictures do not show, see [`Basis::detail`]; `n`: the share of its surfaces that no
 //! photograph shows ([`Seen::by_none`]); `s`: 1 for objects with silhouettes, 0 for whole photographs.

@@ -1,5 +1,5 @@
-//! Pictures of held-out sources that were rendered before: none is rendered twice. Where the field has a folder they are
-//! kept in it, and a second choice for the same sources under the same options renders none of them again.
+//! Pictures of held-out sources that were rendered before: none is rendered twice. Where the field has a folder they
+//! are kept in it, and a second choice for the same sources under the same options renders none of them again.
 //!
 //! A file's name is the SHA-256 of all that its pictures depend on but scheme and settings, which are in each picture's
 //! own name: another scene, size, option, device or version finds nothing, and makes a file of its own. A file that is
@@ -67,8 +67,8 @@ impl Kept {
         self.is_new = true;
     }
 
-    /// Writes the file, if there is one and there are new pictures. That it cannot be written costs the next run its time, and is a
-    /// warning.
+    /// Writes the file, if there is one and there are new pictures. That it cannot be written costs the next run its
+    /// time, and is a warning.
     pub(super) fn write(&mut self, progress: &dyn Progress) {
         let is_new = std::mem::take(&mut self.is_new);
         let Some((path, digest)) = self.file.as_ref().filter(|_| is_new) else { return };

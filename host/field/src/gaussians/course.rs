@@ -23,8 +23,8 @@ use viewfuse_scene::photographs::{SourceImages, longest_side};
 
 /// Levels of the pyramid.
 const LEVELS: usize = 4;
-/// Share of the finest level's iterations from which on the harmonics of degree 1 are optimised; those of degree 2 and 3
-/// from twice and thrice as much.
+/// Share of the finest level's iterations from which on the harmonics of degree 1 are optimised; those of degree 2 and
+/// 3 from twice and thrice as much.
 const DEGREE_SHARE: f32 = 0.15;
 
 /// Gaussians of a scene, optimised so far.

@@ -35,8 +35,8 @@ pub(super) fn warning(
     let mean = correlations.iter().sum::<f64>() / correlations.len().max(1) as f64;
     Ok((!correlations.is_empty() && mean < MIN_CORRELATION).then(|| {
         format!(
-            "the Gaussians do not show what the photographs show (correlation {mean:.2}, {MIN_CORRELATION} and more for those of \
-             the scene): they are of another scene, or in another world"
+            "the Gaussians do not show what the photographs show (correlation {mean:.2}, {MIN_CORRELATION} and more \
+             for those of the scene): they are of another scene, or in another world"
         )
     }))
 }

@@ -55,7 +55,8 @@ impl Residuals {
         self.views.get(view).is_some_and(Option::is_none)
     }
 
-    /// Makes that of a source from the Gaussians' picture of it: `gain` is how much brighter the source is than they are.
+    /// Makes that of a source from the Gaussians' picture of it: `gain` is how much brighter the source is than they
+    /// are.
     pub fn add_source(&mut self, view: usize, picture: Rendered, images: &SourceImages, gain: [f32; 3]) {
         let (Some(place), Some(image)) = (self.views.get_mut(view), images.images.get(view)) else { return };
         let residual = residual(&picture.colours, image, images, gain);

@@ -101,7 +101,8 @@ impl Architecture {
         match &denoiser {
             Some(denoiser) if denoiser.in_channels != COLOUR_CHANNELS + feature_count => {
                 return Err(sizes.refuse(format!(
-                    "the denoiser takes {} channels, not {COLOUR_CHANNELS} colours and the {feature_count} features of a point",
+                    "the denoiser takes {} channels, not {COLOUR_CHANNELS} colours and the {feature_count} features of \
+                        a point",
                     denoiser.in_channels
                 )));
             }
@@ -178,7 +179,8 @@ impl Architecture {
             // The shape first: it says how much there is to read.
             if *shape != [1, 1, 2, 2] || sizes.checkpoint().tensor(name)? != MEAN {
                 return Err(sizes.refuse(format!(
-                    "{name}, of shape {shape:?}, is not the mean of 2x2 pixels; denoisers with other filters are not supported"
+                    "{name}, of shape {shape:?}, is not the mean of 2x2 pixels; denoisers with other filters are not \
+                        supported"
                 )));
             }
         }

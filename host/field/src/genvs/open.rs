@@ -44,7 +44,8 @@ flags! {
     "samples", "N,N,N|N", parse_samples, Picture, &[],
         "Samples on a ray of a GeNVS [default: 64]",
         |options, count| options.rays.sample_count = count;
-    "near-far", "NEAR,FAR", parse_near_far, Picture, &[], NEAR_FAR, |options, bounds| options.rays.near_far = Some(bounds);
+    "near-far", "NEAR,FAR", parse_near_far, Picture, &[], NEAR_FAR, |options,
+    bounds| options.rays.near_far = Some(bounds);
     "noise", "MAX,MIN", parse_noise, Picture, &[],
         "Largest and smallest noise level [default: 80,0.002]",
         |options, schedule| options.plan.schedule = schedule;

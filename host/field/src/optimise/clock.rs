@@ -8,8 +8,8 @@ use viewfuse_job::progress::Progress;
 
 /// Iterations of the finest level that are measured.
 const MEASURED: u32 = 20;
-/// How much longer than these the mean iteration takes, because the number of Gaussians grows: measured on fox, where it
-/// is four times as many at last (`host/results/gaussian_quality.md`).
+/// How much longer than these the mean iteration takes, because the number of Gaussians grows: measured on fox, where
+/// it is four times as many at last (`host/results/gaussian_quality.md`).
 const GROWN: f64 = 1.9;
 /// Fewest iterations of the finest level that a limit leaves.
 const MIN_ITERATIONS: u32 = 100;

@@ -94,7 +94,8 @@ impl SceneOptimisation<'_> {
         };
         let held_out_count = trial.held_out.len();
         progress.note(&format!(
-            "{held_out_count} of {count} photographs left out of a trial have {fast_score:.2} dB with fast and {score:.2} dB with {quality}: {words}"
+            "{held_out_count} of {count} photographs left out of a trial have {fast_score:.2} dB with fast and \
+                {score:.2} dB with {quality}: {words}"
         ));
         Ok(chosen)
     }

@@ -149,16 +149,16 @@ impl Architecture {
         let embedded_len = sizes.size("mlp_coarse.lin_in.weight", 2, 1)?;
         if embedded_len < 12 || embedded_len % 6 != 0 || embedded_len > 6 + 6 * MAX_OCTAVES {
             return Err(sizes.refuse(format!(
-                "mlp_coarse.lin_in.weight takes {embedded_len} numbers a point; this family takes 6 + 6 x octaves (a point \
-                 with sines and cosines, and a direction), at most {MAX_OCTAVES}"
+                "mlp_coarse.lin_in.weight takes {embedded_len} numbers a point; this family takes 6 + 6 x octaves (a \
+                 point with sines and cosines, and a direction), at most {MAX_OCTAVES}"
             )));
         }
         let block_count = sizes.count(|block| format!("mlp_coarse.blocks.{block}.fc_0.weight"));
         let injected_count = sizes.count(|block| format!("mlp_coarse.lin_z.{block}.weight"));
         if block_count == 0 || injected_count == 0 || injected_count > block_count {
             return Err(sizes.refuse(format!(
-                "mlp_coarse has {block_count} blocks and {injected_count} latent layers (lin_z); at least one of each is \
-                 needed, and no more latent layers than blocks"
+                "mlp_coarse has {block_count} blocks and {injected_count} latent layers (lin_z); at least one of each \
+                 is needed, and no more latent layers than blocks"
             )));
         }
         let latent_channels = sizes.size("mlp_coarse.lin_z.0.weight", 2, 1)?;
@@ -169,8 +169,8 @@ impl Architecture {
             let block_count = sizes.count(|block| format!("encoder.model.layer{level}.{block}.conv1.weight"));
             if block_count == 0 {
                 return Err(sizes.refuse(format!(
-                    "the point networks take latents of {latent_channels} channels, but the trunk's levels up to layer{} \
-                     have {channels} and there is no layer{level}",
+                    "the point networks take latents of {latent_channels} channels, but the trunk's levels up to \
+                     layer{} have {channels} and there is no layer{level}",
                     level - 1
                 )));
             }
@@ -211,8 +211,8 @@ impl Architecture {
         let side = checkpoint.metadata().get(SIDE).cloned().unwrap_or_else(|| SOURCE_SIDE.to_string());
         (is_of_family && !says).then(|| {
             format!(
-                "{}: what its tensors do not tell is assumed to be as in the authors' srn_car: a max pool in the trunk, \
-                 sources of {side} pixels (their sn64 has no pool, and 64 pixels); keep the file as \
+                "{}: what its tensors do not tell is assumed to be as in the authors' srn_car: a max pool in the \
+                 trunk, sources of {side} pixels (their sn64 has no pool, and 64 pixels); keep the file as \
                  EXPERIMENT/pixel_nerf_latest, as their archive has it, or have `viewfuse convert` write {FIRST_POOL} \
                  and {SIDE} into it",
                 checkpoint.path().display()

@@ -48,7 +48,8 @@ pub(super) const RAYS: Omission = Omission {
     name: "rays",
     what: "second-pass samples",
     part: "on empty rays",
-    typical_error: "surfaces that the first pass missed; those behind have at most the transmittance of early termination",
+    typical_error: "surfaces that the first pass missed; those behind have at most the transmittance of early \
+        termination",
 };
 const PARTS: Omission = Omission { name: "parts", part: "in empty parts of rays", ..RAYS };
 const HIDDEN: Omission = Omission { name: "hidden", part: "behind surfaces", ..RAYS };
@@ -62,7 +63,8 @@ flags! {
             let sampling = &mut options.sampling;
             [sampling.coarse_count, sampling.importance_count, sampling.depth_count] = counts;
         };
-    "near-far", "NEAR,FAR", parse_near_far, Picture, &[], NEAR_FAR, |options, bounds| options.sampling.near_far = Some(bounds);
+    "near-far", "NEAR,FAR", parse_near_far, Picture, &[], NEAR_FAR, |options,
+    bounds| options.sampling.near_far = Some(bounds);
     "published-depth", "", switch, Picture, &[],
         "Place second-pass samples around the depth of the published code (the sum of weights times depths, too \
          near on rays that are not opaque) instead of the mean depth",

@@ -22,8 +22,8 @@ pub enum RenderError {
     Sources(SourcesError),
     /// The size does not fit the scene.
     #[error(
-        "a size of {width}x{height} does not keep the shape of the views ({view_width}x{view_height}); for this width it \
-         would be {width}x{fitting_height}"
+        "a size of {width}x{height} does not keep the shape of the views ({view_width}x{view_height}); for this width \
+         it would be {width}x{fitting_height}"
     )]
     Shape {
         /// The requested value.

@@ -25,8 +25,8 @@ pub struct RenderOptions {
     pub mixture: Option<Mixture>,
     /// A bound on each picture's error or time, which chooses the effort.
     pub bound: Option<Bound>,
-    /// Whether frames are only shown: where the field rounds its pictures, [`Frame::colours`](crate::render::Frame::colours)
-    /// are not there then.
+    /// Whether frames are only shown: where the field rounds its pictures,
+    /// [`Frame::colours`](crate::render::Frame::colours) are not there then.
     pub is_rounded: bool,
 }
 

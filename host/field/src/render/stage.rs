@@ -323,8 +323,8 @@ impl<'a> Stage<'a> {
         })
     }
 
-    /// The weights of the sources for a target, without those that are omitted by the options, and without any that need
-    /// not be.
+    /// The weights of the sources for a target, without those that are omitted by the options, and without any that
+    /// need not be.
     fn weighed(&self, weighting: &Weighting, target: &Target) -> (SourceWeights, Omission<MAX_SOURCES>, SourceWeights) {
         let pose = self.unit.pose(&target.camera.pose);
         let weights = weighting.weigh(&self.sources, &pose);

@@ -92,7 +92,8 @@ flags! {
     "gaussian-iterations", "N", parse_iterations, Picture, &[],
         "Iterations at each size of the sources",
         |recipe, iterations| *recipe = recipe.with(Some(iterations), None);
-    "gaussian-count", "N", parse_count, Picture, &[], "Most Gaussians", |recipe, count| *recipe = recipe.with(None, Some(count));
+    "gaussian-count", "N", parse_count, Picture, &[], "Most Gaussians", |recipe, count| *recipe = recipe.with(None,
+    Some(count));
 }
 
 fn parse_iterations(text: &str) -> Result<u32, String> {

@@ -57,8 +57,8 @@ pub(super) struct Mixed<'a, D: Device> {
     /// The Gaussians of the current weighting by each recipe, once they are needed; none where the sources have too few
     /// surfaces.
     splats: Vec<(Recipe, Option<Splats<D>>)>,
-    /// The hull's last picture under the current weighting and options, with what was asked for: it is filled, and carved,
-    /// by the Gaussians of each recipe.
+    /// The hull's last picture under the current weighting and options, with what was asked for: it is filled, and
+    /// carved, by the Gaussians of each recipe.
     last: Option<(Asked, Rendered)>,
 }
 
@@ -232,7 +232,8 @@ impl<D: Device> Prepared for Mixed<'_, D> {
     }
 
     /// The pictures of the sweep and that of the Gaussians, whose errors are the least like the others'; of an object,
-    /// by each recipe, the hull's one picture, filled or carved as well, and that of the Gaussians, or the latter alone.
+    /// by each recipe, the hull's one picture, filled or carved as well, and that of the Gaussians, or the latter
+    /// alone.
     fn mixtures(&self, chosen: &AnyOptions) -> Vec<Variant<Vec<AnyOptions>>> {
         let Some(chosen) = chosen.of::<TrainingFree>() else { return Vec::new() };
         let has_silhouettes = self.depths.images.has_silhouettes;

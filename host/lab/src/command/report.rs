@@ -10,9 +10,11 @@ use viewfuse_job::files::{check_writable, write_whole};
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
-    viewfuse-lab report runs/random runs/close runs/count -o report.html\n      three evaluations with their tables, figures and pictures\n  \
-    viewfuse-lab report runs/count --pareto out/pareto.json --training trained -o report.html\n      with error over run time, and the curves of a training\n\n\
-    The page is a single file without scripts and without links to other files. Evaluations and trainings may still be running.")]
+    viewfuse-lab report runs/random runs/close runs/count -o report.html\n      three evaluations with their tables, \
+    figures and pictures\n  viewfuse-lab report runs/count --pareto out/pareto.json --training trained -o \
+    report.html\n      with error over run time, and the curves of a training\n\n\
+    The page is a single file without scripts and without links to other files. Evaluations and trainings may still be \
+    running.")]
 pub(super) struct Arguments {
     /// Folders of `evaluate --protocol`
     #[arg(value_name = "DIR", required_unless_present_any = ["pareto", "training"])]

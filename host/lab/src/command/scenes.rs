@@ -30,7 +30,8 @@ enum Command {
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
-    viewfuse-lab scenes photograph room scene/ --seed 3\n      scene/transforms.json and scene/images, 12 views of 320 x 240 pixels\n\n\
+    viewfuse-lab scenes photograph room scene/ --seed 3\n      scene/transforms.json and scene/images, 12 views of 320 \
+    x 240 pixels\n\n\
     The same settings give the same pictures.")]
 struct PhotographArguments {
     /// What is photographed: a table in a furnished room
@@ -55,8 +56,10 @@ struct PhotographArguments {
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
-    viewfuse-lab scenes make cars learn/ --train 400 --val 10 --test 20 --size 64\n      learn/cars_train, learn/cars_val and learn/cars_test, one folder for each object\n\n\
-    Training cameras are random points on a sphere, nine of ten on its upper half; validation and test cameras are on the\n\
+    viewfuse-lab scenes make cars learn/ --train 400 --val 10 --test 20 --size 64\n      learn/cars_train, \
+    learn/cars_val and learn/cars_test, one folder for each object\n\n\
+    Training cameras are random points on a sphere, nine of ten on its upper half; validation and test cameras are on \
+    the\n\
     spiral of SRN's test scenes. The same settings give the same pictures. After an interruption the same command\n\
     continues, and with a larger number of objects it adds the missing ones.")]
 struct MakeArguments {

@@ -20,12 +20,13 @@ const MODEL: &str = "model.safetensors";
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     viewfuse-lab scenes make cars learn/ --train 400 --val 12 --views 30 --size 64\n  \
-    viewfuse-lab train pixelnerf learn/cars -o runs/pixelnerf --steps 5000\n      a small PixelNeRF: an hour on one core\n  \
-    viewfuse-lab train genvs learn/cars -o runs/genvs\n  \
+    viewfuse-lab train pixelnerf learn/cars -o runs/pixelnerf --steps 5000\n      a small PixelNeRF: an hour on one \
+    core\n  viewfuse-lab train genvs learn/cars -o runs/genvs\n  \
     viewfuse-lab train weighting runs/pixelnerf/model.safetensors learn/cars -o runs/weighting --steps 1000\n      \
     the paper's attention weighting for it\n\n\
-    The same command continues an interrupted run, with the same results as an uninterrupted one. With more --steps it goes on \
-    behind the end of a shorter run: the rate, which falls until the last step, is from there on that of the longer one.")]
+    The same command continues an interrupted run, with the same results as an uninterrupted one. With more --steps it \
+    goes on behind the end of a shorter run: the rate, which falls until the last step, is from there on that of the \
+    longer one.")]
 pub(super) struct Arguments {
     #[command(subcommand)]
     what: What,
@@ -46,8 +47,8 @@ enum What {
 struct RunOptions {
     /// Data: ROOT/cars for ROOT/cars_train and ROOT/cars_val, or a folder that holds such folders
     data: PathBuf,
-    /// Folder of the run: its state, the trained model, curves and a record. An existing run is continued, also with more
-    /// --steps
+    /// Folder of the run: its state, the trained model, curves and a record. An existing run is continued, also with
+    /// more --steps
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
     #[command(flatten)]

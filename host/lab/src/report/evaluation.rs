@@ -79,7 +79,8 @@ impl Evaluation {
                 }
                 @if !self.missing.is_empty() {
                     p.warning {
-                        strong { "Not finished: " } (done) " of " (counted(*job_count, "job")) "; the tables are of these. Missing: "
+                        strong { "Not finished: " } (done) " of " (counted(*job_count, "job")) "; the tables are of \
+                            these. Missing: "
                         (named(&self.missing)) "."
                     }
                 }
@@ -147,7 +148,8 @@ fn lead(table: &Table) -> Option<Markup> {
         p.lead {
             "From " (sources.join(", ")) " sources: "
             @match names.as_slice() {
-                [] => { "no row is shown to differ from the best; " (metric.label) " at most " (metric.text(value.mean)) " " (metric.unit) },
+                [] => { "no row is shown to differ from the best; " (metric.label) " at \
+                    most " (metric.text(value.mean)) " " (metric.unit) },
                 [name] => {
                     "best is " strong { (name) } ", " (metric.label) " " (metric.text(value.mean)) " " (metric.unit)
                     @if let Some(gain) = gain { ", " (metric.interval_text(&gain, true)) " over " (REFERENCE) }

@@ -23,8 +23,8 @@ fn baseline_shape(name: &str) -> usize {
     Baseline::ALL.iter().position(|baseline| baseline.name() == name).unwrap_or(0)
 }
 
-/// The style of a scheme's points: the reference is black, baselines are grey, the others, counted from 0, cycle through
-/// colours and then shapes.
+/// The style of a scheme's points: the reference is black, baselines are grey, the others, counted from 0, cycle
+/// through colours and then shapes.
 fn style(scheme: &str, other: usize) -> Style {
     match scheme {
         REFERENCE => Style { colour: BLACK, shape: 0 },

@@ -36,7 +36,8 @@ pub fn page(report: &Report) -> Result<String, ReportError> {
             body {
                 header {
                     h1 { (title) }
-                    p { "Few-shot novel view synthesis with camera-weighted fusion; made by viewfuse " (env!("CARGO_PKG_VERSION")) "." }
+                    p { "Few-shot novel view synthesis with camera-weighted fusion; made by \
+                        viewfuse " (env!("CARGO_PKG_VERSION")) "." }
                     @if sections.len() > 1 {
                         nav { ul {
                             @for (index, (title, _)) in sections.iter().enumerate() {

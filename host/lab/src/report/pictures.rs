@@ -17,8 +17,8 @@ const BAR: [f32; 2] = [8.0, 22.0];
 pub(super) fn error_legend() -> Markup {
     html! {
         span.scale aria-hidden="true" {}
-        " Below each picture its error: white where it is equal to the photograph, through red to black at a mean difference of a \
-         quarter of the range, and above."
+        " Below each picture its error: white where it is equal to the photograph, through red to black at a mean \
+         difference of a quarter of the range, and above."
     }
 }
 

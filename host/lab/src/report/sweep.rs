@@ -69,7 +69,8 @@ impl Sweep {
                 }
                 @for failure in failures { p.warning { strong { "Failed: " } (failure) } }
                 figure.wide { div.scroll.drawn { (PreEscaped(svg)) } figcaption {
-                    "Ringed and named: the settings that no other beats in both. " code { "equal" } " is the exact picture."
+                    "Ringed and named: the settings that no other beats in both. " code { "equal" } " is the exact \
+                        picture."
                 } }
                 @for device in devices { (points(device)) }
                 (self.record())

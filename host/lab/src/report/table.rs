@@ -85,8 +85,10 @@ fn half_width(interval: &Interval, metric: &Metric) -> Markup {
 pub(super) fn legend() -> Markup {
     html! {
         p.legend {
-            b { "Bold" } ": the best of its column; " i { "italic" } ": not shown to differ from the best, by the interval of their difference; neither where that is "
-            "every row. Means are over scenes, or over the views of one, with 95 % intervals (Student). Differences from the nearest copy and from " code { (REFERENCE) } " are taken scene by scene, or view by view; "
+            b { "Bold" } ": the best of its column; " i { "italic" } ": not shown to differ from the best, by the \
+                interval of their difference; neither where that is "
+            "every row. Means are over scenes, or over the views of one, with 95 % intervals (Student). Differences \
+                from the nearest copy and from " code { (REFERENCE) } " are taken scene by scene, or view by view; "
             span.gain { "coloured" } " where the interval leaves out zero."
         }
     }

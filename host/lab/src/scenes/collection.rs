@@ -78,11 +78,13 @@ pub struct Made {
 #[derive(Debug, thiserror::Error)]
 pub enum MakeError {
     #[error(
-        "{}: what is there was made with other settings ({there}; asked for: {wanted}); give the same settings or another folder",
+        "{}: what is there was made with other settings ({there}; asked for: {wanted}); give the same settings or \
+            another folder",
         path.display()
     )]
     OtherSettings { path: PathBuf, there: String, wanted: String },
-    #[error("{}: exists, but {} does not, which says what it was made with; give another folder", path.display(), settings.display())]
+    #[error("{}: exists, but {} does not, which says what it was made with; give another \
+        folder", path.display(), settings.display())]
     NoSettings { path: PathBuf, settings: PathBuf },
     #[error("{}: cannot be read", path.display())]
     Read { path: PathBuf, source: io::Error },

@@ -16,7 +16,8 @@ use viewfuse_weighting::{WeightingError, WeightingSpec};
 pub(crate) struct Augmentation {
     /// Numbers of sources; each step draws one of the list [default: 1,2,3,3,3,3,4,6 for a PixelNeRF, 1,2,3,3 for a
     /// GeNVS]
-    #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = RangedU64ValueParser::<usize>::new().range(1..=256))]
+    #[arg(long, value_name = "N,N", value_delimiter = ',',
+        value_parser = RangedU64ValueParser::<usize>::new().range(1..=256))]
     pub(crate) sources: Vec<usize>,
     // Sides of the sources' pictures, pixels, multiples of 16 up to the settings' side. Empty: that side. Rays are
     // always of pictures of the settings' side. A GeNVS has pictures of one side only: its volumes are made for it.

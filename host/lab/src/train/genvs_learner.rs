@@ -31,7 +31,8 @@ pub(crate) struct GenvsSettings {
     /// Channels of the denoiser's first level, a multiple of 4
     // See [`Architecture::narrow`]. A network that continues from a file has the file's.
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = number(
-        |width: &usize| (1..=1024).contains(width) && width.is_multiple_of(4), "a multiple of 4 from 4 to 1024 is needed"))]
+        |width: &usize| (1..=1024).contains(width) && width.is_multiple_of(4), "a multiple of 4 from 4 to 1024 is \
+            needed"))]
     width: usize,
     /// Side of the pictures, pixels, a multiple of 16
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = side())]
@@ -47,7 +48,8 @@ pub(crate) struct GenvsSettings {
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..=4096))]
     samples: u32,
     /// Share of the pictures that have the largest noise level, 0 to 1
-    #[arg(long = "largest-share", value_name = "SHARE", default_value_t = MAX_LEVEL_SHARE, value_parser = share::<f32>())]
+    #[arg(long = "largest-share", value_name = "SHARE", default_value_t = MAX_LEVEL_SHARE,
+        value_parser = share::<f32>())]
     share_of_largest: f32,
     /// What a new denoiser's estimate is relative to: the colours of the feature image, or nothing, as published
     #[arg(long, default_value = "colours", value_parser = estimate())]

@@ -154,8 +154,8 @@ pub(crate) struct Plan<'a, S> {
 }
 
 impl<S: Serialize> Plan<'_, S> {
-    /// The inputs that a run's numbers depend on: a run continues only if all of them are the same. Files are identified
-    /// by their content, not by their path.
+    /// The inputs that a run's numbers depend on: a run continues only if all of them are the same. Files are
+    /// identified by their content, not by their path.
     fn record(&self, schedule: &Schedule, data: &Data) -> Result<serde_json::Value, TrainError> {
         let digest = |checkpoint: &Checkpoint| {
             let path = checkpoint.path();

@@ -23,8 +23,8 @@ pub enum CheckpointError {
     Pickle(PathBuf, PickleError),
     /// It would take more memory than the supported networks.
     #[error(
-        "{}: {what} would take {bytes} bytes of memory, at most {limit} are allowed; the file is damaged, malicious, or \
-         of another network", path.display()
+        "{}: {what} would take {bytes} bytes of memory, at most {limit} are allowed; the file is damaged, malicious, \
+         or of another network", path.display()
     )]
     TooLarge {
         /// The file.

@@ -31,8 +31,8 @@ pub(crate) fn solve(job: &PoseJob) -> Result<Solution> {
         });
     let (graph, _) = frontend.build_with_report(&dataset(job)?, &told)?;
     // The library takes a photograph for misplaced whose rotation differs from the median over its pairs by 20 degrees.
-    // Of few photographs far apart more than half of the pairs may be matched by chance: it refused true poses. Where focal
-    // lengths are guesses it stays.
+    // Of few photographs far apart more than half of the pairs may be matched by chance: it refused true poses. Where
+    // focal lengths are guesses it stays.
     let mut config = Incremental::default().config().clone();
     if job.cameras.iter().all(|camera| !camera.is_guess) {
         config = config.with_registration_max_rotation_edge_error(None);

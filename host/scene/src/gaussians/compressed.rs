@@ -1,6 +1,6 @@
 //! The compressed `.ply` of PlayCanvas and SuperSplat: 256 Gaussians share the ranges of a row of the element `chunk`;
-//! a row of `vertex` has position, rotation, scales and colour packed into a word each, and a row of `sh`, where there is
-//! one, the spherical harmonics as bytes.
+//! a row of `vertex` has position, rotation, scales and colour packed into a word each, and a row of `sh`, where there
+//! is one, the spherical harmonics as bytes.
 
 use std::path::Path;
 

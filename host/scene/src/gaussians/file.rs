@@ -35,8 +35,8 @@ pub struct GaussianFile {
 }
 
 impl GaussianFile {
-    /// Reads a file of Gaussians for a scene. If nerfstudio's `dataparser_transforms.json` is beside the file, or in the
-    /// scene's folder, Gaussians that viewfuse did not write are in the world that it states.
+    /// Reads a file of Gaussians for a scene. If nerfstudio's `dataparser_transforms.json` is beside the file, or in
+    /// the scene's folder, Gaussians that viewfuse did not write are in the world that it states.
     ///
     /// # Errors
     /// As [`GaussianScene::read`]; a file without Gaussians.

@@ -1,5 +1,6 @@
 //! `.splat`, the format of antimatter15's viewer: 32 bytes a Gaussian and no header. Position and standard deviations
-//! are three `float` each; red, green, blue and opacity a byte each; the quaternion `w, x, y, z` a byte each, 128 for 0.
+//! are three `float` each; red, green, blue and opacity a byte each; the quaternion `w, x, y, z` a byte each, 128 for
+//! 0.
 
 use std::path::Path;
 

@@ -44,7 +44,8 @@ impl GaussianScene {
         // `float` and fixed point lose such coordinates, and no header states an origin.
         let [x, y, z] = frame.origin.to_array();
         let cause = format!(
-            "the scene is around ({x}, {y}, {z}): .splat and .spz hold no such coordinates and state no origin; write a .ply"
+            "the scene is around ({x}, {y}, {z}): .splat and .spz hold no such coordinates and state no origin; write \
+                a .ply"
         );
         Err(unwritten(path, cause))
     }

@@ -43,8 +43,8 @@ pub(super) fn warning<'a>(images: &[SourceImage], names: impl Iterator<Item = &'
     let ratio = brightest.0 / darkest.0;
     (ratio > MAX_RATIO).then(|| {
         format!(
-            "photograph '{}' is {ratio:.0} times as bright as '{}' (the mean, in linear light): with other exposures surfaces are \
-             not recognised and pictures become patchy; develop all photographs with one exposure",
+            "photograph '{}' is {ratio:.0} times as bright as '{}' (the mean, in linear light): with other exposures \
+             surfaces are not recognised and pictures become patchy; develop all photographs with one exposure",
             brightest.1, darkest.1
         )
     })

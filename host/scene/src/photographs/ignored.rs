@@ -36,8 +36,8 @@ pub(super) fn by_alpha(photograph: Photograph) -> Photograph {
     Photograph { seen: seen.as_raw().contains(&0).then_some(seen), ..photograph.without_alpha() }
 }
 
-/// The photograph with the nearest pixel of the row that counts in the place of those that do not; where none of the row
-/// does, with the nearest row. So they are background before a background, and part of an object inside of it.
+/// The photograph with the nearest pixel of the row that counts in the place of those that do not; where none of the
+/// row does, with the nearest row. So they are background before a background, and part of an object inside of it.
 pub(super) fn filled(mut photograph: Photograph) -> Photograph {
     let Some(seen) = &photograph.seen else { return photograph };
     let (width, height) = photograph.pixels.dimensions();

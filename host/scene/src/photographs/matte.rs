@@ -37,7 +37,8 @@ pub enum BackgroundChoice {
 /// The text is not a background.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "unknown background '{0}'; the choices are auto, none, black, white, and RED,GREEN,BLUE with whole numbers from 0 to 255"
+    "unknown background '{0}'; the choices are auto, none, black, white, and RED,GREEN,BLUE with whole numbers from 0 \
+        to 255"
 )]
 pub struct BackgroundError(String);
 

@@ -171,7 +171,8 @@ fn model_in(root: &Path) -> Option<Model> {
     MODEL_FOLDERS.into_iter().find_map(in_folder).or_else(|| Model::of(root))
 }
 
-/// COLMAP makes a model of each part of the photographs that it cannot join with another: `0`, `1` and so on, ascending.
+/// COLMAP makes a model of each part of the photographs that it cannot join with another: `0`, `1` and so on,
+/// ascending.
 fn numbered_models(folder: &Path) -> Vec<Model> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
     let numbered = |path: PathBuf| {
@@ -193,7 +194,8 @@ fn other_models(model: &Model) -> Option<String> {
     let (count, model) = (model.image_count(), model.folder.display());
     (!list.is_empty()).then(|| {
         format!(
-            "{model}: this model has {count} photographs; others beside it are not read, each has coordinates of its own: {list}"
+            "{model}: this model has {count} photographs; others beside it are not read, each has coordinates of its \
+                own: {list}"
         )
     })
 }

@@ -1,4 +1,5 @@
-//! Places in files, and the parts of [`super::SceneFault`]: faults of images, intrinsics, files, arrays and PLY headers.
+//! Places in files, and the parts of [`super::SceneFault`]: faults of images, intrinsics, files, arrays and PLY
+//! headers.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -99,7 +100,8 @@ pub enum ImageFault {
     /// Its header has too large a size.
     #[error("the image is {0} x {1}; at most {MAX_SIDE} pixels are allowed on a side")]
     TooLarge(u32, u32),
-    /// Its pixels take too much memory for its width and height: the bytes that decoding takes, and the most that are used.
+    /// Its pixels take too much memory for its width and height: the bytes that decoding takes, and the most that are
+    /// used.
     #[error(
         "the image is {} x {}: decoding it takes {} MiB; at most {} MiB are used for a photograph",
         .0[0], .0[1], .1 >> 20, .2 >> 20
@@ -121,11 +123,12 @@ pub enum ImageFault {
         /// The source of the other size: a file, with the line or key.
         declared_in: String,
     },
-    /// It must be turned to be upright, and it is ambiguous whether the cameras are for the upright or the stored picture.
+    /// It must be turned to be upright, and it is ambiguous whether the cameras are for the upright or the stored
+    /// picture.
     #[error(
         "the file says that its pixels must be turned to be upright (EXIF orientation {}, {:?}), and the \
-         size that the cameras are for does not tell whether they are those of the stored or of the upright picture; save \
-         the photograph without the tag", .0.to_exif(), .0
+         size that the cameras are for does not tell whether they are those of the stored or of the upright picture; \
+         save the photograph without the tag", .0.to_exif(), .0
     )]
     Orientation(Orientation),
 }
@@ -146,11 +149,13 @@ fn in_one_line(cause: &ImageError) -> String {
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum IntrinsicsFault {
     /// A focal length, along x or y, is out of range.
-    #[error("focal lengths {} and {} are not both from {SHORTEST_FOCAL} to {LONGEST_FOCAL:e} pixels", Short(*.0), Short(*.1))]
+    #[error("focal lengths {} and {} are not both from {SHORTEST_FOCAL} to {LONGEST_FOCAL:e} \
+        pixels", Short(*.0), Short(*.1))]
     Focal(f64, f64),
     /// A coordinate of the principal point, to the right or downwards, is out of range.
     #[error(
-        "principal point ({}, {}) is further than {LONGEST_FOCAL:e} pixels from the corner of the image", Short(*.0), Short(*.1)
+        "principal point ({}, {}) is further than {LONGEST_FOCAL:e} pixels from the corner of the \
+            image", Short(*.0), Short(*.1)
     )]
     Principal(f64, f64),
     /// A width or height is not a whole number of pixels from 1 to 2^20.

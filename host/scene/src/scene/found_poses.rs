@@ -1,5 +1,5 @@
-//! The record `pose.json` beside a scene whose poses were found (`viewfuse pose`): which of them are doubtful, and for how
-//! many photographs there are none, is said whenever the scene is opened.
+//! The record `pose.json` beside a scene whose poses were found (`viewfuse pose`): which of them are doubtful, and for
+//! how many photographs there are none, is said whenever the scene is opened.
 
 use std::path::Path;
 

@@ -50,8 +50,8 @@ pub(super) fn of(axes: &[(DVec3, DVec3)]) -> (SceneFrame, Option<String>) {
     let digits = (spread / (far * f64::EPSILON)).log10();
     let warning = (digits < MIN_DIGITS).then(|| {
         format!(
-            "the cameras are {spread:.3e} units apart and {far:.3e} from the origin: the files' numbers hold only {} digits \
-             of their distances; subtract the offset before they are written",
+            "the cameras are {spread:.3e} units apart and {far:.3e} from the origin: the files' numbers hold only {} \
+             digits of their distances; subtract the offset before they are written",
             digits.max(0.0).floor()
         )
     });

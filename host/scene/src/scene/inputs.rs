@@ -11,7 +11,8 @@ use super::files::{IMAGE_FOLDERS, has_extension, is_images_folder};
 const FOLDERS: [&str; 9] = ["mask", "masks", "pose", "target_pose", "sparse", "dense", "train", "val", "test"];
 /// Extensions of lists of cameras, depths and points beside the folders.
 const LISTS: [&str; 6] = ["json", "txt", "npy", "npz", "bin", "ply"];
-/// Names by which layouts are recognised, besides `NAME_par.txt`: a new file of such a name would make another scene of it.
+/// Names by which layouts are recognised, besides `NAME_par.txt`: a new file of such a name would make another scene of
+/// it.
 const RECOGNISED: &str = "transforms.json transforms_train.json transforms_val.json transforms_test.json \
                           poses_bounds.npy cameras_sphere.npz cameras.npz cameras_large.npz intrinsics.txt \
                           cameras.txt cameras.bin images.txt images.bin";
@@ -49,8 +50,8 @@ impl Scene {
     }
 }
 
-/// Whether pictures written into `folder`, which need not exist, would be read as some of the scene in `root`, whatever its
-/// layout: it is `root` itself, or a folder below it that layouts read.
+/// Whether pictures written into `folder`, which need not exist, would be read as some of the scene in `root`, whatever
+/// its layout: it is `root` itself, or a folder below it that layouts read.
 pub fn reads_below(root: &Path, folder: &Path) -> bool {
     let (root, folder) = (absolute(root), absolute(folder));
     folder == root || is_inside(&root, &folder)

@@ -4,8 +4,8 @@
 //! white on black, in COLMAP's and nerfstudio's ignored pixels are black. Some programs write 1 for the greatest value.
 //! Values between are fractions of a pixel of an object; of an ignore mask, pixels count from half of the greatest on.
 //! instant-ngp's `dynamic_mask_NAME.png` beside the photograph is inverted: 0 where it counts. A mask has the
-//! photograph's size, or another of the same shape; of a photograph that carries an orientation (EXIF), it may be a mask
-//! of the stored or of the upright picture.
+//! photograph's size, or another of the same shape; of a photograph that carries an orientation (EXIF), it may be a
+//! mask of the stored or of the upright picture.
 //!
 //! A layout may name masks itself. Otherwise they are searched in a folder `mask` or `masks` in the scene, beside the
 //! photograph's folder or one above it: `images/left/1.jpg` has `masks/left/1.jpg.png` (COLMAP) or `masks/left/1.png`
@@ -88,8 +88,8 @@ fn beside(root: &Path, image: &Path) -> Option<PathBuf> {
     None
 }
 
-/// A mask at its own size, turned like the pixels of its photograph in memory: 255 where they count. Of an object's mask
-/// values between are fractions; of an ignore mask there are none.
+/// A mask at its own size, turned like the pixels of its photograph in memory: 255 where they count. Of an object's
+/// mask values between are fractions; of an ignore mask there are none.
 ///
 /// A mask with an orientation of its own is turned by it if it then has the upright photograph's shape. Otherwise its
 /// stored size decides whether it is a mask of the stored or of the upright photograph.

@@ -1,5 +1,5 @@
-//! The names of views that a layout can hold: those that its reader, and others', give back as they were. This is the one
-//! place that says so.
+//! The names of views that a layout can hold: those that its reader, and others', give back as they were. This is the
+//! one place that says so.
 
 use super::Layout;
 use crate::scene::check::is_name;

@@ -270,7 +270,8 @@ pub fn rust_source(parameters: &QuantisedAttention, origin: &str) -> String {
 fn layer<const P: usize, const N: usize, const B: usize>(name: &str, layer: &QuantisedLinear<P, N, B>) -> String {
     let rows: String = layer.weight.iter().map(|row| format!("            {row:?},\n")).collect();
     format!(
-        "    {name}: QuantisedLinear {{\n        weight: [\n{rows}        ],\n        scale: {:?},\n        bias: {:?},\n    }},\n",
+        "    {name}: QuantisedLinear {{\n        weight: [\n{rows}        ],\n        scale: {:?},\n        bias: \
+            {:?},\n    }},\n",
         layer.scale, layer.bias
     )
 }

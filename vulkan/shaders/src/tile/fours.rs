@@ -1,7 +1,8 @@
 //! A matrix product in tiles of several sizes, for matrices that lie in fours: what is loaded and stored are vectors.
 //!
-//! As the scalar one of [`super`]: two steps in the workgroup's memory, sums in registers, the same order. An invocation
-//! fetches a square of 4 by 4 numbers a step, of the left matrix, which it turns, or of the right one, or none.
+//! As the scalar one of [`super`]: two steps in the workgroup's memory, sums in registers, the same order. An
+//! invocation fetches a square of 4 by 4 numbers a step, of the left matrix, which it turns, or of the right one, or
+//! none.
 
 use super::{InvocationTile, read, row_place, wait_for_all, write};
 use core::marker::PhantomData;

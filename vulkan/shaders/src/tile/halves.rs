@@ -1,12 +1,12 @@
 //! Products by the matrix units of a device: factors in f16, sums in f32
-//! ([`Form::Half`](viewfuse_kernels::rows::Form::Half), [`Form::TwoHalves`](viewfuse_kernels::rows::Form::TwoHalves) and
-//! their smaller tiles), of matrices that lie in fours.
+//! ([`Form::Half`](viewfuse_kernels::rows::Form::Half), [`Form::TwoHalves`](viewfuse_kernels::rows::Form::TwoHalves)
+//! and their smaller tiles), of matrices that lie in fours.
 //!
 //! A workgroup has subgroups of 32 invocations below, beside and behind one another, each of which has a part of the
 //! tile, in matrices of 16 times 16 sums; those behind one another have the same part and other inner indices. For each
-//! step along the inner index the workgroup rounds its rows of the left matrix and its columns of the right one into its
-//! memory, while the next step's numbers are on their way. Beyond the inner index both are 0; beyond rows and columns
-//! the last ones are read and nothing is stored.
+//! step along the inner index the workgroup rounds its rows of the left matrix and its columns of the right one into
+//! its memory, while the next step's numbers are on their way. Beyond the inner index both are 0; beyond rows and
+//! columns the last ones are read and nothing is stored.
 //!
 //! In two parts a factor is `high + low / 2048`: `high` is the nearest f16, or 0 below 2^-14, and `low` the nearest f16
 //! of 2048 times what is missing. One sum has the products of `high`, another one those of a `high` and a `low`. The

@@ -44,10 +44,12 @@ pub(crate) struct ProtocolOptions {
     #[arg(long, value_name = "PROTOCOL", conflicts_with_all = ["sources", "views"], help_heading = PROTOCOLS)]
     pub(super) protocol: Option<Protocol>,
     /// Draw sources and targets this many times for every scene
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000), help_heading = PROTOCOLS)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000),
+        help_heading = PROTOCOLS)]
     trials: u32,
     /// Targets of a trial
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=10_000), help_heading = PROTOCOLS)]
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=10_000),
+        help_heading = PROTOCOLS)]
     targets_per_trial: u16,
     /// Do only part INDEX of COUNT, counted from 0: every COUNT-th job
     #[arg(long, value_name = "INDEX/COUNT", requires_all = ["protocol", "output"], help_heading = PROTOCOLS)]

@@ -62,8 +62,8 @@ impl Quality {
         let count = self.left_out.len() as f64;
         let mean = |value: &dyn Fn(&HeldOutSource) -> f64| self.left_out.iter().map(value).sum::<f64>() / count;
         say(format_args!(
-            "left out   {count} photographs, rendered from the others: PSNR {:.1} dB, from {:.1} ({}) to {:.1} ({}); a copy of \
-             the nearest photograph {:.1} dB",
+            "left out   {count} photographs, rendered from the others: PSNR {:.1} dB, from {:.1} ({}) to {:.1} ({}); a \
+             copy of the nearest photograph {:.1} dB",
             mean(&|source| source.psnr),
             least.psnr,
             least.source,
@@ -73,7 +73,8 @@ impl Quality {
         ))?;
         let Expected { psnr, interval: [low, high], .. } = expected;
         say(format_args!(
-            "expected   PSNR {psnr:.1} dB half-way between neighbours (80 %: {low:.1} to {high:.1}), {}; measured in {:.1} s",
+            "expected   PSNR {psnr:.1} dB half-way between neighbours (80 %: {low:.1} to {high:.1}), {}; measured in \
+                {:.1} s",
             in_words(psnr),
             self.seconds
         ))

@@ -21,8 +21,8 @@ pub(crate) fn model_help() -> String {
         .map(|row| format!("{} ({})", row.test_networks().iter().map(sizes).collect::<Vec<_>>().join(", "), row.title));
     let others: Vec<&str> = ROWS.iter().filter(|row| row.prefix().is_none()).map(|row| row.name).collect();
     format!(
-        "Checkpoint of {} (.pth, .pt, .safetensors, .pkl), or a test network with deterministic initialisation: {}, or a \
-         field without a network: {} [default: {}]",
+        "Checkpoint of {} (.pth, .pt, .safetensors, .pkl), or a test network with deterministic initialisation: {}, or \
+         a field without a network: {} [default: {}]",
         networks.join(" or "),
         tests.collect::<Vec<_>>().join(", "),
         others.join(", "),
@@ -113,9 +113,9 @@ mod tests {
     fn the_help_names_every_test_network() {
         assert_eq!(
             super::model_help(),
-            "Checkpoint of a PixelNeRF or a GeNVS (.pth, .pt, .safetensors, .pkl), or a test network with deterministic \
-             initialisation: formula[:WIDTH], body[:WIDTH] (PixelNeRF), genvs[:small] (GeNVS), or a field without a network: \
-             training-free, plane-sweep, gaussians [default: training-free]"
+            "Checkpoint of a PixelNeRF or a GeNVS (.pth, .pt, .safetensors, .pkl), or a test network with \
+             deterministic initialisation: formula[:WIDTH], body[:WIDTH] (PixelNeRF), genvs[:small] (GeNVS), or a \
+             field without a network: training-free, plane-sweep, gaussians [default: training-free]"
         );
     }
 

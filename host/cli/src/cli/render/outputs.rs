@@ -17,7 +17,8 @@ pub(crate) struct OutputOptions {
     #[arg(long, help_heading = FILES)]
     alpha: bool,
     /// Formats of depth maps: png (16 bit), exr, npy (both 32-bit floating point); units are in run.json
-    #[arg(long, value_name = "FORMATS", value_delimiter = ',', default_value = "png", value_parser = parse_depth, help_heading = FILES)]
+    #[arg(long, value_name = "FORMATS", value_delimiter = ',', default_value = "png", value_parser = parse_depth,
+        help_heading = FILES)]
     depth: Vec<DepthFormat>,
     /// Write no contact sheets
     #[arg(long, help_heading = FILES)]

@@ -72,7 +72,8 @@ fn choice(chosen: &ChosenRecord, weighting: &str) -> String {
     let more = if gain > 0.0 { format!(", {gain:.2} dB more than by default") } else { String::new() };
     let count = left_out.len();
     format!(
-        "chosen: {weighting}{with}: {count} photographs that were left out have {psnr:.1} dB{more} (what was tried: {RECORD})"
+        "chosen: {weighting}{with}: {count} photographs that were left out have {psnr:.1} dB{more} (what was tried: \
+            {RECORD})"
     )
 }
 
@@ -93,8 +94,8 @@ fn summary(frame: &FrameRecord, sources: &[String], folder: &Path) -> String {
             format!("  expected PSNR {psnr:.1} dB (80 %: {low:.1} to {high:.1})")
         }
         (None, Some(Beyond::Far(times))) => format!(
-            "  no PSNR to expect: the camera is {times:.1} times as far from the photographs as the farthest of these is \
-             from the others"
+            "  no PSNR to expect: the camera is {times:.1} times as far from the photographs as the farthest of these \
+             is from the others"
         ),
         (None, Some(Beyond::Unseen(_))) => "  no PSNR to expect: too much of it is invented".to_owned(),
         (None, None) => String::new(),

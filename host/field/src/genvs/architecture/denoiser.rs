@@ -196,7 +196,8 @@ impl Denoiser {
         let image_side = sizes.checkpoint().shapes().keys().find_map(|name| side_of(name));
         let Some(image_side @ 1..=4096) = image_side else {
             return Err(sizes.refuse(format!(
-                "the denoiser has no first convolution that tells the side of its images, such as {part}128x128_conv.weight"
+                "the denoiser has no first convolution that tells the side of its images, such as \
+                    {part}128x128_conv.weight"
             )));
         };
         let block = |level: usize, block: usize, leaf: &str| {

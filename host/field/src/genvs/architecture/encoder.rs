@@ -83,8 +83,8 @@ impl Encoder {
         let volume_channels = size("volume_head.reshape_conv.weight", 0)?;
         if volume_channels % feature_count != 0 {
             return Err(sizes.refuse(format!(
-                "{PREFIX}.volume_head.reshape_conv has {volume_channels} output channels, not whole voxels of {feature_count} \
-                 features"
+                "{PREFIX}.volume_head.reshape_conv has {volume_channels} output channels, not whole voxels of \
+                 {feature_count} features"
             )));
         }
         Ok(Encoder {

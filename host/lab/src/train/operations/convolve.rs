@@ -271,8 +271,9 @@ pub(super) fn sum<T: Real>(lists: Vec<Vec<T>>) -> Vec<T> {
     all
 }
 
-/// The gradients of all objects from those of each: of its own inputs and of the weights of its views, one object behind
-/// another, and the sum of those of the parameters that objects share. Only the weights' if the network does not train.
+/// The gradients of all objects from those of each: of its own inputs and of the weights of its views, one object
+/// behind another, and the sum of those of the parameters that objects share. Only the weights' if the network does not
+/// train.
 pub(super) fn of_all<T: Real>(objects: Vec<(Vec<T>, Vec<T>, Vec<T>)>, trains: bool) -> [Option<Vec<T>>; 3] {
     let (mut of_inputs, mut of_weights, mut of_parameters) = (Vec::new(), Vec::new(), Vec::new());
     for (inputs, weights, parameters) in objects {

@@ -1,5 +1,5 @@
-//! What masks say: which pixels do not count (an ignore mask: what moves, a tripod, a car's bonnet), or where the object
-//! is (an object mask: its silhouette).
+//! What masks say: which pixels do not count (an ignore mask: what moves, a tripod, a car's bonnet), or where the
+//! object is (an object mask: its silhouette).
 //!
 //! A person says it ([`MaskChoice`]), or the layout does ([`Reader::masks`](super::super::reader::Reader::masks)).
 //! Otherwise the masks themselves do. In every photograph a silhouette is one region away from the border; silhouettes
@@ -87,7 +87,8 @@ const MAX_BORDER: f64 = 0.05;
 const MAX_DIFFERENCE: f64 = 0.02;
 /// Least share of the photographs that ignore masks leave. A fisheye's circle leaves 0.44 of a 16:9 picture.
 const MIN_LEFT: f64 = 0.4;
-/// Below this share, masks that touch the border may also be of an object that is near: what they are taken for is said.
+/// Below this share, masks that touch the border may also be of an object that is near: what they are taken for is
+/// said.
 const MAX_DOUBTFUL: f64 = 0.7;
 
 /// What masks mean, with a line that says it, and a warning where it was guessed and may be wrong.
@@ -130,8 +131,8 @@ pub(in super::super) fn decide(views: &[View], choice: MaskChoice, layout: Optio
     let is_doubtful = is_guessed && !looks.is_empty() && left < MAX_DOUBTFUL;
     let warning = (meaning == MaskMeaning::Ignore && is_doubtful).then(|| {
         format!(
-            "masks that leave {:.0} % of the pixels are taken to say which pixels do not count: do they show the object \
-             instead, it must be said",
+            "masks that leave {:.0} % of the pixels are taken to say which pixels do not count: do they show the \
+             object instead, it must be said",
             100.0 * left
         )
     });

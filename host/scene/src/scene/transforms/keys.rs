@@ -79,8 +79,8 @@ impl<'a> Keys<'a> {
         let (all, count, keys) = (self.frame_count, self.overriding_count, list(&self.overridden));
         (count > 0).then(|| {
             format!(
-                "{count} of {all} frames state {keys} otherwise than the top of the file: each frame's values are taken \
-                 (nerfstudio takes those at the top)"
+                "{count} of {all} frames state {keys} otherwise than the top of the file: each frame's values are \
+                 taken (nerfstudio takes those at the top)"
             )
         })
     }
@@ -94,7 +94,8 @@ impl<'a> Keys<'a> {
         }
         if self.is_moving {
             lines.push(format!(
-                "{path}: the frames are of different times (time): the scene moves, and is rendered as if it stood still"
+                "{path}: the frames are of different times (time): the scene moves, and is rendered as if it stood \
+                    still"
             ));
         }
         lines
