@@ -110,7 +110,7 @@ fn pictures_are_compared_upright() {
             let undone = Orientation::from_exif(match tag {
                 6 => 8,
                 8 => 6,
-                own => own,
+                other => other,
             });
             let mut stored = plain.clone();
             stored.apply_orientation(undone.expect("an orientation"));

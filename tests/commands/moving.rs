@@ -67,9 +67,10 @@ fn a_path_as_animated_webp_and_as_y4m() {
     assert_eq!((video.get_framerate().num, video.get_framerate().den), (12, 1));
     for picture in &pictures {
         let frame = video.read_frame().expect("a frame");
-        for (x, y, Rgb(own)) in picture.enumerate_pixels() {
+        for (x, y, Rgb(levels)) in picture.enumerate_pixels() {
             let shown = rgb_of(&frame, 24, x as usize, y as usize);
-            own.iter()
+            levels
+                .iter()
                 .zip(shown)
                 .for_each(|(level, shown)| assert!((f64::from(*level) - shown).abs() < 3.0, "{level} {shown}"));
         }

@@ -31,20 +31,20 @@ const WORKGROUP_COUNT: u32 = 8;
 /// Kernels whose work is cut into bands of rows.
 const IN_BANDS: [Kernel; 4] = [Kernel::MatchCost, Kernel::SumRow, Kernel::MeanColumn, Kernel::PickDepth];
 
-fn own() -> Limits {
+fn device_limits() -> Limits {
     GpuOptions::default().limits
 }
 
 /// All that a picture stands.
 fn all_lowered() -> Limits {
-    Limits { buffer_range: BYTES, allocation: BYTES, workgroup_count: WORKGROUP_COUNT, ..own() }
+    Limits { buffer_range: BYTES, allocation: BYTES, workgroup_count: WORKGROUP_COUNT, ..device_limits() }
 }
 
 /// Each limit in bytes lowered alone, with its name in Vulkan.
 fn lowered(bytes: u64) -> [(Limits, &'static str); 2] {
     [
-        (Limits { buffer_range: bytes, ..own() }, "maxStorageBufferRange"),
-        (Limits { allocation: bytes, ..own() }, "maxMemoryAllocationSize"),
+        (Limits { buffer_range: bytes, ..device_limits() }, "maxStorageBufferRange"),
+        (Limits { allocation: bytes, ..device_limits() }, "maxMemoryAllocationSize"),
     ]
 }
 
@@ -76,15 +76,15 @@ const _: () = {
 };
 
 fn a_lower_buffer_range_gives_the_same_picture(candidate: &Candidate) -> Result<(), Failed> {
-    same_picture(candidate, Limits { buffer_range: BYTES, ..own() }, &IN_BANDS)
+    same_picture(candidate, Limits { buffer_range: BYTES, ..device_limits() }, &IN_BANDS)
 }
 
 fn a_lower_allocation_gives_the_same_picture(candidate: &Candidate) -> Result<(), Failed> {
-    same_picture(candidate, Limits { allocation: BYTES, ..own() }, &IN_BANDS)
+    same_picture(candidate, Limits { allocation: BYTES, ..device_limits() }, &IN_BANDS)
 }
 
 fn fewer_workgroups_give_the_same_picture(candidate: &Candidate) -> Result<(), Failed> {
-    same_picture(candidate, Limits { workgroup_count: WORKGROUP_COUNT, ..own() }, &KERNELS)
+    same_picture(candidate, Limits { workgroup_count: WORKGROUP_COUNT, ..device_limits() }, &KERNELS)
 }
 
 fn all_limits_lowered_give_the_same_picture(candidate: &Candidate) -> Result<(), Failed> {
@@ -118,13 +118,13 @@ fn what_cannot_be_cut_names_the_limit(candidate: &Candidate) -> Result<(), Faile
         assert_works(&gpu)?;
     }
     // An element that is larger than any allocation.
-    let gpu = candidate.gpu(&under(Limits { allocation: 12, ..own() }))?;
+    let gpu = candidate.gpu(&under(Limits { allocation: 12, ..device_limits() }))?;
     assert_eq!(
         refused(gpu.zeros::<[f32; 4]>(1).map(|_| ()), "maxMemoryAllocationSize", 12)?,
         "an array of 16 bytes an element"
     );
     assert_eq!(gpu.download(&gpu.upload(&[[1.0_f32; 3]; 9])?)?, [[1.0; 3]; 9]);
-    let nothing = candidate.gpu(&under(Limits { allocation: 0, buffer_range: 0, ..own() }))?;
+    let nothing = candidate.gpu(&under(Limits { allocation: 0, buffer_range: 0, ..device_limits() }))?;
     refused(nothing.upload(&[1_u8]).map(|_| ()), "maxMemoryAllocationSize", 0)?;
     Ok(())
 }

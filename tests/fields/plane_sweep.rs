@@ -161,8 +161,8 @@ fn two_other_views_confirm_a_depth() {
     for (view, image) in sources.images.iter().enumerate() {
         assert_eq!(none[view].depths, all[view].depths, "the depths stay");
         for pixel in 0..72 * 54 {
-            let [own, mixed, consistent] = [&none, &half, &all].map(|maps| maps[view].confidences[pixel]);
-            assert!((mixed - 0.5 * (own + consistent)).abs() < 1.0e-6, "{own} {mixed} {consistent}");
+            let [alone, mixed, consistent] = [&none, &half, &all].map(|maps| maps[view].confidences[pixel]);
+            assert!((mixed - 0.5 * (alone + consistent)).abs() < 1.0e-6, "{alone} {mixed} {consistent}");
             // One view gives at most 0.65, two 1 - 0.35 * 0.35.
             assert!((0.0..0.8776).contains(&consistent), "{consistent}");
             let ray = image.camera.ray((pixel % 72) as f32 + 0.5, (pixel / 72) as f32 + 0.5);

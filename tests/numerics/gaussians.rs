@@ -166,8 +166,8 @@ fn derivatives_of(gaussians: &[GaussianBlock], is_antialiased: bool) {
 
 #[test]
 fn tiles_list_splats_front_to_back() {
-    let own = gaussians();
-    let splats: Vec<ProjectedGaussian> = own.iter().rev().map(|gaussian| rounded(gaussian, false)).collect();
+    let all = gaussians();
+    let splats: Vec<ProjectedGaussian> = all.iter().rev().map(|gaussian| rounded(gaussian, false)).collect();
     let block = TileBlock::new(SIZE[0], SIZE[1], BACKGROUND);
     let Tiles { starts, entries, in_sight } = Tiles::of(&block, &splats);
     assert!(in_sight.iter().all(|in_sight| *in_sight));
@@ -195,18 +195,18 @@ fn tiles_list_splats_front_to_back() {
         in_boxes += splats.iter().filter(|splat| has_box_in(splat, [left, top])).count();
     }
     assert!(entries.len() < in_boxes, "{} entries of {in_boxes}: corners of boxes are listed", entries.len());
-    assert!(entries.len() > own.len(), "they reach over several tiles");
+    assert!(entries.len() > all.len(), "they reach over several tiles");
 }
 
 #[test]
 fn pictures_do_not_depend_on_the_number_of_threads() {
-    let own = gaussians();
+    let all = gaussians();
     let picture = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         pool.install(|| {
             let splatter = Splatter { device: &Cpu, near: NEAR, background: BACKGROUND, is_antialiased: false };
-            let uploaded = Cpu.upload(&own).expect("memory");
-            let picture = splatter.picture(&uploaded, own.len(), &camera()).expect("a picture");
+            let uploaded = Cpu.upload(&all).expect("memory");
+            let picture = splatter.picture(&uploaded, all.len(), &camera()).expect("a picture");
             let by_pixels = vec![[0.3, -0.2, 0.1, 0.4]; (SIZE[0] * SIZE[1]) as usize];
             let gradients = splatter.gradients(&uploaded, &picture, &by_pixels).expect("derivatives");
             (Cpu.download(&picture.colours).expect("colours"), gradients)

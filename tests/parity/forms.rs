@@ -19,13 +19,15 @@ pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> 
     let tiled = || Kernel::ALL.into_iter().filter(|kernel| kernel.is_tiled());
     let in_pieces = |kernel: Kernel| {
         let name = format!("{}::in_pieces", kernel.name());
-        trial_on(instance, adapter, &name, move |instance, own| pieces_have_the_same_bits(instance, own, kernel))
+        trial_on(instance, adapter, &name, move |instance, adapter| {
+            pieces_have_the_same_bits(instance, adapter, kernel)
+        })
     };
     let is_there = |form: &&Form| **form != Form::Single && adapter.runs(**form);
     let others = |kernel: Kernel| kernel.forms().iter().filter(is_there).map(move |form| (kernel, *form));
     let other = |(kernel, form): (Kernel, Form)| {
         let name = format!("{}::{}", kernel.name(), form.name());
-        trial_on(instance, adapter, &name, move |instance, own| is_as_the_first(instance, own, kernel, form))
+        trial_on(instance, adapter, &name, move |instance, adapter| is_as_the_first(instance, adapter, kernel, form))
     };
     let mut trials: Vec<Trial> = tiled().map(in_pieces).chain(tiled().flat_map(others).map(other)).collect();
     if adapter.subgroup_size.is_none() {

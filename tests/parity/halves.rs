@@ -25,8 +25,8 @@ pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> 
                 continue;
             }
             let options = GpuOptions { form: Some(form), stand_ins, ..GpuOptions::default() };
-            trials.push(trial_on(instance, adapter, &format!("{}::{what}", form.name()), move |instance, own| {
-                is_within_its_bound(instance, own, &options, form)
+            trials.push(trial_on(instance, adapter, &format!("{}::{what}", form.name()), move |instance, adapter| {
+                is_within_its_bound(instance, adapter, &options, form)
             }));
         }
     }

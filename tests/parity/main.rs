@@ -42,8 +42,8 @@ fn main() -> ExitCode {
                 trials.extend(forms::trials(&instance, &adapter));
                 trials.extend(halves::trials(&instance, &adapter));
                 trials.extend(Kernel::ALL.map(|kernel| {
-                    let (instance, own) = (instance.clone(), adapter.clone());
-                    let open = move || Ok(Vulkan::open(&instance, &own, &GpuOptions::default())?);
+                    let (instance, opened) = (instance.clone(), adapter.clone());
+                    let open = move || Ok(Vulkan::open(&instance, &opened, &GpuOptions::default())?);
                     let count = |device: &Vulkan, kernel| Some(device.tally(kernel).dispatches);
                     trial_of(&adapter.name, kernel, count, open)
                 }));
@@ -92,8 +92,8 @@ fn trial_on(
     test: impl FnOnce(&Arc<Instance>, &Adapter) -> Result<(), Failed> + Send + 'static,
 ) -> Trial {
     let missing: Vec<String> = adapter.missing.iter().map(Missing::to_string).collect();
-    let (instance, own) = (instance.clone(), adapter.clone());
-    let trial = timed(format!("{}::{name}", adapter.name), move || test(&instance, &own));
+    let (instance, adapter) = (instance.clone(), adapter.clone());
+    let trial = timed(format!("{}::{name}", adapter.name), move || test(&instance, &adapter));
     needing((!missing.is_empty()).then(|| missing.join(", ")), is_required(REQUIRED), trial)
 }
 

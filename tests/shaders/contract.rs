@@ -234,7 +234,9 @@ const OF_MATRICES: [(Change, &str); 3] = [
     (
         |module| {
             let is_mark = |operand: &Operand| matches!(operand, Operand::MemoryAccess(_));
-            for_each(module, Op::CooperativeMatrixLoadKHR, |access| access.operands.retain(|own| !is_mark(own)));
+            for_each(module, Op::CooperativeMatrixLoadKHR, |access| {
+                access.operands.retain(|operand| !is_mark(operand))
+            });
         },
         "accesses to shared memory are private",
     ),

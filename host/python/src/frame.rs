@@ -95,8 +95,8 @@ pub(crate) fn to_python(py: Python<'_>, scene: &Scene, sources: &[usize], finish
         let is_there = !values.is_empty();
         is_there.then(|| array(py, [height, width], values)).transpose()
     };
-    let own: Option<Pinhole> = target.camera.pinhole.resized(width as u32, height as u32).ok();
-    let matrix = intrinsic_matrix(&own.unwrap_or(target.camera.pinhole));
+    let resized: Option<Pinhole> = target.camera.pinhole.resized(width as u32, height as u32).ok();
+    let matrix = intrinsic_matrix(&resized.unwrap_or(target.camera.pinhole));
     let pose = scene.frame.file_from_camera(&target.camera.pose);
     let (psnr, corrected_psnr) = truth.as_ref().map(|truth| (truth.psnr, truth.corrected_psnr)).unzip();
     let ssim = truth.as_ref().and_then(|truth| truth.ssim);

@@ -94,7 +94,7 @@ impl Optimisation {
             ..of_scene
         };
         let device = device(&self.device)?;
-        let is_resumable = output.extension().is_some_and(|own| own.eq_ignore_ascii_case("ply"));
+        let is_resumable = output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("ply"));
         let ended = optimisation.run(&device, progress, |so_far| match is_resumable {
             true => so_far.write(output, &scene.frame),
             false => Ok(()),

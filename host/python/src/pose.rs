@@ -104,14 +104,14 @@ impl Order {
             let text = format!("{}: exists already and is not an empty folder; give another name", output.display());
             return Err(Failure::Input(text));
         }
-        let solvers = || self.solvers.iter().map(|own| own.as_ref() as &dyn Solver);
+        let solvers = || self.solvers.iter().map(|solver| solver.as_ref() as &dyn Solver);
         let Some(folder) = Kept::folder_beside(output) else {
             return self.written(&solvers().collect::<Vec<_>>(), progress);
         };
         let failed = |cause: std::io::Error| Failure::File(format!("{}: {cause}", folder.display()));
         Kept::check(&folder).map_err(failed)?;
         let kept: Vec<Kept<'_>> = solvers().map(|solver| Kept::new(solver, &folder)).collect();
-        let written = self.written(&kept.iter().map(|own| own as &dyn Solver).collect::<Vec<_>>(), progress);
+        let written = self.written(&kept.iter().map(|solver| solver as &dyn Solver).collect::<Vec<_>>(), progress);
         let is_stopped = matches!(written, Err(Failure::Interrupted));
         // Before the first question there is nothing of this call; what is there is of one that was ended.
         if kept.iter().any(Kept::was_asked) && !is_stopped {

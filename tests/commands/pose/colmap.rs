@@ -121,8 +121,9 @@ fn as_a_second_opinion() {
     assert!(worst_rotation(&Scene::open(folder.join("posed")).expect("a scene")) < 1.5);
     let record = read_json(folder.join("posed/pose.json"));
     let attempts = list_of(&record["attempts"]);
-    let solver =
-        |own: &serde_json::Value| own["solver"].as_str().unwrap_or_default().split(' ').next().map(str::to_owned);
+    let solver = |attempt: &serde_json::Value| {
+        attempt["solver"].as_str().unwrap_or_default().split(' ').next().map(str::to_owned)
+    };
     let solvers: Vec<_> = attempts.iter().filter_map(solver).collect();
     assert_eq!(solvers, ["openmvg-sfm", "openmvg-sfm", "COLMAP", "COLMAP"]);
     // The wrong attempt is known as one.

@@ -17,7 +17,7 @@ use viewfuse_tests::patience::PATIENCE;
 const NAMES_FOR_TESTS: &str = "addEventListener('load', async () => {
     if (!location.protocol.startsWith('http')) return;
     const [{ state }, { matrixOf }, { goTo }] =
-        await Promise.all(['state', 'poses', 'hand'].map((own) => import(`${document.baseURI}${own}.js`)));
+        await Promise.all(['state', 'poses', 'hand'].map((name) => import(`${document.baseURI}${name}.js`)));
     Object.assign(window, { matrixOf, goTo, shows: state });
 })";
 
@@ -243,8 +243,9 @@ impl Tab<'_> {
     #[track_caller]
     pub(super) fn middle_of(&self, selector: &str) -> [f64; 2] {
         let place = self.evaluate(&format!(
-            "(() => {{ const own = document.querySelector('{selector}'); own.scrollIntoView({{block: 'nearest'}}); \
-             const box = own.getBoundingClientRect(); return [box.x + box.width / 2, box.y + box.height / 2]; }})()"
+            "(() => {{ const element = document.querySelector('{selector}'); element.scrollIntoView({{block: \
+             'nearest'}}); const box = element.getBoundingClientRect(); return [box.x + box.width / 2, box.y + \
+             box.height / 2]; }})()"
         ));
         [0, 1].map(|axis| number_of(&place[axis]))
     }

@@ -226,7 +226,7 @@ fn a_page_follows_a_hand_and_a_finger() {
     assert!(turned.iter().zip(&before).any(|(a, b)| (a - b).abs() > 0.05), "{turned:?}");
     // Two fingers that part bring it nearer: the camera, and with it the weight of the nearest source.
     let distance = "(() => { const list = [...document.querySelectorAll('#sources output')]; return \
-        Math.max(...list.map((own) => own.dataset.weight)); })()";
+        Math.max(...list.map((output) => output.dataset.weight)); })()";
     let far = phone.number(distance);
     phone.slide(&[&[[x - 20.0, y], [x + 20.0, y]], &[[x - 60.0, y], [x + 60.0, y]]]);
     phone.wait_for(STILL);

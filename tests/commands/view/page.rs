@@ -55,8 +55,8 @@ fn followed(tab: &Tab<'_>, act: impl FnOnce()) {
 #[track_caller]
 fn choose(tab: &Tab<'_>, id: &str, value: &str, event: &str) {
     tab.evaluate(&format!(
-        "(() => {{ const own = document.getElementById('{id}'); own.value = '{value}'; own.dispatchEvent(new \
-            Event('{event}', {{bubbles: true}})); }})()"
+        "(() => {{ const element = document.getElementById('{id}'); element.value = '{value}'; \
+            element.dispatchEvent(new Event('{event}', {{bubbles: true}})); }})()"
     ));
 }
 
@@ -108,7 +108,8 @@ fn a_hand_turns_the_view() {
     let chromium = Chromium::start(browser);
     let tab = opened(&chromium, &program);
     tab.wait_for(
-        "[...document.images].every((own) => own.complete && own.naturalWidth > 0) && document.images.length === 5",
+        "[...document.images].every((element) => element.complete && element.naturalWidth > 0) && \
+            document.images.length === 5",
     );
     let (first, first_weights, first_map) =
         (canvas(&tab), weights(&tab), tab.text("document.getElementById('map').toDataURL()"));
@@ -141,7 +142,7 @@ fn a_hand_turns_the_view() {
         assert_ne!(tab.text(matrix), place, "{there}");
         tab.key(back);
         let gap = tab.number(&format!(
-            "Math.max(...matrixOf(shows.pose).flat().map((own, i) => Math.abs(own - {place}.flat()[i])))"
+            "Math.max(...matrixOf(shows.pose).flat().map((value, i) => Math.abs(value - {place}.flat()[i])))"
         ));
         assert!(gap < 1.0e-9, "{there} and {back}: {gap}");
     }
@@ -158,7 +159,7 @@ fn a_hand_turns_the_view() {
 /// Schemes by the menu, their parameter by the slider, layers over the picture, and a view from a source.
 fn schemes_and_layers(tab: &Tab<'_>) {
     choose(tab, "scheme", "mean", "change");
-    tab.wait_for(&format!("{WEIGHTS}.every((own) => Math.abs(own - 0.2) < 1e-6)"));
+    tab.wait_for(&format!("{WEIGHTS}.every((value) => Math.abs(value - 0.2) < 1e-6)"));
     weights(tab);
     choose(tab, "scheme", "gaussian", "change");
     choose(tab, "parameter", "700", "input");
@@ -190,8 +191,8 @@ fn tabs_come_and_go() {
     let [x, y] = second.middle_of("#picture");
     followed(&second, || second.drag([x, y], [x + 150.0, y], 5));
     // Each has a view of its own.
-    assert_eq!(first.evaluate("shows.pose.centre.every((own, i) => own === shows.scene.start.centre[i])"), true);
-    assert_eq!(second.evaluate("shows.pose.centre.every((own, i) => own === shows.scene.start.centre[i])"), false);
+    assert_eq!(first.evaluate("shows.pose.centre.every((value, i) => value === shows.scene.start.centre[i])"), true);
+    assert_eq!(second.evaluate("shows.pose.centre.every((value, i) => value === shows.scene.start.centre[i])"), false);
     assert_eq!(second.console(), [""; 0]);
     // Closed in the middle of a drag.
     second.mouse("mousePressed", [x, y], json!({}));
@@ -226,15 +227,15 @@ fn a_phone_shows_all_of_it() {
     let [x, y] = tab.middle_of("#picture");
     followed(&tab, || tab.slide(&[&[[x, y]], &[[x + 40.0, y]], &[[x + 80.0, y]]]));
     assert!(difference(&canvas(&tab), &first) > 2.0, "the picture does not follow the finger");
-    let distance = "Math.hypot(...shows.pose.centre.map((own, i) => own - shows.focus[i]))";
+    let distance = "Math.hypot(...shows.pose.centre.map((value, i) => value - shows.focus[i]))";
     let before = tab.number(distance);
     let fingers = |apart: f64| [[x - apart, y], [x + apart, y]];
     tab.slide(&[&fingers(30.0), &fingers(45.0), &fingers(60.0)]);
     assert!(tab.number(distance) < 0.7 * before, "a pinch does not move");
     assert_eq!(tab.number("window.visualViewport.scale"), 1.0, "the page is not enlarged instead");
     weights(&tab);
-    let smallest = "Math.min(...[...document.querySelectorAll('p, label, legend, output, b, pre')].map((own) => \
-        parseFloat(getComputedStyle(own).fontSize)))";
+    let smallest = "Math.min(...[...document.querySelectorAll('p, label, legend, output, b, pre')].map((element) => \
+        parseFloat(getComputedStyle(element).fontSize)))";
     assert!(tab.number(smallest) >= 12.0, "{}", tab.number(smallest));
     assert_eq!(tab.console(), [""; 0]);
 }
@@ -252,12 +253,13 @@ fn where_nothing_was_photographed_it_is_said() {
         assert_eq!(tab.evaluate(&format!("{support}.hidden")), true);
         // Half a turn around the subject.
         tab.evaluate(
-            "window.back = { ...shows.pose, centre: shows.focus.map((own, i) => 2 * own - shows.pose.centre[i]) }",
+            "window.back = { ...shows.pose, centre: shows.focus.map((value, i) => 2 * value - shows.pose.centre[i]) }",
         );
         for _ in 0..60 {
             tab.key("ArrowLeft");
             let is_there = tab.evaluate(
-                "Math.hypot(...shows.pose.centre.map((own, i) => own - back.centre[i])) < 0.5 * shows.scene.distance",
+                "Math.hypot(...shows.pose.centre.map((value, i) => value - back.centre[i])) < 0.5 * \
+                    shows.scene.distance",
             );
             if is_there == true {
                 break;
@@ -464,10 +466,10 @@ fn names_from_files_are_no_commands() {
     let tab = opened(&chromium, &program);
     // A long name takes no room of another one, and its end can be read.
     let names = "[...document.querySelectorAll('#sources .name')]";
-    assert_eq!(tab.evaluate(&format!("{names}.every((own) => own.scrollWidth <= own.clientWidth)")), true);
-    assert!(tab.text(&format!("{names}.map((own) => own.textContent).join(' ')")).contains("_000001"));
+    assert_eq!(tab.evaluate(&format!("{names}.every((element) => element.scrollWidth <= element.clientWidth)")), true);
+    assert!(tab.text(&format!("{names}.map((element) => element.textContent).join(' ')")).contains("_000001"));
     let name = serde_json::to_string(NAME).expect("JSON");
-    tab.evaluate(&format!("goTo(shows.scene.others.find((own) => own.name === {name}).pose)"));
+    tab.evaluate(&format!("goTo(shows.scene.others.find((element) => element.name === {name}).pose)"));
     let line = text_in(&tab, "command");
     assert!(!line.chars().any(char::is_control), "{line:?}");
     let script = format!("viewfuse() {{ printf '%s\\n' \"$@\"; }}\n{line}\n");

@@ -67,8 +67,8 @@ fn members(module: &Module) -> Members {
 
 /// Splits the first phi of an aggregate; `None` if there is none.
 fn split_one(function: &mut Function, members: &Members, fresh: &mut impl FnMut() -> u32) -> Option<()> {
-    let is_aggregate = |own: &Instruction| {
-        own.class.opcode == Op::Phi && own.result_type.is_some_and(|kind| members.contains_key(&kind))
+    let is_aggregate = |instruction: &Instruction| {
+        instruction.class.opcode == Op::Phi && instruction.result_type.is_some_and(|kind| members.contains_key(&kind))
     };
     let (place, at) = function
         .blocks
@@ -90,7 +90,8 @@ fn split_one(function: &mut Function, members: &Members, fresh: &mut impl FnMut(
             let part = fresh();
             let block = &mut function.blocks[*labels.get(from)?].instructions;
             // Before the branch, and before the merge that belongs to it.
-            let is_end = |own: &Instruction| matches!(own.class.opcode, Op::SelectionMerge | Op::LoopMerge);
+            let is_end =
+                |instruction: &Instruction| matches!(instruction.class.opcode, Op::SelectionMerge | Op::LoopMerge);
             let end = block.iter().position(is_end).unwrap_or(block.len() - 1);
             let path = path.iter().map(|member| Operand::LiteralBit32(*member));
             let of = std::iter::once(Operand::IdRef(*value)).chain(path).collect();
@@ -103,7 +104,7 @@ fn split_one(function: &mut Function, members: &Members, fresh: &mut impl FnMut(
         parts.push(part);
     }
     let block = &mut function.blocks[place].instructions;
-    let after = block.iter().position(|own| own.class.opcode != Op::Phi)?;
+    let after = block.iter().position(|instruction| instruction.class.opcode != Op::Phi)?;
     let mut built = Vec::new();
     build(members, kind, phi.result_id, &mut parts.into_iter(), fresh, &mut built);
     block.splice(after..after, built);

@@ -17,9 +17,9 @@ pub fn unroll(bytes: &[u8], is_chosen: impl Fn(&str) -> bool) -> Result<Vec<u8>,
         module.functions.iter_mut().filter(|function| function.def_id().is_some_and(|id| chosen.contains(&id)))
     {
         for header in innermost(function) {
-            for own in &mut function.blocks[header].instructions {
-                if own.class.opcode == Op::LoopMerge {
-                    own.operands[2] = Operand::LoopControl(LoopControl::UNROLL);
+            for instruction in &mut function.blocks[header].instructions {
+                if instruction.class.opcode == Op::LoopMerge {
+                    instruction.operands[2] = Operand::LoopControl(LoopControl::UNROLL);
                 }
             }
         }
@@ -32,8 +32,8 @@ fn innermost(function: &Function) -> Vec<usize> {
     let labels: HashMap<u32, usize> =
         function.blocks.iter().enumerate().filter_map(|(place, block)| Some((block.label_id()?, place))).collect();
     let merge = |block: &Block| {
-        let own = block.instructions.iter().find(|own| own.class.opcode == Op::LoopMerge)?;
-        own.operands.first().and_then(Operand::id_ref_any)
+        let instruction = block.instructions.iter().find(|instruction| instruction.class.opcode == Op::LoopMerge)?;
+        instruction.operands.first().and_then(Operand::id_ref_any)
     };
     let is_innermost = |header: usize, merge_label: u32| {
         let (mut seen, mut open) = (HashSet::new(), vec![header]);
@@ -42,7 +42,7 @@ fn innermost(function: &Function) -> Vec<usize> {
                 continue;
             }
             let block = &function.blocks[place];
-            let has = |wanted: Op| block.instructions.iter().any(|own| own.class.opcode == wanted);
+            let has = |wanted: Op| block.instructions.iter().any(|instruction| instruction.class.opcode == wanted);
             if has(Op::ControlBarrier) || place != header && has(Op::LoopMerge) {
                 return false;
             }

@@ -99,14 +99,14 @@ type Step = [[Vec4; 2]; 2];
 impl<R: Copy> Share<R> {
     /// Neighbours fetch what lies next to one another: numbers of a row, and columns.
     #[inline(always)]
-    fn new<L: Left<Row = R>>(own: u32, place: InvocationTile, shape: Shape, left: L) -> Share<R> {
-        let (left_four, right_four) = (own / STEP, own % FOURS);
+    fn new<L: Left<Row = R>>(local: u32, place: InvocationTile, shape: Shape, left: L) -> Share<R> {
+        let (left_four, right_four) = (local / STEP, local % FOURS);
         let near_rows = four_rows(left, place.first_row + left_four * 4, shape);
         let far_rows = four_rows(left, place.first_row + (left_four + NEXT_FOUR) * 4, shape);
         let (first, last) = (place.first_column + right_four, shape.column_count - 1);
         let columns =
             [first.min(last), (first + FOURS).min(last), (first + 2 * FOURS).min(last), (first + 3 * FOURS).min(last)];
-        Share { left: [own % STEP, left_four], right: [own / FOURS, right_four], near_rows, far_rows, columns }
+        Share { left: [local % STEP, left_four], right: [local / FOURS, right_four], near_rows, far_rows, columns }
     }
 
     #[inline(always)]
@@ -173,9 +173,9 @@ impl Tiles for Staged<'_> {
     #[inline(always)]
     fn multiply<L: Left>(self, invocation: u32, shape: Shape, left: L, right: impl Right, mut outputs: impl Outputs) {
         let Staged { rows, columns } = self;
-        let (group, own) = (invocation / INVOCATIONS, invocation % INVOCATIONS);
-        let place = InvocationTile::new(group, own, [SIDE; 2], LINE, shape);
-        let share = Share::new(own, place, shape, left);
+        let (group, local) = (invocation / INVOCATIONS, invocation % INVOCATIONS);
+        let place = InvocationTile::new(group, local, [SIDE; 2], LINE, shape);
+        let share = Share::new(local, place, shape, left);
         let mut next = share.fetch(0, shape, left, right);
         share.write(rows, columns, 0, next);
         wait_for_all();
@@ -238,8 +238,8 @@ pub(crate) fn store_sums<S: Sums>(
 
 /// Where in a tile the row number `index` of the invocation lies that is number `own` of `line` below one another.
 #[inline(always)]
-pub(crate) fn row_place(line: u32, own: u32, index: u32) -> u32 {
-    (index / 4 * line + own) * 4 + index % 4
+pub(crate) fn row_place(line: u32, local: u32, index: u32) -> u32 {
+    (index / 4 * line + local) * 4 + index % 4
 }
 
 #[inline(always)]

@@ -22,8 +22,8 @@ pub fn plane_opacity(
         let number = group as usize * PLANES + plane;
         let (mut support, mut violation) = (Bounded::ZERO, Bounded::ZERO);
         for view in views.iter().filter(|view| view.disparity_step > 0.0) {
-            if let Some([own, against]) = of_view(frustum, view, disparities, pixel, number)? {
-                support = support + own;
+            if let Some([supporting, against]) = of_view(frustum, view, disparities, pixel, number)? {
+                support = support + supporting;
                 violation = violation + against;
             }
         }

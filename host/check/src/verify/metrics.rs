@@ -160,10 +160,10 @@ impl<'a> Pairs<'a> {
     fn prefixed(&self, prefix: &str) -> Checkpoint {
         let mut heads = Vec::new();
         for (name, view) in self.file.tensors.iter() {
-            let Some(own) = name.strip_prefix(prefix).filter(|_| view.dtype() == Dtype::F32) else { continue };
+            let Some(head) = name.strip_prefix(prefix).filter(|_| view.dtype() == Dtype::F32) else { continue };
             let shape = if view.shape().len() == 1 { vec![1, view.shape()[0], 1, 1] } else { view.shape().to_vec() };
             let values = view.data().as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
-            heads.push((TensorShape { name: own.to_owned(), shape }, values));
+            heads.push((TensorShape { name: head.to_owned(), shape }, values));
             self.file.cover(name);
         }
         Checkpoint::in_memory(&self.file.path.display().to_string(), heads, BTreeMap::new())

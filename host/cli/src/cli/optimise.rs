@@ -161,7 +161,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         ))?;
     }
     let loops = match &device {
-        AnyDevice::Vulkan(own) if own.is_software() => {
+        AnyDevice::Vulkan(gpu) if gpu.is_software() => {
             "; a software driver: the steps were made by the CPU's own loops"
         }
         _ => "",

@@ -16,10 +16,10 @@ use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError, TensorShape};
 /// Only if the program's own copy is damaged.
 pub fn published_lpips(trunk: LpipsTrunk) -> Result<Checkpoint, CheckpointError> {
     match trunk {
-        LpipsTrunk::Alex => own("published LPIPS heads (alex)", include_bytes!("heads/lpips_alex.safetensors")),
-        LpipsTrunk::Vgg => own("published LPIPS heads (vgg)", include_bytes!("heads/lpips_vgg.safetensors")),
+        LpipsTrunk::Alex => included("published LPIPS heads (alex)", include_bytes!("heads/lpips_alex.safetensors")),
+        LpipsTrunk::Vgg => included("published LPIPS heads (vgg)", include_bytes!("heads/lpips_vgg.safetensors")),
         LpipsTrunk::Squeeze => {
-            own("published LPIPS heads (squeeze)", include_bytes!("heads/lpips_squeeze.safetensors"))
+            included("published LPIPS heads (squeeze)", include_bytes!("heads/lpips_squeeze.safetensors"))
         }
     }
 }
@@ -29,10 +29,10 @@ pub fn published_lpips(trunk: LpipsTrunk) -> Result<Checkpoint, CheckpointError>
 /// # Errors
 /// Only if the program's own copy is damaged.
 pub fn published_dists() -> Result<Checkpoint, CheckpointError> {
-    own("published DISTS weights", include_bytes!("heads/dists.safetensors"))
+    included("published DISTS weights", include_bytes!("heads/dists.safetensors"))
 }
 
-fn own(label: &str, bytes: &[u8]) -> Result<Checkpoint, CheckpointError> {
+fn included(label: &str, bytes: &[u8]) -> Result<Checkpoint, CheckpointError> {
     let damaged = |error| CheckpointError::Content(PathBuf::from(label), format!("is damaged: {error}"));
     let file = SafeTensors::deserialize(bytes).map_err(damaged)?;
     let tensor = |(name, view): (&str, safetensors::tensor::TensorView<'_>)| {

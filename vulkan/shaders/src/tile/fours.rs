@@ -92,14 +92,14 @@ impl<T: Tile, const R: usize, const C: usize> Tiles for InFours<'_, T, R, C> {
     #[inline(always)]
     fn multiply<L: Left>(self, invocation: u32, shape: Shape, left: L, right: impl Right, mut outputs: impl Outputs) {
         let InFours { tile: _, rows, columns } = self;
-        let (group, own) = (invocation / T::FORM.invocations(), invocation % T::FORM.invocations());
+        let (group, local) = (invocation / T::FORM.invocations(), invocation % T::FORM.invocations());
         let tile = [T::FORM.rows(), T::FORM.columns()];
-        let place = InvocationTile::new(group, own, tile, T::ACROSS, shape);
-        let (is_row, is_column) = (own < T::ROW_SQUARES, own < T::SQUARES);
+        let place = InvocationTile::new(group, local, tile, T::ACROSS, shape);
+        let (is_row, is_column) = (local < T::ROW_SQUARES, local < T::SQUARES);
 
         // Neighbours fetch what lies next to one another: numbers of a row, and columns.
-        let (row_inner, row_four) = (own % STEP_FOURS * 4, own / STEP_FOURS);
-        let square = own.wrapping_sub(T::ROW_SQUARES);
+        let (row_inner, row_four) = (local % STEP_FOURS * 4, local / STEP_FOURS);
+        let square = local.wrapping_sub(T::ROW_SQUARES);
         let (column_inner, column_four) = (square / T::COLUMN_FOURS * 4, square % T::COLUMN_FOURS);
         let row = move |index: u32| left.row((place.first_row + row_four * 4 + index).min(shape.row_count - 1));
         let own_rows = [row(0), row(1), row(2), row(3)];

@@ -277,14 +277,14 @@ macro_rules! form {
                 const { assert!([$($chunk),*].len() as u32 * BEHIND * 16 == STEP) };
 
                 let $Form { units: _, shared, subgroup, lane } = self;
-                let (group, own) = (invocation / INVOCATIONS, invocation % INVOCATIONS);
+                let (group, local) = (invocation / INVOCATIONS, invocation % INVOCATIONS);
                 let group_columns = shape.column_count.div_ceil(COLUMNS);
                 let (first_row, first_column) = (group / group_columns * ROWS, group % group_columns * COLUMNS);
                 let behind = subgroup % BEHIND;
                 let own_row = subgroup / BEHIND / ACROSS * OWN_ROWS;
                 let own_column = subgroup / BEHIND % ACROSS * OWN_COLUMNS;
-                let (row, row_inner) = (own / (STEP / 8), own % (STEP / 8) * 8);
-                let (column_inner, column) = (own / (COLUMNS / 8), own % (COLUMNS / 8));
+                let (row, row_inner) = (local / (STEP / 8), local % (STEP / 8) * 8);
+                let (column_inner, column) = (local / (COLUMNS / 8), local % (COLUMNS / 8));
                 let row_place = row * LEFT_STRIDE + row_inner / 8;
                 let column_place = PARTS * LEFT + column_inner * RIGHT_STRIDE + column;
 

@@ -30,10 +30,10 @@ pub(super) fn run(layers: Layers<'_>, sizes: &Denoiser, inputs: &Tensor, levels:
     let mut residual = inputs.clone();
     for step in sizes.down() {
         match step {
-            DenoiserStep::Convolution(own) => x = layers.convolved(&own.name, &x, Window::same(3), false)?,
-            DenoiserStep::Block(own) => x = block(layers, &own, &x, &embedded)?,
-            DenoiserStep::Residual(own) => {
-                residual = halved(&layers.convolved(&own.name, &residual, Window::same(3), false)?)?;
+            DenoiserStep::Convolution(layer) => x = layers.convolved(&layer.name, &x, Window::same(3), false)?,
+            DenoiserStep::Block(layer) => x = block(layers, &layer, &x, &embedded)?,
+            DenoiserStep::Residual(layer) => {
+                residual = halved(&layers.convolved(&layer.name, &residual, Window::same(3), false)?)?;
                 x = ((residual + x)? * FRAC_1_SQRT_2)?;
                 residual = x.clone();
                 kept.pop();

@@ -90,7 +90,7 @@ struct Way<T> {
     raw: Vec<T>,
     lengths: Vec<T>,
     /// Optical depth of each sample, and the transmittance in front of it.
-    own: Vec<T>,
+    optical_depths: Vec<T>,
     reaching: Vec<T>,
 }
 
@@ -169,7 +169,7 @@ impl MarchVolumes {
             hidden: [first, second],
             raw,
             lengths: Vec::with_capacity(points.len()),
-            own: Vec::with_capacity(points.len()),
+            optical_depths: Vec::with_capacity(points.len()),
             reaching: Vec::with_capacity(points.len()),
         };
         let mut passed = T::zero();
@@ -184,7 +184,7 @@ impl MarchVolumes {
             // NaN stays: the loss must show it.
             let density = if given < T::zero() { T::zero() } else { given };
             way.lengths.push(T::of(length));
-            way.own.push(density * T::of(length));
+            way.optical_depths.push(density * T::of(length));
             way.reaching.push((T::zero() - passed).exponential());
             passed += density * T::of(length);
         }
@@ -204,7 +204,7 @@ impl MarchVolumes {
     fn composite<T: Real>(&self, way: &Way<T>, seen: &mut [T]) {
         let features = self.sizes.features;
         for (index, fused) in way.fused.chunks_exact(features).enumerate() {
-            let (share, _) = self.share(way.own[index], way.reaching[index]);
+            let (share, _) = self.share(way.optical_depths[index], way.reaching[index]);
             let raw = &way.raw[index * (1 + features) + 1..][..features];
             let sums = &mut seen[index / self.samples() * features..][..features];
             sums.iter_mut().zip(fused.iter().zip(raw)).for_each(|(sum, (fused, raw))| *sum += share * (*fused + *raw));
@@ -223,7 +223,7 @@ impl MarchVolumes {
         let MarchSizes { features, width: inner, .. } = self.sizes;
         let way = self.run(inputs, object, chunk);
         let [_, weights, parameters] = inputs;
-        let (samples, point_count) = (self.samples(), way.own.len());
+        let (samples, point_count) = (self.samples(), way.optical_depths.len());
         let mut of_raw = vec![T::zero(); way.raw.len()];
         let mut of_fused = vec![T::zero(); way.fused.len()];
         for ray in 0..chunk.len() {
@@ -231,7 +231,7 @@ impl MarchVolumes {
             // The loss of the samples behind by more optical depth here.
             let mut behind = T::zero();
             for index in (ray * samples..(ray + 1) * samples).rev() {
-                let (share, slope) = self.share(way.own[index], way.reaching[index]);
+                let (share, slope) = self.share(way.optical_depths[index], way.reaching[index]);
                 let fused = &way.fused[index * features..][..features];
                 let of_raw = &mut of_raw[index * (1 + features)..][..1 + features];
                 let of_fused = &mut of_fused[index * features..][..features];
