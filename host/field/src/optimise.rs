@@ -14,6 +14,7 @@ use crate::gaussians::{GivenGaussians, Optimisation, Quality, Recipe, RecipeOpti
 use crate::point_cloud::{CloudPoint, point_cloud};
 use crate::render::{RenderError, RenderOptions, Stage, open_album};
 use clock::Clock;
+use std::sync::Arc;
 use std::time::Duration;
 use viewfuse_device::choice::AnyDevice;
 use viewfuse_job::files::WriteError;
@@ -103,6 +104,15 @@ pub struct EndedOptimisation {
     pub fit: Option<(f64, usize)>,
 }
 
+/// What an optimisation has its photographs from, and what its pictures are compared with.
+#[derive(Clone, Copy)]
+struct Photographed<'a> {
+    device: &'a AnyDevice,
+    album: &'a Album<'a>,
+    /// The sources.
+    images: &'a Arc<SourceImages>,
+}
+
 impl<'a> SceneOptimisation<'a> {
     /// Of a scene, with the default options. `held_out` and `towards` are lists of views; neither is a source.
     ///
@@ -172,6 +182,7 @@ impl<'a> SceneOptimisation<'a> {
             progress.stage("trying recipes on sources left out", trial, 30);
             recipe = self.tried(device, &album, recipe, progress)?;
         }
+        let photographed = Photographed { device, album: &album, images: &stage.images };
         let mut optimisation = self.begin(device, &stage.images, &points, recipe)?;
         if let Some(before) = &self.before {
             before.notes.iter().for_each(|note| progress.warn(note));
@@ -189,16 +200,16 @@ impl<'a> SceneOptimisation<'a> {
         let mut scores = Vec::new();
         let is_timed = is_sharp && recipe.grows;
         let timed = is_timed.then_some(&mut clock);
-        self.advance(optimisation.as_mut(), device, &album, progress, timed, &mut keep, &mut scores)?;
+        self.advance(optimisation.as_mut(), photographed, progress, timed, &mut keep, &mut scores)?;
         if more > 0 && !progress.is_cancelled() {
             optimisation.extend(more);
             optimisation.weigh(&self.weights()?);
-            self.advance(optimisation.as_mut(), device, &album, progress, None, &mut keep, &mut scores)?;
+            self.advance(optimisation.as_mut(), photographed, progress, None, &mut keep, &mut scores)?;
         }
         let gaussians = optimisation.optimised().map_err(RenderError::from)?.scene();
         let sources = &self.sources[..self.sources.len().min(FIT_SOURCES)];
         let is_alone = self.held_out.is_empty() && !progress.is_cancelled();
-        let fit = is_alone.then(|| self.score(&gaussians, device, &album, sources)).transpose()?;
+        let fit = is_alone.then(|| self.score(&gaussians, photographed, sources)).transpose()?;
         Ok(EndedOptimisation {
             gaussians,
             background: behind(&stage.images),
@@ -227,12 +238,10 @@ impl<'a> SceneOptimisation<'a> {
 
     /// All iterations, with scores and what is kept on the way; fewer if it is cancelled. With a clock, the time is
     /// told that they will take, and they are as many as fit.
-    #[allow(clippy::too_many_arguments)]
     fn advance(
         &self,
         optimisation: &mut dyn Optimisation,
-        any: &AnyDevice,
-        album: &Album<'_>,
+        photographed: Photographed<'_>,
         progress: &dyn Progress,
         mut clock: Option<&mut Clock>,
         keep: &mut dyn FnMut(&GaussianScene) -> Result<(), WriteError>,
@@ -256,7 +265,7 @@ impl<'a> SceneOptimisation<'a> {
                 keep(&gaussians)?;
             }
             if !self.held_out.is_empty() {
-                let psnr = self.score(&gaussians, any, album, &self.held_out)?;
+                let psnr = self.score(&gaussians, photographed, &self.held_out)?;
                 progress.note(&format!(
                     "iteration {done} of {iteration_count}: views left out have a PSNR of {psnr:.2} dB"
                 ));
@@ -283,13 +292,13 @@ impl<'a> SceneOptimisation<'a> {
     fn score(
         &self,
         gaussians: &GaussianScene,
-        any: &AnyDevice,
-        album: &Album<'_>,
+        Photographed { device, album, images }: Photographed<'_>,
         views: &[usize],
     ) -> Result<f64, RenderError> {
         let given = AnyField::new(GivenGaussians { scene: gaussians.clone(), notes: Vec::new() });
-        let renderer = given.on(any);
-        let mut stage = Stage::prepare(self.scene, album, &self.sources, renderer.as_ref(), &self.options, &Silent)?;
+        let (renderer, images) = (given.on(device), images.clone());
+        let (scene, sources, options) = (self.scene, &self.sources, &self.options);
+        let mut stage = Stage::of_images(scene, album, sources, images, renderer.as_ref(), options, &Silent)?;
         let mut sum = 0.0;
         for view in views {
             let frame = stage.frame(&self.weighting, &target_of(self.scene, *view), &Silent)?;

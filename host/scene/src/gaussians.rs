@@ -28,6 +28,7 @@ mod splat;
 mod spz;
 mod write;
 
+use rayon::prelude::*;
 use std::path::Path;
 
 use viewfuse_core::Vec3;
@@ -101,7 +102,7 @@ impl GaussianScene {
                 ..GaussianBlock::default()
             }
         };
-        self.gaussians.iter().enumerate().map(block).collect()
+        self.gaussians.par_iter().enumerate().map(block).collect()
     }
 }
 

@@ -183,6 +183,8 @@ fn python_without_pycolmap() {
     folder.write("modules/pycolmap.py", "raise ImportError('none here')\n");
     let mut refused = command(&folder, "pose bare -o posed --from pycolmap");
     refused.env("PYTHONPATH", folder.join("modules")).env_remove("VIEWFUSE_PYTHON");
+    // Python itself would leave the module compiled beside it.
+    refused.env("PYTHONDONTWRITEBYTECODE", "1");
     let before = folder.path();
     assert_command_refused(
         refused,

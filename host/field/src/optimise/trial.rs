@@ -1,6 +1,6 @@
 //! Which recipe, and how many iterations: those that held-out sources prefer, tried at a small size.
 
-use super::{OptimiseError, SceneOptimisation};
+use super::{OptimiseError, Photographed, SceneOptimisation};
 use crate::AnyField;
 use crate::gaussians::{Quality, Recipe, RecipeOptions};
 use crate::point_cloud::point_cloud;
@@ -64,12 +64,13 @@ impl SceneOptimisation<'_> {
         let recipes = [small(fast), small(recipe)];
         progress.expect(recipes.iter().map(|recipe| recipe.iterations.iter().sum::<u32>() as usize).sum());
         let trial = SceneOptimisation { sources, held_out, before: None, towards: Vec::new(), ..self.clone() };
+        let photographed = Photographed { device, album, images: &stage.images };
         let mut curves = Vec::new();
         for recipe in recipes {
             let mut optimisation = trial.begin(device, &stage.images, &points, recipe)?;
             let mut scores = Vec::new();
             let counted = Counted(progress);
-            trial.advance(optimisation.as_mut(), device, album, &counted, None, &mut |_| Ok(()), &mut scores)?;
+            trial.advance(optimisation.as_mut(), photographed, &counted, None, &mut |_| Ok(()), &mut scores)?;
             progress.check().map_err(|error| OptimiseError::Render(crate::FieldError::from(error).into()))?;
             curves.push(scores);
         }
