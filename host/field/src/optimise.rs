@@ -13,7 +13,11 @@ use crate::AnyField;
 use crate::gaussians::{GivenGaussians, Optimisation, Quality, Recipe, RecipeOptions, behind, optimisation};
 use crate::point_cloud::{CloudPoint, point_cloud};
 use crate::render::{RenderError, RenderOptions, Stage, open_album};
+use crate::scores::psnr_of_seen;
 use clock::Clock;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::sync::Arc;
 use std::time::Duration;
 use viewfuse_device::choice::AnyDevice;
@@ -23,7 +27,7 @@ use viewfuse_job::progress::{Progress, Silent};
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{Selection, SelectionError, Target, target_of};
 use viewfuse_scene::gaussians::{GaussianFile, GaussianScene};
-use viewfuse_scene::photographs::{Album, SourceImages};
+use viewfuse_scene::photographs::{Album, GroundTruth, SourceImages};
 use viewfuse_scene::unit::RigUnit;
 use viewfuse_weighting::Weighting;
 use viewfuse_weighting::sources::SourcePoses;
@@ -105,12 +109,19 @@ pub struct EndedOptimisation {
 }
 
 /// What an optimisation has its photographs from, and what its pictures are compared with.
-#[derive(Clone, Copy)]
 struct Photographed<'a> {
     device: &'a AnyDevice,
     album: &'a Album<'a>,
     /// The sources.
-    images: &'a Arc<SourceImages>,
+    images: Arc<SourceImages>,
+    /// Photographs of the pictures' size, from when they were first compared; by their views.
+    truths: RefCell<BTreeMap<usize, GroundTruth>>,
+}
+
+impl<'a> Photographed<'a> {
+    fn new(device: &'a AnyDevice, album: &'a Album<'a>, images: &Arc<SourceImages>) -> Photographed<'a> {
+        Photographed { device, album, images: images.clone(), truths: RefCell::default() }
+    }
 }
 
 impl<'a> SceneOptimisation<'a> {
@@ -182,7 +193,7 @@ impl<'a> SceneOptimisation<'a> {
             progress.stage("trying recipes on sources left out", trial, 30);
             recipe = self.tried(device, &album, recipe, progress)?;
         }
-        let photographed = Photographed { device, album: &album, images: &stage.images };
+        let photographed = &Photographed::new(device, &album, &stage.images);
         let mut optimisation = self.begin(device, &stage.images, &points, recipe)?;
         if let Some(before) = &self.before {
             before.notes.iter().for_each(|note| progress.warn(note));
@@ -241,7 +252,7 @@ impl<'a> SceneOptimisation<'a> {
     fn advance(
         &self,
         optimisation: &mut dyn Optimisation,
-        photographed: Photographed<'_>,
+        photographed: &Photographed<'_>,
         progress: &dyn Progress,
         mut clock: Option<&mut Clock>,
         keep: &mut dyn FnMut(&GaussianScene) -> Result<(), WriteError>,
@@ -292,17 +303,24 @@ impl<'a> SceneOptimisation<'a> {
     fn score(
         &self,
         gaussians: &GaussianScene,
-        Photographed { device, album, images }: Photographed<'_>,
+        Photographed { device, album, images, truths }: &Photographed<'_>,
         views: &[usize],
     ) -> Result<f64, RenderError> {
         let given = AnyField::new(GivenGaussians { scene: gaussians.clone(), notes: Vec::new() });
         let (renderer, images) = (given.on(device), images.clone());
         let (scene, sources, options) = (self.scene, &self.sources, &self.options);
         let mut stage = Stage::of_images(scene, album, sources, images, renderer.as_ref(), options, &Silent)?;
-        let mut sum = 0.0;
+        let (mut truths, mut sum) = (truths.borrow_mut(), 0.0);
         for view in views {
-            let frame = stage.frame(&self.weighting, &target_of(self.scene, *view), &Silent)?;
-            sum += frame.truth.map_or(0.0, |truth| truth.psnr);
+            let target = Target { truth: None, ..target_of(scene, *view) };
+            let picture = stage.frame(&self.weighting, &target, &Silent)?.picture;
+            let truth = match truths.entry(*view) {
+                Entry::Occupied(known) => known.into_mut(),
+                Entry::Vacant(place) => {
+                    place.insert(album.truth(*view, picture.dimensions().into(), stage.background())?)
+                }
+            };
+            sum += psnr_of_seen(&picture, &truth.picture, truth.seen.as_ref());
         }
         Ok(sum / views.len() as f64)
     }

@@ -8,6 +8,7 @@ use viewfuse_core::Vec3;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::gaussian::SH_0;
 use viewfuse_core::random::uniform;
+use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, DeviceError};
 use viewfuse_job::progress::Progress;
 use viewfuse_kernels::rows::{GaussianBlock, Kernel};
@@ -185,14 +186,13 @@ pub fn behind(sources: &SourceImages) -> [f32; 3] {
     if sources.has_silhouettes { sources.background } else { mean_colour(sources) }
 }
 
-/// The mean of what all photographs show.
+/// The mean of what all photographs show. Each is summed by itself, and these in their order, whatever the threads.
 fn mean_colour(sources: &SourceImages) -> [f32; 3] {
-    [0, 1, 2].map(|channel| {
-        let (mut sum, mut opacity) = (0.0_f64, 0.0_f64);
-        for image in &sources.images {
-            sum += image.texels.iter().map(|texel| f64::from(texel[channel])).sum::<f64>();
-            opacity += image.texels.iter().map(|texel| f64::from(texel[3])).sum::<f64>();
-        }
-        (sum / opacity.max(1.0)) as f32
-    })
+    let sums = map(sources.images.len(), 1, |view| {
+        let sum =
+            |channel: usize| sources.images[view].texels.iter().map(|texel| f64::from(texel[channel])).sum::<f64>();
+        [0, 1, 2, 3].map(sum)
+    });
+    let sum = |channel: usize| sums.iter().fold(0.0, |sum, photograph| sum + photograph[channel]);
+    [0, 1, 2].map(|channel| (sum(channel) / sum(3).max(1.0)) as f32)
 }

@@ -64,7 +64,7 @@ impl SceneOptimisation<'_> {
         let recipes = [small(fast), small(recipe)];
         progress.expect(recipes.iter().map(|recipe| recipe.iterations.iter().sum::<u32>() as usize).sum());
         let trial = SceneOptimisation { sources, held_out, before: None, towards: Vec::new(), ..self.clone() };
-        let photographed = Photographed { device, album, images: &stage.images };
+        let photographed = &Photographed::new(device, album, &stage.images);
         let mut curves = Vec::new();
         for recipe in recipes {
             let mut optimisation = trial.begin(device, &stage.images, &points, recipe)?;
