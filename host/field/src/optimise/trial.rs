@@ -17,7 +17,10 @@ const MAX_ITERATIONS: u32 = 1500;
 const HELD_OUT_EVERY: usize = 8;
 /// Fewest sources of a trial: of fewer, what is held out is far from the others.
 const MIN_SOURCES: usize = 12;
-/// Share of its iterations before which a trial's best score ends the recipe early: later ones hardly differ.
+/// How many decibels less than the best score are as good: of such scores the last one ends the recipe, since pictures of
+/// the whole size have more to learn (`host/results/gaussian_quality.md`).
+const AS_GOOD: f64 = 0.05;
+/// Share of its iterations before which a trial's last good score ends the recipe early: later ones hardly differ.
 const EARLY: f32 = 0.8;
 /// Least share of the iterations that is left: before it the number has hardly grown.
 const LEAST: f32 = 0.1;
@@ -74,15 +77,9 @@ impl SceneOptimisation<'_> {
             progress.check().map_err(|error| OptimiseError::Render(crate::FieldError::from(error).into()))?;
             curves.push(scores);
         }
-        let best = |scores: &[(u32, f64)]| {
-            scores
-                .iter()
-                .copied()
-                .fold((0, f64::NEG_INFINITY), |best, score| if score.1 > best.1 { score } else { best })
-        };
         // The fast recipe ends where it ends.
         let fast_score = curves[0].last().map_or(f64::NEG_INFINITY, |score| score.1);
-        let (end, score) = best(&curves[1]);
+        let (end, score) = last_good(&curves[1]);
         let (chosen, words) = if score <= fast_score {
             (fast, "fast is used".to_owned())
         } else {
@@ -100,6 +97,13 @@ impl SceneOptimisation<'_> {
         ));
         Ok(chosen)
     }
+}
+
+/// The iteration of the last score that is [`AS_GOOD`] as the best, and the best.
+fn last_good(scores: &[(u32, f64)]) -> (u32, f64) {
+    let best = scores.iter().map(|(_, score)| *score).fold(f64::NEG_INFINITY, f64::max);
+    let last = scores.iter().rfind(|(_, score)| *score >= best - AS_GOOD);
+    (last.map_or(0, |(iteration, _)| *iteration), best)
 }
 
 /// With this share of the finest level's iterations, at least [`LEAST`].
@@ -124,6 +128,15 @@ impl Progress for Counted<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_trial_ends_with_the_last_of_its_best_scores() {
+        let flat = [(120, 17.92), (480, 18.025), (600, 17.96), (1200, 18.004), (1320, 17.968), (1620, 17.952)];
+        assert_eq!(last_good(&flat), (1200, 18.025));
+        let falling = [(120, 20.3), (240, 20.2), (360, 20.0)];
+        assert_eq!(last_good(&falling), (120, 20.3));
+        assert_eq!(last_good(&[(40, f64::NAN)]), (0, f64::NEG_INFINITY), "a score that is none");
+    }
 
     #[test]
     fn held_out_sources_are_apart_and_leave_most() {
