@@ -64,7 +64,7 @@ pub use crate::compact::RUN;
 pub use crate::finite::FINITE_RUN;
 pub use crate::gaussians::blend_gradient::SplatGradient;
 pub use crate::gaussians::lists::{ListBlock, STATUS_NUMBERS, TILE_RUN};
-pub use crate::gaussians::steps::{GainStepBlock, HarmonicTerm, ParticleBlock, ParticleState, StepBlock};
+pub use crate::gaussians::steps::{GainStepBlock, HarmonicTerm, ParticleBlock, ParticleState, StepBlock, TermState};
 pub use crate::gaussians::windows::{GainBlock, LossBlock, SHARE_RUN};
 pub use crate::gaussians::{SplatBlock, TileBlock};
 pub use crate::genvs::{DenoiserInputBlock, FeatureBlock, VolumeBlock};

@@ -95,7 +95,7 @@ macro_rules! floats {
     )+ };
 }
 
-floats!(f32, TargetRay, GaussianBlock, ProjectedGaussian, SplatGradient, HarmonicTerm);
+floats!(f32, TargetRay, GaussianBlock, ProjectedGaussian, SplatGradient, HarmonicTerm, TermState);
 
 impl<const N: usize> Floats for [f32; N]
 where

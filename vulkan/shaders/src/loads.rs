@@ -10,7 +10,7 @@ use viewfuse_core::gaussian::{GaussianBlock, ProjectedGaussian};
 use viewfuse_core::pose::PoseBlock;
 use viewfuse_core::rays::RayPoint;
 use viewfuse_kernels::gaussians::blend_gradient::SplatGradient;
-use viewfuse_kernels::gaussians::steps::{HarmonicTerm, ParticleState};
+use viewfuse_kernels::gaussians::steps::{HarmonicTerm, ParticleState, TermState};
 use viewfuse_kernels::plane_sweep::Planes;
 use viewfuse_kernels::plane_sweep::frustum::SweptView;
 use viewfuse_kernels::store::Store;
@@ -249,29 +249,42 @@ impl IntoVectors for ParticleState {
 }
 
 impl InVectors for HarmonicTerm {
-    type Vectors = [Vec4; 3];
+    type Vectors = [Vec4; 1];
 
     #[inline(always)]
-    fn from_vectors([value, first, last]: [Vec4; 3]) -> HarmonicTerm {
-        HarmonicTerm {
-            value: [value.x, value.y, value.z],
-            padding: 0.0,
-            moments: [[first.x, first.y], [first.z, first.w], [last.x, last.y]],
-            padding_end: [0.0; 2],
-        }
+    fn from_vectors([value]: [Vec4; 1]) -> HarmonicTerm {
+        HarmonicTerm { value: [value.x, value.y, value.z], padding: 0.0 }
     }
 }
 
 impl IntoVectors for HarmonicTerm {
     #[inline(always)]
-    fn into_vectors(self) -> [Vec4; 3] {
-        let ([x, y, z], [[a, b], [c, d], [e, f]]) = (self.value, self.moments);
-        [Vec4::new(x, y, z, 0.0), Vec4::new(a, b, c, d), Vec4::new(e, f, 0.0, 0.0)]
+    fn into_vectors(self) -> [Vec4; 1] {
+        let [x, y, z] = self.value;
+        [Vec4::new(x, y, z, 0.0)]
+    }
+}
+
+impl InVectors for TermState {
+    type Vectors = [Vec4; 2];
+
+    #[inline(always)]
+    fn from_vectors([first, last]: [Vec4; 2]) -> TermState {
+        TermState { moments: [[first.x, first.y], [first.z, first.w], [last.x, last.y]], padding: [0.0; 2] }
+    }
+}
+
+impl IntoVectors for TermState {
+    #[inline(always)]
+    fn into_vectors(self) -> [Vec4; 2] {
+        let [[a, b], [c, d], [e, f]] = self.moments;
+        [Vec4::new(a, b, c, d), Vec4::new(e, f, 0.0, 0.0)]
     }
 }
 
 const _: () = assert!(size_of::<<ParticleState as InVectors>::Vectors>() == size_of::<ParticleState>());
 const _: () = assert!(size_of::<<HarmonicTerm as InVectors>::Vectors>() == size_of::<HarmonicTerm>());
+const _: () = assert!(size_of::<<TermState as InVectors>::Vectors>() == size_of::<TermState>());
 const _: () = assert!(size_of::<<CameraBlock as InVectors>::Vectors>() == size_of::<CameraBlock>());
 const _: () = assert!(size_of::<<SweptView as InVectors>::Vectors>() == size_of::<SweptView>());
 const _: () = assert!(size_of::<<RayPoint as InVectors>::Vectors>() == size_of::<RayPoint>());

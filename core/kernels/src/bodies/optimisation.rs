@@ -7,8 +7,8 @@ use crate::gaussians::lists::{
 };
 use crate::gaussians::project_gradient;
 use crate::gaussians::steps::{
-    GainStepBlock, HarmonicTerm, ParticleBlock, ParticleState, StepBlock, by_colour, colour_along, corrections,
-    direction, step_gain, step_particle, step_term,
+    GainStepBlock, HarmonicTerm, ParticleBlock, ParticleState, StepBlock, TermState, by_colour, colour_along,
+    corrections, direction, step_gain, step_particle, step_term,
 };
 use crate::gaussians::windows::{GainBlock, LossBlock, SHARE_RUN, pixel_gradient, structure};
 use crate::gaussians::{SPLAT_TILE, SplatBlock};
@@ -351,12 +351,14 @@ pub fn step_harmonics(
     gradients: &(impl Fetch<GaussianBlock> + ?Sized),
     status: &[u32],
     terms: &(impl Fetch<HarmonicTerm> + ?Sized),
+    term_states: &(impl Fetch<TermState> + ?Sized),
     next_terms: &mut (impl Store<HarmonicTerm> + ?Sized),
+    next_term_states: &mut (impl Store<TermState> + ?Sized),
     term: u32,
 ) {
     let at = (term / block.term_count()) as usize;
     let number = term % block.term_count();
-    let mut next = terms.fetch(term as usize);
+    let (mut next, mut after) = (terms.fetch(term as usize), term_states.fetch(term as usize));
     let (splat, state) = (splats.fetch(at), states.fetch(at));
     let of_degree = REST_COUNTS[block.degree as usize];
     let count = if state.rest_count > of_degree { state.rest_count } else { of_degree };
@@ -364,8 +366,9 @@ pub fn step_harmonics(
         let by = by_colour(gradients.fetch(at).colour, splat.colour, block.degree);
         if has_finite_bits(by[0]) && has_finite_bits(by[1]) && has_finite_bits(by[2]) {
             let basis = harmonics(direction(&gaussians.fetch(at), &block.camera))[number as usize];
-            next = step_term(&next, by, basis, block.rates[4], corrections(state.step_count + 1));
+            (next, after) = step_term(&next, &after, by, basis, block.rates[4], corrections(state.step_count + 1));
         }
     }
     next_terms.store(term as usize, next);
+    next_term_states.store(term as usize, after);
 }

@@ -42,7 +42,7 @@ pub struct ParticleState {
 
 const _: () = assert!(size_of::<ParticleState>() == 128);
 
-/// A coefficient of spherical harmonics, red, green and blue, with the state of its optimisation, as plain data.
+/// A coefficient of spherical harmonics, red, green and blue, as plain data: all that pictures read of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct HarmonicTerm {
@@ -50,13 +50,19 @@ pub struct HarmonicTerm {
     pub value: [f32; 3],
     /// Zero.
     pub padding: f32,
+}
+
+/// The state of a coefficient's optimisation, as plain data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct TermState {
     /// Moments of the derivatives, `[channel]`.
     pub moments: [[f32; 2]; 3],
     /// Zero.
-    pub padding_end: [f32; 2],
+    pub padding: [f32; 2],
 }
 
-const _: () = assert!(size_of::<HarmonicTerm>() == 48);
+const _: () = assert!(size_of::<HarmonicTerm>() == 16 && size_of::<TermState>() == 32);
 
 /// A camera and Gaussians whose colours depend on the direction, as plain data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -203,22 +209,24 @@ pub fn by_colour(gradient: [f32; 3], seen: [f32; 3], degree: u32) -> [f32; 3] {
     ]
 }
 
-/// A coefficient with the spherical harmonic `basis` after a step against the derivatives by the colour.
+/// A coefficient of the spherical harmonic `basis`, and its state, after a step against the derivatives by the colour.
 #[inline(always)]
 pub fn step_term(
     term: &HarmonicTerm,
+    state: &TermState,
     by_colour: [f32; 3],
     basis: f32,
     colour_rate: f32,
     corrections: [f32; 2],
-) -> HarmonicTerm {
+) -> (HarmonicTerm, TermState) {
     let step = |channel: usize| {
-        let (mut value, mut moments) = (term.value[channel], term.moments[channel]);
+        let (mut value, mut moments) = (term.value[channel], state.moments[channel]);
         adam_step(&mut value, &mut moments, by_colour[channel] * basis, RATE_SHARE * colour_rate, corrections);
         (value, moments)
     };
     let ((red, of_red), (green, of_green), (blue, of_blue)) = (step(0), step(1), step(2));
-    HarmonicTerm { value: [red, green, blue], moments: [of_red, of_green, of_blue], ..*term }
+    let value = [red, green, blue];
+    (HarmonicTerm { value, ..*term }, TermState { moments: [of_red, of_green, of_blue], ..*state })
 }
 
 /// A parameter and its moments after a step; the same if the derivative is not finite.

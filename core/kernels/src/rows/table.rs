@@ -566,8 +566,8 @@ macro_rules! for_each_kernel {
                 write next_gaussians: GaussianBlock as vectors,
                 write next_states: ParticleState as vectors,
             }
-            /// Spherical harmonics after a step against the derivatives: `next_terms[gaussian][term]`. An element is a
-            /// term.
+            /// Spherical harmonics and their states after a step against the derivatives: `next_terms[gaussian][term]`.
+            /// An element is a term.
             StepHarmonics step_harmonics(block: StepBlock)
             for term in [0..block.gaussian_count() * block.term_count(); 256 a core] {
                 read gaussians: GaussianBlock as vectors,
@@ -576,7 +576,9 @@ macro_rules! for_each_kernel {
                 read gradients: GaussianBlock as vectors,
                 read status: u32,
                 read terms: HarmonicTerm as vectors,
+                read term_states: TermState as vectors,
                 write next_terms: HarmonicTerm as vectors,
+                write next_term_states: TermState as vectors,
             }
             /// What runs of 256 pixels add to the derivative by a gain: `sums[run]`. An element is a run.
             SumShares sum_shares(pixel_count: u32)

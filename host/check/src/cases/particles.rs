@@ -33,14 +33,15 @@ pub(super) fn state(numbers: &mut Numbers) -> ParticleState {
     ParticleState { moments, step_count, moved: numbers.between(0.0, 2.0), moved_count: step_count, rest_count }
 }
 
-/// So many terms with their moments.
+/// So many terms.
 pub(super) fn terms(numbers: &mut Numbers, count: u32) -> Vec<HarmonicTerm> {
-    let term = |_| HarmonicTerm {
-        value: [0; 3].map(|_| numbers.between(-0.3, 0.3)),
-        moments: [0; 3].map(|_| [numbers.between(-0.5, 0.5), numbers.between(0.3, 0.6)]),
-        ..HarmonicTerm::default()
-    };
-    (0..count).map(term).collect()
+    (0..count).map(|_| HarmonicTerm { value: [0; 3].map(|_| numbers.between(-0.3, 0.3)), padding: 0.0 }).collect()
+}
+
+/// The states of so many terms.
+pub(super) fn term_states(numbers: &mut Numbers, count: u32) -> Vec<TermState> {
+    let mut moments = || [numbers.between(-0.5, 0.5), numbers.between(0.3, 0.6)];
+    (0..count).map(|_| TermState { moments: [0; 3].map(|_| moments()), padding: [0.0; 2] }).collect()
 }
 
 impl Case for ProjectParticles {

@@ -3,7 +3,7 @@
 //! long.
 
 use super::gaussians::{NEAR, gaussians};
-use super::particles::{TERMS, camera, state, terms};
+use super::particles::{TERMS, camera, state, term_states, terms};
 use super::*;
 use crate::list_oracle::pixels;
 use crate::step_oracle::{adam, depth, harmonics};
@@ -185,6 +185,9 @@ impl Case for StepHarmonics {
         ("gradients", |case| increase(case.gradients.iter_mut().flat_map(|gradient| &mut gradient.colour))),
         ("status", |case| case.status[0] ^= 1),
         ("terms", |case| increase(case.terms.iter_mut().flat_map(|term| &mut term.value))),
+        ("term_states", |case| {
+            increase(case.term_states.iter_mut().flat_map(|state| state.moments.as_flattened_mut()))
+        }),
         ("parameters", |case| case.block.rates[4] *= 1.5),
     ];
 
@@ -192,38 +195,52 @@ impl Case for StepHarmonics {
         let dispatch = |(degree, status): (u32, u32)| {
             let size = size.div_ceil(TERMS).max(24);
             let Stepped { block, gaussians, states, splats, gradients } = Stepped::new(seed, size, degree);
-            let terms = terms(&mut Numbers::new(seed + 9), size * TERMS);
-            let (status, next_terms) = (vec![status, 0, 0], Output::Zeros(terms.len()));
-            StepHarmonics { block, gaussians, states, splats, gradients, status, terms, next_terms }
+            let numbers = &mut Numbers::new(seed + 9);
+            let (terms, term_states) = (terms(numbers, size * TERMS), term_states(numbers, size * TERMS));
+            let (next_terms, next_term_states) = (Output::Zeros(terms.len()), Output::Zeros(terms.len()));
+            let status = vec![status, 0, 0];
+            StepHarmonics {
+                block,
+                gaussians,
+                states,
+                splats,
+                gradients,
+                status,
+                terms,
+                term_states,
+                next_terms,
+                next_term_states,
+            }
         };
         [(1, 0), (2, 0), (2, 1)].map(dispatch).to_vec()
     }
 
     fn expected(&self) -> Vec<Option<Bounded>> {
-        let StepHarmonics { block, gaussians, states, splats, gradients, status, terms, .. } = self;
-        let term = |at: usize| {
+        let StepHarmonics { block, gaussians, states, splats, gradients, status, terms, term_states, .. } = self;
+        let term = |at: usize| -> ([Option<Bounded>; 4], [Option<Bounded>; 8]) {
             let (index, number) = (at / TERMS as usize, at % TERMS as usize);
-            let term = &terms[at];
-            let same = bytemuck::cast::<HarmonicTerm, [f32; 12]>(*term).map(|number| Some(Bounded::from(number)));
+            let (term, state) = (&terms[at], &term_states[at]);
             let by = by_colour(block, &gradients[index], &splats[index]);
             let count = states[index].rest_count.max(REST_COUNTS[block.degree as usize]) as usize;
-            let Some(takes) = takes(block, &splats[index], status) else { return [None; 12] };
+            let Some(takes) = takes(block, &splats[index], status) else { return ([None; 4], [None; 8]) };
             if !takes || number >= count || by.iter().any(|by| !by.is_finite()) {
-                return same;
+                let same = |number: f32| Some(Bounded::from(number));
+                let (term, state): ([f32; 4], [f32; 8]) = (bytemuck::cast(*term), bytemuck::cast(*state));
+                return (term.map(same), state.map(same));
             }
             let basis = harmonics(&gaussians[index], &block.camera)[number];
             let rate = Bounded::from(0.2_f32) * block.rates[4].into();
             let step_count = states[index].step_count + 1;
             let [red, green, blue] = [0, 1, 2].map(|channel| {
                 let gradient = Bounded::from(by[channel]) * basis;
-                adam(term.value[channel], term.moments[channel], gradient, rate, step_count)
+                adam(term.value[channel], state.moments[channel], gradient, rate, step_count)
             });
             let zero = Bounded::ZERO;
-            let values = [red[0], green[0], blue[0], zero];
             let moments = [red[1], red[2], green[1], green[2], blue[1], blue[2], zero, zero];
-            std::array::from_fn(|number| values.iter().chain(&moments).nth(number).copied())
+            ([red[0], green[0], blue[0], zero].map(Some), moments.map(Some))
         };
-        map(terms.len(), 16, term).into_iter().flatten().collect()
+        let (terms, states): (Vec<_>, Vec<_>) = map(terms.len(), 16, term).into_iter().unzip();
+        terms.into_iter().flatten().chain(states.into_iter().flatten()).collect()
     }
 }
 

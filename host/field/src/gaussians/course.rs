@@ -263,10 +263,15 @@ impl Course {
         growth.filter(|_| self.recipe.grows)
     }
 
+    /// Whether the next iteration is the first one of a level.
+    pub(super) fn begins_level(&self) -> bool {
+        self.level != Some(self.level_of(self.iteration).0)
+    }
+
     /// Whether the next iteration begins with other Gaussians than the last one ended with, or at another level.
     pub(super) fn changes(&self) -> bool {
         let (level, share) = self.level_of(self.iteration);
-        self.level != Some(level) || self.growth(level, share).is_some()
+        self.begins_level() || self.growth(level, share).is_some()
     }
 
     /// Makes the Gaussians those of the next iteration, and says what it does. The gains' mean is 1 after it.

@@ -12,7 +12,7 @@ mod arrays;
 
 use super::course::{Course, Optimisation, Optimised, Plan};
 use crate::FieldError;
-use arrays::{Entries, Level, Particles, Stepped, list_block, stepped};
+use arrays::{Entries, Level, Needed, Particles, Stepped, list_block, stepped};
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::gaussian::REST_COUNTS;
 use viewfuse_device::{Device, DeviceError};
@@ -26,8 +26,9 @@ use viewfuse_scene::gaussians::GaussianScene;
 
 pub(super) use arrays::fits;
 
-/// Iterations after which the host sees whether the lists had room.
-const ROUND: usize = 32;
+/// Iterations after which the host sees whether the lists had room: with more of them it waits less often, and more are
+/// dispatched in vain where they had none.
+const ROUND: usize = 64;
 /// Entries that there is room for at first: so many for each Gaussian, and at least these.
 pub(super) const ENTRIES_A_GAUSSIAN: usize = 8;
 const MIN_ENTRIES: usize = 4096;
@@ -40,6 +41,8 @@ pub(super) struct Resident<'d, D: Device> {
     first_capacity: Option<usize>,
     level: Option<Level<D>>,
     particles: Option<Particles<D>>,
+    /// The most coefficients of a channel beyond degree 0 that a Gaussian has.
+    rest_count: u32,
     entries: Option<Entries<D>>,
     status: Option<Stepped<D::Buffer<u32>>>,
     /// Iterations that are dispatched, of which it is not yet known whether the lists had room.
@@ -49,7 +52,7 @@ pub(super) struct Resident<'d, D: Device> {
 impl<'d, D: Device> Resident<'d, D> {
     pub(super) fn new(device: &'d D, course: Course, first_capacity: Option<usize>) -> Resident<'d, D> {
         let (level, particles, entries, status, pending) = (None, None, None, None, Vec::new());
-        Resident { device, course, first_capacity, level, particles, entries, status, pending }
+        Resident { device, course, first_capacity, level, particles, rest_count: 0, entries, status, pending }
     }
 
     /// Takes what an iteration needs to the device, as far as it is not there.
@@ -65,6 +68,7 @@ impl<'d, D: Device> Resident<'d, D> {
             let there = course.particles.iter().map(|particle| particle.harmonics.count()).max().unwrap_or(0) as u32;
             let term_count = REST_COUNTS[degree as usize].max(there);
             self.particles = Some(Particles::new(device, course, term_count, level.bin_count)?);
+            self.rest_count = there;
             let usual = (course.particles.len() * ENTRIES_A_GAUSSIAN).max(MIN_ENTRIES);
             let least = self.first_capacity.unwrap_or(usual).min(device.most_elements::<SplatGradient>());
             if self.entries.as_ref().is_none_or(|entries| entries.capacity < least) {
@@ -84,7 +88,8 @@ impl<'d, D: Device> Resident<'d, D> {
         let is_antialiased = u32::from(self.course.recipe.is_antialiased);
         let (Some(level), Some(particles)) = (&mut self.level, &mut self.particles) else { return Ok(()) };
         let (Some(entries), Some(status)) = (&mut self.entries, &mut self.status) else { return Ok(()) };
-        let Particles { count: gaussian_count, term_count, gaussians, states, terms, gains, .. } = particles;
+        let Particles { count: gaussian_count, term_count, gaussians, states, terms, term_states, gains, .. } =
+            particles;
         let (gaussian_count, term_count) = (*gaussian_count, *term_count);
         let (splats, gradients, masks) = (&mut particles.splats, &mut particles.gradients, &mut particles.masks);
         let camera = CameraBlock { first_texel: 0, ..plan.step.camera };
@@ -120,9 +125,14 @@ impl<'d, D: Device> Resident<'d, D> {
         let (before, after) = (&gaussians.now, &mut gaussians.next);
         device.step_particles(&step, before, &states.now, splats, gradients, &status.now, after, &mut states.next)?;
         if step.degree > 0 && term_count > 0 {
-            let (now, next) = (&terms.now, &mut terms.next);
-            device.step_harmonics(&step, before, &states.now, splats, gradients, &status.now, now, next)?;
+            let (terms_now, states_now) = (&terms.now, &term_states.now);
+            let (terms_next, states_next) = (&mut terms.next, &mut term_states.next);
+            device.step_harmonics(
+                &step, before, &states.now, splats, gradients, &status.now, terms_now, states_now, terms_next,
+                states_next,
+            )?;
             terms.swap();
+            term_states.swap();
         }
         gaussians.swap();
         states.swap();
@@ -168,11 +178,12 @@ impl<'d, D: Device> Resident<'d, D> {
         Ok(changes)
     }
 
-    /// The Gaussians and gains to the host. They stay on the device, too.
-    fn bring(&mut self) -> Result<(), DeviceError> {
+    /// What the host needs of the Gaussians, and the gains. They stay on the device, too.
+    fn bring(&mut self, needed: Needed) -> Result<(), DeviceError> {
         // They come with the status, and a second time where that says that they are not there yet.
         let device = self.device;
-        let later = |particles: &Option<Particles<D>>| particles.as_ref().map(|now| now.later(device)).transpose();
+        let later =
+            |particles: &Option<Particles<D>>| particles.as_ref().map(|now| now.later(device, needed)).transpose();
         let mut coming = later(&self.particles)?;
         if self.settle()? {
             coming = later(&self.particles)?;
@@ -185,11 +196,13 @@ impl<'d, D: Device> Resident<'d, D> {
 
     fn iterate(&mut self) -> Result<(), DeviceError> {
         if self.course.changes() {
-            self.bring()?;
+            // What grows goes on with its states; a level begins without any.
+            self.bring(if self.course.begins_level() { Needed::Blocks } else { Needed::All })?;
             self.particles = None;
         }
         let plan = self.course.plan();
         self.load(&plan)?;
+        self.rest_count = self.rest_count.max(REST_COUNTS[plan.step.degree as usize]);
         self.pending.push(plan);
         self.dispatch(&plan)?;
         if self.pending.len() >= ROUND {
@@ -247,7 +260,7 @@ impl<D: Device> Optimisation for Resident<'_, D> {
     }
 
     fn optimised(&mut self) -> Result<Optimised, FieldError> {
-        self.bring()?;
+        self.bring(Needed::Scene(self.rest_count))?;
         Ok(self.course.optimised())
     }
 }

@@ -11,7 +11,7 @@ use viewfuse_core::gaussian::REST_COUNTS;
 use viewfuse_device::{Device, DeviceError, Element, Later};
 use viewfuse_kernels::gaussians::blend_gradient::SplatGradient;
 use viewfuse_kernels::rows::{
-    GainBlock, GaussianBlock, HarmonicTerm, ListBlock, ParticleState, ProjectedGaussian, SHARE_RUN, TILE_RUN,
+    GainBlock, GaussianBlock, HarmonicTerm, ListBlock, ParticleState, ProjectedGaussian, SHARE_RUN, TILE_RUN, TermState,
 };
 
 /// Gaussians must be fewer: their number has 24 bits.
@@ -26,7 +26,7 @@ pub(in crate::gaussians) fn fits<D: Device>(device: &D, course: &Course) -> bool
     let cameras = course.levels.iter().flatten().map(|view| &view.camera);
     count < MAX_GAUSSIANS.min(device.most_elements::<ParticleState>())
         && cameras.into_iter().all(|camera| can_be_listed(device, camera, count))
-        && terms <= device.most_elements::<HarmonicTerm>()
+        && terms <= device.most_elements::<TermState>()
         && most_pixels <= device.most_elements::<[f32; 4]>()
         && count * ENTRIES_A_GAUSSIAN <= device.most_elements::<SplatGradient>()
 }
@@ -37,6 +37,17 @@ fn pixel_count(view: &LevelView) -> usize {
 
 /// Gaussians and gains on the host.
 pub(super) type Brought = (Vec<Particle>, Vec<GainBlock>);
+
+/// What the host needs of the Gaussians.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Needed {
+    /// What lower levels have: colours of degree 0.
+    Blocks,
+    /// What pictures and files have: so many coefficients of a channel, too.
+    Scene(u32),
+    /// The state of the optimisation, too.
+    All,
+}
 
 /// An array before and after a step.
 pub(super) struct Stepped<B> {
@@ -51,10 +62,15 @@ impl<B> Stepped<B> {
     }
 }
 
-/// An array of these values, and another of as many. No device has empty ones.
-pub(super) fn stepped<D: Device, T: Element>(device: &D, values: &[T]) -> Result<Stepped<D::Buffer<T>>, DeviceError> {
-    let now = if values.is_empty() { device.zeros(1)? } else { device.upload(values)? };
-    Ok(Stepped { now, next: device.zeros(values.len().max(1))? })
+/// An array of these values, and another of as many. No device has empty ones; default values, with which states begin,
+/// are not uploaded.
+pub(super) fn stepped<D: Device, T: Element + PartialEq>(
+    device: &D,
+    values: &[T],
+) -> Result<Stepped<D::Buffer<T>>, DeviceError> {
+    let zeros = || device.zeros(values.len().max(1));
+    let is_begun = values.iter().any(|value| *value != T::default());
+    Ok(Stepped { now: if is_begun { device.upload(values)? } else { zeros()? }, next: zeros()? })
 }
 
 /// The photographs of a level, and arrays for a picture of the largest of them.
@@ -152,6 +168,7 @@ pub(super) struct Particles<D: Device> {
     pub(super) gaussians: Stepped<D::Buffer<GaussianBlock>>,
     pub(super) states: Stepped<D::Buffer<ParticleState>>,
     pub(super) terms: Stepped<D::Buffer<HarmonicTerm>>,
+    pub(super) term_states: Stepped<D::Buffer<TermState>>,
     pub(super) gains: Stepped<D::Buffer<GainBlock>>,
     pub(super) splats: D::Buffer<ProjectedGaussian>,
     pub(super) gradients: D::Buffer<GaussianBlock>,
@@ -168,10 +185,10 @@ impl<D: Device> Particles<D> {
         let all = &course.particles;
         let gaussians: Vec<GaussianBlock> = all.iter().map(|particle| particle.gaussian).collect();
         let states: Vec<ParticleState> = all.iter().map(|particle| particle.state).collect();
-        let term =
-            |particle: &Particle, index: u32| particle.harmonics.0.get(index as usize).copied().unwrap_or_default();
         let terms: Vec<HarmonicTerm> =
-            all.iter().flat_map(|particle| (0..term_count).map(move |index| term(particle, index))).collect();
+            all.iter().flat_map(|particle| first_of(&particle.harmonics.terms, term_count)).collect();
+        let term_states: Vec<TermState> =
+            all.iter().flat_map(|particle| first_of(&particle.harmonics.states, term_count)).collect();
         let count = all.len() as u32;
         let mask_count = list_block(&CameraBlock::default(), count, 0).mask_count();
         Ok(Particles {
@@ -180,6 +197,7 @@ impl<D: Device> Particles<D> {
             gaussians: stepped(device, &gaussians)?,
             states: stepped(device, &states)?,
             terms: stepped(device, &terms)?,
+            term_states: stepped(device, &term_states)?,
             gains: stepped(device, &course.gains)?,
             splats: device.zeros(all.len().max(1))?,
             gradients: device.zeros(all.len().max(1))?,
@@ -187,26 +205,58 @@ impl<D: Device> Particles<D> {
         })
     }
 
-    /// As they are now, with the gains, to be waited for later.
+    /// What the host needs of them as they are now, with the gains, to be waited for later. What it does not need is as
+    /// at the beginning of an optimisation.
     pub(super) fn later<'d>(
         &self,
         device: &'d D,
+        needed: Needed,
     ) -> Result<impl FnOnce() -> Result<Brought, DeviceError> + use<'d, D>, DeviceError> {
-        let (term_count, count) = (self.term_count, self.count as usize);
-        let (gaussians, states) =
-            (device.download_later(&self.gaussians.now)?, device.download_later(&self.states.now)?);
-        let terms = if term_count > 0 { Some(device.download_later(&self.terms.now)?) } else { None };
+        let (term_count, count) = (self.term_count as usize, self.count as usize);
+        let gaussians = device.download_later(&self.gaussians.now)?;
+        let has_terms = term_count > 0 && !matches!(needed, Needed::Blocks | Needed::Scene(0));
+        let terms = later_if(device, &self.terms.now, has_terms)?;
+        let states = later_if(device, &self.states.now, needed == Needed::All)?;
+        let term_states = later_if(device, &self.term_states.now, term_count > 0 && needed == Needed::All)?;
         let gains = device.download_later(&self.gains.now)?;
         Ok(move || {
-            let (gaussians, states) = (gaussians.get()?, states.get()?);
-            let terms = terms.map_or_else(|| Ok(Vec::new()), Later::get)?;
-            let particle = |(index, (gaussian, state)): (usize, (GaussianBlock, ParticleState))| {
-                let first = index * term_count as usize;
-                let count = state.rest_count.min(term_count) as usize;
-                Particle { gaussian, harmonics: Harmonics(terms[first..first + count].to_vec()), state }
+            let (gaussians, terms) = (gaussians.get()?, arrived(terms)?);
+            let (states, term_states) = (arrived(states)?, arrived(term_states)?);
+            let particle = |(index, gaussian): (usize, GaussianBlock)| {
+                let state = states.get(index).copied().unwrap_or_default();
+                let there = match needed {
+                    Needed::Blocks => 0,
+                    Needed::Scene(there) => there as usize,
+                    Needed::All => state.rest_count as usize,
+                };
+                let first = if has_terms { index * term_count } else { 0 };
+                let those = first..first + there.min(term_count);
+                let mut harmonics = Harmonics::begun(terms[those.clone()].to_vec());
+                if needed == Needed::All {
+                    harmonics.states.copy_from_slice(&term_states[those]);
+                }
+                Particle { gaussian, harmonics, state }
             };
-            let all = gaussians.into_iter().zip(states).take(count);
-            Ok((all.enumerate().map(particle).collect(), gains.get()?))
+            Ok((gaussians.into_iter().take(count).enumerate().map(particle).collect(), gains.get()?))
         })
     }
+}
+
+/// So many elements, the last of them defaults if there are fewer.
+fn first_of<T: Element>(elements: &[T], count: u32) -> impl Iterator<Item = T> {
+    (0..count as usize).map(|index| elements.get(index).copied().unwrap_or_default())
+}
+
+/// An array to be waited for later, where it is needed.
+fn later_if<'d, D: Device, T: Element>(
+    device: &'d D,
+    buffer: &D::Buffer<T>,
+    is_needed: bool,
+) -> Result<Option<Later<'d, T>>, DeviceError> {
+    is_needed.then(|| device.download_later(buffer)).transpose()
+}
+
+/// What was needed; nothing where it was not.
+fn arrived<T>(later: Option<Later<'_, T>>) -> Result<Vec<T>, DeviceError> {
+    later.map_or_else(|| Ok(Vec::new()), Later::get)
 }
