@@ -191,12 +191,17 @@ impl<'a> SceneOptimisation<'a> {
         recipe.is_antialiased |= self.before.as_ref().is_some_and(|before| before.scene.is_antialiased);
         if is_sharp && self.before.is_none() {
             progress.stage("trying recipes on sources left out", trial, 30);
-            recipe = self.tried(device, &album, recipe, progress)?;
+            recipe = self.tried(device, &album, recipe, &clock, progress)?;
         }
         let photographed = &Photographed::new(device, &album, &stage.images);
         let mut optimisation = self.begin(device, &stage.images, &points, recipe)?;
         if let Some(before) = &self.before {
-            before.notes.iter().for_each(|note| progress.warn(note));
+            // What is said of given Gaussians: their notes, and whether they show what the photographs show.
+            self.given(&before.scene, &before.notes, photographed, progress, |_| Ok(()))?;
+            if !self.held_out.is_empty() {
+                progress
+                    .note("views left out may have been sources of the Gaussians to go on from: that raises scores");
+            }
             if before.scene.degree > recipe.degree {
                 progress.warn(
                     "the colours to go on from depend on the direction; this quality or file has one for all \
@@ -282,6 +287,9 @@ impl<'a> SceneOptimisation<'a> {
                 ));
                 scores.push((done, psnr));
             }
+            if let Some(clock) = &mut clock {
+                clock.go_on(optimisation);
+            }
         }
         Ok(())
     }
@@ -303,26 +311,40 @@ impl<'a> SceneOptimisation<'a> {
     fn score(
         &self,
         gaussians: &GaussianScene,
-        Photographed { device, album, images, truths }: &Photographed<'_>,
+        photographed: &Photographed<'_>,
         views: &[usize],
     ) -> Result<f64, RenderError> {
-        let given = AnyField::new(GivenGaussians { scene: gaussians.clone(), notes: Vec::new() });
+        self.given(gaussians, &[], photographed, &Silent, |stage| {
+            let (mut truths, mut sum) = (photographed.truths.borrow_mut(), 0.0);
+            for view in views {
+                let target = Target { truth: None, ..target_of(self.scene, *view) };
+                let picture = stage.frame(&self.weighting, &target, &Silent)?.picture;
+                let truth = match truths.entry(*view) {
+                    Entry::Occupied(known) => known.into_mut(),
+                    Entry::Vacant(place) => {
+                        let size = picture.dimensions().into();
+                        place.insert(photographed.album.truth(*view, size, stage.background())?)
+                    }
+                };
+                sum += psnr_of_seen(&picture, &truth.picture, truth.seen.as_ref());
+            }
+            Ok(sum / views.len() as f64)
+        })
+    }
+
+    /// What pictures of these Gaussians are for.
+    fn given<T>(
+        &self,
+        gaussians: &GaussianScene,
+        notes: &[String],
+        Photographed { device, album, images, .. }: &Photographed<'_>,
+        progress: &dyn Progress,
+        work: impl FnOnce(&mut Stage<'_>) -> Result<T, RenderError>,
+    ) -> Result<T, RenderError> {
+        let given = AnyField::new(GivenGaussians { scene: gaussians.clone(), notes: notes.to_vec() });
         let (renderer, images) = (given.on(device), images.clone());
         let (scene, sources, options) = (self.scene, &self.sources, &self.options);
-        let mut stage = Stage::of_images(scene, album, sources, images, renderer.as_ref(), options, &Silent)?;
-        let (mut truths, mut sum) = (truths.borrow_mut(), 0.0);
-        for view in views {
-            let target = Target { truth: None, ..target_of(scene, *view) };
-            let picture = stage.frame(&self.weighting, &target, &Silent)?.picture;
-            let truth = match truths.entry(*view) {
-                Entry::Occupied(known) => known.into_mut(),
-                Entry::Vacant(place) => {
-                    place.insert(album.truth(*view, picture.dimensions().into(), stage.background())?)
-                }
-            };
-            sum += psnr_of_seen(&picture, &truth.picture, truth.seen.as_ref());
-        }
-        Ok(sum / views.len() as f64)
+        work(&mut Stage::of_images(scene, album, sources, images, renderer.as_ref(), options, progress)?)
     }
 }
 

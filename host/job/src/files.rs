@@ -124,8 +124,8 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     file.finish()
 }
 
-/// Checks, before long work, that `path` can be written: it is not a folder, no part of it is a link to nothing or has
-/// a name that the system does not take, and files can be created in the nearest existing folder above it. No file
+/// Checks, before long work, that `path` can be written: it is no folder, pipe or device, no part of it is a link to nothing or
+/// has a name that the system does not take, and files can be created in the nearest existing folder above it. No file
 /// remains.
 ///
 /// # Errors
@@ -138,6 +138,9 @@ pub fn check_writable(path: &Path) -> Result<(), WriteError> {
     }
     if path.is_dir() {
         return Err(failed(std::io::Error::other("it is a folder")));
+    }
+    if path.exists() && !path.is_file() {
+        return Err(failed(std::io::Error::other("it is no ordinary file, and is left alone")));
     }
     let above = || path.ancestors().skip(1).map(|folder| if folder == "" { Path::new(".") } else { folder });
     let Some(nearest) = above().find(|folder| folder.exists()) else { return Ok(()) };

@@ -156,6 +156,13 @@ impl<'a> PlyHeader<'a> {
         }
         Err(fault(PlyFault::NoSuchElement(name)))
     }
+
+    /// Bytes behind the rows of all elements; none where an element has lists.
+    pub(crate) fn surplus(&self, bytes: &[u8]) -> u64 {
+        let sizes = self.elements.iter().map(|element| Some(element.count.saturating_mul(element.row_size? as u64)));
+        let all: Option<u64> = sizes.sum();
+        all.map_or(0, |all| ((bytes.len() - self.length) as u64).saturating_sub(all))
+    }
 }
 
 /// The header of a file with one element, to be followed by its rows: `properties` are types and names. Comments stand

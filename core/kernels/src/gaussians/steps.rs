@@ -82,6 +82,9 @@ pub struct ParticleBlock {
 
 const _: () = assert!(size_of::<ParticleBlock>() == 96);
 
+/// The bit of [`StepBlock::counts`] that limits colours.
+const LIMITED: u32 = 1 << 28;
+
 /// What an iteration does to Gaussians, as plain data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -98,7 +101,8 @@ pub struct StepBlock {
     pub depth: f32,
     /// Degree of the spherical harmonics so far, at most 3.
     pub degree: u32,
-    /// Number of Gaussians in the lower 24 bits; above them the terms of a Gaussian in the array of all.
+    /// Number of Gaussians in the lower 24 bits; above them the terms of a Gaussian in the array of all, in four bits,
+    /// and one that is 1 where colours stay between 0 and 1.
     pub counts: u32,
 }
 
@@ -127,7 +131,18 @@ const _: () = assert!(size_of::<GainStepBlock>() == 32);
 impl StepBlock {
     /// The two numbers of `counts`: fewer than 2^24 Gaussians, at most 15 terms.
     pub fn with_counts(self, gaussian_count: u32, term_count: u32) -> StepBlock {
-        StepBlock { counts: gaussian_count | term_count << 24, ..self }
+        StepBlock { counts: self.counts & LIMITED | gaussian_count | term_count << 24, ..self }
+    }
+
+    /// Whether colours stay between 0 and 1.
+    pub fn with_limited_colours(self, are_limited: bool) -> StepBlock {
+        StepBlock { counts: self.counts & !LIMITED | if are_limited { LIMITED } else { 0 }, ..self }
+    }
+
+    /// Whether colours stay between 0 and 1.
+    #[inline(always)]
+    pub fn has_limited_colours(&self) -> bool {
+        self.counts & LIMITED != 0
     }
 
     /// Number of Gaussians.
@@ -139,7 +154,7 @@ impl StepBlock {
     /// Terms of a Gaussian in the array of all.
     #[inline(always)]
     pub fn term_count(&self) -> u32 {
-        self.counts >> 24
+        self.counts >> 24 & 15
     }
 }
 
@@ -273,6 +288,9 @@ pub fn step_particle(
     let (colour, [m11, m12, m13]) = three(11, gaussian.colour, by_colour, colour);
     after.moments = [m0, m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11, m12, m13];
     (next.position, next.rotation, next.colour) = (position, [w, i, j, k], colour);
+    if block.has_limited_colours() {
+        next.colour = [clamp(colour[0], 0.0, 1.0), clamp(colour[1], 0.0, 1.0), clamp(colour[2], 0.0, 1.0)];
+    }
     let [x, y, z] = next.position;
     let depth = block.camera.pose.rotate_to_camera(Vec3::new(x, y, z) - block.camera.centre_world()).z;
     let most = ln(MAX_SCALE * block.footprint * max(depth / block.depth, 1.0));

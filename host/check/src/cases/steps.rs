@@ -82,13 +82,14 @@ impl Case for StepParticles {
     ];
 
     fn inputs(seed: u64, size: u32) -> Vec<StepParticles> {
-        let dispatch = |(degree, status): (u32, u32)| {
+        let dispatch = |(degree, status, has_limited_colours): (u32, u32, bool)| {
             let Stepped { block, gaussians, states, splats, gradients } = Stepped::new(seed, size.max(24), degree);
+            let block = block.with_limited_colours(has_limited_colours);
             let (next_gaussians, next_states) = (Output::Zeros(gaussians.len()), Output::Zeros(gaussians.len()));
             let status = vec![status, 3, 0];
             StepParticles { block, gaussians, states, splats, gradients, status, next_gaussians, next_states }
         };
-        [(0, 0), (2, 0), (1, 1)].map(dispatch).to_vec()
+        [(0, 0, false), (2, 0, false), (1, 1, false), (0, 0, true)].map(dispatch).to_vec()
     }
 
     fn expected(&self) -> Vec<Option<Bounded>> {
@@ -160,6 +161,7 @@ impl StepParticles {
         let least = scales[0].greater(scales[1]).greater(scales[2]) - Bounded::from(2.3_f32);
         let scales = scales.map(|scale| scale.greater(least));
         let opacity = opacity[0].clamped(-6.0, 6.0);
+        let colour = if block.has_limited_colours() { colour.map(|value| value.clamped(0.0, 1.0)) } else { colour };
         let square = gradient.position.iter().fold(Bounded::ZERO, |sum, part| sum + Bounded::from(*part).squared());
         let moved = square.square_root() * depth / block.camera.intrinsics[0].into();
         let rest_count = state.rest_count.max(REST_COUNTS[block.degree as usize]);

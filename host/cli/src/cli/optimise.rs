@@ -17,7 +17,7 @@ use viewfuse_device::choice::{AnyDevice, Chosen};
 use viewfuse_field::AnyField;
 use viewfuse_field::gaussians::{MAX_COUNT, MAX_ITERATIONS, Quality, Recipe, RecipeOptions};
 use viewfuse_field::optimise::{EndedOptimisation, SceneOptimisation, TOWARDS};
-use viewfuse_job::files::check_writable;
+use viewfuse_job::files::{check_writable, remove_if_there};
 use viewfuse_output::gaussian_page::{check_name, holds_harmonics, is_page, write_optimised};
 use viewfuse_scene::gaussians::{GaussianFile, GaussianScene};
 use viewfuse_weighting::{WeightingSpec, grammar};
@@ -34,7 +34,8 @@ const SHARP_SOURCES: usize = 20;
     a server: to share\n  viewfuse render photos/ --gaussians photos.ply --orbit 24 -o out\n\n\
     Begins with the surfaces that the training-free field finds, and takes some ten seconds; --quality standard takes \
     minutes, and is sharper from some twenty photographs on. Ctrl-C writes what there is so far, and a .ply is written \
-    on the way: --resume goes on from it with the iterations of the finest size. The file has the layout of \"3D \
+    on the way: --resume goes on from it with the iterations of the finest size. Where photos.ply is there already, \
+    both write photos.unfinished.ply until all is done. The file has the layout of \"3D \
     Gaussian Splatting\", which other viewers read, in the coordinates of the scene's files; a .spz has less than a \
     tenth of its bytes, a .splat an eighth.")]
 pub(crate) struct Arguments {
@@ -114,6 +115,12 @@ fn quality_for(output: &Path, source_count: usize) -> Quality {
     if is_page(output) && source_count >= SHARP_SOURCES { Quality::Standard } else { Quality::Fast }
 }
 
+/// The file for what is not finished: `photos.unfinished.ply` beside `photos.ply`.
+fn beside(output: &Path) -> PathBuf {
+    let extension = output.extension().unwrap_or_default().to_string_lossy();
+    output.with_extension(format!("unfinished.{extension}"))
+}
+
 /// A file of a format that is written.
 fn known_file(path: PathBuf) -> Result<PathBuf, &'static str> {
     check_name(&path).map(|()| path)
@@ -136,6 +143,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     if max_time.is_some() && quality == Quality::Fast {
         return Err(wrong("--max-time is for --quality standard and high: fast has a few hundred iterations"));
     }
+    if let (Some(GaussianFile { scene, .. }), Some(count)) = (&before, count)
+        && scene.gaussians.len() > count as usize
+    {
+        let there = scene.gaussians.len();
+        return Err(wrong(&format!(
+            "--count {count}: the file to go on from has {there} Gaussians, and none are removed"
+        )));
+    }
     let is_antialiased = arguments.antialias || before.as_ref().is_some_and(|before| before.scene.is_antialiased);
     let is_of_one_colour = !holds_harmonics(output);
     if is_antialiased && is_of_one_colour {
@@ -145,15 +160,27 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let optimisation = SceneOptimisation { options, weighting, recipe, max_time, before, ..of_scene };
     let Chosen { device, reason } = arguments.device.open()?;
     let progress = Terminal::new("optimising");
-    // For --resume, if the program is killed.
+    // For --resume, if the program is killed. A file that is there stays as it is until there is a finished one.
     let is_resumable = output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ply"));
-    let keep = |so_far: &GaussianScene| if is_resumable { so_far.write(output, &scene.frame) } else { Ok(()) };
+    let unfinished = if output.exists() { beside(output) } else { output.clone() };
+    let mut is_kept = false;
+    let keep = |so_far: &GaussianScene| {
+        is_kept |= is_resumable;
+        if is_resumable { so_far.write(&unfinished, &scene.frame) } else { Ok(()) }
+    };
     let ended = on_threads(arguments.picture.threads, || optimisation.run(&device, &progress, keep))??;
     drop(progress);
-    write_optimised(output, &scene, &optimisation.sources, &ended)?;
     let EndedOptimisation { gaussians, done, of, fit, .. } = &ended;
+    let written = if done < of { &unfinished } else { output };
+    write_optimised(written, &scene, &optimisation.sources, &ended)?;
+    if written != &unfinished && is_kept {
+        remove_if_there(&unfinished)?;
+    }
     let count = gaussians.gaussians.len();
-    say(format_args!("{}: {count} Gaussians after {done} of {of} iterations", output.display()))?;
+    say(format_args!("{}: {count} Gaussians after {done} of {of} iterations", written.display()))?;
+    if written != output {
+        say(format_args!("{}: as it was before", output.display()))?;
+    }
     if let Some((psnr, count)) = fit {
         say(format_args!(
             "fit: PSNR {psnr:.2} dB on {count} of the sources themselves, which says nothing of new views: --left-out \

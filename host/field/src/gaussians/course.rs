@@ -71,6 +71,9 @@ pub trait Optimisation {
     /// How many iterations are done at the finest level.
     fn done_at_finest(&self) -> u32;
 
+    /// How many times as many Gaussians there will be at the end.
+    fn growth(&self) -> f64;
+
     /// How many iterations are done.
     fn done(&self) -> u32;
 
@@ -214,6 +217,11 @@ impl Course {
         self.iteration.saturating_sub(self.iteration_count() - finest)
     }
 
+    pub(super) fn growth_to_come(&self) -> f64 {
+        let most = if self.recipe.grows { self.recipe.max_count } else { 0 };
+        (most as f64 / self.particles.len().max(1) as f64).max(1.0)
+    }
+
     pub(super) fn iteration_count(&self) -> u32 {
         self.recipe.iterations.iter().sum()
     }
@@ -313,6 +321,7 @@ impl Course {
             degree: degree.min(3),
             counts: 0,
         };
+        let step = step.with_limited_colours(recipe.has_limited_colours);
         let loss = LossBlock {
             width,
             height,

@@ -68,7 +68,8 @@ pub struct RecipeOptions {
     pub iterations: Option<u32>,
     /// Most Gaussians, whatever the sources' size.
     pub count: Option<u32>,
-    /// Whether colours are the same from everywhere, as some files have them: sources have gains then.
+    /// Whether colours are the same from everywhere and between 0 and 1, as some files have them: sources have gains
+    /// then.
     pub is_of_one_colour: bool,
     /// Whether splats keep their integral when they are dilated: for pictures of other sizes than the sources'.
     pub is_antialiased: bool,
@@ -84,7 +85,7 @@ impl RecipeOptions {
         if !self.is_of_one_colour {
             return recipe;
         }
-        Recipe { degree: 0, rates: Recipe::default().rates, ..recipe }
+        Recipe { degree: 0, rates: Recipe::default().rates, has_limited_colours: true, ..recipe }
     }
 }
 

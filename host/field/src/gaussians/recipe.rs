@@ -57,6 +57,8 @@ pub struct Recipe {
     pub degree: u32,
     /// Whether the number of Gaussians rises to the most at the finest level.
     pub grows: bool,
+    /// Whether colours stay between 0 and 1, for files that have a byte for each.
+    pub has_limited_colours: bool,
     /// Whether splats keep their integral when they are dilated (`viewfuse_core::gaussian::project_as`).
     pub is_antialiased: bool,
     /// Seed of what is drawn at random.
@@ -86,6 +88,7 @@ impl Default for Recipe {
             residual_share: 1.0,
             degree: 0,
             grows: false,
+            has_limited_colours: false,
             is_antialiased: false,
             seed: 0,
         }

@@ -235,6 +235,10 @@ impl<D: Device> Optimisation for Resident<'_, D> {
         self.course.done_at_finest()
     }
 
+    fn growth(&self) -> f64 {
+        self.course.growth_to_come()
+    }
+
     fn done(&self) -> u32 {
         self.course.iteration
     }

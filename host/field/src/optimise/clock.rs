@@ -1,4 +1,4 @@
-//! How long an optimisation takes: said once a few iterations of the finest level are measured, and how many fit into a
+//! How long an optimisation takes: said once a few iterations of the finest level are measured; and how many fit into a
 //! time.
 
 use crate::FieldError;
@@ -8,25 +8,36 @@ use viewfuse_job::progress::Progress;
 
 /// Iterations of the finest level that are measured.
 const MEASURED: u32 = 20;
-/// How much longer than these the mean iteration takes, because the number of Gaussians grows: measured on fox, where
-/// it is four times as many at last (`host/results/gaussian_quality.md`).
-const GROWN: f64 = 1.9;
-/// Fewest iterations of the finest level that a limit leaves.
-const MIN_ITERATIONS: u32 = 100;
+/// How much longer an iteration takes with twice the Gaussians, less 1: the rest of it is a matter of the pixels. On fox,
+/// where the number grows four times, the mean iteration takes 1.9 times the first ones
+/// (`host/results/gaussian_quality.md`).
+const OF_GAUSSIANS: f64 = 0.44;
+/// Share of a limit after which a trial ends.
+const TRIAL: f64 = 0.4;
 
 /// The time of an optimisation.
 pub(super) struct Clock {
     begun: Instant,
     limit: Option<Duration>,
-    /// When the finest level began, and after how many of its iterations.
-    finest: Option<(Instant, u32)>,
+    /// When it was measured last at the finest level, and after how many of its iterations.
+    measured: Option<(Instant, u32)>,
     is_told: bool,
 }
 
 impl Clock {
     /// Starts, with a limit or without.
     pub(super) fn start(limit: Option<Duration>) -> Clock {
-        Clock { begun: Instant::now(), limit, finest: None, is_told: false }
+        Clock { begun: Instant::now(), limit, measured: None, is_told: false }
+    }
+
+    /// When a trial must end, if there is a limit.
+    pub(super) fn end_of_trial(&self) -> Option<Instant> {
+        self.limit.map(|limit| self.begun + limit.mul_f64(TRIAL))
+    }
+
+    /// The time that is left, if there is a limit.
+    pub(super) fn left(&self) -> Option<Duration> {
+        self.limit.map(|limit| limit.saturating_sub(self.begun.elapsed()))
     }
 
     /// To be called after each iteration: once, when the first ones of the finest level are measured, it sets how many
@@ -43,9 +54,9 @@ impl Clock {
         if self.is_told || done == 0 {
             return Ok(false);
         }
-        let Some((begun, first)) = self.finest else {
+        let Some((begun, first)) = self.measured else {
             optimisation.finish()?;
-            self.finest = Some((Instant::now(), done));
+            self.measured = Some((Instant::now(), done));
             return Ok(false);
         };
         if done < first + MEASURED {
@@ -53,17 +64,38 @@ impl Clock {
         }
         optimisation.finish()?;
         self.is_told = true;
-        let one = GROWN * begun.elapsed().as_secs_f64() / f64::from(done - first);
-        if let Some(limit) = self.limit {
-            let left = limit.saturating_sub(self.begun.elapsed()).as_secs_f64();
-            let fitting = done + (left / one.max(1.0e-9)) as u32;
-            let whole = done + optimisation.iteration_count() - optimisation.done();
-            optimisation.set_finest(fitting.clamp(MIN_ITERATIONS, whole.max(MIN_ITERATIONS)));
-        }
+        let one = mean_cost(optimisation.growth()) * begun.elapsed().as_secs_f64() / f64::from(done - first);
+        self.measured = Some((Instant::now(), done));
+        self.fit(optimisation, one);
         let left = optimisation.iteration_count() - optimisation.done();
         progress.note(&format!("{left} iterations more, about {}", words(f64::from(left) * one)));
         Ok(true)
     }
+
+    /// To be called on the way, after what is done beside the iterations: with a limit, as many of them are left as fit
+    /// at the pace since the last time; none once it is over.
+    pub(super) fn go_on(&mut self, optimisation: &mut dyn Optimisation) {
+        let done = optimisation.done_at_finest();
+        let Some((begun, first)) = self.measured.filter(|(_, first)| self.is_told && done > *first) else { return };
+        let one = begun.elapsed().as_secs_f64() / f64::from(done - first);
+        self.measured = Some((Instant::now(), done));
+        self.fit(optimisation, one);
+    }
+
+    /// With a limit, leaves as many iterations as fit, of so many seconds each, and no more than there are.
+    fn fit(&self, optimisation: &mut dyn Optimisation, one: f64) {
+        let Some(left) = self.left() else { return };
+        let done = optimisation.done_at_finest();
+        let most = optimisation.iteration_count() - optimisation.done();
+        optimisation.set_finest(done + most.min((left.as_secs_f64() / one.max(1.0e-9)) as u32));
+    }
+}
+
+/// What the mean iteration costs, relative to one now, if the number of Gaussians grows so many times: by equal factors
+/// in three fifths of the iterations.
+fn mean_cost(growth: f64) -> f64 {
+    let mean = if growth > 1.0 + 1.0e-6 { 0.6 * (growth - 1.0) / growth.ln() + 0.4 * growth } else { 1.0 };
+    1.0 + OF_GAUSSIANS * (mean - 1.0)
 }
 
 /// A time in words.
@@ -71,5 +103,17 @@ fn words(seconds: f64) -> String {
     match seconds {
         0.0..90.0 => format!("{seconds:.0} s"),
         _ => format!("{:.0} minutes", seconds / 60.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn growth_makes_iterations_dearer() {
+        assert_eq!(mean_cost(1.0), 1.0);
+        assert!((mean_cost(4.25) - 1.9).abs() < 0.01, "fox: {}", mean_cost(4.25));
+        assert!(mean_cost(20.0) > mean_cost(4.25));
     }
 }

@@ -1,13 +1,15 @@
 //! Which recipe, and how many iterations: those that held-out sources prefer, tried at a small size.
 
+use super::clock::Clock;
 use super::{OptimiseError, Photographed, SceneOptimisation};
 use crate::AnyField;
 use crate::gaussians::{Quality, Recipe, RecipeOptions};
 use crate::point_cloud::point_cloud;
 use crate::render::Stage;
+use std::time::Instant;
 use viewfuse_device::choice::AnyDevice;
 use viewfuse_job::progress::{Progress, Silent};
-use viewfuse_scene::photographs::Album;
+use viewfuse_scene::photographs::{Album, longest_side};
 
 /// Longest side of the sources in a trial, in pixels: that of the fast recipe.
 const SIDE: u32 = 280;
@@ -40,12 +42,14 @@ fn small(recipe: Recipe) -> Recipe {
 
 impl SceneOptimisation<'_> {
     /// The recipe, or the fast one where held-out sources prefer it; with fewer iterations where they are better after
-    /// fewer.
+    /// fewer. Where the time is limited a trial ends after a share of it, and the fast one is taken, too, if what is
+    /// left is less than the recipe took in the trial to become better.
     pub(super) fn tried(
         &self,
         device: &AnyDevice,
         album: &Album<'_>,
         recipe: Recipe,
+        clock: &Clock,
         progress: &dyn Progress,
     ) -> Result<Recipe, OptimiseError> {
         let (quality, count) = (self.recipe.quality, self.sources.len());
@@ -68,11 +72,13 @@ impl SceneOptimisation<'_> {
         progress.expect(recipes.iter().map(|recipe| recipe.iterations.iter().sum::<u32>() as usize).sum());
         let trial = SceneOptimisation { sources, held_out, before: None, towards: Vec::new(), ..self.clone() };
         let photographed = &Photographed::new(device, album, &stage.images);
-        let mut curves = Vec::new();
+        let until = clock.end_of_trial();
+        let (mut curves, mut begun) = (Vec::new(), Instant::now());
         for recipe in recipes {
+            begun = Instant::now();
             let mut optimisation = trial.begin(device, &stage.images, &points, recipe)?;
             let mut scores = Vec::new();
-            let counted = Counted(progress);
+            let counted = Counted { progress, until };
             trial.advance(optimisation.as_mut(), photographed, &counted, None, &mut |_| Ok(()), &mut scores)?;
             progress.check().map_err(|error| OptimiseError::Render(crate::FieldError::from(error).into()))?;
             curves.push(scores);
@@ -80,8 +86,22 @@ impl SceneOptimisation<'_> {
         // The fast recipe ends where it ends.
         let fast_score = curves[0].last().map_or(f64::NEG_INFINITY, |score| score.1);
         let (end, score) = last_good(&curves[1]);
+        if score == f64::NEG_INFINITY {
+            progress.note(&format!("the time is too short for a trial of {quality}: fast is used"));
+            return Ok(fast);
+        }
+        let is_over = until.is_some_and(|until| until <= Instant::now());
+        let ahead = curves[1].iter().find(|(_, score)| *score > fast_score).map_or(0, |(iteration, _)| *iteration);
+        let tried = curves[1].last().map_or(1, |(iteration, _)| *iteration);
+        let side = stage.images.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
+        let pixels = (f64::from(side.min(recipe.side)) / f64::from(side.min(small(recipe).side))).powi(2);
+        let least = begun.elapsed().mul_f64(pixels * f64::from(ahead) / f64::from(tried));
         let (chosen, words) = if score <= fast_score {
             (fast, "fast is used".to_owned())
+        } else if clock.left().is_some_and(|left| left < least) {
+            (fast, format!("the time that is left is too short for {quality}, and fast is used"))
+        } else if is_over {
+            (recipe, format!("{quality} is used"))
         } else {
             let [.., finest] = small(recipe).iterations;
             let before = recipes[1].iterations.iter().sum::<u32>() - finest;
@@ -112,16 +132,19 @@ fn ended_early(recipe: Recipe, share: f32) -> Recipe {
     Recipe { iterations: [eighth, quarter, half, ((whole as f32 * share.max(LEAST)) as u32).max(1)], ..recipe }
 }
 
-/// Steps and cancellation alone.
-struct Counted<'a>(&'a dyn Progress);
+/// Steps and cancellation alone; the end of the time is one, too.
+struct Counted<'a> {
+    progress: &'a dyn Progress,
+    until: Option<Instant>,
+}
 
 impl Progress for Counted<'_> {
     fn step(&self) {
-        self.0.step();
+        self.progress.step();
     }
 
     fn is_cancelled(&self) -> bool {
-        self.0.is_cancelled()
+        self.progress.is_cancelled() || self.until.is_some_and(|until| until <= Instant::now())
     }
 }
 

@@ -92,6 +92,10 @@ pub(super) fn read(
 ) -> Result<GaussianScene, SceneError> {
     let (element, rows) = header.rows(bytes, ELEMENT)?;
     let columns = GaussianColumns::of(path, element, notes)?;
+    let surplus = header.surplus(bytes);
+    if surplus > 0 {
+        notes.push(format!("{surplus} bytes behind the rows are not read: the header may count too few of them"));
+    }
     // Rows have at least these columns: the lengths are bounded by that of the file.
     let size = element.row_size.unwrap_or(1).max(1);
     let rest_columns = without_padding(rest(path, element)?, rows, size);
