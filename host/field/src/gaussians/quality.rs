@@ -68,8 +68,7 @@ pub struct RecipeOptions {
     pub iterations: Option<u32>,
     /// Most Gaussians, whatever the sources' size.
     pub count: Option<u32>,
-    /// Whether colours are the same from everywhere and between 0 and 1, as some files have them: sources have gains
-    /// then.
+    /// Whether colours are the same from everywhere, as some files have them: sources have gains then.
     pub is_of_one_colour: bool,
     /// Whether splats keep their integral when they are dilated: for pictures of other sizes than the sources'.
     pub is_antialiased: bool,
@@ -82,10 +81,12 @@ impl RecipeOptions {
     pub fn recipe(&self, has_silhouettes: bool) -> Recipe {
         let recipe = self.quality.recipe(has_silhouettes).with(self.iterations, self.count);
         let recipe = Recipe { seed: self.seed, is_antialiased: self.is_antialiased, ..recipe };
-        if !self.is_of_one_colour {
-            return recipe;
-        }
-        Recipe { degree: 0, rates: Recipe::default().rates, has_limited_colours: true, ..recipe }
+        let recipe = match self.is_of_one_colour {
+            true => Recipe { degree: 0, rates: Recipe::default().rates, ..recipe },
+            false => recipe,
+        };
+        // Where they do not depend on the direction, colours that no photograph has are only what fits the sources.
+        Recipe { has_limited_colours: recipe.degree == 0, ..recipe }
     }
 }
 

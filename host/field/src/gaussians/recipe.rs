@@ -57,7 +57,7 @@ pub struct Recipe {
     pub degree: u32,
     /// Whether the number of Gaussians rises to the most at the finest level.
     pub grows: bool,
-    /// Whether colours stay between 0 and 1, for files that have a byte for each.
+    /// Whether colours stay between 0 and 1, as files hold them that have a byte for each.
     pub has_limited_colours: bool,
     /// Whether splats keep their integral when they are dilated (`viewfuse_core::gaussian::project_as`).
     pub is_antialiased: bool,

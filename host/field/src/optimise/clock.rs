@@ -22,12 +22,14 @@ pub(super) struct Clock {
     /// When it was measured last at the finest level, and after how many of its iterations.
     measured: Option<(Instant, u32)>,
     is_told: bool,
+    /// Iterations of the finest level that there are without a limit.
+    wanted: u32,
 }
 
 impl Clock {
     /// Starts, with a limit or without.
     pub(super) fn start(limit: Option<Duration>) -> Clock {
-        Clock { begun: Instant::now(), limit, measured: None, is_told: false }
+        Clock { begun: Instant::now(), limit, measured: None, is_told: false, wanted: 0 }
     }
 
     /// When a trial must end, if there is a limit.
@@ -56,6 +58,7 @@ impl Clock {
         }
         let Some((begun, first)) = self.measured else {
             optimisation.finish()?;
+            self.wanted = done + optimisation.iteration_count() - optimisation.done();
             self.measured = Some((Instant::now(), done));
             return Ok(false);
         };
@@ -82,12 +85,11 @@ impl Clock {
         self.fit(optimisation, one);
     }
 
-    /// With a limit, leaves as many iterations as fit, of so many seconds each, and no more than there are.
+    /// With a limit, leaves as many iterations as fit, of so many seconds each, and no more than without.
     fn fit(&self, optimisation: &mut dyn Optimisation, one: f64) {
         let Some(left) = self.left() else { return };
-        let done = optimisation.done_at_finest();
-        let most = optimisation.iteration_count() - optimisation.done();
-        optimisation.set_finest(done + most.min((left.as_secs_f64() / one.max(1.0e-9)) as u32));
+        let fitting = (left.as_secs_f64() / one.max(1.0e-9)) as u32;
+        optimisation.set_finest(optimisation.done_at_finest().saturating_add(fitting).min(self.wanted));
     }
 }
 
