@@ -71,7 +71,10 @@ impl Clock {
         self.measured = Some((Instant::now(), done));
         self.fit(optimisation, one);
         let left = optimisation.iteration_count() - optimisation.done();
-        progress.note(&format!("{left} iterations more, about {}", words(f64::from(left) * one)));
+        progress.note(&match self.limit {
+            Some(_) => format!("some {left} iterations more, as many as fit into the time"),
+            None => format!("{left} iterations more, about {}", words(f64::from(left) * one)),
+        });
         Ok(true)
     }
 
