@@ -147,7 +147,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         && scene.gaussians.len() > count as usize
     {
         let there = scene.gaussians.len();
-        return Err(wrong(&format!(
+        return Err(wrong(format!(
             "--count {count}: the file to go on from has {there} Gaussians, and none are removed"
         )));
     }
