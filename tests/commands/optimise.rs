@@ -162,12 +162,13 @@ fn after_a_kill_it_goes_on_from_the_file() {
 /// Colours of a byte: what is scored on the way is what the file shows.
 fn a_file_of_bytes_has_the_score_that_is_told() {
     let folder = toy();
-    let text = done(&folder, "optimise toy --size 32x32 --iterations 300 --left-out 20 --device cpu -o a.splat");
+    let text = done(&folder, "optimise toy --size 24x24 --iterations 800 --left-out 20 --device cpu -o a.splat");
     let told = scores(&text).last().expect("a score").1;
-    let rendered = done(&folder, "render toy --gaussians a.splat --targets 20 --size 32x32 --device cpu -o out");
+    let rendered = done(&folder, "render toy --gaussians a.splat --targets 20 --size 24x24 --device cpu -o out");
     let psnr = rendered.split("PSNR ").nth(1).and_then(|rest| rest.split(' ').next()).expect("a score");
     let shown: f64 = psnr.parse().expect("a number");
-    assert!((shown - told).abs() < 0.3, "{shown} dB of {told}");
+    // Colours that leave 0 to 1 cost 0.24 dB here.
+    assert!((shown - told).abs() < 0.1, "{shown} dB of {told}");
 }
 
 /// `--model gaussians` optimises on the way.

@@ -200,7 +200,7 @@ impl<'a> SceneOptimisation<'a> {
             self.given(&before.scene, &before.notes, photographed, progress, |_| Ok(()))?;
             if !self.held_out.is_empty() {
                 progress
-                    .note("views left out may have been sources of the Gaussians to go on from: that raises scores");
+                    .note("held-out views may have been sources of the Gaussians to go on from: that raises scores");
             }
             if before.scene.degree > recipe.degree {
                 progress.warn(
