@@ -6,7 +6,7 @@ use super::{assert_refused, assert_wrong_arguments, done, done_with_warnings, ki
 use std::fs;
 use std::path::Path;
 use viewfuse::scene::SceneFrame;
-use viewfuse::scene::gaussians::GaussianScene;
+use viewfuse::scene::gaussians::{Gaussian, GaussianScene};
 use viewfuse_tests::command::{Outcome, files_below, names_in, toy};
 use viewfuse_tests::patience::{end, send, wait_while_running};
 
@@ -30,6 +30,19 @@ const OPTIMISE: &str = "optimise toy --size 48x48 --device cpu";
 
 fn gaussians(path: &Path) -> GaussianScene {
     GaussianScene::read(path, &SceneFrame::FILE).expect("a file of Gaussians")
+}
+
+/// Writes a file with a Gaussian that no camera of the sample scene sees.
+fn scene(path: &Path) {
+    let gaussian = Gaussian {
+        position: [0.0, 0.0, 900.0],
+        log_scales: [-3.0; 3],
+        rotation: [1.0, 0.0, 0.0, 0.0],
+        opacity: 3.0,
+        f_dc: [0.0; 3],
+    };
+    let scene = GaussianScene { gaussians: vec![gaussian], ..GaussianScene::default() };
+    scene.write(path, &SceneFrame::FILE).expect("a file");
 }
 
 /// Iteration and decibels of the lines about held-out views.
@@ -56,6 +69,8 @@ fn held_out_views_are_scored_on_the_way() {
     let psnr = |line: &str| line.split("PSNR ").nth(1)?.split(" dB").next()?.parse::<f64>().ok();
     let again: Vec<f64> = rendered.lines().filter_map(psnr).collect();
     assert!(again.len() == 2 && (again.iter().sum::<f64>() / 2.0 - scores[5].1).abs() < 0.02, "{rendered}\n{text}");
+    assert!(rendered.contains("\n2 views of the file's Gaussians on cpu: "), "{rendered}");
+    assert!(rendered.contains("\nthe file does not say which photographs it was made from: "), "{rendered}");
     // The same seed, any number of threads.
     done(&folder, &format!("{OPTIMISE} --left-out 20,21 --threads 1 -o b.ply"));
     let read = |name: &str| fs::read(folder.join(name)).expect("a file");
@@ -195,6 +210,30 @@ fn what_it_refuses() {
     assert_wrong_arguments(&folder, &format!("{OPTIMISE} --count 0 -o toy.ply"), &["--count"]);
     assert_refused(&folder, &format!("{OPTIMISE} --resume no.ply -o toy.ply"), &["no.ply"]);
     assert_refused(&folder, &format!("{OPTIMISE} --left-out 99 -o toy.ply"), &["99"]);
+    assert_refused(&folder, &format!("{OPTIMISE} --left-out , -o toy.ply"), &["nothing would be held out"]);
+    let twice = format!("{OPTIMISE} --sources 0..9 --left-out 3 -o toy.ply");
+    assert_refused(&folder, &twice, &["a target and a source at once", "--left-out"]);
+    assert_wrong_arguments(
+        &folder,
+        &format!("{OPTIMISE} --early-termination 0.1 -o toy.ply"),
+        &["unexpected argument"],
+    );
+    let made = std::process::Command::new("mkfifo").arg(folder.join("pipe.ply")).status().expect("mkfifo runs");
+    assert!(made.success());
+    assert_refused(&folder, &format!("{OPTIMISE} -o pipe.ply"), &["pipe.ply", "no ordinary file"]);
+    // What makes pictures without a field has none of its options.
+    scene(&folder.join("a.ply"));
+    for option in ["--fast", "--samples 8", "--gaussian-count 300", "--leave-out 0.1", "--max-error 40dB"] {
+        let arguments = format!("render toy --gaussians a.ply {option} --targets 20 -o out");
+        assert_wrong_arguments(&folder, &arguments, &["--gaussians", "cannot be used with"]);
+    }
+    folder.write("page.html", "<!doctype html>");
+    let page = "render toy --gaussians page.html --targets 20 -o out";
+    assert_refused(&folder, page, &["page.html", "Gaussians are not read from it"]);
+    // Of another scene: a point far away.
+    let other = format!("{OPTIMISE} --resume a.ply --iterations 1 -o b.ply");
+    let Outcome { code, stderr, .. } = run(&folder, &other);
+    assert!(code == Some(0) && stderr.contains("see none of the Gaussians"), "{stderr}");
 }
 
 /// Held-out sources prefer the sharper recipe on the sample scene; the views that a person keeps back are none of them.

@@ -5,19 +5,22 @@ mod device;
 mod gpu;
 
 use device::{Counted, Counting};
+use std::sync::Arc;
 use viewfuse::device::Memory;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::field::gaussians::{Recipe, optimisation_by_host, optimisation_on_device};
+use viewfuse::field::gaussians::{GivenGaussians, optimisation_by_host, optimisation_on_device};
 use viewfuse::field::genvs::sampling::{Plan, Steps};
-use viewfuse::field::render::{RenderError, RenderOptions, RenderRun};
+use viewfuse::field::render::{RenderError, RenderOptions, RenderRun, Stage};
 use viewfuse::field::training_free::TrainingFree;
 use viewfuse::field::{Field, On, auto, genvs, pixelnerf};
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::few_shot::Selection;
+use viewfuse::scene::gaussians::{Gaussian, GaussianScene};
+use viewfuse_core::random::uniform;
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::weights::Weights;
 use viewfuse_kernels::rows::{Form, GainBlock, HarmonicTerm, Kernel};
-use viewfuse_tests::cloud::toy_cloud;
+use viewfuse_tests::cloud::{small_recipe, toy_cloud};
 use viewfuse_tests::fields;
 use viewfuse_tests::lorry::{photographs, target};
 
@@ -132,16 +135,46 @@ fn a_choice_and_three_pictures_are_few_transfers() {
     assert!(transfers.uploads <= 380 && transfers.downloads <= 90, "{transfers:?}");
 }
 
+/// Gaussians whose colours depend on the direction are taken to the device once for all pictures.
+#[test]
+fn pictures_of_gaussians_need_no_uploads() {
+    let device = gpu::CpuAsGpu::default();
+    let place = |index: u32| [0, 1, 2].map(|axis| 0.7 * (uniform(0, index, axis) - 0.5));
+    let gaussian = |index| Gaussian {
+        position: place(index),
+        log_scales: [-3.0; 3],
+        rotation: [1.0, 0.0, 0.0, 0.0],
+        opacity: 1.0,
+        f_dc: place(index),
+    };
+    let gaussians: Vec<Gaussian> = (0..500).map(gaussian).collect();
+    let f_rest = (0..500 * 45).map(|index| 0.2 * (index as f32).sin()).collect();
+    let scene = GaussianScene { gaussians, degree: 3, f_rest, is_antialiased: false };
+    let field = GivenGaussians { scene, notes: Vec::new() };
+    let (renderer, options) = (On { device: &device, field: &field }, RenderOptions::default());
+    let sources = Arc::new(photographs(4, 48));
+    let mut stage = Stage::of_sources(sources, &renderer, &options, &Silent).expect("a field");
+    stage.weigh_by(&[], &Silent).expect("no weighting");
+    let mut transfers = || {
+        stage.picture(&target(48), &Weights::mean(4), 0.0, &Silent).expect("a picture");
+        device.transfers()
+    };
+    let [first, second] = [transfers(), transfers()];
+    assert_eq!(first.uploads, 2, "Gaussians and their terms");
+    assert_eq!(second.uploads, first.uploads);
+    println!("a picture of given Gaussians: {} waits", second.downloads - first.downloads);
+    assert!(second.downloads - first.downloads <= 2, "their lists and the picture");
+}
+
 /// Of an optimisation with levels, growth and harmonics, after every third iteration: the host's Gaussians, of which
 /// nothing comes from the device but what pictures need.
 #[test]
 fn gaussians_come_without_their_states() {
     let device = gpu::CpuAsGpu::default();
     let (images, points) = toy_cloud();
-    let small = Recipe { side: 32, iterations: [0, 6, 6, 30], cell: 8.0, random_count: 100, ..Recipe::default() };
     // Gains' sums have another order on a device.
-    let rates = [0.1, 0.01, 0.002, 0.05, 0.005, 0.0];
-    let recipe = Recipe { max_per_pixel: 0.5, degree: 3, grows: true, rates, ..small };
+    let mut recipe = small_recipe();
+    recipe.rates[5] = 0.0;
     let mut ours = optimisation_on_device(&device, images, points, recipe, None).expect("memory").expect("points");
     let mut hosts = optimisation_by_host(&Cpu, images, points, recipe).expect("memory").expect("points");
     let mut degrees = Vec::new();

@@ -5,12 +5,14 @@ use viewfuse::check::gaussian_oracle::{blend, project};
 use viewfuse::device::Memory;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::gaussians::{Splatter, Tiles};
+use viewfuse_core::Vec3;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::pose::Pose;
+use viewfuse_core::gaussian::{SH_0, colour_along};
+use viewfuse_core::pose::{Pose, PoseBlock};
 use viewfuse_kernels::gaussians::lanes::falloff;
 use viewfuse_kernels::gaussians::shown::{bytes_of_pixel, shown_pixel, surface_depth};
 use viewfuse_kernels::gaussians::{SplatBlock, TileBlock};
-use viewfuse_kernels::rows::{GaussianBlock, ProjectedGaussian};
+use viewfuse_kernels::rows::{GaussianBlock, HarmonicTerm, ProjectedGaussian};
 
 const SIZE: [u32; 2] = [21, 18];
 const NEAR: f32 = 0.2;
@@ -133,7 +135,7 @@ fn derivatives_of(gaussians: &[GaussianBlock], is_antialiased: bool) {
     let (gaussians, [width, height]) = (gaussians.to_vec(), SIZE);
     let counted = counted(&gaussians, is_antialiased);
     assert!(counted.iter().filter(|counted| **counted).count() > counted.len() / 2, "most pixels are compared");
-    let splatter = Splatter { device: &Cpu, near: NEAR, background: BACKGROUND, is_antialiased };
+    let splatter = Splatter { device: &Cpu, near: NEAR, background: BACKGROUND, is_antialiased, harmonics: None };
     let uploaded = Cpu.upload(&gaussians).expect("memory");
     let picture = splatter.picture(&uploaded, gaussians.len(), &camera()).expect("a picture");
     let pixels = 0..width * height;
@@ -198,13 +200,57 @@ fn tiles_list_splats_front_to_back() {
     assert!(entries.len() > all.len(), "they reach over several tiles");
 }
 
+/// Spherical harmonics make the colours that core's function gives for the camera's place, from wherever it looks.
+#[test]
+fn colours_depend_on_the_direction() {
+    const TERMS: usize = 15;
+    let all = gaussians();
+    let value = |term: usize, channel: usize| 0.3 * ((5 * term + 3 * channel) as f32).sin();
+    let term = |term: usize| HarmonicTerm { value: [0, 1, 2].map(|channel| value(term, channel)), padding: 0.0 };
+    let terms: Vec<HarmonicTerm> = (0..all.len() * TERMS).map(term).collect();
+    let with = Splatter {
+        device: &Cpu,
+        near: NEAR,
+        background: BACKGROUND,
+        is_antialiased: false,
+        harmonics: Some((&terms, TERMS as u32)),
+    };
+    let without = Splatter { harmonics: None, ..with };
+    let mut shown = Vec::new();
+    for centre in [[0.0, 0.0, 0.0], [0.3, -0.2, -0.4]] {
+        let mut camera = camera();
+        let PoseBlock { right, down, forward } = &mut camera.pose;
+        [right[3], down[3], forward[3]] = centre;
+        let coloured = |(index, gaussian): (usize, &GaussianBlock)| {
+            let f_dc = gaussian.colour.map(|level| (level - 0.5) / SH_0);
+            let rest: Vec<f32> =
+                (0..3).flat_map(|channel| (0..TERMS).map(move |term| value(index * TERMS + term, channel))).collect();
+            let towards = Vec3::from(gaussian.position) - camera.centre_world();
+            GaussianBlock { colour: colour_along(f_dc, &rest[..], 3, towards), ..*gaussian }
+        };
+        let expected: Vec<GaussianBlock> = all.iter().enumerate().map(coloured).collect();
+        let [ours, expected] = [(&with, &all), (&without, &expected)].map(|(splatter, gaussians)| {
+            splatter.picture(gaussians, gaussians.len(), &camera).expect("a picture").colours
+        });
+        for (ours, expected) in ours.iter().zip(&expected) {
+            assert_eq!(ours[3], expected[3]);
+            // Two directions of unit length, each within some roundings, and a sum of sixteen terms below 2.
+            let apart = (0..3).map(|channel| (ours[channel] - expected[channel]).abs()).fold(0.0, f32::max);
+            assert!(apart < 64.0 * f32::EPSILON, "{ours:?} {expected:?}");
+        }
+        shown.push(ours);
+    }
+    assert_ne!(shown[0], shown[1]);
+}
+
 #[test]
 fn pictures_do_not_depend_on_the_number_of_threads() {
     let all = gaussians();
     let picture = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         pool.install(|| {
-            let splatter = Splatter { device: &Cpu, near: NEAR, background: BACKGROUND, is_antialiased: false };
+            let splatter =
+                Splatter { device: &Cpu, near: NEAR, background: BACKGROUND, is_antialiased: false, harmonics: None };
             let uploaded = Cpu.upload(&all).expect("memory");
             let picture = splatter.picture(&uploaded, all.len(), &camera()).expect("a picture");
             let by_pixels = vec![[0.3, -0.2, 0.1, 0.4]; (SIZE[0] * SIZE[1]) as usize];

@@ -6,6 +6,7 @@ use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 use glam::{DMat3, DVec3};
 use serde_json::json;
+use std::fs;
 use std::io::{Read, Write};
 use std::path::Path;
 use viewfuse::scene::gaussians::{GaussianFile, GaussianScene};
@@ -20,7 +21,7 @@ fn read(path: &Path) -> Result<GaussianFile, String> {
 
 /// The header of a file of Gaussians, with its last line, and the bytes of its rows.
 fn parts(path: &Path) -> (String, Vec<u8>) {
-    let mut bytes = std::fs::read(path).expect("a file");
+    let mut bytes = fs::read(path).expect("a file");
     let end = bytes.windows(11).position(|part| part == b"end_header\n").expect("a header") + 11;
     let rows = bytes.split_off(end);
     (String::from_utf8(bytes).expect("text"), rows)
@@ -78,6 +79,19 @@ fn nerfstudios_world_is_undone() {
     // What viewfuse wrote is in the scene's coordinates, whatever lies beside it.
     gaussians.write(&path, &SceneFrame::FILE).expect("a file");
     assert_eq!(GaussianFile::open(&path, &scene).expect("a file").scene, gaussians);
+}
+
+#[test]
+fn bytes_behind_the_rows_are_told() {
+    let (folder, gaussians) = (Folder::new(), drawn(3, 1, 2));
+    let path = folder.join("longer.ply");
+    gaussians.write(&path, &SceneFrame::FILE).expect("a file");
+    let mut bytes = fs::read(&path).expect("a file");
+    bytes.extend([0; 40]);
+    fs::write(&path, bytes).expect("a file");
+    let file = GaussianFile::read(&path, &SceneFrame::FILE).expect("a file");
+    assert_eq!(file.scene, gaussians);
+    assert!(file.notes.iter().any(|note| note.contains("40 bytes behind the rows are not read")), "{:?}", file.notes);
 }
 
 #[test]

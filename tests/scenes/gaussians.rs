@@ -9,7 +9,7 @@ use viewfuse::check::poses::Random;
 use viewfuse::scene::SceneFrame;
 use viewfuse::scene::gaussians::{Gaussian, GaussianScene, MAX_LOGARITHM};
 use viewfuse_core::Vec3;
-use viewfuse_core::gaussian::{REST_COUNTS, colour_along};
+use viewfuse_core::gaussian::{REST_COUNTS, SH_0};
 use viewfuse_tests::scenes::Folder;
 
 /// Gaussians of random parameters.
@@ -244,16 +244,16 @@ fn what_is_no_file_of_gaussians_is_refused() {
 }
 
 #[test]
-fn blocks_have_the_colours_of_a_place() {
+fn blocks_have_the_colours_of_degree_0() {
     let scene = drawn(6, 2, 4);
-    let centre = Vec3::new(0.5, -2.0, 1.0);
-    for (index, (block, gaussian)) in scene.blocks(centre).iter().zip(&scene.gaussians).enumerate() {
-        let rest = &scene.f_rest[24 * index..24 * (index + 1)];
-        let towards = Vec3::from(gaussian.position) - centre;
-        assert_eq!(block.colour, colour_along(gaussian.f_dc, rest, 2, towards));
-        assert_eq!((block.position, block.rotation), (gaussian.position, gaussian.rotation));
-        assert_eq!((block.log_scales, block.opacity), (gaussian.log_scales, gaussian.opacity));
+    let level = |value: f32| 0.5 + SH_0 * value;
+    assert!(scene.gaussians.iter().any(|gaussian| gaussian.f_dc.into_iter().any(|value| level(value) < 0.0)));
+    let flat = GaussianScene { degree: 0, f_rest: Vec::new(), ..scene.clone() };
+    for (scene, least) in [(&scene, f32::MIN), (&flat, 0.0)] {
+        for (block, gaussian) in scene.blocks().iter().zip(&scene.gaussians) {
+            assert_eq!(block.colour, gaussian.f_dc.map(|value| level(value).max(least)));
+            assert_eq!((block.position, block.rotation), (gaussian.position, gaussian.rotation));
+            assert_eq!((block.log_scales, block.opacity), (gaussian.log_scales, gaussian.opacity));
+        }
     }
-    let dark = GaussianScene { degree: 0, f_rest: Vec::new(), ..scene };
-    assert_ne!(dark.blocks(centre)[0].colour, dark.blocks(centre)[1].colour);
 }

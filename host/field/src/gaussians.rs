@@ -46,7 +46,7 @@ mod start;
 mod tiles;
 
 pub use course::{Optimisation, Optimised};
-pub use given::{GivenGaussians, behind, scene_of};
+pub use given::{GIVEN, GivenGaussians, behind, scene_of};
 pub use optimise::{optimisation, optimisation_by_host, optimisation_on_device, optimised};
 pub use picture::{Drawn, Splatted, Splatter};
 pub use quality::{Quality, RecipeOptions};

@@ -25,7 +25,7 @@ use viewfuse_job::files::WriteError;
 use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_job::progress::{Progress, Silent};
 use viewfuse_scene::Scene;
-use viewfuse_scene::few_shot::{Selection, SelectionError, Target, target_of};
+use viewfuse_scene::few_shot::{Selection, SelectionError, SelectionFault, Target, target_of, view_list};
 use viewfuse_scene::gaussians::{GaussianFile, GaussianScene};
 use viewfuse_scene::photographs::{Album, GroundTruth, SourceImages};
 use viewfuse_scene::unit::RigUnit;
@@ -136,24 +136,21 @@ impl<'a> SceneOptimisation<'a> {
         towards: Option<&str>,
     ) -> Result<SceneOptimisation<'a>, SelectionError> {
         let least_sources = AnyField::default().about().least_sources;
-        let views = |list: Option<&str>| -> Result<Vec<Target>, SelectionError> {
-            match list {
-                None => Ok(Vec::new()),
-                Some(list) => {
-                    let selection = Selection { targets: Some(list.to_owned()), ..Selection::default() };
-                    Ok(selection.resolve(scene, least_sources)?.targets)
-                }
-            }
+        let views = |list: Option<&str>| list.map_or(Ok(Vec::new()), |list| view_list(scene, list));
+        let photographs = |views: &[usize]| -> Vec<usize> {
+            views.iter().copied().filter(|view| scene.views[*view].image.is_some()).collect()
         };
-        let (held_out, towards) = (views(held_out)?, views(towards)?);
-        let photographs = |targets: &[Target]| targets.iter().filter_map(|target| target.truth).collect::<Vec<usize>>();
-        let held_out = photographs(&held_out);
-        let excluded = [held_out.clone(), photographs(&towards)].concat();
+        let held_out_views = photographs(&views(held_out)?);
+        if let Some(list) = held_out.filter(|_| held_out_views.is_empty()) {
+            return Err(SelectionFault::NothingHeldOut(list.to_owned()).in_scene(scene));
+        }
+        let towards = views(towards)?;
+        let excluded = [held_out_views.clone(), photographs(&towards)].concat();
         Ok(SceneOptimisation {
             scene,
             sources: selection.sources_without(scene, &excluded, least_sources)?,
-            held_out,
-            towards,
+            held_out: held_out_views,
+            towards: towards.into_iter().map(|view| target_of(scene, view)).collect(),
             options: RenderOptions::default(),
             weighting: Weighting::default_scheme(),
             recipe: RecipeOptions::default(),

@@ -62,6 +62,9 @@ pub enum SelectionFault {
     /// No target was requested and the scene has no target poses.
     #[error("no targets were chosen, and the scene has no poses without photographs")]
     NoTargets,
+    /// A list of views to hold out has none with a photograph.
+    #[error("'{0}' names no view with a photograph: nothing would be held out")]
+    NothingHeldOut(String),
     /// The cameras do not span an orbit: what was wrong with a camera of it.
     #[error("its cameras span no circle: they stand at, or straight above, what they look at")]
     NoOrbit(PoseError),

@@ -31,8 +31,7 @@ mod write;
 use rayon::prelude::*;
 use std::path::Path;
 
-use viewfuse_core::Vec3;
-use viewfuse_core::gaussian::{GaussianBlock, REST_COUNTS, colour_along};
+use viewfuse_core::gaussian::{GaussianBlock, SH_0};
 
 use crate::{FilePlace, SceneError, SceneFault, SceneFrame};
 
@@ -86,23 +85,19 @@ impl GaussianScene {
         Ok(GaussianFile::read(path, frame)?.scene)
     }
 
-    /// The Gaussians as a kernel reads them, with their colours from a camera at `centre_world`.
-    pub fn blocks(&self, centre_world: Vec3) -> Vec<GaussianBlock> {
-        let rest_count = 3 * REST_COUNTS[self.degree.min(MAX_DEGREE) as usize] as usize;
-        let block = |(index, gaussian): (usize, &Gaussian)| {
-            let rest = self.f_rest.get(index * rest_count..(index + 1) * rest_count);
-            let towards = Vec3::from(gaussian.position) - centre_world;
-            let (rest, degree) = rest.map_or((&[][..], 0), |rest| (rest, self.degree));
-            GaussianBlock {
-                position: gaussian.position,
-                opacity: gaussian.opacity,
-                log_scales: gaussian.log_scales,
-                rotation: gaussian.rotation,
-                colour: colour_along(gaussian.f_dc, rest, degree, towards),
-                ..GaussianBlock::default()
-            }
+    /// The Gaussians as a kernel reads them, with their colours of degree 0: at least 0 where these are all, since what
+    /// higher degrees add may bring a colour above it.
+    pub fn blocks(&self) -> Vec<GaussianBlock> {
+        let least = if self.degree == 0 { 0.0 } else { f32::MIN };
+        let block = |gaussian: &Gaussian| GaussianBlock {
+            position: gaussian.position,
+            opacity: gaussian.opacity,
+            log_scales: gaussian.log_scales,
+            rotation: gaussian.rotation,
+            colour: gaussian.f_dc.map(|value| (0.5 + SH_0 * value).max(least)),
+            ..GaussianBlock::default()
         };
-        self.gaussians.par_iter().enumerate().map(block).collect()
+        self.gaussians.par_iter().map(block).collect()
     }
 }
 

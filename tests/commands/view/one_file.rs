@@ -81,7 +81,7 @@ fn cameras() -> [(String, Camera); VIEWS] {
 /// The picture by core's functions.
 fn expected(scene: &GaussianScene, camera: &Camera) -> RgbImage {
     let block = camera.block(0);
-    let blocks = scene.blocks(camera.pose.centre_world());
+    let blocks = scene.blocks();
     let projected: Vec<ProjectedGaussian> = blocks.iter().map(|gaussian| project(gaussian, &block, 0.02)).collect();
     let mut order = vec![0; projected.len()];
     nearest_first(&projected, &mut order);

@@ -22,16 +22,20 @@ use viewfuse_core::math::{has_finite_bits, ln};
 pub fn project_particles(
     block: &ParticleBlock,
     gaussians: &(impl Fetch<GaussianBlock> + ?Sized),
-    states: &(impl Fetch<ParticleState> + ?Sized),
     terms: &(impl Fetch<HarmonicTerm> + ?Sized),
+    states: &(impl Fetch<ParticleState> + ?Sized),
     splats: &mut (impl Store<ProjectedGaussian> + ?Sized),
     gaussian: u32,
 ) {
     let at = gaussian as usize;
     let mut seen = gaussians.fetch(at);
     if block.term_count > 0 {
-        let (count, unit) = (states.fetch(at).rest_count, direction(&seen, &block.camera));
-        let count = if count < block.term_count { count } else { block.term_count };
+        let mut count = block.term_count;
+        if block.has_states != 0 {
+            let there = states.fetch(at).rest_count;
+            count = if there < count { there } else { count };
+        }
+        let unit = direction(&seen, &block.camera);
         seen.colour = colour_along(seen.colour, terms, gaussian * block.term_count, count, unit);
     }
     splats.store(at, project_as(&seen, &block.camera, block.near, block.is_antialiased != 0));

@@ -78,9 +78,11 @@ pub struct ParticleBlock {
     pub term_count: u32,
     /// 1 if splats keep their integral when they are dilated, otherwise 0.
     pub is_antialiased: u32,
+    /// 1 if states say how many terms of each Gaussian there are so far, 0 if all are there.
+    pub has_states: u32,
 }
 
-const _: () = assert!(size_of::<ParticleBlock>() == 96);
+const _: () = assert!(size_of::<ParticleBlock>() == 100);
 
 /// The bit of [`StepBlock::counts`] that limits colours.
 const LIMITED: u32 = 1 << 28;

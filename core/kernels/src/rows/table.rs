@@ -470,12 +470,12 @@ macro_rules! for_each_kernel {
                 write gradients: GaussianBlock as vectors,
             }
             /// Gaussians whose colours depend on the direction, as a camera sees them: `terms[gaussian][term]` are
-            /// their spherical harmonics. An element is a Gaussian.
+            /// their spherical harmonics, of which states say how many there are so far. An element is a Gaussian.
             ProjectParticles project_particles(block: ParticleBlock)
             for gaussian in [0..block.gaussian_count; 128 a core] {
                 read gaussians: GaussianBlock as vectors,
-                read states: ParticleState as vectors,
-                read terms: HarmonicTerm as vectors,
+                paged terms: HarmonicTerm as vectors,
+                optional states: ParticleState as vectors = gaussians if !block.has_states,
                 write splats: ProjectedGaussian as vectors,
             }
             /// Which splats' boxes reach each bin of 8 by 8 tiles: `masks[bin][mask]`, 32 splats a mask. An element is

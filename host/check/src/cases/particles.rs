@@ -49,8 +49,8 @@ impl Case for ProjectParticles {
     const REASON: &'static str = "as project_gaussians, with a sum over spherical harmonics";
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
         ("gaussians", |case| increase(case.gaussians.iter_mut().flat_map(|gaussian| &mut gaussian.log_scales))),
-        ("states", |case| case.states.iter_mut().for_each(|state| state.rest_count ^= 3)),
         ("terms", |case| increase(case.terms.iter_mut().flat_map(|term| &mut term.value))),
+        ("states", |case| case.states.iter_mut().flatten().for_each(|state| state.rest_count ^= 3)),
         ("parameters", |case| case.block.camera.intrinsics[0] *= 1.01),
     ];
 
@@ -63,14 +63,14 @@ impl Case for ProjectParticles {
         states[0].rest_count = TERMS;
         let count = gaussians.len() as u32;
         let (camera, near) = (camera(seed), NEAR);
-        let dispatch = |(term_count, is_antialiased): (u32, u32)| ProjectParticles {
-            block: ParticleBlock { camera, near, gaussian_count: count, term_count, is_antialiased },
+        let dispatch = |(term_count, is_antialiased, has_states): (u32, u32, bool)| ProjectParticles {
+            block: ParticleBlock { camera, near, gaussian_count: count, term_count, is_antialiased, has_states: 0 },
             gaussians: gaussians.clone(),
-            states: states.clone(),
             terms: terms(numbers, (count * term_count).max(1)),
+            states: has_states.then(|| states.clone()),
             splats: Output::Zeros(gaussians.len()),
         };
-        [(TERMS, 0), (0, 0), (TERMS, 1)].map(dispatch).to_vec()
+        [(TERMS, 0, true), (0, 0, true), (TERMS, 1, true), (TERMS, 0, false)].map(dispatch).to_vec()
     }
 
     fn expected(&self) -> Vec<Option<Bounded>> {
@@ -82,7 +82,8 @@ impl Case for ProjectParticles {
             let Some(mut splat) = gaussian_oracle::project(&seen, gaussian) else {
                 return [None; 16];
             };
-            let count = states[index].rest_count.min(block.term_count) as usize;
+            let there = states.as_ref().map_or(block.term_count, |states| states[index].rest_count);
+            let count = there.min(block.term_count) as usize;
             if splat[3].value > 0.0 && count > 0 {
                 let basis = harmonics(gaussian, &block.camera);
                 let terms = &terms[index * block.term_count as usize..][..count];

@@ -14,7 +14,7 @@ mod tables;
 
 use super::metrics_options::MetricOptions;
 use super::model::ModelOptions;
-use super::options::{BoundOptions, DeviceOptions, PictureOptions, SourceOptions};
+use super::options::{BoundOptions, DeviceOptions, OmissionOptions, PictureOptions, SourceOptions};
 use super::outputs::{keep_file_apart, refuse_extension};
 use super::printing::{say, warn_of};
 use super::terminal::Terminal;
@@ -74,6 +74,8 @@ pub(crate) struct Arguments {
     protocol: ProtocolOptions,
     #[command(flatten)]
     picture: PictureOptions,
+    #[command(flatten)]
+    omissions: OmissionOptions,
     #[command(flatten)]
     bound: BoundOptions,
     #[command(flatten)]
@@ -146,7 +148,7 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
     arguments.output.as_deref().map_or(Ok(()), check_writable)?;
     let field = arguments.model.open(arguments.seed, None)?;
     let about = field.about();
-    let options = arguments.picture.to_render_options(arguments.model.exact, &about)?;
+    let options = arguments.omissions.omitting(arguments.picture.to_render_options(), arguments.model.exact, &about)?;
     let options = arguments.bound.bounded(options, &about, arguments.model.says_omissions());
     let Chosen { device, reason } = arguments.device.open()?;
     // All are opened before the first is computed: a wrong path shows at once.

@@ -43,7 +43,7 @@ fn sentence(hint: Hint) -> Option<&'static str> {
     Some(match hint {
         // The error says it all.
         Hint::ViewList => return None,
-        Hint::SourceOrTarget => "remove it from --sources or from --targets",
+        Hint::SourceOrTarget => "remove it from --sources, or from --targets or --left-out",
         Hint::FewerSources => "choose with --sources or --views",
         Hint::Targets => "give --targets NAMES, --orbit N, --between A B, --spiral N or --camera-path FILE",
         Hint::NoOrbit => "give --targets",

@@ -8,7 +8,7 @@
 mod flags;
 mod name;
 
-pub(crate) use flags::{Flags, SEQUENCE};
+pub(crate) use flags::{Flags, SEQUENCE, of_fields};
 
 use super::options::EFFORTS;
 use super::wrong::wrong;

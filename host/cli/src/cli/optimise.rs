@@ -14,7 +14,6 @@ use std::process::ExitCode;
 use std::time::Duration;
 use viewfuse_device::Memory;
 use viewfuse_device::choice::{AnyDevice, Chosen};
-use viewfuse_field::AnyField;
 use viewfuse_field::gaussians::{MAX_COUNT, MAX_ITERATIONS, Quality, Recipe, RecipeOptions};
 use viewfuse_field::optimise::{EndedOptimisation, SceneOptimisation, TOWARDS};
 use viewfuse_job::files::{check_writable, remove_if_there};
@@ -133,7 +132,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let Arguments { left_out, towards, output, .. } = arguments;
     let selection = arguments.sources.to_selection(None, None);
     let of_scene = SceneOptimisation::new(&scene, &selection, left_out.as_deref(), towards.as_deref())?;
-    let options = arguments.picture.to_render_options(false, &AnyField::default().about())?;
+    let options = arguments.picture.to_render_options();
     check_writable(output)?;
     keep_file_apart([&scene], output)?;
     GaussianScene::check_place(output, &scene.frame)?;
@@ -177,7 +176,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         remove_if_there(&unfinished)?;
     }
     let count = gaussians.gaussians.len();
-    say(format_args!("{}: {count} Gaussians after {done} of {of} iterations", written.display()))?;
+    let gaussians = if count == 1 { "Gaussian" } else { "Gaussians" };
+    say(format_args!("{}: {count} {gaussians} after {done} of {of} iterations", written.display()))?;
     if written != output {
         say(format_args!("{}: as it was before", output.display()))?;
     }

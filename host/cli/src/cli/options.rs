@@ -49,6 +49,20 @@ pub(crate) struct PictureOptions {
     background: BackgroundChoice,
     #[command(flatten)]
     pub(crate) masks: MaskOption,
+    /// Work on this many threads [default: all cores]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub(crate) threads: Option<u16>,
+}
+
+impl PictureOptions {
+    pub(crate) fn to_render_options(&self) -> RenderOptions {
+        RenderOptions { size: self.size, background: self.background, ..RenderOptions::default() }
+    }
+}
+
+/// What any field may omit.
+#[derive(Args)]
+pub(crate) struct OmissionOptions {
     /// Leave out the least relevant sources while their weights together stay at or below this
     #[arg(long, value_name = "TOTAL", default_value_t = DEFAULT_LEAVE_OUT, value_parser = parse_share,
         help_heading = EFFORTS)]
@@ -57,14 +71,12 @@ pub(crate) struct PictureOptions {
     /// GeNVS [default: 1/256]
     #[arg(long, alias = "settled", value_name = "SHARE", value_parser = parse_share, help_heading = EFFORTS)]
     early_termination: Option<f32>,
-    /// Work on this many threads [default: all cores]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
-    pub(crate) threads: Option<u16>,
 }
 
-impl PictureOptions {
-    /// With `exact`, nothing is omitted. Options that the field does not have are rejected.
-    pub(crate) fn to_render_options(&self, exact: bool, field: &About) -> anyhow::Result<RenderOptions> {
+impl OmissionOptions {
+    /// The options with these omissions; with `exact`, nothing is omitted. Options that the field does not have are
+    /// rejected.
+    pub(crate) fn omitting(&self, options: RenderOptions, exact: bool, field: &About) -> anyhow::Result<RenderOptions> {
         if self.early_termination.is_some() && !field.ends_rays {
             let title = rows::named(field.name).map_or(field.name, |row| row.title);
             return Err(wrong(format_args!(
@@ -74,8 +86,7 @@ impl PictureOptions {
         let early_termination =
             if exact || !field.ends_rays { 0.0 } else { self.early_termination.unwrap_or(DEFAULT_EARLY_TERMINATION) };
         let leave_out = if exact { 0.0 } else { self.leave_out };
-        let (size, background) = (self.size, self.background);
-        Ok(RenderOptions { size, background, leave_out, early_termination, ..RenderOptions::default() })
+        Ok(RenderOptions { leave_out, early_termination, ..options })
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::environment::device_options;
 use super::model::NetworkOptions;
-use super::options::{PictureOptions, SourceOptions};
+use super::options::{OmissionOptions, PictureOptions, SourceOptions};
 use super::outputs::keep_folder_apart;
 use super::parse::parse_seconds;
 use super::printing::{complain, say, warn_of};
@@ -54,6 +54,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     picture: PictureOptions,
     #[command(flatten)]
+    omissions: OmissionOptions,
+    #[command(flatten)]
     network: NetworkOptions,
     /// Seed of every random draw (the training-free field makes none)
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -97,7 +99,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     network.iter().for_each(|assumption| complain(format_args!("warning: {assumption}")));
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);
     let job = selection.resolve(&scene, field.about().least_sources)?;
-    let options = arguments.picture.to_render_options(false, &field.about())?;
+    let options = arguments.omissions.omitting(arguments.picture.to_render_options(), false, &field.about())?;
     keep_folder_apart([&scene], &arguments.output)?;
     let [csv, svg, json] = ["pareto.csv", "pareto.svg", "pareto.json"].map(|name| arguments.output.join(name));
     [&csv, &svg, &json].into_iter().try_for_each(|path| check_writable(path))?;

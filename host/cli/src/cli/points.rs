@@ -62,7 +62,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let field = AnyField::default();
     let about = field.about();
     let sources = arguments.sources.to_selection(None, None).sources_without(&scene, &[], about.least_sources)?;
-    let options = arguments.picture.to_render_options(false, &about)?;
+    let options = arguments.picture.to_render_options();
     check_writable(&arguments.output)?;
     keep_file_apart([&scene], &arguments.output)?;
     let Chosen { device, reason } = arguments.device.open()?;

@@ -7,8 +7,8 @@ mod stream;
 mod summary;
 mod write;
 
-use super::model::{Flags, ModelOptions, SEQUENCE, chosen_scheme, scene_help};
-use super::options::{BoundOptions, DeviceOptions, PictureOptions, SourceOptions};
+use super::model::{Flags, ModelOptions, SEQUENCE, chosen_scheme, of_fields, scene_help};
+use super::options::{BoundOptions, DeviceOptions, OmissionOptions, PictureOptions, SourceOptions};
 use super::path::PathOptions;
 use super::posed::PoseOption;
 use super::terminal::Terminal;
@@ -61,13 +61,15 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     picture: PictureOptions,
     #[command(flatten)]
+    omissions: OmissionOptions,
+    #[command(flatten)]
     bound: BoundOptions,
     #[command(flatten)]
     model: ModelOptions,
     #[command(flatten)]
     sequence: Flags<SEQUENCE>,
     /// Render the Gaussians of this file, of `optimise` or of another program, in the coordinates of the scene's files
-    #[arg(long, value_name = "FILE", conflicts_with = "model")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = of_fields(true), conflicts_with = "fast")]
     gaussians: Option<PathBuf>,
     #[command(flatten)]
     device: DeviceOptions,

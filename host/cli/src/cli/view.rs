@@ -1,7 +1,7 @@
 //! `viewfuse view`.
 
-use super::model::{ModelOptions, chosen_scheme, scene_help};
-use super::options::{BoundOptions, DeviceOptions, PictureOptions, SourceOptions};
+use super::model::{ModelOptions, chosen_scheme, of_fields, scene_help};
+use super::options::{BoundOptions, DeviceOptions, OmissionOptions, PictureOptions, SourceOptions};
 use super::posed::PoseOption;
 use super::printing::{say, warn_of};
 use super::terminal::Terminal;
@@ -37,11 +37,13 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     picture: PictureOptions,
     #[command(flatten)]
+    omissions: OmissionOptions,
+    #[command(flatten)]
     bound: BoundOptions,
     #[command(flatten)]
     model: ModelOptions,
     /// Show the Gaussians of this file, of `optimise` or of another program, in the coordinates of the scene's files
-    #[arg(long, value_name = "FILE", conflicts_with = "model")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = of_fields(false))]
     gaussians: Option<PathBuf>,
     #[command(flatten)]
     device: DeviceOptions,
@@ -71,7 +73,7 @@ pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> 
     };
     let about = field.about();
     let sources = arguments.sources.to_selection(None, None).sources_without(&scene, &[], about.least_sources)?;
-    let options = arguments.picture.to_render_options(arguments.model.exact, &about)?;
+    let options = arguments.omissions.omitting(arguments.picture.to_render_options(), arguments.model.exact, &about)?;
     let options = arguments.bound.bounded(options, &about, arguments.model.says_omissions());
     let Chosen { device, reason } = arguments.device.open()?;
     on_threads(arguments.picture.threads, || -> anyhow::Result<()> {

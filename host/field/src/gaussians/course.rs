@@ -10,7 +10,6 @@ use super::recipe::Recipe;
 use super::start::{Extent, start};
 use crate::FieldError;
 use crate::point_cloud::CloudPoint;
-use viewfuse_core::Vec3;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::gaussian::REST_COUNTS;
 use viewfuse_core::random::uniform;
@@ -189,12 +188,14 @@ impl Course {
 
     pub(super) fn resume(&mut self, scene: &GaussianScene) {
         let count = 3 * REST_COUNTS[scene.degree.min(3) as usize] as usize;
-        let flat = GaussianScene { gaussians: scene.gaussians.clone(), ..GaussianScene::default() };
-        let particle = |(index, gaussian): (usize, GaussianBlock)| {
+        let particle = |(index, mut gaussian): (usize, GaussianBlock)| {
             let rest = scene.f_rest.get(index * count..(index + 1) * count).filter(|_| self.recipe.degree > 0);
+            if rest.is_none() {
+                gaussian.colour = gaussian.colour.map(|level| level.max(0.0));
+            }
             Particle::begun(gaussian, rest.map_or_else(Harmonics::default, Harmonics::new))
         };
-        self.particles = flat.blocks(Vec3::ZERO).into_iter().enumerate().map(particle).collect();
+        self.particles = scene.blocks().into_iter().enumerate().map(particle).collect();
         self.first_count = self.particles.len();
         let [.., finest] = self.recipe.iterations;
         self.iteration = self.iteration_count() - finest;

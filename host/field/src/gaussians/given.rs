@@ -1,21 +1,24 @@
 //! A scene of Gaussians that is there already, as a field: optimised before, or by another program.
 
 use super::covers;
+use super::harmonics::terms_of;
 use super::picture::Splatter;
 use crate::{About, Encoding, Field, FieldError, Prepared, Rendered, Request, Rounded};
 use std::path::Path;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::gaussian::SH_0;
+use viewfuse_core::gaussian::{REST_COUNTS, SH_0};
 use viewfuse_core::random::uniform;
 use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, DeviceError};
 use viewfuse_job::progress::Progress;
-use viewfuse_kernels::rows::{GaussianBlock, Kernel};
-use viewfuse_scene::gaussians::{Gaussian, GaussianFile, GaussianScene};
+use viewfuse_kernels::rows::{GaussianBlock, HarmonicTerm, Kernel, ParticleState};
+use viewfuse_scene::gaussians::{Gaussian, GaussianFile, GaussianScene, MAX_DEGREE};
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_scene::{Scene, SceneError};
 
+/// The field's name: sources play no part in its pictures.
+pub const GIVEN: &str = "gaussian-file";
 /// Depth from which on Gaussians are seen, relative to their median depth in the sources.
 const NEAR: f32 = 0.1;
 /// Most Gaussians whose depths are looked at.
@@ -46,13 +49,15 @@ struct Prepare<'a, D: Device> {
 struct Uploaded<D: Device> {
     gaussians: D::Buffer<GaussianBlock>,
     count: usize,
-    /// The camera's centre that their colours are for; those of degree 0 are the same for all cameras.
-    centre: Vec3,
+    /// As of [`Splatter::harmonics`].
+    harmonics: Option<(D::Buffer<HarmonicTerm>, u32)>,
 }
 
-/// Those of a picture, in the order of their first use.
-const KERNELS: [Kernel; 8] = [
+/// Those of a picture, in the order of their first use: the first one of colours that are the same from everywhere, the
+/// second one of others.
+const KERNELS: [Kernel; 9] = [
     Kernel::ProjectGaussians,
+    Kernel::ProjectParticles,
     Kernel::CountEntries,
     Kernel::SumEntries,
     Kernel::ListEntries,
@@ -65,7 +70,7 @@ const KERNELS: [Kernel; 8] = [
 impl Field for GivenGaussians {
     /// The Gaussians are only drawn.
     fn about(&self) -> About {
-        About { is_live: true, kernels: &KERNELS, ..About::new("gaussians") }
+        About { is_live: true, kernels: &KERNELS, ..About::new(GIVEN) }
     }
 
     fn prepare<'a, D: Device>(
@@ -111,34 +116,21 @@ impl GivenGaussians {
     }
 }
 
-impl<'d, D: Device> Prepare<'d, D> {
-    /// The Gaussians on the device as this camera sees them. Those that all cameras see alike are taken there once.
-    fn uploaded(&mut self, camera: &CameraBlock) -> Result<&Uploaded<D>, DeviceError> {
-        let scene = self.scene;
-        let is_there = |uploaded: &Uploaded<D>| scene.degree == 0 || uploaded.centre == camera.centre_world();
-        let kept = self.uploaded.take().filter(is_there);
-        let uploaded = match kept {
-            Some(uploaded) => uploaded,
-            None => {
-                let mut blocks = scene.blocks(camera.centre_world());
-                if blocks.is_empty() {
-                    // No device has empty buffers.
-                    blocks.push(GaussianBlock { opacity: -80.0, ..GaussianBlock::default() });
-                }
-                Uploaded { gaussians: self.device.upload(&blocks)?, count: blocks.len(), centre: camera.centre_world() }
-            }
-        };
-        Ok(self.uploaded.insert(uploaded))
-    }
-
-    fn splatter(&self) -> Splatter<'d, D> {
+impl<D: Device> Prepare<'_, D> {
+    /// The Gaussians on the device, where they are taken once, and what makes their pictures.
+    fn uploaded(&mut self) -> Result<(&Uploaded<D>, Splatter<'_, D>), DeviceError> {
         let Prepare { device, near, background, scene, .. } = *self;
-        Splatter { device, near, background, is_antialiased: scene.is_antialiased }
+        let uploaded = match self.uploaded.take() {
+            Some(uploaded) => uploaded,
+            None => Uploaded::new(device, scene)?,
+        };
+        let uploaded = self.uploaded.insert(uploaded);
+        let harmonics = uploaded.harmonics.as_ref().map(|(terms, count)| (terms, *count));
+        Ok((uploaded, Splatter { device, near, background, is_antialiased: scene.is_antialiased, harmonics }))
     }
 
     fn picture(&mut self, camera: &CameraBlock) -> Result<Rendered, FieldError> {
-        let splatter = self.splatter();
-        let Uploaded { gaussians, count, .. } = self.uploaded(camera)?;
+        let (Uploaded { gaussians, count, .. }, splatter) = self.uploaded()?;
         Ok(splatter.rendered(gaussians, *count, &[*camera], MIN_OPACITY)?.remove(0))
     }
 }
@@ -163,9 +155,24 @@ impl<D: Device> Prepared for Prepare<'_, D> {
         progress: &dyn Progress,
     ) -> Result<Option<Rounded>, FieldError> {
         progress.check()?;
-        let (splatter, camera) = (self.splatter(), request.camera.block(0));
-        let Uploaded { gaussians, count, .. } = self.uploaded(&camera)?;
-        Ok(Some(splatter.rounded(gaussians, *count, &camera, MIN_OPACITY)?))
+        let (Uploaded { gaussians, count, .. }, splatter) = self.uploaded()?;
+        Ok(Some(splatter.rounded(gaussians, *count, &request.camera.block(0), MIN_OPACITY)?))
+    }
+}
+
+impl<D: Device> Uploaded<D> {
+    fn new(device: &D, scene: &GaussianScene) -> Result<Uploaded<D>, DeviceError> {
+        let mut blocks = scene.blocks();
+        let count = blocks.len();
+        // No device has empty buffers, and one of these Gaussians stands in for a state.
+        let hidden = GaussianBlock { opacity: -80.0, ..GaussianBlock::default() };
+        blocks.resize(count.max(size_of::<ParticleState>() / size_of::<GaussianBlock>()), hidden);
+        let term_count = REST_COUNTS[scene.degree.min(MAX_DEGREE) as usize];
+        let harmonics = match term_count {
+            0 => None,
+            _ => Some((device.upload_owned(terms_of(&scene.f_rest, term_count as usize))?, term_count)),
+        };
+        Ok(Uploaded { gaussians: device.upload_owned(blocks)?, count: count.max(1), harmonics })
     }
 }
 

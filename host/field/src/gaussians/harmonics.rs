@@ -2,7 +2,21 @@
 
 use viewfuse_core::Vec3;
 use viewfuse_core::gaussian::{REST_COUNTS, harmonics};
+use viewfuse_device::parallel::map;
 use viewfuse_kernels::gaussians::steps::{HarmonicTerm, TermState, colour_along, step_term};
+
+/// Terms that a core makes at once.
+const TERMS_A_CORE: usize = 1 << 14;
+
+/// The terms of coefficients `[gaussian][channel][coefficient]`, so many a channel: `[gaussian][term]`.
+pub(super) fn terms_of(coefficients: &[f32], count: usize) -> Vec<HarmonicTerm> {
+    let term = |index: usize| {
+        let (gaussian, term) = (index / count, index % count);
+        let value = [0, 1, 2].map(|channel| coefficients[(3 * gaussian + channel) * count + term]);
+        HarmonicTerm { value, padding: 0.0 }
+    };
+    map(coefficients.len() / 3, TERMS_A_CORE, term)
+}
 
 /// The coefficients in their order; none for a colour that is the same from everywhere.
 #[derive(Clone, Debug, Default)]
@@ -15,9 +29,7 @@ pub(super) struct Harmonics {
 impl Harmonics {
     /// Of coefficients `[channel][coefficient]`.
     pub(super) fn new(coefficients: &[f32]) -> Harmonics {
-        let count = coefficients.len() / 3;
-        let value = |index: usize| [0, 1, 2].map(|channel| coefficients[channel * count + index]);
-        Harmonics::begun((0..count).map(|index| HarmonicTerm { value: value(index), padding: 0.0 }).collect())
+        Harmonics::begun(terms_of(coefficients, coefficients.len() / 3))
     }
 
     /// At the beginning of an optimisation.

@@ -153,7 +153,7 @@ impl<D: Device> ByHost<'_, D> {
         let Plan { level, source, step, loss, gain_rate } = self.course.plan();
         let (device, course) = (self.device, &mut self.course);
         let Course { near, background, recipe: Recipe { is_antialiased, .. }, .. } = *course;
-        let splatter = Splatter { device, near, background, is_antialiased };
+        let splatter = Splatter { device, near, background, is_antialiased, harmonics: None };
         let view = &course.levels[level][source];
         let mut gaussians = vec![GaussianBlock::default(); course.particles.len()];
         for_each(&mut gaussians, 256, |index, gaussian| *gaussian = course.particles[index].block(&view.camera));

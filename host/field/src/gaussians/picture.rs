@@ -6,11 +6,13 @@ use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::{Device, DeviceError, Later};
 use viewfuse_kernels::gaussians::shown::bytes_of_pixel;
 use viewfuse_kernels::gaussians::{SplatBlock, TileBlock};
-use viewfuse_kernels::rows::{GaussianBlock, ListBlock, ProjectedGaussian, STATUS_NUMBERS, TILE_RUN};
+use viewfuse_kernels::rows::{
+    GaussianBlock, HarmonicTerm, ListBlock, ParticleBlock, ProjectedGaussian, STATUS_NUMBERS, TILE_RUN,
+};
 
 /// Makes pictures of Gaussians on a device.
 #[derive(Debug)]
-pub struct Splatter<'d, D> {
+pub struct Splatter<'d, D: Device> {
     /// The device.
     pub device: &'d D,
     /// Depth along the principal axis from which on Gaussians are seen, world units, above 0.
@@ -19,6 +21,9 @@ pub struct Splatter<'d, D> {
     pub background: [f32; 3],
     /// Whether splats keep their integral when they are dilated.
     pub is_antialiased: bool,
+    /// Spherical harmonics of their colours, `[gaussian][term]`, and how many terms each has; without them, colours are
+    /// the same from everywhere.
+    pub harmonics: Option<(&'d D::Buffer<HarmonicTerm>, u32)>,
 }
 
 /// Most masks of a picture's bins, 256 MiB: where there are more, the host makes the lists.
@@ -78,6 +83,26 @@ impl<'d, D: Device> Splatter<'d, D> {
         SplatBlock { camera, near, gaussian_count, is_antialiased, padding: 0 }
     }
 
+    /// The Gaussians as a camera sees them.
+    fn splats(
+        &self,
+        gaussians: &D::Buffer<GaussianBlock>,
+        gaussian_count: u32,
+        camera: CameraBlock,
+    ) -> Result<D::Buffer<ProjectedGaussian>, DeviceError> {
+        let mut splats = self.device.zeros(gaussian_count.max(1) as usize)?;
+        let block = self.block(camera, gaussian_count);
+        match self.harmonics {
+            None => self.device.project_gaussians(&block, gaussians, &mut splats)?,
+            Some((terms, term_count)) => {
+                let SplatBlock { camera, near, gaussian_count, is_antialiased, .. } = block;
+                let block = ParticleBlock { camera, near, gaussian_count, term_count, is_antialiased, has_states: 0 };
+                self.device.project_particles(&block, gaussians, terms, None, &mut splats)?;
+            }
+        }
+        Ok(splats)
+    }
+
     /// The picture of these Gaussians from a camera.
     ///
     /// # Errors
@@ -92,8 +117,7 @@ impl<'d, D: Device> Splatter<'d, D> {
         let gaussian_count = gaussian_count as u32;
         let camera = CameraBlock { first_texel: 0, ..*camera };
         let block = self.block(camera, gaussian_count);
-        let mut splats = device.zeros(gaussian_count as usize)?;
-        device.project_gaussians(&block, gaussians, &mut splats)?;
+        let splats = self.splats(gaussians, gaussian_count, camera)?;
         let tiles = TileBlock::new(camera.width, camera.height, self.background);
         let lists = Tiles::of(&tiles, &device.download(&splats)?);
         let starts = device.upload(&lists.starts)?;
@@ -135,10 +159,7 @@ impl<'d, D: Device> Splatter<'d, D> {
         let camera = CameraBlock { first_texel: 0, ..*camera };
         let CameraBlock { width, height, .. } = camera;
         let gaussian_count = gaussian_count as u32;
-        let mut splats = device.zeros(gaussian_count.max(1) as usize)?;
-        let projected = self.block(camera, gaussian_count);
-        device.project_gaussians(&projected, gaussians, &mut splats)?;
-
+        let splats = self.splats(gaussians, gaussian_count, camera)?;
         let block = ListBlock { width, height, splat_count: gaussian_count, capacity: u32::MAX };
         let zeros = |count: u32| device.zeros(count.max(1) as usize);
         let mut masks = zeros(block.bin_count() * block.mask_count())?;
@@ -249,7 +270,8 @@ impl<'d, D: Device> Splatter<'d, D> {
     }
 
     /// Derivatives of a loss by the Gaussians' parameters, in the places of these, from those by the picture's pixels,
-    /// `[row][column]` (by red, green, blue and opacity); and of how many tiles each Gaussian is seen in.
+    /// `[row][column]` (by red, green, blue and opacity); and of how many tiles each Gaussian is seen in. Those by a
+    /// colour are by the colour that the camera sees.
     ///
     /// # Errors
     /// [`DeviceError`].

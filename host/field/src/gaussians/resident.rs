@@ -93,8 +93,8 @@ impl<'d, D: Device> Resident<'d, D> {
         let (gaussian_count, term_count) = (*gaussian_count, *term_count);
         let (splats, gradients, masks) = (&mut particles.splats, &mut particles.gradients, &mut particles.masks);
         let camera = CameraBlock { first_texel: 0, ..plan.step.camera };
-        let projected = ParticleBlock { camera, near, gaussian_count, term_count, is_antialiased };
-        device.project_particles(&projected, &gaussians.now, &states.now, &terms.now, splats)?;
+        let projected = ParticleBlock { camera, near, gaussian_count, term_count, is_antialiased, has_states: 1 };
+        device.project_particles(&projected, &gaussians.now, &terms.now, Some(&states.now), splats)?;
 
         let lists = list_block(&camera, gaussian_count, entries.capacity as u32);
         let (counts, before, starts) = (&mut level.counts, &mut level.before, &mut level.starts);

@@ -121,7 +121,8 @@ impl<D: Device> Splats<D> {
         request: &Request<'_>,
     ) -> Result<Rendered, FieldError> {
         let Splats { gaussians, count, near, background, is_antialiased, gains, residuals } = self;
-        let splatter = Splatter { device, near: *near, background: *background, is_antialiased: *is_antialiased };
+        let splatter =
+            Splatter { device, near: *near, background: *background, is_antialiased: *is_antialiased, harmonics: None };
         let weights: Vec<(usize, f32)> = request.views.iter().copied().zip(request.view_weights()).collect();
         let used = weights.iter().filter(|(_, weight)| *weight > 0.0).map(|(view, _)| *view);
         let missing: Vec<usize> = used.filter(|view| residuals.is_missing(*view)).collect();

@@ -77,6 +77,8 @@ fn read(path: &Path, frame: &SceneFrame, world: Option<&(ParserWorld, PathBuf)>)
     };
     let mut scene = if bytes.starts_with(&[0x1f, 0x8b]) {
         spz::read(path, &bytes, &place)?
+    } else if bytes.trim_ascii_start().starts_with(b"<") {
+        return Err(refused(path, "a page or another text: Gaussians are not read from it; write them as .ply, too"));
     } else if let Some((_, _, what)) = OTHERS.iter().find(known) {
         return Err(refused(path, &format!("{what}: {WAY_OUT}")));
     } else if !bytes.starts_with(b"ply") && is_splat {

@@ -70,7 +70,8 @@ pub(super) fn run(
     folder.map_or(Ok(()), |folder| check_writable(&folder.join(SETTINGS)))?;
     let field = arguments.model.open(arguments.seed, None)?;
     let about = field.about();
-    let render_options = arguments.picture.to_render_options(arguments.model.exact, &about)?;
+    let render_options =
+        arguments.omissions.omitting(arguments.picture.to_render_options(), arguments.model.exact, &about)?;
     let render_options = arguments.bound.bounded(render_options, &about, arguments.model.says_omissions());
     let scenes: Vec<Scene> =
         arguments.paths()?.iter().map(|path| arguments.picture.masks.open(path)).collect::<Result<_, _>>()?;

@@ -51,6 +51,14 @@ fn argument(name: &'static str) -> Arg {
     }
 }
 
+/// The options that say how a field makes its pictures, for what makes them without one. `with_sequence`: where the
+/// command has the options of sequences.
+pub(crate) fn of_fields(with_sequence: bool) -> Vec<&'static str> {
+    let about = [PICTURE, EFFORT].into_iter().chain(with_sequence.then_some(SEQUENCE));
+    let flags = about.flat_map(names);
+    flags.chain(["model", "compute", "leave_out", "early_termination", "max_error", "max_time"]).collect()
+}
+
 /// What flags are about, as a parameter.
 pub(crate) const PICTURE: u8 = FlagAbout::Picture as u8;
 pub(crate) const EFFORT: u8 = FlagAbout::Effort as u8;

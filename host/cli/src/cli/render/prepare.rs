@@ -64,7 +64,8 @@ impl Prepared {
         let about = field.about();
         let selection = arguments.sources.to_selection(arguments.targets.as_deref(), arguments.path.choice());
         let job = selection.resolve(&scene, about.least_sources)?;
-        let options = arguments.picture.to_render_options(arguments.model.exact, &about)?;
+        let options =
+            arguments.omissions.omitting(arguments.picture.to_render_options(), arguments.model.exact, &about)?;
         let options = arguments.bound.bounded(
             options,
             &about,

@@ -5,6 +5,7 @@ use crate::cli::verdict::of_two;
 use std::path::Path;
 use viewfuse_field::auto::{Beyond, Candidate, Expected};
 use viewfuse_field::budget::{Estimate, Kept};
+use viewfuse_field::gaussians::GIVEN;
 use viewfuse_field::render::Seen;
 use viewfuse_output::record::{ChosenRecord, FrameRecord, RunRecord};
 use viewfuse_output::run::RECORD;
@@ -18,18 +19,24 @@ const MIN_EXPOSURE: f64 = 0.5;
 
 /// Prints the summary of a run.
 pub(super) fn print(record: &RunRecord, folder: &Path) -> std::io::Result<()> {
+    let is_of_sources = record.field != GIVEN;
     for frame in &record.frames {
-        say(format_args!("{}", summary(frame, &record.sources, folder)))?;
+        say(format_args!("{}", summary(frame, &record.sources, is_of_sources, folder)))?;
     }
-    say(format_args!(
-        "{} from {} sources, {}, {} on {}: {:.2} s",
-        if record.frames.len() == 1 { "1 view".to_owned() } else { format!("{} views", record.frames.len()) },
-        record.sources.len(),
-        record.weighting,
-        record.field,
-        record.device,
-        record.times.total
-    ))?;
+    let views = if record.frames.len() == 1 { "1 view".to_owned() } else { format!("{} views", record.frames.len()) };
+    let RunRecord { weighting, field, device, .. } = record;
+    let (source_count, seconds) = (record.sources.len(), record.times.total);
+    if is_of_sources {
+        say(format_args!("{views} from {source_count} sources, {weighting}, {field} on {device}: {seconds:.2} s"))?;
+    } else {
+        say(format_args!("{views} of the file's Gaussians on {device}: {seconds:.2} s"))?;
+    }
+    if !is_of_sources && record.frames.iter().any(|frame| frame.psnr.is_some()) {
+        say(
+            "the file does not say which photographs it was made from: PSNR is a score of new views only where it was \
+             made without these (`optimise --left-out VIEWS`)",
+        )?;
+    }
     if record.earlier > 0 {
         say(format_args!("added to {} of an earlier run with the same settings and sources", record.earlier))?;
     }
@@ -77,7 +84,7 @@ fn choice(chosen: &ChosenRecord, weighting: &str) -> String {
     )
 }
 
-fn summary(frame: &FrameRecord, sources: &[String], folder: &Path) -> String {
+fn summary(frame: &FrameRecord, sources: &[String], is_of_sources: bool, folder: &Path) -> String {
     let corrected = match (frame.psnr, frame.corrected_psnr) {
         (Some(psnr), Some(corrected)) if corrected - psnr >= MIN_EXPOSURE => {
             format!(" ({corrected:.2} colour-corrected)")
@@ -101,6 +108,7 @@ fn summary(frame: &FrameRecord, sources: &[String], folder: &Path) -> String {
         (None, None) => String::new(),
     };
     let left_out = match frame.left_out.len() {
+        _ if !is_of_sources => String::new(),
         0 => String::new(),
         1 => format!("  1 source left out (weight {:.4})", frame.left_out_weight),
         count => format!("  {count} sources left out (weight {:.4})", frame.left_out_weight),
