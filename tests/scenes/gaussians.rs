@@ -245,7 +245,7 @@ fn what_is_no_file_of_gaussians_is_refused() {
 
 #[test]
 fn blocks_have_the_colours_of_degree_0() {
-    let scene = drawn(6, 2, 4);
+    let scene = drawn(60, 2, 4);
     let level = |value: f32| 0.5 + SH_0 * value;
     assert!(scene.gaussians.iter().any(|gaussian| gaussian.f_dc.into_iter().any(|value| level(value) < 0.0)));
     let flat = GaussianScene { degree: 0, f_rest: Vec::new(), ..scene.clone() };
