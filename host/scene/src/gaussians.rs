@@ -66,7 +66,7 @@ pub struct GaussianScene {
     /// Degree of the spherical harmonics, 0 to [`MAX_DEGREE`].
     pub degree: u32,
     /// Coefficients of the degrees above 0: `[gaussian][channel][coefficient]`, with
-    /// [`REST_COUNTS`]`[degree]` coefficients a channel.
+    /// [`REST_COUNTS`](viewfuse_core::gaussian::REST_COUNTS)`[degree]` coefficients a channel.
     pub f_rest: Vec<f32>,
     /// Whether they were trained for splats that keep their integral when they are dilated to a pixel: each is fainter
     /// by as much as its dilation widens it (mip-splatting's 2D filter).
