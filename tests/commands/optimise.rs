@@ -211,6 +211,7 @@ fn what_it_refuses() {
     assert_refused(&folder, &format!("{OPTIMISE} --resume no.ply -o toy.ply"), &["no.ply"]);
     assert_refused(&folder, &format!("{OPTIMISE} --left-out 99 -o toy.ply"), &["99"]);
     assert_refused(&folder, &format!("{OPTIMISE} --left-out , -o toy.ply"), &["nothing would be held out"]);
+    assert_refused(&folder, &format!("{OPTIMISE} --towards , -o toy.ply"), &["nothing would be held out"]);
     let twice = format!("{OPTIMISE} --sources 0..9 --left-out 3 -o toy.ply");
     assert_refused(&folder, &twice, &["a target and a source at once", "--left-out"]);
     assert_wrong_arguments(

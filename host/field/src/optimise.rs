@@ -144,13 +144,16 @@ impl<'a> SceneOptimisation<'a> {
         if let Some(list) = held_out.filter(|_| held_out_views.is_empty()) {
             return Err(SelectionFault::NothingHeldOut(list.to_owned()).in_scene(scene));
         }
-        let towards = views(towards)?;
-        let excluded = [held_out_views.clone(), photographs(&towards)].concat();
+        let towards_views = views(towards)?;
+        if let Some(list) = towards.filter(|_| towards_views.is_empty()) {
+            return Err(SelectionFault::NothingHeldOut(list.to_owned()).in_scene(scene));
+        }
+        let excluded = [held_out_views.clone(), photographs(&towards_views)].concat();
         Ok(SceneOptimisation {
             scene,
             sources: selection.sources_without(scene, &excluded, least_sources)?,
             held_out: held_out_views,
-            towards: towards.into_iter().map(|view| target_of(scene, view)).collect(),
+            towards: towards_views.into_iter().map(|view| target_of(scene, view)).collect(),
             options: RenderOptions::default(),
             weighting: Weighting::default_scheme(),
             recipe: RecipeOptions::default(),
