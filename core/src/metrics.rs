@@ -40,10 +40,17 @@ pub fn ssim(prediction: &[u8], truth: &[u8], width: usize, height: usize, channe
     while channel < channel_count {
         let mut row = 0;
         while row + SSIM_WINDOW <= height {
+            // The columns of the last window, and their sum: whole numbers, hence exact in any order.
+            let (mut columns, mut window) = ([Sums::default(); SSIM_WINDOW], Sums::default());
             let mut column = 0;
-            while column + SSIM_WINDOW <= width {
-                total += window_similarity(prediction, truth, width, channel_count, [row, column, channel]);
+            while column < width {
+                let entering = Sums::of_column(prediction, truth, width, channel_count, [row, column, channel]);
+                let leaving = core::mem::replace(&mut columns[column % SSIM_WINDOW], entering);
+                window = window.moved(entering, leaving);
                 column += 1;
+                if column >= SSIM_WINDOW {
+                    total += window.similarity();
+                }
             }
             row += 1;
         }
@@ -53,34 +60,57 @@ pub fn ssim(prediction: &[u8], truth: &[u8], width: usize, height: usize, channe
     Some(total / window_count as f64)
 }
 
-/// SSIM of the window whose top left corner is `[row, column]`, in one channel. The sums are whole numbers, hence
-/// exact.
-fn window_similarity(prediction: &[u8], truth: &[u8], width: usize, channel_count: usize, at: [usize; 3]) -> f64 {
-    const COUNT: f64 = (SSIM_WINDOW * SSIM_WINDOW) as f64;
-    const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);
-    const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
-    let (mut sum_p, mut sum_t, mut sum_pp, mut sum_tt, mut sum_pt) = (0_u32, 0_u32, 0_u32, 0_u32, 0_u32);
-    let mut row = at[0];
-    while row < at[0] + SSIM_WINDOW {
-        let mut column = at[1];
-        while column < at[1] + SSIM_WINDOW {
-            let i = (row * width + column) * channel_count + at[2];
+/// Sums over pixels of one channel of a prediction and of the truth: of the values, of their squares, of the products.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    p: u32,
+    t: u32,
+    pp: u32,
+    tt: u32,
+    pt: u32,
+}
+
+impl Sums {
+    /// Those of a window's height of pixels from `[row, column, channel]` down.
+    fn of_column(prediction: &[u8], truth: &[u8], width: usize, channel_count: usize, at: [usize; 3]) -> Sums {
+        let mut sums = Sums::default();
+        let mut row = at[0];
+        while row < at[0] + SSIM_WINDOW {
+            let i = (row * width + at[1]) * channel_count + at[2];
             let (p, t) = (prediction[i] as u32, truth[i] as u32);
-            sum_p += p;
-            sum_t += t;
-            sum_pp += p * p;
-            sum_tt += t * t;
-            sum_pt += p * t;
-            column += 1;
+            sums.p += p;
+            sums.t += t;
+            sums.pp += p * p;
+            sums.tt += t * t;
+            sums.pt += p * t;
+            row += 1;
         }
-        row += 1;
+        sums
     }
-    let (mean_p, mean_t) = (sum_p as f64 / COUNT, sum_t as f64 / COUNT);
-    let covariance = |sum: u32, a: f64, b: f64| (sum as f64 - COUNT * a * b) / (COUNT - 1.0);
-    let variance_p = covariance(sum_pp, mean_p, mean_p);
-    let variance_t = covariance(sum_tt, mean_t, mean_t);
-    let covariance_pt = covariance(sum_pt, mean_p, mean_t);
-    let numerator = (2.0 * mean_p * mean_t + C1) * (2.0 * covariance_pt + C2);
-    let denominator = (mean_p * mean_p + mean_t * mean_t + C1) * (variance_p + variance_t + C2);
-    numerator / denominator
+
+    /// With a column, and without another that is in it.
+    fn moved(self, entering: Sums, leaving: Sums) -> Sums {
+        Sums {
+            p: self.p + entering.p - leaving.p,
+            t: self.t + entering.t - leaving.t,
+            pp: self.pp + entering.pp - leaving.pp,
+            tt: self.tt + entering.tt - leaving.tt,
+            pt: self.pt + entering.pt - leaving.pt,
+        }
+    }
+
+    /// SSIM of the window that these are the sums of.
+    fn similarity(self) -> f64 {
+        const COUNT: f64 = (SSIM_WINDOW * SSIM_WINDOW) as f64;
+        const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);
+        const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
+        let (mean_p, mean_t) = (self.p as f64 / COUNT, self.t as f64 / COUNT);
+        let covariance = |sum: u32, a: f64, b: f64| (sum as f64 - COUNT * a * b) / (COUNT - 1.0);
+        let variance_p = covariance(self.pp, mean_p, mean_p);
+        let variance_t = covariance(self.tt, mean_t, mean_t);
+        let covariance_pt = covariance(self.pt, mean_p, mean_t);
+        let numerator = (2.0 * mean_p * mean_t + C1) * (2.0 * covariance_pt + C2);
+        let denominator = (mean_p * mean_p + mean_t * mean_t + C1) * (variance_p + variance_t + C2);
+        numerator / denominator
+    }
 }

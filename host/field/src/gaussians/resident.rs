@@ -76,7 +76,7 @@ impl<'d, D: Device> Resident<'d, D> {
             }
         }
         if self.status.is_none() {
-            self.status = Some(stepped(device, &[0; STATUS_NUMBERS as usize])?);
+            self.status = Some(stepped(device, [0; STATUS_NUMBERS as usize].into_iter())?);
         }
         self.level = Some(level);
         Ok(())

@@ -1,6 +1,7 @@
 //! The depth range of a scene: near and far bounds of the planes, for any camera.
 
 use crate::Surfaces;
+use std::cell::RefCell;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_scene::photographs::SourceImages;
@@ -12,6 +13,8 @@ const PERCENTILES: [f64; 2] = [0.01, 0.99];
 const MARGINS: [f32; 2] = [0.85, 1.3];
 /// Fewest points from which bounds are estimated.
 const MIN_POINTS: usize = 32;
+/// Most cameras whose range is kept.
+const MAX_KNOWN: usize = 256;
 
 /// The known depths of a scene.
 #[derive(Clone, Debug)]
@@ -20,17 +23,23 @@ pub(super) struct Space {
     points: Vec<Vec3>,
     /// Least and greatest disparity for a camera that sees too few points; `None` if unknown.
     bounds: Option<[f32; 2]>,
+    /// Of the cameras that were asked for last: trials of settings ask for the same ones again and again.
+    known: RefCell<Vec<(CameraBlock, [f32; 2])>>,
 }
 
 impl Space {
+    fn new(points: Vec<Vec3>, bounds: Option<[f32; 2]>) -> Space {
+        Space { points, bounds, known: RefCell::default() }
+    }
+
     /// The depths in the scene's files: bounds first, because they also state the intended range, then points.
     pub(super) fn of(sources: &SourceImages) -> Space {
         if let Some([near, far]) = sources.near_far {
-            return Space { points: Vec::new(), bounds: Some([1.0 / far, 1.0 / near]) };
+            return Space::new(Vec::new(), Some([1.0 / far, 1.0 / near]));
         }
         let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
         let points = sources.points.clone();
-        if points.len() < MIN_POINTS { Space { points, bounds: None } } else { Space::of_points(points, &cameras) }
+        if points.len() < MIN_POINTS { Space::new(points, None) } else { Space::of_points(points, &cameras) }
     }
 
     /// From surface points. For a camera that sees too few, the bounds are those of all the cameras that see enough; if
@@ -38,7 +47,7 @@ impl Space {
     pub(super) fn of_points(points: Vec<Vec3>, cameras: &[Camera]) -> Space {
         let seen = cameras.iter().filter_map(|camera| in_frustum(&points, &camera.block(0)));
         let bounds = seen.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).unwrap_or_else(|| common_volume(cameras));
-        Space { points, bounds: Some(bounds) }
+        Space::new(points, Some(bounds))
     }
 
     /// Whether bounds are known.
@@ -59,7 +68,16 @@ impl Space {
 
     /// Least and greatest disparity in a camera's frustum.
     pub(super) fn disparities(&self, camera: &CameraBlock) -> [f32; 2] {
-        in_frustum(&self.points, camera).or(self.bounds).unwrap_or([0.0, 1.0])
+        let mut known = self.known.borrow_mut();
+        if let Some((_, disparities)) = known.iter().find(|(known, _)| known == camera) {
+            return *disparities;
+        }
+        let disparities = in_frustum(&self.points, camera).or(self.bounds).unwrap_or([0.0, 1.0]);
+        if known.len() == MAX_KNOWN {
+            known.remove(0);
+        }
+        known.push((*camera, disparities));
+        disparities
     }
 }
 

@@ -8,12 +8,15 @@ use super::super::picture::can_be_listed;
 use super::ENTRIES_A_GAUSSIAN;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::gaussian::REST_COUNTS;
+use viewfuse_device::parallel::for_each;
 use viewfuse_device::{Device, DeviceError, Element, Later};
 use viewfuse_kernels::gaussians::blend_gradient::SplatGradient;
 use viewfuse_kernels::rows::{
     GainBlock, GaussianBlock, HarmonicTerm, ListBlock, ParticleState, ProjectedGaussian, SHARE_RUN, TILE_RUN, TermState,
 };
 
+/// Pixels that are enough work for a thread.
+const MIN_PIXELS: usize = 4096;
 /// Gaussians must be fewer: their number has 24 bits.
 const MAX_GAUSSIANS: usize = 1 << 24;
 
@@ -63,14 +66,15 @@ impl<B> Stepped<B> {
 }
 
 /// An array of these values, and another of as many. No device has empty ones; default values, with which states begin,
-/// are not uploaded.
+/// are neither collected nor uploaded.
 pub(super) fn stepped<D: Device, T: Element + PartialEq>(
     device: &D,
-    values: &[T],
+    values: impl Iterator<Item = T> + Clone,
 ) -> Result<Stepped<D::Buffer<T>>, DeviceError> {
-    let zeros = || device.zeros(values.len().max(1));
-    let is_begun = values.iter().any(|value| *value != T::default());
-    Ok(Stepped { now: if is_begun { device.upload(values)? } else { zeros()? }, next: zeros()? })
+    let count = values.clone().count().max(1);
+    let is_begun = values.clone().any(|value| value != T::default());
+    let now = if is_begun { device.upload_owned(values.collect())? } else { device.zeros(count)? };
+    Ok(Stepped { now, next: device.zeros(count)? })
 }
 
 /// The photographs of a level, and arrays for a picture of the largest of them.
@@ -96,21 +100,18 @@ pub(super) struct Level<D: Device> {
 
 impl<D: Device> Level<D> {
     pub(super) fn new(device: &D, number: usize, views: &[LevelView]) -> Result<Level<D>, DeviceError> {
-        let (mut photographs, mut means, mut variances) = (Vec::new(), Vec::new(), Vec::new());
-        let mut firsts = Vec::new();
-        for view in views {
-            firsts.push(photographs.len() as u32);
-            let number = |channels: [&[f32]; 4], pixel: usize| {
-                channels.map(|channel| channel.get(pixel).copied().unwrap_or(0.0))
-            };
-            let [red, green, blue] = &view.structure;
-            let [a, b, c, d] = &view.channels;
-            for pixel in 0..pixel_count(view) {
-                photographs.push(number([a, b, c, d], pixel));
-                means.push(number([&red.means, &green.means, &blue.means, &[]], pixel));
-                variances.push(number([&red.variances, &green.variances, &blue.variances, &[]], pixel));
-            }
-        }
+        let firsts = views.iter().scan(0, |next, view| {
+            let first = *next;
+            *next += pixel_count(view) as u32;
+            Some(first)
+        });
+        let means = joined(views, |LevelView { structure: [red, green, blue], .. }| {
+            [&red.means[..], &green.means, &blue.means, &[]]
+        });
+        let variances = joined(views, |LevelView { structure: [red, green, blue], .. }| {
+            [&red.variances[..], &green.variances, &blue.variances, &[]]
+        });
+        let photographs = joined(views, |view| view.channels.each_ref().map(|channel| &channel[..]));
         let most = |of: fn(&ListBlock) -> u32| {
             let blocks = views.iter().map(|view| list_block(&view.camera, 0, 0));
             blocks.map(|block| of(&block)).max().unwrap_or(0).max(1) as usize
@@ -120,7 +121,7 @@ impl<D: Device> Level<D> {
         let pixels = views.iter().map(pixel_count).max().unwrap_or(0).max(1);
         Ok(Level {
             number,
-            firsts,
+            firsts: firsts.collect(),
             photographs: device.upload_owned(photographs)?,
             means: device.upload_owned(means)?,
             variances: device.upload_owned(variances)?,
@@ -137,6 +138,21 @@ impl<D: Device> Level<D> {
             bin_count: most(ListBlock::bin_count) as u32,
         })
     }
+}
+
+/// `[source][row][column]`: four channels of each, 0 where one is not there.
+fn joined(views: &[LevelView], channels: impl Fn(&LevelView) -> [&[f32]; 4]) -> Vec<[f32; 4]> {
+    let mut pixels = vec![[0.0; 4]; views.iter().map(pixel_count).sum()];
+    let mut rest = &mut pixels[..];
+    for view in views {
+        let (of_view, others) = rest.split_at_mut(pixel_count(view));
+        let channels = channels(view);
+        for_each(of_view, MIN_PIXELS, |pixel, numbers| {
+            *numbers = channels.map(|channel| channel.get(pixel).copied().unwrap_or(0.0));
+        });
+        rest = others;
+    }
+    pixels
 }
 
 /// A picture of a camera.
@@ -183,22 +199,18 @@ impl<D: Device> Particles<D> {
         bin_count: u32,
     ) -> Result<Particles<D>, DeviceError> {
         let all = &course.particles;
-        let gaussians: Vec<GaussianBlock> = all.iter().map(|particle| particle.gaussian).collect();
-        let states: Vec<ParticleState> = all.iter().map(|particle| particle.state).collect();
-        let terms: Vec<HarmonicTerm> =
-            all.iter().flat_map(|particle| first_of(&particle.harmonics.terms, term_count)).collect();
-        let term_states: Vec<TermState> =
-            all.iter().flat_map(|particle| first_of(&particle.harmonics.states, term_count)).collect();
+        let terms = all.iter().flat_map(|particle| first_of(&particle.harmonics.terms, term_count));
+        let term_states = all.iter().flat_map(|particle| first_of(&particle.harmonics.states, term_count));
         let count = all.len() as u32;
         let mask_count = list_block(&CameraBlock::default(), count, 0).mask_count();
         Ok(Particles {
             count,
             term_count,
-            gaussians: stepped(device, &gaussians)?,
-            states: stepped(device, &states)?,
-            terms: stepped(device, &terms)?,
-            term_states: stepped(device, &term_states)?,
-            gains: stepped(device, &course.gains)?,
+            gaussians: stepped(device, all.iter().map(|particle| particle.gaussian))?,
+            states: stepped(device, all.iter().map(|particle| particle.state))?,
+            terms: stepped(device, terms)?,
+            term_states: stepped(device, term_states)?,
+            gains: stepped(device, course.gains.iter().copied())?,
             splats: device.zeros(all.len().max(1))?,
             gradients: device.zeros(all.len().max(1))?,
             masks: device.zeros((bin_count * mask_count).max(1) as usize)?,
@@ -243,7 +255,7 @@ impl<D: Device> Particles<D> {
 }
 
 /// So many elements, the last of them defaults if there are fewer.
-fn first_of<T: Element>(elements: &[T], count: u32) -> impl Iterator<Item = T> {
+fn first_of<T: Element>(elements: &[T], count: u32) -> impl Iterator<Item = T> + Clone {
     (0..count as usize).map(|index| elements.get(index).copied().unwrap_or_default())
 }
 

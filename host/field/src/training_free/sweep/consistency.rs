@@ -8,7 +8,7 @@
 use super::views::Views;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::Device;
-use viewfuse_device::parallel::map;
+use viewfuse_device::parallel::for_each;
 use viewfuse_kernels::plane_sweep::evidence::planes_behind;
 use viewfuse_kernels::plane_sweep::frustum::Track;
 use viewfuse_kernels::visual_hull::fade;
@@ -24,10 +24,11 @@ const WIDTH: f32 = 2.0;
 const MIN_PIXELS: usize = 512;
 
 impl<D: Device> Views<'_, D> {
-    /// Confidences of these views by what they say of one another, in `maps[view][row][column]`: of a view with at
-    /// least [`OTHERS`] others, `consistency_share` of each is its geometric consistency.
-    pub(super) fn confirm(&self, views: &[usize], maps: &mut [[f32; 2]]) {
+    /// `maps[view][row][column]` with the confidences of these views by what they say of one another: of a view with
+    /// at least [`OTHERS`] others, `consistency_share` of each is its geometric consistency.
+    pub(super) fn confirmed(&self, views: &[usize], maps: &[[f32; 2]]) -> Vec<[f32; 2]> {
         let share = self.settings.consistency_share;
+        let mut confirmed = maps.to_vec();
         let is_found = |view: usize| views.contains(&view) && self.maps.steps[view] > 0.0;
         for &view in views.iter().filter(|view| share > 0.0 && is_found(**view)) {
             let others = self.others(view).into_iter().filter(|(other, weight)| *weight > 0.0 && is_found(*other));
@@ -40,13 +41,12 @@ impl<D: Device> Views<'_, D> {
             }
             let camera = self.matched.images.cameras[view];
             let (first, count) = (camera.first_texel as usize, (camera.width * camera.height) as usize);
-            // Of the maps only disparities are read, which stay.
-            let confidences = map(count, MIN_PIXELS, |pixel| {
-                let [disparity, confidence] = maps[first + pixel];
-                confidence + share * (consistency(&camera, pixel as u32, disparity, &others, maps) - confidence)
+            for_each(&mut confirmed[first..first + count], MIN_PIXELS, |pixel, [disparity, confidence]| {
+                let consistency = consistency(&camera, pixel as u32, *disparity, &others, maps);
+                *confidence += share * (consistency - *confidence);
             });
-            maps[first..].iter_mut().zip(confidences).for_each(|(pixel, confidence)| pixel[1] = confidence);
         }
+        confirmed
     }
 }
 

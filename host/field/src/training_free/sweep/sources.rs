@@ -87,16 +87,16 @@ impl<D: Device> SourceMeans<D> {
 
 impl<D: Device> Views<'_, D> {
     /// The sources' disparities and confidences, each from the costs of its planes alone.
-    pub(super) fn found(&self) -> Result<Vec<[f32; 2]>, FieldError> {
+    pub(super) fn found(&self) -> Result<&[[f32; 2]], FieldError> {
         let is_settled = self.settings.second_share > 0.0;
         let settled = self.maps.settled.as_ref().filter(|_| is_settled);
         let first = (&self.maps.disparities, &self.maps.on_host);
         let (maps, on_host) = settled.map_or(first, |settled| (&settled.maps, &settled.on_host));
         if let Some(known) = on_host.get() {
-            return Ok(known.clone());
+            return Ok(known);
         }
         let found = self.scene.device.download(maps)?;
-        Ok(on_host.get_or_init(|| found).clone())
+        Ok(on_host.get_or_init(|| found))
     }
 
     /// Finds the disparities of these views the second time, if the settings ask for it, where others say something of

@@ -61,8 +61,7 @@ impl<D: Device> Views<'_, D> {
         if let Some(known) = known {
             return Ok(known);
         }
-        let mut on_host = self.found()?;
-        self.confirm(views, &mut on_host);
+        let on_host = self.confirmed(views, self.found()?);
         let steps = &self.maps.steps;
         let used: Vec<f32> =
             steps.iter().enumerate().map(|(view, step)| if views.contains(&view) { *step } else { 0.0 }).collect();

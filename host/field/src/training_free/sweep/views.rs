@@ -222,11 +222,11 @@ impl<D: Device> Geometry for Views<'_, D> {
     }
 
     fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError> {
-        let mut maps = self.found()?;
+        let mut maps = self.found()?.to_vec();
         self.add_kept(&mut maps);
         let view_count = self.maps.steps.len();
         let encoded: Vec<usize> = (0..view_count).filter(|view| self.maps.steps[*view] > 0.0).collect();
-        self.confirm(&encoded, &mut maps);
+        let maps = self.confirmed(&encoded, &maps);
         Ok((0..view_count).map(|view| self.depth_map(view, &maps)).collect())
     }
 }
