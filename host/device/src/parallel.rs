@@ -125,9 +125,17 @@ impl<'a, T> Rest<'a, T> {
 
 /// The results of `work` for `0..count`, in order; `least` results are enough work for a part.
 pub fn map<R: Send>(count: usize, least: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {
-    let mut results: Vec<Option<R>> = (0..count).map(|_| None).collect();
-    for_each(&mut results, least, |index, result| *result = Some(work(index)));
-    results.into_iter().flatten().collect()
+    let part_len = rows_at_once(count, 1, least);
+    let mut parts: Vec<Vec<R>> = (0..count.div_ceil(part_len)).map(|_| Vec::new()).collect();
+    for_each_part(&mut parts, 1, &|index, part| {
+        let first = index * part_len;
+        part[0] = (first..count.min(first + part_len)).map(&work).collect();
+    });
+    let mut parts = parts.into_iter();
+    let mut results = parts.next().unwrap_or_default();
+    results.reserve_exact(count - results.len());
+    parts.for_each(|mut part| results.append(&mut part));
+    results
 }
 
 /// As [`map`] with parts of one result, until one fails: of the errors, the one of the lowest index is returned.
