@@ -85,7 +85,7 @@ fn list(dispatches: impl IntoIterator<Item = u64>) {
 }
 
 fn print(name: &str, counted: &Counted) {
-    println!("{name}: {} dispatches, {:?}", counted.all(), counted.transfers);
+    println!("{name}: {} dispatches, {:?}", counted.all(), counted.transfers.transfers());
     list(counted.dispatches.iter().copied());
     let (share, small) = filling(counted);
     println!("  {:.1} % of the multiply-adds in products with {ENOUGH_WORKGROUPS} workgroups or more", 100.0 * share);
@@ -97,6 +97,7 @@ fn a_picture_of_pixelnerf_is_few_dispatches() {
     let counted = pixelnerf();
     print("PixelNeRF, 128x128, three views, exact", &counted);
     assert!(counted.all() <= 2500, "{} dispatches", counted.all());
+    assert!(counted.transfers.transfers().downloads <= 9, "{:?}", counted.transfers);
     let (share, small) = filling(&counted);
     assert!(share > 0.98, "{share}: {small:?}");
 }
@@ -110,9 +111,10 @@ fn a_call_of_the_denoiser_is_few_dispatches() {
     list(long.dispatches.iter().zip(&short.dispatches).map(|(long, short)| long - short));
     // A group norm takes two of them, and 117 of its layers are group norms.
     assert!(call <= 423, "{call} dispatches");
-    assert!(long.transfers.downloads - short.transfers.downloads <= 1, "a call waits more than once");
+    let waits = |counted: &Counted| counted.transfers.transfers().downloads;
+    assert!(waits(&long) - waits(&short) <= 1, "a call waits more than once");
     let (share, small) = filling(&long);
-    assert!(share > 0.8, "{share}: {small:?}");
+    assert!(share > 0.93, "{share}: {small:?}");
 }
 
 /// `render tests/data/room` with its three targets under what is chosen for it, in small pictures: transfers do not

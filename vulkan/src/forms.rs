@@ -53,8 +53,7 @@ impl Class {
         let work = u64::from(row_count) * u64::from(inner_count) * u64::from(column_count);
         let tiles = move |form: Form| form.tiles(row_count, column_count);
         // Of those in fours one: measured in a process that has just compiled them, GPUs are not what they are later.
-        let mut sizes = [Form::Large, Form::Small, Form::Tiny].into_iter();
-        let in_fours = sizes.find(|form| tiles(*form) >= ENOUGH_TILES).unwrap_or(Form::Tiny);
+        let in_fours = Form::IN_FOURS.into_iter().find(|form| tiles(*form) >= ENOUGH_TILES).unwrap_or(Form::Least);
         let has_fours = self.is_in_fours() && !is_software;
         let fits = move |form: &Form| match form {
             Form::Single => true,
@@ -158,7 +157,7 @@ mod tests {
 
     #[test]
     fn candidates_are_a_matter_of_the_work_the_outputs_and_the_kind_of_device() {
-        use Form::{Large, Single, Small, Subgroup, Tiny};
+        use Form::{Large, Least, Single, Small, Subgroup, Tiny};
         let candidates = |class: Class, is_software| class.candidates(is_software).collect::<Vec<_>>();
         for is_software in [true, false] {
             assert_eq!(candidates(class(128, 128, 128), is_software), [Single], "little work");
@@ -166,8 +165,9 @@ mod tests {
         assert_eq!(candidates(class(4096, 512, 512), true), [Single, Subgroup]);
         assert_eq!(candidates(class(32_768, 512, 512), false), [Single, Large]);
         assert_eq!(candidates(class(2046, 512, 512), false), [Single, Small]);
-        // A convolution of 16x16 pixels with 512 channels.
-        assert_eq!(candidates(class(256, 4608, 512), false), [Single, Tiny]);
+        // Convolutions of 32x32 pixels with 256 channels, and of 16x16 with 512.
+        assert_eq!(candidates(class(1024, 2304, 256), false), [Single, Tiny]);
+        assert_eq!(candidates(class(256, 4608, 512), false), [Single, Least]);
         let shape = Shape { row_count: 32_768, inner_count: 510, column_count: 512 };
         assert_eq!(candidates(Class::new(Kernel::Linear, shape, false), false), [Single, Subgroup]);
     }

@@ -33,7 +33,7 @@ pub mod vulkan;
 pub use bundles::{HullScene, Layer, Pixels, Rays};
 pub use error::DeviceError;
 pub use kernels::{Device, LayerShape};
-pub use memory::{Element, KernelTime, Later, Memory, Transfers};
+pub use memory::{Element, KernelTime, Later, Memory, TransferCounter, Transfers};
 pub use precision::Precision;
 
 /// The examples of the README, compiled and run.

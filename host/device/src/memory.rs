@@ -35,6 +35,52 @@ pub struct Transfers {
     pub downloaded_bytes: u64,
 }
 
+/// Counts the transfers of a device.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TransferCounter {
+    transfers: Transfers,
+    /// How many arrays were asked for to be there later, of which so many are.
+    asked: u64,
+    arrived: u64,
+}
+
+impl TransferCounter {
+    /// The transfers so far.
+    pub fn transfers(&self) -> Transfers {
+        self.transfers
+    }
+
+    /// An array was uploaded.
+    pub fn upload(&mut self, bytes: usize) {
+        self.transfers.uploads += 1;
+        self.transfers.uploaded_bytes += bytes as u64;
+    }
+
+    /// An array was waited for, and with it all that were asked for.
+    pub fn download(&mut self, bytes: usize) {
+        self.transfers.downloads += 1;
+        self.transfers.downloaded_bytes += bytes as u64;
+        self.arrived = self.asked;
+    }
+
+    /// Asks for an array to be there later: its number.
+    pub fn ask(&mut self) -> u64 {
+        self.asked += 1;
+        self.asked
+    }
+
+    /// An array that was asked for is taken. Returns whether it has to be waited for, and with it all others.
+    pub fn take(&mut self, number: u64, bytes: usize) -> bool {
+        self.transfers.downloaded_bytes += bytes as u64;
+        let is_late = number > self.arrived;
+        if is_late {
+            self.arrived = self.asked;
+            self.transfers.downloads += 1;
+        }
+        is_late
+    }
+}
+
 /// Values on their way from a device.
 pub struct Later<'d, T>(Box<dyn FnOnce() -> Result<Vec<T>, DeviceError> + 'd>);
 

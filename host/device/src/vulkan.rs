@@ -2,7 +2,7 @@
 
 use super::error::DeviceError;
 use super::kernels::{Device, LayerShape};
-use super::memory::{Element, KernelTime, Later, Memory, Transfers};
+use super::memory::{Element, KernelTime, Later, Memory, TransferCounter, Transfers};
 use super::precision::Precision;
 use crate::argument;
 use bytemuck::bytes_of;
@@ -18,18 +18,10 @@ use viewfuse_vulkan::{Adapter, AdapterKind, Buffer, Gpu, GpuOptions, Instance, T
 /// there is enough of it.
 pub struct Vulkan {
     gpu: Gpu,
-    counted: Mutex<Counted>,
+    transfers: Mutex<TransferCounter>,
     is_software: bool,
     /// Where it remembers what it measured and compiled.
     memory: Option<PathBuf>,
-}
-
-/// Transfers, and how many arrays were asked for to be there later, of which so many are.
-#[derive(Default)]
-struct Counted {
-    transfers: Transfers,
-    asked: u64,
-    arrived: u64,
 }
 
 /// The kernels that have forms of rounded factors.
@@ -51,7 +43,7 @@ impl Vulkan {
     /// [`VulkanError`].
     pub fn open(instance: &Arc<Instance>, adapter: &Adapter, options: &GpuOptions) -> Result<Vulkan, VulkanError> {
         let (gpu, is_software) = (Gpu::open(instance, adapter, options)?, adapter.kind == AdapterKind::Software);
-        Ok(Vulkan { gpu, counted: Mutex::default(), is_software, memory: None })
+        Ok(Vulkan { gpu, transfers: Mutex::default(), is_software, memory: None })
     }
 
     /// As [`Vulkan::open`], with a folder where the device remembers compiled pipelines and which forms of its kernels
@@ -86,8 +78,8 @@ impl Vulkan {
         self.gpu.has_timestamps()
     }
 
-    fn counted(&self) -> MutexGuard<'_, Counted> {
-        self.counted.lock().unwrap_or_else(PoisonError::into_inner)
+    fn counter(&self) -> MutexGuard<'_, TransferCounter> {
+        self.transfers.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// A layer in a form of rounded factors. `parameters` say whether there is a residual.
@@ -136,9 +128,7 @@ impl Memory for Vulkan {
 
     fn upload<T: Element>(&self, values: &[T]) -> Result<Buffer<T>, DeviceError> {
         let buffer = self.gpu.upload(values)?;
-        let transfers = &mut self.counted().transfers;
-        transfers.uploads += 1;
-        transfers.uploaded_bytes += size_of_val(values) as u64;
+        self.counter().upload(size_of_val(values));
         Ok(buffer)
     }
 
@@ -174,15 +164,12 @@ impl Memory for Vulkan {
     }
 
     fn transfers(&self) -> Transfers {
-        self.counted().transfers
+        self.counter().transfers()
     }
 
     fn download_first<T: Element>(&self, buffer: &Buffer<T>, count: usize) -> Result<Vec<T>, DeviceError> {
         let values = self.gpu.download_first(buffer, count)?;
-        let mut counted = self.counted();
-        counted.arrived = counted.asked;
-        counted.transfers.downloads += 1;
-        counted.transfers.downloaded_bytes += size_of_val(&values[..]) as u64;
+        self.counter().download(size_of_val(&values[..]));
         Ok(values)
     }
 
@@ -191,19 +178,12 @@ impl Memory for Vulkan {
             let values = self.download(buffer)?;
             return Ok(Later::new(move || Ok(values)));
         };
-        let mut counted = self.counted();
-        counted.asked += 1;
-        let number = counted.asked;
+        let (number, bytes) = (self.counter().ask(), buffer.len() * size_of::<T>());
         Ok(Later::new(move || {
-            let mut counted = self.counted();
-            if number > counted.arrived {
+            if self.counter().take(number, bytes) {
                 self.gpu.wait()?;
-                counted.arrived = counted.asked;
-                counted.transfers.downloads += 1;
             }
-            let values = self.gpu.arrived(coming)?;
-            counted.transfers.downloaded_bytes += size_of_val(&values[..]) as u64;
-            Ok(values)
+            Ok(self.gpu.arrived(coming)?)
         }))
     }
 }

@@ -99,6 +99,8 @@ struct Views<'a, D: Device> {
     counts: Counts,
     options: PixelNerfOptions,
     overflow: Overflow,
+    /// Of the last picture.
+    workspace: Option<Workspace<D>>,
 }
 
 /// Counts of computed and omitted work so far.
@@ -170,6 +172,7 @@ impl PixelNerf {
             counts: Counts::default(),
             options: self.options,
             overflow: Overflow::default(),
+            workspace: None,
         })
     }
 }
@@ -263,10 +266,15 @@ impl<D: Device> Views<'_, D> {
         }
     }
 
-    /// Buffers for a target's points.
-    fn workspace(&self, request: &Request<'_>, most_points: usize) -> Result<Workspace<D>, DeviceError> {
-        let (architecture, maps) = (&self.field.architecture, self.options.omissions.latent_layers);
-        Workspace::new(self.device, architecture, request.views.len(), most_points, maps)
+    /// Buffers for a target's points: those of the last picture, if they will do.
+    fn workspace(&mut self, request: &Request<'_>, most_points: usize) -> Result<Workspace<D>, DeviceError> {
+        let (device, architecture) = (self.device, &self.field.architecture);
+        let (view_count, maps) = (request.views.len(), self.options.omissions.latent_layers);
+        let last = self.workspace.take();
+        match last.filter(|last| last.serves(device, architecture, view_count, most_points, maps)) {
+            Some(last) => Ok(last),
+            None => Workspace::new(device, architecture, view_count, most_points, maps),
+        }
     }
 
     /// Renders a target under these options, which differ from those that are set in their precision alone.
@@ -283,9 +291,9 @@ impl<D: Device> Views<'_, D> {
             0 => pixel_count * sampling.coarse_count as usize,
             _ => node_picture::most_points(pixel_count),
         };
+        let mut workspace = self.workspace(request, most_points)?;
         let views = self.used(request.views, &request.view_weights(), Some(&self.cast(request)))?;
         let renderer = self.renderer(&views, request, options, progress);
-        let mut workspace = self.workspace(request, most_points)?;
         let mut evaluated = [Evaluated::default(); 2];
         let step = if omissions.nodes > 0 { 0 } else { omissions.empty_space };
         let probes = match step > 1 {
@@ -304,6 +312,7 @@ impl<D: Device> Views<'_, D> {
         };
         workspace.check(self.device)?;
         along_axis(&mut rendered, &renderer.cast);
+        self.workspace = Some(workspace);
         if !self.unit.is_world() {
             rendered.depths.iter_mut().for_each(|depth| *depth *= self.unit.length());
         }
@@ -375,12 +384,13 @@ impl<D: Device> Prepared for Views<'_, D> {
         // Nothing less than exact: what leaves out empty parts of rays misses mist in its own check.
         let options = variants::exact(&self.options);
         let most_points = pixels.len() * options.sampling.coarse_count as usize;
+        let mut workspace = self.workspace(request, most_points)?;
         let views = self.used(request.views, &request.view_weights(), Some(&self.cast(request)))?;
         let renderer = self.renderer(&views, request, options, progress);
-        let mut workspace = self.workspace(request, most_points)?;
         let mut evaluated = [Evaluated::default(); 2];
         let (colours, _) = renderer.pixels_at(&mut workspace, pixels, None, &mut evaluated)?;
         workspace.check(self.device)?;
+        self.workspace = Some(workspace);
         Ok(colours)
     }
 

@@ -4,7 +4,7 @@
 use std::marker::PhantomData;
 use std::sync::Mutex;
 use viewfuse::device::argument;
-use viewfuse::device::{Device, DeviceError, Element, KernelTime, LayerShape, Memory, Transfers};
+use viewfuse::device::{Device, DeviceError, Element, KernelTime, Later, LayerShape, Memory, TransferCounter};
 use viewfuse_kernels::finite::ALL_FINITE;
 use viewfuse_kernels::network::tile::Shape;
 use viewfuse_kernels::rows::*;
@@ -18,7 +18,7 @@ pub(super) struct Counted {
     /// The matrix products of tiled kernels, and how often each.
     pub(super) products: Vec<(Kernel, Shape, u64)>,
     /// Arrays up and down.
-    pub(super) transfers: Transfers,
+    pub(super) transfers: TransferCounter,
 }
 
 impl Counted {
@@ -49,6 +49,17 @@ pub(super) struct Length<T> {
     elements: PhantomData<fn() -> T>,
 }
 
+impl<T: Element> Length<T> {
+    /// What it is said to hold.
+    fn first(&self, count: usize) -> Vec<T> {
+        let mut values = vec![T::default(); count];
+        if self.says_finite {
+            bytemuck::cast_slice_mut::<T, u32>(&mut values).fill(ALL_FINITE);
+        }
+        values
+    }
+}
+
 impl<T> Length<T> {
     fn written_by(&mut self, kernel: Kernel) {
         self.says_finite = kernel == Kernel::FindNonFinite;
@@ -69,9 +80,7 @@ impl Memory for Counting {
     }
 
     fn upload<T: Element>(&self, values: &[T]) -> Result<Length<T>, DeviceError> {
-        let transfers = &mut self.0.lock().expect("no panic").transfers;
-        transfers.uploads += 1;
-        transfers.uploaded_bytes += size_of_val(values) as u64;
+        self.0.lock().expect("no panic").transfers.upload(size_of_val(values));
         self.zeros(values.len())
     }
 
@@ -101,14 +110,16 @@ impl Memory for Counting {
 
     fn download_first<T: Element>(&self, buffer: &Length<T>, count: usize) -> Result<Vec<T>, DeviceError> {
         let count = count.min(buffer.len);
-        let transfers = &mut self.0.lock().expect("no panic").transfers;
-        transfers.downloads += 1;
-        transfers.downloaded_bytes += (count * size_of::<T>()) as u64;
-        let mut values = vec![T::default(); count];
-        if buffer.says_finite {
-            bytemuck::cast_slice_mut::<T, u32>(&mut values).fill(ALL_FINITE);
-        }
-        Ok(values)
+        self.0.lock().expect("no panic").transfers.download(count * size_of::<T>());
+        Ok(buffer.first(count))
+    }
+
+    fn download_later<T: Element>(&self, buffer: &Length<T>) -> Result<Later<'_, T>, DeviceError> {
+        let (values, number) = (buffer.first(buffer.len), self.0.lock().expect("no panic").transfers.ask());
+        Ok(Later::new(move || {
+            self.0.lock().expect("no panic").transfers.take(number, size_of_val(&values[..]));
+            Ok(values)
+        }))
     }
 }
 

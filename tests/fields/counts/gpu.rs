@@ -1,28 +1,22 @@
 //! A device that computes as the CPU does and says that it is a GPU: what fields do on GPUs, with its transfers
 //! counted.
 
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard};
 use viewfuse::device::argument;
 use viewfuse::device::cpu::{Cpu, Weights};
-use viewfuse::device::{Device, DeviceError, Element, KernelTime, Later, LayerShape, Memory, Transfers};
+use viewfuse::device::{
+    Device, DeviceError, Element, KernelTime, Later, LayerShape, Memory, TransferCounter, Transfers,
+};
 use viewfuse_kernels::for_each_kernel;
 use viewfuse_kernels::rows::*;
 
 /// The CPU with the counts of a GPU.
 #[derive(Default)]
-pub(super) struct CpuAsGpu(Mutex<Counted>);
-
-/// Transfers, and how many arrays were asked for to be there later, of which so many are.
-#[derive(Default)]
-struct Counted {
-    transfers: Transfers,
-    asked: u64,
-    arrived: u64,
-}
+pub(super) struct CpuAsGpu(Mutex<TransferCounter>);
 
 impl CpuAsGpu {
-    fn count<R>(&self, add: impl FnOnce(&mut Counted) -> R) -> R {
-        add(&mut self.0.lock().expect("no panic"))
+    fn counter(&self) -> MutexGuard<'_, TransferCounter> {
+        self.0.lock().expect("no panic")
     }
 }
 
@@ -34,10 +28,7 @@ impl Memory for CpuAsGpu {
     }
 
     fn upload<T: Element>(&self, values: &[T]) -> Result<Vec<T>, DeviceError> {
-        self.count(|Counted { transfers, .. }| {
-            transfers.uploads += 1;
-            transfers.uploaded_bytes += size_of_val(values) as u64;
-        });
+        self.counter().upload(size_of_val(values));
         Cpu.upload(values)
     }
 
@@ -66,33 +57,20 @@ impl Memory for CpuAsGpu {
     }
 
     fn transfers(&self) -> Transfers {
-        self.count(|counted| counted.transfers)
+        self.counter().transfers()
     }
 
     fn download_first<T: Element>(&self, buffer: &Vec<T>, count: usize) -> Result<Vec<T>, DeviceError> {
         let values = Cpu.download_first(buffer, count)?;
-        self.count(|counted| {
-            counted.transfers.downloads += 1;
-            counted.transfers.downloaded_bytes += size_of_val(&values[..]) as u64;
-            counted.arrived = counted.asked;
-        });
+        self.counter().download(size_of_val(&values[..]));
         Ok(values)
     }
 
     fn download_later<T: Element>(&self, buffer: &Vec<T>) -> Result<Later<'_, T>, DeviceError> {
         let values = Cpu.download(buffer)?;
-        let number = self.count(|counted| {
-            counted.asked += 1;
-            counted.asked
-        });
+        let number = self.counter().ask();
         Ok(Later::new(move || {
-            self.count(|counted| {
-                if number > counted.arrived {
-                    counted.arrived = counted.asked;
-                    counted.transfers.downloads += 1;
-                }
-                counted.transfers.downloaded_bytes += size_of_val(&values[..]) as u64;
-            });
+            self.counter().take(number, size_of_val(&values[..]));
             Ok(values)
         }))
     }
@@ -111,7 +89,7 @@ macro_rules! methods {
             type Weights = Weights;
 
             fn weights(&self, shape: &LayerShape, weights: &[f32]) -> Result<Weights, DeviceError> {
-                self.count(|counted| counted.transfers.uploads += 1);
+                self.counter().upload(size_of_val(weights));
                 Cpu.weights(shape, weights)
             }
 

@@ -24,7 +24,7 @@ pub const MATRIX_EXTENSION: &str = "SPV_KHR_cooperative_matrix";
 /// What stands before the names of entry points for arrays in fours, which are forms of the kernels that follow.
 const IN_FOURS: &str = "in_fours::";
 /// The forms of those that every device may run.
-pub const FORMS_IN_FOURS: [&str; 3] = ["large", "small", "tiny"];
+pub const FORMS_IN_FOURS: [&str; 4] = ["large", "small", "tiny", "least"];
 
 /// The compiled kernels, as bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]

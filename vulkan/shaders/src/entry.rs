@@ -245,7 +245,9 @@ macro_rules! entries_in_fours {
                 /// In tiles of 64 times 64.
                 small Small (256) SmallRows SmallColumns,
                 /// In tiles of 32 times 32.
-                tiny Tiny (64) TinyRows TinyColumns
+                tiny Tiny (64) TinyRows TinyColumns,
+                /// In tiles of 16 times 16.
+                least Least (64) LeastRows LeastColumns
             }
             entries_in_fours! {
                 halves $method, $Block, $block [$row_count, $inner_count, $column_count], [$($binding $array),*], $last,

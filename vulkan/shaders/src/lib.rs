@@ -26,7 +26,7 @@ use spirv_std::spirv;
 #[cfg(target_arch = "spirv")]
 use tile::Matrices;
 use tile::{Half, HalfSmall, HalfTiny, StandIns, TwoHalves, TwoHalvesSmall, TwoHalvesTiny};
-use tile::{InFours, Large, SharedOfSingle, Small, Staged, Subgroup, Tiny, shared};
+use tile::{InFours, Large, Least, SharedOfSingle, Small, Staged, Subgroup, Tiny, shared};
 use tile::{SharedOfHalf, SharedOfHalfSmall, SharedOfHalfTiny};
 use tile::{SharedOfTwoHalves, SharedOfTwoHalvesSmall, SharedOfTwoHalvesTiny};
 use unchecked::{Endless, EndlessFours, Together, Unchecked, UncheckedFours};

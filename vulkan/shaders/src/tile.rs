@@ -14,7 +14,7 @@ mod fours;
 mod halves;
 mod subgroup;
 
-pub(crate) use fours::{InFours, Large, Small, Tiny, shared};
+pub(crate) use fours::{InFours, Large, Least, Small, Tiny, shared};
 #[cfg(target_arch = "spirv")]
 pub(crate) use halves::Matrices;
 pub(crate) use halves::{Half, HalfSmall, HalfTiny, StandIns, TwoHalves, TwoHalvesSmall, TwoHalvesTiny};

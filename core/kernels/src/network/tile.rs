@@ -336,3 +336,38 @@ impl Sums for FourSums {
         each(0, first);
     }
 }
+
+/// Four sums of a row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LineSums(Vec4);
+
+impl Sums for LineSums {
+    const ROWS: u32 = 1;
+    const COLUMNS: u32 = 4;
+    const ZERO: LineSums = LineSums(Vec4::ZERO);
+    /// The first of the four counts.
+    type OfRows = f32;
+    type OfColumns = Vec4;
+
+    #[inline(always)]
+    fn rows(four: impl Fn(u32) -> Vec4) -> f32 {
+        four(0).x
+    }
+
+    #[inline(always)]
+    fn columns(four: impl Fn(u32) -> Vec4) -> Vec4 {
+        four(0)
+    }
+
+    #[inline(always)]
+    fn add(&mut self, row: f32, columns: Vec4) {
+        self.0 += columns * row;
+    }
+
+    #[inline(always)]
+    fn take_row(&mut self, mut each: impl FnMut(u32, Vec4)) {
+        let first = self.0;
+        self.0 = Vec4::ZERO;
+        each(0, first);
+    }
+}

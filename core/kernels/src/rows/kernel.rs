@@ -34,6 +34,8 @@ pub enum Form {
     Small,
     /// The same with 32 times 32 outputs, 4 times 4 an invocation.
     Tiny,
+    /// The same with 16 times 16 outputs, 4 an invocation: where a GPU would wait for what few workgroups load.
+    Least,
     /// Rows pass between the invocations of a subgroup instead of through the workgroup's memory. There are no
     /// barriers. Only for devices with [subgroups that fit](Form::needs_subgroups).
     Subgroup,
@@ -56,7 +58,9 @@ pub enum Form {
 
 impl Form {
     /// The forms of two roundings that are summed in the same order, which give the same bits.
-    pub const ALL: [Form; 5] = [Form::Single, Form::Large, Form::Small, Form::Tiny, Form::Subgroup];
+    pub const ALL: [Form; 6] = [Form::Single, Form::Large, Form::Small, Form::Tiny, Form::Least, Form::Subgroup];
+    /// Those of them for arrays [in fours](Form::needs_fours), the largest tiles first.
+    pub const IN_FOURS: [Form; 4] = [Form::Large, Form::Small, Form::Tiny, Form::Least];
     /// Those of them that every tiled kernel has: the others are for arrays [in fours](Form::needs_fours).
     pub const OF_ANY_ARRAYS: [Form; 2] = [Form::Single, Form::Subgroup];
     /// The forms of rounded factors, for devices with matrix units.
@@ -69,6 +73,7 @@ impl Form {
             Form::Large | Form::Half | Form::TwoHalves => 128,
             Form::Single | Form::Small | Form::Subgroup | Form::HalfSmall | Form::TwoHalvesSmall => TILE,
             Form::Tiny | Form::HalfTiny | Form::TwoHalvesTiny => 32,
+            Form::Least => 16,
         }
     }
 
@@ -85,7 +90,7 @@ impl Form {
         match self {
             Form::Large | Form::Small | Form::TwoHalves => 256,
             Form::Half | Form::HalfSmall | Form::HalfTiny | Form::TwoHalvesSmall | Form::TwoHalvesTiny => 128,
-            Form::Single | Form::Tiny | Form::Subgroup => WORKGROUP,
+            Form::Single | Form::Tiny | Form::Least | Form::Subgroup => WORKGROUP,
         }
     }
 
@@ -93,8 +98,10 @@ impl Form {
     pub const fn shared_bytes(self) -> usize {
         match self {
             Form::TwoHalves => 3 * SHARED_BYTES,
-            Form::Large | Form::Small | Form::Half | Form::TwoHalvesSmall | Form::TwoHalvesTiny => 2 * SHARED_BYTES,
-            Form::Single | Form::Tiny | Form::Subgroup | Form::HalfSmall | Form::HalfTiny => SHARED_BYTES,
+            Form::Large | Form::Small | Form::Tiny | Form::Half | Form::TwoHalvesSmall | Form::TwoHalvesTiny => {
+                2 * SHARED_BYTES
+            }
+            Form::Single | Form::Least | Form::Subgroup | Form::HalfSmall | Form::HalfTiny => SHARED_BYTES,
         }
     }
 
@@ -146,6 +153,7 @@ impl Form {
             Form::Large => &[Form::Large],
             Form::Small => &[Form::Small],
             Form::Tiny => &[Form::Tiny],
+            Form::Least => &[Form::Least],
             Form::Subgroup => &[Form::Subgroup],
         }
     }
@@ -157,6 +165,7 @@ impl Form {
             Form::Large => "large",
             Form::Small => "small",
             Form::Tiny => "tiny",
+            Form::Least => "least",
             Form::Subgroup => "subgroup",
             Form::Half => "half",
             Form::HalfSmall => "half_small",
@@ -321,6 +330,9 @@ macro_rules! list {
                     },
                     Form::Tiny => match self {
                         $(Kernel::$Kernel => concat!(stringify!($method), "::tiny"),)+
+                    },
+                    Form::Least => match self {
+                        $(Kernel::$Kernel => concat!(stringify!($method), "::least"),)+
                     },
                     Form::Subgroup => match self {
                         $(Kernel::$Kernel => concat!(stringify!($method), "::subgroup"),)+

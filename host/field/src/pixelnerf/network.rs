@@ -10,7 +10,7 @@ use std::mem::swap;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::fuse::FuseBlock;
 use viewfuse_core::rays::RayPoint;
-use viewfuse_device::{Device, DeviceError, Precision};
+use viewfuse_device::{Device, DeviceError, Later, Precision};
 use viewfuse_kernels::finite::{ALL_FINITE, FINITE_RUN};
 use viewfuse_kernels::pixelnerf::{EmbedBlock, GatherBlock};
 use viewfuse_nn::linear::{Linear, LinearOptions};
@@ -33,10 +33,12 @@ pub(super) struct Views<'a, D: Device> {
     pub(super) visibility: Option<Visibility>,
 }
 
-/// Buffers for activations, reused for every chunk of points.
+/// Buffers for activations, reused for every chunk of points, and for other pictures of as many views.
 pub(super) struct Workspace<D: Device> {
     /// The most points at once.
     pub(super) point_count: u32,
+    /// Of how many views, and whether without latents.
+    views: (usize, bool),
     pub(super) points: D::Buffer<RayPoint>,
     embedded: D::Buffer<f32>,
     /// `[view][point][channel]`; empty where the grids hold `lin_z` outputs.
@@ -66,6 +68,7 @@ impl<D: Device> Workspace<D> {
         let rows = points * view_count;
         Ok(Workspace {
             point_count: points as u32,
+            views: (view_count, maps),
             points: device.zeros(points)?,
             embedded: device.zeros(rows * architecture.embedded_len())?,
             latents: device.zeros(if maps { 1 } else { rows * architecture.latent_channels() })?,
@@ -78,13 +81,29 @@ impl<D: Device> Workspace<D> {
         })
     }
 
-    /// Checks all outputs since the last check.
+    /// Whether it is as [`Workspace::new`] would make it, or larger.
+    pub(super) fn serves(
+        &self,
+        device: &D,
+        architecture: &Architecture,
+        view_count: usize,
+        most_points: usize,
+        maps: bool,
+    ) -> bool {
+        let points = points_at_once(device, architecture, view_count, most_points, maps);
+        self.views == (view_count, maps) && self.point_count as usize >= points
+    }
+
+    /// Checks all outputs since the last check, for which it waits once.
     ///
     /// # Errors
     /// [`FieldError::NotFinite`]: weights that are finite themselves may overflow together.
     pub(super) fn check(&mut self, device: &D) -> Result<(), FieldError> {
-        for firsts in std::mem::take(&mut self.not_finite) {
-            if let Some(first) = device.download(&firsts)?.into_iter().find(|first| *first != ALL_FINITE) {
+        let chunks = std::mem::take(&mut self.not_finite);
+        let chunks: Vec<Later<'_, u32>> =
+            chunks.iter().map(|firsts| device.download_later(firsts)).collect::<Result<_, _>>()?;
+        for firsts in chunks {
+            if let Some(first) = firsts.get()?.into_iter().find(|first| *first != ALL_FINITE) {
                 return Err(FieldError::NotFinite(NotFinite {
                     stage: "evaluating the network at points".to_owned(),
                     tensor: "outputs [point][4]".to_owned(),
