@@ -39,6 +39,6 @@ pub fn toy_cloud() -> &'static (SourceImages, Vec<CloudPoint>) {
 
 /// Few Gaussians on small pictures, in all that an optimisation has: levels, harmonics, growth.
 pub fn small_recipe() -> Recipe {
-    let small = Recipe { side: 32, iterations: [0, 6, 6, 30], cell: 8.0, random_count: 100, ..Recipe::default() };
+    let small = Recipe { side: 32, iterations: [0, 6, 6, 30], cell: 8.0, ..Recipe::default() };
     Recipe { max_per_pixel: 0.5, degree: 3, grows: true, ..small }
 }

@@ -53,7 +53,7 @@ impl Quality {
             ..fast
         };
         match has_silhouettes {
-            true => Recipe { random_count: 0, opacity_penalty: 0.1, silhouette_share: 1.0, ..whole },
+            true => Recipe { opacity_penalty: 0.1, silhouette_share: 1.0, ..whole },
             false => whole,
         }
     }

@@ -29,9 +29,11 @@ pub struct Recipe {
     pub cell: f32,
     /// Fewest points of a cube that become one.
     pub least_points: u32,
-    /// Faint Gaussians at random.
-    pub random_count: u32,
-    /// Opacity of the Gaussians from points, and of those at random.
+    /// Faint Gaussians at random behind all points, for what is far away; none where silhouettes say what is behind.
+    pub background_count: u32,
+    /// Standard deviation of those, in footprints at their own depth.
+    pub background_scale: f32,
+    /// Opacity of the Gaussians from points, and of those behind all points.
     pub opacities: [f32; 2],
     /// Thickness of the Gaussians from points along the surface's normal, relative to the surface's directions; 1 for
     /// balls.
@@ -75,8 +77,9 @@ impl Default for Recipe {
             max_per_pixel: 1.5,
             cell: 6.0,
             least_points: 3,
-            random_count: 2000,
-            opacities: [0.4, 0.1],
+            background_count: 600,
+            background_scale: 16.0,
+            opacities: [0.4, 0.2],
             flatness: 0.2,
             structure_share: 0.2,
             opacity_penalty: 0.02,
@@ -103,8 +106,7 @@ impl Recipe {
     }
 
     /// The recipes for pictures that are mixed with the field's own; which of them is better is the scene's
-    /// (`host/results/objects.md`). Where there are silhouettes Gaussians begin on surfaces alone, and the outline has
-    /// twice the weight; more than half of an object's time is that of its trials, and pictures get twice the
+    /// (`host/results/objects.md`). Where there are silhouettes the outline has twice the weight; more than half of an object's time is that of its trials, and pictures get twice the
     /// iterations. They are few and large, opaque only where that gains, for glossy objects, of which the sources agree
     /// on little; or many and small.
     pub fn mixed_with(self, images: &SourceImages) -> Vec<Variant<Recipe>> {
@@ -114,7 +116,6 @@ impl Recipe {
         let small = Recipe {
             iterations: self.iterations.map(|count| 2 * count),
             trial_divisor: 2 * self.trial_divisor,
-            random_count: 0,
             max_per_pixel: self.max_per_pixel.min(0.4),
             opacity_penalty: 0.1,
             silhouette_share: 1.0,

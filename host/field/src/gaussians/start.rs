@@ -1,5 +1,5 @@
-//! The Gaussians to begin with: the sources' surfaces, a cube of points each, and faint ones at random for what no
-//! surface was found of.
+//! The Gaussians to begin with: the sources' surfaces, a cube of points each, and large faint ones behind all points for
+//! what is far away or of which no surface was found.
 
 use super::recipe::Recipe;
 use crate::point_cloud::CloudPoint;
@@ -12,10 +12,10 @@ use viewfuse_scene::photographs::{SourceImage, SourceImages};
 
 /// Fewest points from which a scene's size is known.
 const MIN_POINTS: usize = 32;
-/// Percentiles of the points' depths between which Gaussians are drawn at random.
-const PERCENTILES: [f64; 2] = [0.02, 0.98];
-/// Draws for each Gaussian at random, of which one must be seen by two sources.
-const MAX_DRAWS: u32 = 16;
+/// Percentile of the points' depths behind which the background is.
+const FARTHEST: f64 = 0.98;
+/// Its least disparity, relative to that of the farthest points.
+const LEAST_DISPARITY: f32 = 0.1;
 
 /// The size of a scene, as its sources see it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,8 +24,8 @@ pub(super) struct Extent {
     pub(super) depth: f32,
     /// Size of a pixel of the finest level at that depth, world units.
     pub(super) footprint: f32,
-    /// Nearest and farthest depth of nearly all points.
-    near_far: [f32; 2],
+    /// Depth of the farthest points.
+    far: f32,
 }
 
 impl Extent {
@@ -43,7 +43,7 @@ impl Extent {
         depths.sort_by(f32::total_cmp);
         let at = |share: f64| depths[((depths.len() - 1) as f64 * share).round() as usize];
         let depth = at(0.5);
-        Some(Extent { depth, footprint: depth / focal, near_far: PERCENTILES.map(at) })
+        Some(Extent { depth, footprint: depth / focal, far: at(FARTHEST) })
     }
 }
 
@@ -55,9 +55,11 @@ pub(super) fn start(
     recipe: &Recipe,
 ) -> Vec<GaussianBlock> {
     let mut gaussians = evenly(of_points(points, extent, recipe), recipe.max_count);
-    let count = (recipe.random_count as usize).min(recipe.max_count - gaussians.len());
-    let mut drawn = (0..MAX_DRAWS * recipe.random_count).filter_map(|draw| at_random(draw, images, extent, recipe));
-    gaussians.extend(drawn.by_ref().take(count));
+    // What is behind a silhouette is known.
+    let count = if images.has_silhouettes { 0 } else { recipe.background_count };
+    let count = count.min((recipe.max_count - gaussians.len()) as u32);
+    let cameras: Vec<CameraBlock> = images.images.iter().map(|image| image.camera.block(0)).collect();
+    gaussians.extend((0..count).filter_map(|draw| in_background(draw, images, &cameras, extent, recipe)));
     gaussians
 }
 
@@ -123,20 +125,25 @@ fn ball(position: Vec3, scale: f32, opacity: f32, colour: Vec3) -> GaussianBlock
     }
 }
 
-/// A faint Gaussian on a ray of a source, at a disparity between those of the points; `None` if fewer than two sources
-/// see its place.
-fn at_random(draw: u32, images: &SourceImages, extent: &Extent, recipe: &Recipe) -> Option<GaussianBlock> {
+/// A Gaussian on a ray of a source, drawn at random, at a disparity below that of all points, in the mean colour of the
+/// sources that see it; `None` if none does.
+fn in_background(
+    draw: u32,
+    images: &SourceImages,
+    cameras: &[CameraBlock],
+    extent: &Extent,
+    recipe: &Recipe,
+) -> Option<GaussianBlock> {
     let random = |sample: u32| uniform(recipe.seed, draw, sample);
-    let cameras: Vec<CameraBlock> = images.images.iter().map(|image| image.camera.block(0)).collect();
     let camera = cameras.get((random(0) * cameras.len() as f32) as usize)?;
-    let [near, far] = extent.near_far;
-    let disparity = 1.0 / far + random(1) * (1.0 / near - 1.0 / far);
+    let disparity = (LEAST_DISPARITY + random(1) * (1.0 - LEAST_DISPARITY)) / extent.far;
     let towards = camera.towards(random(2) * camera.width as f32, random(3) * camera.height as f32);
     let position = camera.centre_world() + towards / disparity;
-    let seen = images.images.iter().zip(&cameras).filter_map(|(image, camera)| colour_at(image, camera, position));
+    let seen = images.images.iter().zip(cameras).filter_map(|(image, camera)| colour_at(image, camera, position));
     let (sum, count) = seen.fold((Vec3::ZERO, 0), |(sum, count), colour| (sum + colour, count + 1));
-    let scale = 0.7 * recipe.cell * extent.footprint;
-    (count >= 2).then(|| ball(position, scale, recipe.opacities[1], sum / count as f32))
+    // As large in a picture wherever it is.
+    let scale = recipe.background_scale * extent.footprint / (extent.depth * disparity);
+    (count > 0).then(|| ball(position, scale, recipe.opacities[1], sum / count as f32))
 }
 
 /// The colour that a source shows at a point; `None` if it does not see it, or shows none of the object there.
@@ -150,6 +157,55 @@ fn colour_at(image: &SourceImage, camera: &CameraBlock, position: Vec3) -> Optio
 #[cfg(test)]
 mod tests {
     use super::*;
+    use viewfuse_core::camera::{Camera, Pinhole};
+    use viewfuse_core::pose::Pose;
+
+    /// Two grey photographs of a wall.
+    fn wall() -> (SourceImages, Vec<CloudPoint>) {
+        let pinhole = Pinhole::new([16.0; 2], [8.0; 2], 16, 16).expect("a pinhole");
+        let camera = |x: f32| {
+            let centre = Vec3::new(x, 0.0, 0.0);
+            Camera { pose: Pose::look_at(centre, centre + Vec3::Z, -Vec3::Y).expect("a pose"), pinhole }
+        };
+        let image = |x: f32| SourceImage { camera: camera(x), texels: vec![[0.5, 0.5, 0.5, 1.0]; 256] };
+        let images = SourceImages {
+            images: vec![image(-0.1), image(0.1)],
+            background: [0.0; 3],
+            has_silhouettes: false,
+            points: Vec::new(),
+            near_far: None,
+            warnings: Vec::new(),
+        };
+        let point = |index: usize| {
+            let [x, y] = [index % 8, index / 8].map(|place| 0.2 * (place as f32 - 3.5));
+            CloudPoint { position: Vec3::new(x, y, 4.0), normal: -Vec3::Z, colour: [128; 3], view_count: 2 }
+        };
+        (images, (0..64).map(point).collect())
+    }
+
+    #[test]
+    fn a_background_is_behind_all_points_and_seen() {
+        let (mut images, points) = wall();
+        let extent = Extent::of(&points, &images, 16.0).expect("points");
+        let recipe = Recipe { least_points: 1, cell: 1.0, background_count: 50, ..Recipe::default() };
+        let begun = start(&points, &images, &extent, &recipe);
+        let (behind, front): (Vec<GaussianBlock>, Vec<GaussianBlock>) =
+            begun.into_iter().partition(|gaussian| gaussian.position[2] > 4.0);
+        assert!(behind.len() == 50 && !front.is_empty(), "{} and {}", behind.len(), front.len());
+        for gaussian in &behind {
+            let [_, _, depth] = gaussian.position;
+            assert!((4.0..=40.1).contains(&depth), "{gaussian:?}");
+            let seen = images.images.iter().map(|image| image.camera.block(0));
+            assert!(seen.into_iter().any(|camera| camera.project(Vec3::from_array(gaussian.position)).in_image));
+            // 16 pixels at any depth: the focal length.
+            assert!((gaussian.log_scales[0].exp() / depth - 1.0).abs() < 1.0e-5, "{gaussian:?}");
+            assert_eq!(gaussian.colour, [0.5; 3]);
+        }
+        let few = Recipe { max_count: front.len() + 7, ..recipe };
+        assert_eq!(start(&points, &images, &extent, &few).len(), few.max_count);
+        images.has_silhouettes = true;
+        assert_eq!(start(&points, &images, &extent, &recipe).len(), front.len());
+    }
 
     #[test]
     fn fewer_than_there_are_still_fill_the_whole() {
