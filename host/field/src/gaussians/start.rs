@@ -1,5 +1,5 @@
-//! The Gaussians to begin with: the sources' surfaces, a cube of points each, and large faint ones behind all points for
-//! what is far away or of which no surface was found.
+//! The Gaussians to begin with: the sources' surfaces, a cube of points each, and large faint ones behind all points
+//! for what is far away or of which no surface was found.
 
 use super::recipe::Recipe;
 use crate::point_cloud::CloudPoint;
