@@ -138,7 +138,7 @@ fn ctrl_c_keeps_what_there_is() {
     assert_eq!(end(&mut child).expect("an end").code(), Some(130));
     let text = String::from_utf8(child.wait_with_output().expect("its output").stdout).expect("text");
     let count = gaussians(&path).gaussians.len();
-    assert!(count > 100 && text.contains(&format!("toy.ply: {count} Gaussians after ")), "{text}");
+    assert!(count > 30 && text.contains(&format!("toy.ply: {count} Gaussians after ")), "{text}");
     assert!(text.contains(" of 12000 iterations\n"), "{text}");
     assert_eq!(names_in(&folder), ["toy", "toy.ply"]);
 }
@@ -148,7 +148,7 @@ fn after_a_kill_it_goes_on_from_the_file() {
     let path = folder.join("toy.ply");
     killed_when(&folder, &format!("{OPTIMISE} --iterations 4000 --left-out 20 -o toy.ply"), || path.exists());
     let before = fs::read(&path).expect("a file");
-    assert!(gaussians(&path).gaussians.len() > 100);
+    assert!(gaussians(&path).gaussians.len() > 30);
     let resumed = |output: &str| {
         let text = done(&folder, &format!("{OPTIMISE} --left-out 20 --resume toy.ply -o {output}"));
         (scores(&text), fs::read(folder.join(output)).expect("a file"))
