@@ -305,12 +305,13 @@ impl Course {
         let (view, recipe) = (&self.levels[level][source], &self.recipe);
         let CameraBlock { width, height, .. } = view.camera;
         let [place, scale, turn, opaque, colour, gain_rate] = recipe.rates;
+        let [last_place, last_scale, last_opaque, last_colour] = recipe.last_rates;
         let rates = [
-            place * footprint * 0.3_f32.powf(share),
-            scale * 0.2_f32.powf(done),
+            place * footprint * last_place.powf(share),
+            scale * last_scale.powf(done),
             turn,
-            opaque * 0.2_f32.powf(done),
-            colour * 0.1_f32.powf(done),
+            opaque * last_opaque.powf(done),
+            colour * last_colour.powf(done),
         ];
         let opacity_penalty = recipe.opacity_penalty / (width * height) as f32;
         let step = StepBlock {

@@ -31,7 +31,7 @@ impl Quality {
 
     /// The recipe, for sources with silhouettes or for whole photographs. Beyond [`Quality::Fast`] it begins with few
     /// Gaussians, their number rises to its limit, and colours depend on the direction: with exposures that differ from
-    /// photograph to photograph, too, so that these have no gains. What was measured is in
+    /// photograph to photograph, too, so that these have no gains. Rates are lower, for many iterations. What was measured is in
     /// `host/results/gaussian_quality.md`.
     pub fn recipe(self, has_silhouettes: bool) -> Recipe {
         let fast = Recipe::default();
@@ -40,14 +40,14 @@ impl Quality {
             Quality::Standard => (800, 3000, 100_000),
             Quality::High => (1600, 10_000, 500_000),
         };
-        let [place, scale, turn, opaque, colour, _] = fast.rates;
         let whole = Recipe {
             side,
             iterations: [0, 60, 60, finest],
             max_count,
             max_per_pixel: 0.75,
             split_scale: f32::INFINITY,
-            rates: [place, scale, turn, opaque, colour, 0.0],
+            rates: [0.1, 0.01, 2.0e-3, 0.05, 5.0e-3, 0.0],
+            last_rates: [0.3, 0.2, 0.2, 0.1],
             degree: 3,
             grows: true,
             ..fast
@@ -82,7 +82,11 @@ impl RecipeOptions {
         let recipe = self.quality.recipe(has_silhouettes).with(self.iterations, self.count);
         let recipe = Recipe { seed: self.seed, is_antialiased: self.is_antialiased, ..recipe };
         let recipe = match self.is_of_one_colour {
-            true => Recipe { degree: 0, rates: Recipe::default().rates, ..recipe },
+            true => {
+                let [.., gain_rate] = Recipe::default().rates;
+                let [place, scale, turn, opaque, colour, _] = recipe.rates;
+                Recipe { degree: 0, rates: [place, scale, turn, opaque, colour, gain_rate], ..recipe }
+            }
             false => recipe,
         };
         // Where they do not depend on the direction, colours that no photograph has are only what fits the sources.

@@ -44,6 +44,9 @@ pub struct Recipe {
     pub opacity_penalty: f32,
     /// Learning rates of position (footprints of the level), log scale, rotation, opacity, colour, and gain.
     pub rates: [f32; 6],
+    /// What is left of the rate of position at a level's end, and of those of log scale, opacity and colour at the end
+    /// of all iterations, where they fall exponentially.
+    pub last_rates: [f32; 4],
     /// Opacity below which a Gaussian is pruned when the level changes.
     pub prune_opacity: f32,
     /// Standard deviation from which on a Gaussian is split when the level changes, in footprints of the new level.
@@ -83,7 +86,8 @@ impl Default for Recipe {
             flatness: 0.2,
             structure_share: 0.2,
             opacity_penalty: 0.02,
-            rates: [0.1, 1.0e-2, 2.0e-3, 5.0e-2, 5.0e-3, 5.0e-3],
+            rates: [0.15, 0.04, 0.012, 0.1, 0.01, 5.0e-3],
+            last_rates: [0.3, 0.5, 0.5, 0.4],
             prune_opacity: 0.03,
             split_scale: 1.2,
             near: 0.5,
@@ -106,13 +110,12 @@ impl Recipe {
     }
 
     /// The recipes for pictures that are mixed with the field's own; which of them is better is the scene's
-    /// (`host/results/objects.md`). What is far away the other pictures of a mixture show. Where there are silhouettes
-    /// the outline has twice the weight; more than half of an object's time is that of its trials, and pictures get
-    /// twice the iterations. They are few and large, opaque only where that gains, for glossy objects, of which the
+    /// (`host/results/objects.md`). Where there are silhouettes the outline has twice the weight; more than half of an
+    /// object's time is that of its trials, and pictures get twice the iterations. They are few and large, opaque only where that gains, for glossy objects, of which the
     /// sources agree on little; or many and small.
     pub fn mixed_with(self, images: &SourceImages) -> Vec<Variant<Recipe>> {
         if !images.has_silhouettes {
-            return vec![Variant::to_measure("the usual Gaussians", Recipe { background_count: 0, ..self })];
+            return vec![Variant::to_measure("the usual Gaussians", self)];
         }
         let small = Recipe {
             iterations: self.iterations.map(|count| 2 * count),

@@ -19,6 +19,9 @@ const MAX_ITERATIONS: u32 = 1500;
 const HELD_OUT_EVERY: usize = 8;
 /// Fewest sources of a trial: of fewer, what is held out is far from the others.
 const MIN_SOURCES: usize = 12;
+/// Iterations of the fast recipe at each size where it is tried beside a sharp one: some photographs want its Gaussians,
+/// and no fewer iterations (`host/results/gaussian_quality.md`).
+const LONG: u32 = 300;
 /// How many decibels less than the best score are as good: of such scores the last one ends the recipe, since pictures of
 /// the whole size have more to learn (`host/results/gaussian_quality.md`).
 const AS_GOOD: f64 = 0.05;
@@ -41,9 +44,9 @@ fn small(recipe: Recipe) -> Recipe {
 }
 
 impl SceneOptimisation<'_> {
-    /// The recipe, or the fast one where held-out sources prefer it; with fewer iterations where they are better after
-    /// fewer. Where the time is limited a trial ends after a share of it, and the fast one is taken, too, if what is
-    /// left is less than the recipe took in the trial to become better.
+    /// The recipe, or the fast one with [`LONG`] iterations where held-out sources prefer it; with fewer iterations where
+    /// they are better after fewer. Where the time is limited a trial ends after a share of it, and the fast one is taken,
+    /// with its own iterations, if what is left is less than the recipe took in the trial to become better.
     pub(super) fn tried(
         &self,
         device: &AnyDevice,
@@ -68,36 +71,40 @@ impl SceneOptimisation<'_> {
         let mut stage = Stage::prepare(self.scene, album, &sources, renderer.as_ref(), &self.options, &Silent)?;
         let points = point_cloud(&mut stage, &self.weighting, Recipe::cloud(sources.len()), &Silent)?;
         let fast = fast(stage.images.has_silhouettes);
-        let recipes = [small(fast), small(recipe)];
+        let long = if self.recipe.iterations.is_none() { fast.with(Some(LONG), None) } else { fast };
+        let recipes = [small(long), small(recipe)];
         progress.expect(recipes.iter().map(|recipe| recipe.iterations.iter().sum::<u32>() as usize).sum());
         let trial = SceneOptimisation { sources, held_out, before: None, towards: Vec::new(), ..self.clone() };
         let photographed = &Photographed::new(device, album, &stage.images);
         let until = clock.end_of_trial();
-        let (mut curves, mut begun) = (Vec::new(), Instant::now());
+        let (mut curves, mut times) = (Vec::new(), Vec::new());
         for recipe in recipes {
-            begun = Instant::now();
+            let begun = Instant::now();
             let mut optimisation = trial.begin(device, &stage.images, &points, recipe)?;
             let mut scores = Vec::new();
             let counted = Counted { progress, until };
             trial.advance(optimisation.as_mut(), photographed, &counted, None, &mut |_| Ok(()), &mut scores)?;
             progress.check().map_err(|error| OptimiseError::Render(crate::FieldError::from(error).into()))?;
             curves.push(scores);
+            times.push(begun.elapsed());
         }
         // The fast recipe ends where it ends.
-        let fast_score = curves[0].last().map_or(f64::NEG_INFINITY, |score| score.1);
+        let long_score = curves[0].last().map_or(f64::NEG_INFINITY, |score| score.1);
         let (end, score) = last_good(&curves[1]);
         if score == f64::NEG_INFINITY {
             progress.note(&format!("the time is too short for a trial of {quality}: fast is used"));
             return Ok(fast);
         }
         let is_over = until.is_some_and(|until| until <= Instant::now());
-        let ahead = curves[1].iter().find(|(_, score)| *score > fast_score).map_or(0, |(iteration, _)| *iteration);
+        let ahead = curves[1].iter().find(|(_, score)| *score > long_score).map_or(0, |(iteration, _)| *iteration);
         let tried = curves[1].last().map_or(1, |(iteration, _)| *iteration);
         let side = stage.images.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
         let pixels = (f64::from(side.min(recipe.side)) / f64::from(side.min(small(recipe).side))).powi(2);
-        let least = begun.elapsed().mul_f64(pixels * f64::from(ahead) / f64::from(tried));
-        let (chosen, words) = if score <= fast_score {
-            (fast, "fast is used".to_owned())
+        let least = times[1].mul_f64(pixels * f64::from(ahead) / f64::from(tried));
+        let (chosen, words) = if score <= long_score && clock.left().is_some_and(|left| left < times[0]) {
+            (fast, "the time that is left is too short for so many, and the usual number is used".to_owned())
+        } else if score <= long_score {
+            (long, "fast is used".to_owned())
         } else if clock.left().is_some_and(|left| left < least) {
             (fast, format!("the time that is left is too short for {quality}, and fast is used"))
         } else if is_over {
@@ -112,8 +119,9 @@ impl SceneOptimisation<'_> {
         };
         let held_out_count = trial.held_out.len();
         progress.note(&format!(
-            "{held_out_count} of {count} photographs left out of a trial have {fast_score:.2} dB with fast and \
-                {score:.2} dB with {quality}: {words}"
+            "{held_out_count} of {count} photographs left out of a trial have {long_score:.2} dB with {} iterations \
+                of fast and {score:.2} dB with {quality}: {words}",
+            long.all_iterations()
         ));
         Ok(chosen)
     }
