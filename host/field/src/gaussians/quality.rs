@@ -31,8 +31,8 @@ impl Quality {
 
     /// The recipe, for sources with silhouettes or for whole photographs. Beyond [`Quality::Fast`] it begins with few
     /// Gaussians, their number rises to its limit, and colours depend on the direction: with exposures that differ from
-    /// photograph to photograph, too, so that these have no gains. Rates are lower, for many iterations. What was measured is in
-    /// `host/results/gaussian_quality.md`.
+    /// photograph to photograph, too, so that these have no gains. Rates are lower, for many iterations. What was
+    /// measured is in `host/results/gaussian_quality.md`.
     pub fn recipe(self, has_silhouettes: bool) -> Recipe {
         let fast = Recipe::default();
         let (side, finest, max_count) = match self {

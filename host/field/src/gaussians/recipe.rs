@@ -110,10 +110,10 @@ impl Recipe {
     }
 
     /// The recipes for pictures that are mixed with the field's own; which of them is better is the scene's
-    /// (`host/results/objects.md`). What is far away the other pictures of a mixture show: Gaussians behind all surfaces
-    /// would draw its depths behind them. Where there are silhouettes the outline has twice the weight; more than half
-    /// of an object's time is that of its trials, and pictures get twice the iterations. They are few and large, opaque
-    /// only where that gains, for glossy objects, of which the sources agree on little; or many and small.
+    /// (`host/results/objects.md`). What is far away the other pictures of a mixture show: Gaussians behind all
+    /// surfaces would draw its depths behind them. Where there are silhouettes the outline has twice the weight; more
+    /// than half of an object's time is that of its trials, and pictures get twice the iterations. They are few and
+    /// large, opaque only where that gains, for glossy objects, of which the sources agree on little; or many and small.
     pub fn mixed_with(self, images: &SourceImages) -> Vec<Variant<Recipe>> {
         if !images.has_silhouettes {
             return vec![Variant::to_measure("the usual Gaussians", Recipe { background_count: 0, ..self })];

@@ -19,8 +19,8 @@ const MAX_ITERATIONS: u32 = 1500;
 const HELD_OUT_EVERY: usize = 8;
 /// Fewest sources of a trial: of fewer, what is held out is far from the others.
 const MIN_SOURCES: usize = 12;
-/// Iterations of the fast recipe at each size where it is tried beside a sharp one: some photographs want its Gaussians,
-/// and no fewer iterations (`host/results/gaussian_quality.md`).
+/// Iterations of the fast recipe at each size where it is tried beside a sharp one: some photographs want its
+/// Gaussians, but more iterations (`host/results/gaussian_quality.md`).
 const LONG: u32 = 300;
 /// How many decibels less than the best score are as good: of such scores the last one ends the recipe, since pictures of
 /// the whole size have more to learn (`host/results/gaussian_quality.md`).
@@ -44,9 +44,9 @@ fn small(recipe: Recipe) -> Recipe {
 }
 
 impl SceneOptimisation<'_> {
-    /// The recipe, or the fast one with [`LONG`] iterations where held-out sources prefer it; with fewer iterations where
-    /// they are better after fewer. Where the time is limited a trial ends after a share of it, and the fast one is taken,
-    /// with its own iterations, if what is left is less than the recipe took in the trial to become better.
+    /// The recipe, with fewer iterations where held-out sources are better after fewer, or the fast one with [`LONG`]
+    /// iterations where they prefer it. Where the time is limited a trial ends after a share of it, and the fast one is
+    /// taken, with its own iterations, if what is left is less than the recipe took in the trial to become better.
     pub(super) fn tried(
         &self,
         device: &AnyDevice,
