@@ -45,8 +45,8 @@ fn small(recipe: Recipe) -> Recipe {
 
 impl SceneOptimisation<'_> {
     /// The recipe, with fewer iterations where held-out sources are better after fewer, or the fast one with [`LONG`]
-    /// iterations where they prefer it. Where the time is limited a trial ends after a share of it, and the fast one is
-    /// taken, with its own iterations, if what is left is less than the recipe took in the trial to become better.
+    /// iterations where they prefer it. Where the time is limited a trial ends after a share of it, the fast one has its
+    /// own iterations, and it is taken, too, if what is left is less than the recipe took in the trial to become better.
     pub(super) fn tried(
         &self,
         device: &AnyDevice,
@@ -71,22 +71,23 @@ impl SceneOptimisation<'_> {
         let mut stage = Stage::prepare(self.scene, album, &sources, renderer.as_ref(), &self.options, &Silent)?;
         let points = point_cloud(&mut stage, &self.weighting, Recipe::cloud(sources.len()), &Silent)?;
         let fast = fast(stage.images.has_silhouettes);
-        let long = if self.recipe.iterations.is_none() { fast.with(Some(LONG), None) } else { fast };
+        // A limited time is the sharp recipe's.
+        let is_free = self.recipe.iterations.is_none() && self.max_time.is_none();
+        let long = if is_free { fast.with(Some(LONG), None) } else { fast };
         let recipes = [small(long), small(recipe)];
         progress.expect(recipes.iter().map(|recipe| recipe.iterations.iter().sum::<u32>() as usize).sum());
         let trial = SceneOptimisation { sources, held_out, before: None, towards: Vec::new(), ..self.clone() };
         let photographed = &Photographed::new(device, album, &stage.images);
         let until = clock.end_of_trial();
-        let (mut curves, mut times) = (Vec::new(), Vec::new());
+        let (mut curves, mut begun) = (Vec::new(), Instant::now());
         for recipe in recipes {
-            let begun = Instant::now();
+            begun = Instant::now();
             let mut optimisation = trial.begin(device, &stage.images, &points, recipe)?;
             let mut scores = Vec::new();
             let counted = Counted { progress, until };
             trial.advance(optimisation.as_mut(), photographed, &counted, None, &mut |_| Ok(()), &mut scores)?;
             progress.check().map_err(|error| OptimiseError::Render(crate::FieldError::from(error).into()))?;
             curves.push(scores);
-            times.push(begun.elapsed());
         }
         // The fast recipe ends where it ends.
         let long_score = curves[0].last().map_or(f64::NEG_INFINITY, |score| score.1);
@@ -100,10 +101,8 @@ impl SceneOptimisation<'_> {
         let tried = curves[1].last().map_or(1, |(iteration, _)| *iteration);
         let side = stage.images.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
         let pixels = (f64::from(side.min(recipe.side)) / f64::from(side.min(small(recipe).side))).powi(2);
-        let least = times[1].mul_f64(pixels * f64::from(ahead) / f64::from(tried));
-        let (chosen, words) = if score <= long_score && clock.left().is_some_and(|left| left < times[0]) {
-            (fast, "the time that is left is too short for so many, and the usual number is used".to_owned())
-        } else if score <= long_score {
+        let least = begun.elapsed().mul_f64(pixels * f64::from(ahead) / f64::from(tried));
+        let (chosen, words) = if score <= long_score {
             (long, "fast is used".to_owned())
         } else if clock.left().is_some_and(|left| left < least) {
             (fast, format!("the time that is left is too short for {quality}, and fast is used"))
