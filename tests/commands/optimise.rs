@@ -9,6 +9,7 @@ use viewfuse::scene::SceneFrame;
 use viewfuse::scene::gaussians::{Gaussian, GaussianScene};
 use viewfuse_tests::command::{Outcome, files_below, names_in, toy};
 use viewfuse_tests::patience::{end, send, wait_while_running};
+use viewfuse_tests::places::data;
 
 viewfuse_tests::trials![
     held_out_views_are_scored_on_the_way,
@@ -21,7 +22,7 @@ viewfuse_tests::trials![
     what_it_refuses,
     an_antialiased_file_says_so_and_is_shown_so,
     a_page_holds_what_the_file_holds,
-    more_quality_is_tried_on_sources_and_has_colours_by_direction,
+    more_quality_is_tried_on_sources_and_has_more_gaussians_or_iterations,
     few_photographs_and_a_short_time_have_fewer_iterations,
     without_a_view_that_is_kept_back_it_says_what_its_figure_is,
 ];
@@ -59,16 +60,17 @@ fn held_out_views_are_scored_on_the_way() {
     let folder = toy();
     let text = done(&folder, &format!("{OPTIMISE} --left-out 20,21 -o a.ply"));
     let scores = scores(&text);
-    assert_eq!(scores.iter().map(|score| score.0).collect::<Vec<_>>(), [40, 80, 120, 160, 200, 240], "{text}");
-    assert!(scores[5].1 > scores[0].1 + 3.0, "it becomes better: {text}");
+    let iterations: Vec<u32> = scores.iter().map(|score| score.0).collect();
+    assert_eq!(iterations, [40, 80, 120, 160, 200, 240, 280, 320, 340], "{text}");
+    assert!(scores[8].1 > scores[0].1 + 3.0, "it becomes better: {text}");
     assert!(!text.contains("fit: "), "{text}");
     let count = gaussians(&folder.join("a.ply")).gaussians.len();
-    assert!(text.contains(&format!("a.ply: {count} Gaussians after 240 of 240 iterations\n")), "{text}");
+    assert!(text.contains(&format!("a.ply: {count} Gaussians after 340 of 340 iterations\n")), "{text}");
     // The last score is that of `render` with the file, from the same sources.
     let rendered = done(&folder, "render toy --gaussians a.ply --targets 20,21 --size 48x48 --device cpu -o out");
     let psnr = |line: &str| line.split("PSNR ").nth(1)?.split(" dB").next()?.parse::<f64>().ok();
     let again: Vec<f64> = rendered.lines().filter_map(psnr).collect();
-    assert!(again.len() == 2 && (again.iter().sum::<f64>() / 2.0 - scores[5].1).abs() < 0.02, "{rendered}\n{text}");
+    assert!(again.len() == 2 && (again.iter().sum::<f64>() / 2.0 - scores[8].1).abs() < 0.02, "{rendered}\n{text}");
     assert!(rendered.contains("\n2 views of the file's Gaussians on cpu"), "{rendered}");
     assert!(rendered.contains("\nthe file does not say which photographs it was made from: "), "{rendered}");
     // The same seed, any number of threads.
@@ -110,8 +112,8 @@ fn it_ends_with_the_weights_of_a_view() {
     let (without, one, other) =
         (optimised("", "a.ply"), optimised("--towards 20", "b.ply"), optimised("--towards 21", "c.ply"));
     // The same up to there, then 60 iterations more, which differ by the view and by the scheme.
-    assert_eq!(one.0[..6], without.0[..]);
-    assert_eq!(one.0[6..].iter().map(|score| score.0).collect::<Vec<_>>(), [280, 300]);
+    assert_eq!(one.0[..9], without.0[..]);
+    assert_eq!(one.0[9..].iter().map(|score| score.0).collect::<Vec<_>>(), [360, 400]);
     assert!(one.1 != other.1, "both views have the same weights");
     let mean = optimised("--towards 20 --weights mean", "d.ply");
     assert!(mean.1 != one.1, "the scheme does not count");
@@ -153,14 +155,14 @@ fn after_a_kill_it_goes_on_from_the_file() {
         let text = done(&folder, &format!("{OPTIMISE} --left-out 20 --resume toy.ply -o {output}"));
         (scores(&text), fs::read(folder.join(output)).expect("a file"))
     };
-    // What goes on from a file is the same each time; it has the finest size's 60 iterations, and is better than the
+    // What goes on from a file is the same each time; it has the finest size's 160 iterations, and is better than the
     // file.
     let (first, second) = (resumed("a.ply"), resumed("b.ply"));
     assert!(first == second, "two scenes from one file");
-    assert_eq!(first.0.iter().map(|score| score.0).collect::<Vec<_>>(), [200, 240]);
+    assert_eq!(first.0.iter().map(|score| score.0).collect::<Vec<_>>(), [200, 240, 280, 320, 340]);
     let rendered = done(&folder, "render toy --gaussians toy.ply --targets 20 --size 48x48 --device cpu -o out");
     let psnr = rendered.split("PSNR ").nth(1).and_then(|rest| rest.split(' ').next()).expect("a score");
-    assert!(first.0[1].1 > psnr.parse().expect("a number"), "{rendered} {:?}", first.0);
+    assert!(first.0[4].1 > psnr.parse().expect("a number"), "{rendered} {:?}", first.0);
     assert!(fs::read(&path).expect("a file") == before, "the file that it goes on from has changed");
     // A file that is there stays until there is a finished one.
     let unfinished = folder.join("a.unfinished.ply");
@@ -237,20 +239,33 @@ fn what_it_refuses() {
     assert!(code == Some(0) && stderr.contains("see none of the Gaussians"), "{stderr}");
 }
 
-/// Held-out sources prefer the sharper recipe on the sample scene; the views that a person keeps back are none of them.
-fn more_quality_is_tried_on_sources_and_has_colours_by_direction() {
+/// Held-out sources of the sample scene prefer the sharper recipe to the usual iterations of the fast one, and more of
+/// these to both; the views that a person keeps back are none of them.
+fn more_quality_is_tried_on_sources_and_has_more_gaussians_or_iterations() {
     let folder = toy();
-    let text = done(&folder, &format!("{OPTIMISE} --left-out 20,21 --quality standard -o a.ply"));
-    let trial = text.lines().find(|line| line.contains("left out of a trial")).expect("a trial");
-    assert!(trial.starts_with("2 of 22 photographs") && trial.contains("standard is used"), "{trial}");
-    let about = text.lines().find(|line| line.contains(" iterations more, about ")).expect("a time");
-    assert!(about.ends_with(" s") || about.ends_with(" minutes"), "{about}");
-    let sharp = scores(&text);
-    let fast = scores(&done(&folder, &format!("{OPTIMISE} --left-out 20,21 -o b.ply")));
-    let (sharp, fast) = (sharp.last().expect("scores").1, fast.last().expect("scores").1);
-    assert!(sharp > fast + 0.5, "{sharp} and {fast} dB");
+    let optimised = |options: &str, output: &str| {
+        let text = done(&folder, &format!("{OPTIMISE} --left-out 20,21 {options} -o {output}"));
+        let last = scores(&text).last().expect("scores").1;
+        (text, last)
+    };
+    let trial = |text: &str| {
+        let line = text.lines().find(|line| line.contains("left out of a trial")).expect("a trial");
+        assert!(line.starts_with("2 of 22 photographs"), "{line}");
+        line.to_owned()
+    };
+    // As many iterations of the sharper one as fit: all of them.
+    let (text, sharp) = optimised("--quality standard --max-time 20m", "a.ply");
+    let line = trial(&text);
+    assert!(line.contains("with 340 iterations of fast") && line.contains("standard is used"), "{line}");
+    assert!(text.contains(" iterations more, as many as fit into the time\n"), "{text}");
+    let (text, long) = optimised("--quality standard", "e.ply");
+    let line = trial(&text);
+    assert!(line.contains("with 900 iterations of fast") && line.ends_with("fast is used"), "{line}");
+    assert!(text.contains(" after 900 of 900 iterations\n"), "{text}");
+    let (_, fast) = optimised("", "b.ply");
+    assert!(sharp > fast + 0.2 && long > fast + 0.5, "{sharp}, {long} and {fast} dB");
     let (first, second) = (gaussians(&folder.join("a.ply")), gaussians(&folder.join("b.ply")));
-    assert_eq!((first.degree, second.degree), (3, 0));
+    assert_eq!((first.degree, second.degree), (3, 3));
     // 48x48 pixels, three quarters of a Gaussian each.
     assert_eq!(first.gaussians.len(), 1728, "the number rises to its limit");
     // The last score is that of the file, harmonics included.
@@ -259,20 +274,31 @@ fn more_quality_is_tried_on_sources_and_has_colours_by_direction() {
     let again: Vec<f64> = rendered.lines().filter_map(psnr).collect();
     assert!(again.len() == 2 && (again.iter().sum::<f64>() / 2.0 - sharp).abs() < 0.02, "{rendered}\n{text}");
     // It goes on from the file with its harmonics: the first score of few iterations is no worse.
-    let more = "--resume a.ply --left-out 20,21 --quality standard --iterations 40 -o c.ply";
-    let resumed = scores(&done(&folder, &format!("{OPTIMISE} {more}")));
-    assert!(resumed.last().expect("a score").1 > sharp - 0.5, "{resumed:?} after {sharp}");
+    let (text, resumed) = optimised("--resume a.ply --quality standard --iterations 40", "c.ply");
+    assert!(resumed > sharp - 0.5, "{resumed} after {sharp} dB");
+    let about = text.lines().find(|line| line.contains(" iterations more, about ")).expect("a time");
+    assert!(about.ends_with(" s") || about.ends_with(" minutes"), "{about}");
     assert_eq!(gaussians(&folder.join("c.ply")).degree, 3);
-    let fast = format!("{OPTIMISE} --resume a.ply --iterations 1 -o d.ply");
+    // Whole photographs have one colour for all directions in the fast recipe.
+    let fast = format!("{OPTIMISE} --masks ignore --resume a.ply --iterations 1 -o d.ply");
     let Outcome { code, stderr, .. } = run(&folder, &fast);
     assert!(code == Some(0) && stderr.contains("the colours to go on from depend on the direction"), "{stderr}");
+    assert_eq!(gaussians(&folder.join("d.ply")).degree, 0);
 }
 
 fn few_photographs_and_a_short_time_have_fewer_iterations() {
     let folder = toy();
     let few = done(&folder, &format!("{OPTIMISE} --sources 0..9 --quality standard -o a.ply"));
-    assert!(few.contains("10 photographs are too few for standard, from 12 on: fast\n"), "{few}");
-    assert!(few.contains(" after 240 of 240 iterations\n"), "{few}");
+    assert!(few.contains("10 photographs are too few for standard, from 12 on: fast, with 340 iterations\n"), "{few}");
+    assert!(few.contains(" after 340 of 340 iterations\n"), "{few}");
+    // Whole photographs 25 degrees apart have the usual iterations; near to one another, more.
+    let wide = "--masks ignore --sources 0..9 --quality standard -o a.ply";
+    let Outcome { code, stdout, .. } = run(&folder, &format!("{OPTIMISE} {wide}"));
+    assert!(code == Some(0) && stdout.contains(": fast, with 240 iterations\n"), "{stdout}");
+    let room = data("room").display().to_string();
+    let near = format!("optimise {room} --views 6 --size 40x30 --quality standard --device cpu -o a.ply");
+    let text = done(&folder, &near);
+    assert!(text.contains("6 photographs are too few for standard, from 12 on: fast, with 900 iterations\n"), "{text}");
     // The whole trial takes longer.
     let short = done(&folder, &format!("{OPTIMISE} --quality standard --max-time 1s -o b.ply"));
     let counts = short.split(" Gaussians after ").nth(1).and_then(|rest| rest.split(" iterations").next());
@@ -290,14 +316,15 @@ fn few_photographs_and_a_short_time_have_fewer_iterations() {
 
 fn a_page_holds_what_the_file_holds() {
     let folder = toy();
-    let file = done(&folder, &format!("{OPTIMISE} -o toy.ply"));
+    // Neither holds colours that depend on the direction.
+    let file = done(&folder, &format!("{OPTIMISE} -o toy.splat"));
     let Outcome { code, stdout, stderr } = run(&folder, &format!("{OPTIMISE} --quality fast -o toy.html"));
     assert_eq!((code, stderr.as_str()), (Some(0), ""));
-    assert_eq!(stdout.replace("toy.html", "toy.ply"), file);
+    assert_eq!(stdout.replace("toy.html", "toy.splat"), file);
     let page = fs::read_to_string(folder.join("toy.html")).expect("a page");
     assert!(page.starts_with("<!doctype html>") || page.starts_with("<!DOCTYPE html>"), "{}", &page[..40]);
     assert!(!page.contains("src=\"http") && !page.contains("href=\"http"), "it needs a network");
-    let bytes = files_below(&folder).into_iter().find(|(path, _)| path.ends_with("toy.ply")).expect("a file").1;
+    let bytes = files_below(&folder).into_iter().find(|(path, _)| path.ends_with("toy.splat")).expect("a file").1;
     assert!((page.len() as u64) < bytes + 200_000, "{} bytes of a page for {bytes} of a file", page.len());
 }
 

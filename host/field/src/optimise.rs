@@ -191,7 +191,7 @@ impl<'a> SceneOptimisation<'a> {
         recipe.is_antialiased |= self.before.as_ref().is_some_and(|before| before.scene.is_antialiased);
         if is_sharp && self.before.is_none() {
             progress.stage("trying recipes on sources left out", trial, 30);
-            recipe = self.tried(device, &album, recipe, &clock, progress)?;
+            recipe = self.tried(device, &album, &stage.images, &clock, progress)?;
         }
         let photographed = &Photographed::new(device, &album, &stage.images);
         let mut optimisation = self.begin(device, &stage.images, &points, recipe)?;

@@ -32,11 +32,11 @@ const SHARP_SOURCES: usize = 20;
     --max-time 10m says how many\n  viewfuse optimise photos/ -o photos.html\n      one page for any browser, without \
     a server: to share\n  viewfuse render photos/ --gaussians photos.ply --orbit 24 -o out\n\n\
     Begins with the surfaces that the training-free field finds, and takes some ten seconds; --quality standard takes \
-    minutes, and is sharper from some twenty photographs on. Ctrl-C writes what there is so far, and a .ply is written \
-    on the way: --resume goes on from it with the iterations of the finest size. Where photos.ply is there already, \
-    both write photos.unfinished.ply until all is done. The file has the layout of \"3D \
-    Gaussian Splatting\", which other viewers read, in the coordinates of the scene's files; a .spz has less than a \
-    tenth of its bytes, a .splat an eighth.")]
+    minutes, and is sharper from a dozen photographs on, or from five that are near to one another. Ctrl-C writes \
+    what there is so far, and a .ply is written on the way: --resume goes on from it with the iterations of the finest \
+    size. Where photos.ply is there already, both write photos.unfinished.ply until all is done. The file has the \
+    layout of \"3D Gaussian Splatting\", which other viewers read, in the coordinates of the scene's files; a .spz has \
+    less than a tenth of its bytes, a .splat an eighth.")]
 pub(crate) struct Arguments {
     /// The scene
     scene: PathBuf,
@@ -50,9 +50,9 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "VIEWS", help = towards_help())]
     towards: Option<String>,
     /// How sharp the Gaussians are to be: fast takes some ten seconds, standard minutes and high five times as long;
-    /// these hold some photographs out of a trial first, and take fast where that is better. Photographs are seen at
-    /// --size, by standard at 800 pixels at most and by high at 1600 [default: fast, for a page of 20 photographs and
-    /// more standard]
+    /// these hold some photographs out of a trial first, and take fast where that is better, as they do for fewer than
+    /// 12: with more iterations if that helps. Photographs are seen at --size, by fast at 280 pixels at most, by
+    /// standard at 800 and by high at 1600 [default: fast, for a page of 20 photographs and more standard]
     #[arg(long, value_name = "fast|standard|high")]
     quality: Option<Quality>,
     /// As many iterations as fit into this time with standard or high: seconds, or minutes as 10m

@@ -4,13 +4,16 @@ use super::recipe::Recipe;
 use std::fmt;
 use std::str::FromStr;
 
+/// Iterations of the fast recipe at the finest size of objects: harmonics learn in as many.
+const FINEST_OF_OBJECTS: u32 = 160;
+
 /// How sharp the Gaussians are to be.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Quality {
     /// Some ten seconds: for few photographs, and for a look.
     #[default]
     Fast,
-    /// Minutes: for some twenty photographs and more.
+    /// Minutes: for a dozen photographs and more, or for some that are near to one another.
     Standard,
     /// Five times as long as [`Quality::Standard`], at up to twice the size.
     High,
@@ -31,11 +34,17 @@ impl Quality {
 
     /// The recipe, for sources with silhouettes or for whole photographs. Beyond [`Quality::Fast`] it begins with few
     /// Gaussians, their number rises to its limit, and colours depend on the direction: with exposures that differ from
-    /// photograph to photograph, too, so that these have no gains. Rates are lower, for many iterations. What was
-    /// measured is in `host/results/gaussian_quality.md`.
+    /// photograph to photograph, too, so that these have no gains. Rates are lower, for many iterations. Objects have
+    /// such colours in [`Quality::Fast`], too: with as few Gaussians as silhouettes leave, the iterations that they take
+    /// at the finest level are affordable. What was measured is in `host/results/gaussian_quality.md`.
     pub fn recipe(self, has_silhouettes: bool) -> Recipe {
         let fast = Recipe::default();
         let (side, finest, max_count) = match self {
+            Quality::Fast if has_silhouettes => {
+                let ([place, scale, turn, opaque, colour, _], [.., before, half, _]) = (fast.rates, fast.iterations);
+                let rates = [place, scale, turn, opaque, colour, 0.0];
+                return Recipe { iterations: [0, before, half, FINEST_OF_OBJECTS], rates, degree: 3, ..fast };
+            }
             Quality::Fast => return fast,
             Quality::Standard => (800, 3000, 100_000),
             Quality::High => (1600, 10_000, 500_000),

@@ -7,9 +7,11 @@ use crate::gaussians::{Quality, Recipe, RecipeOptions};
 use crate::point_cloud::point_cloud;
 use crate::render::Stage;
 use std::time::Instant;
+use viewfuse_core::camera::Camera;
 use viewfuse_device::choice::AnyDevice;
 use viewfuse_job::progress::{Progress, Silent};
-use viewfuse_scene::photographs::{Album, longest_side};
+use viewfuse_scene::photographs::{Album, SourceImages, longest_side};
+use viewfuse_scene::rig::gap_warning;
 
 /// Longest side of the sources in a trial, in pixels: that of the fast recipe.
 const SIDE: u32 = 280;
@@ -19,9 +21,11 @@ const MAX_ITERATIONS: u32 = 1500;
 const HELD_OUT_EVERY: usize = 8;
 /// Fewest sources of a trial: of fewer, what is held out is far from the others.
 const MIN_SOURCES: usize = 12;
-/// Iterations of the fast recipe at each size where it is tried beside a sharp one: some photographs want its
-/// Gaussians, but more iterations (`host/results/gaussian_quality.md`).
+/// Iterations of the fast recipe at each size where it is tried beside a sharp one, or taken in its place, at the sharp
+/// one's size: some photographs want its Gaussians, but more iterations (`host/results/gaussian_quality.md`).
 const LONG: u32 = 300;
+/// Fewest whole photographs of which the fast recipe has these without a trial.
+const FEWEST_LONG: usize = 5;
 /// How many decibels less than the best score are as good: of such scores the last one ends the recipe, since pictures of
 /// the whole size have more to learn (`host/results/gaussian_quality.md`).
 const AS_GOOD: f64 = 0.05;
@@ -44,22 +48,35 @@ fn small(recipe: Recipe) -> Recipe {
 }
 
 impl SceneOptimisation<'_> {
-    /// The recipe, with fewer iterations where held-out sources are better after fewer, or the fast one with [`LONG`]
-    /// iterations where they prefer it. Where the time is limited a trial ends after a share of it, the fast one has its
-    /// own iterations, and it is taken, too, if what is left is less than the recipe took in the trial to become better.
+    /// The recipe for these sources, with fewer iterations where held-out ones are better after fewer, or the fast one
+    /// with [`LONG`] iterations where they prefer it. Where the time is limited a trial ends after a share of it, the
+    /// fast one has its own iterations, and it is taken, too, if what is left is less than the recipe took in the trial
+    /// to become better. Fewer than [`MIN_SOURCES`] have the fast one without a trial; with [`LONG`] iterations if they
+    /// are whole photographs, at least [`FEWEST_LONG`], and near enough to one another.
     pub(super) fn tried(
         &self,
         device: &AnyDevice,
         album: &Album<'_>,
-        recipe: Recipe,
+        images: &SourceImages,
         clock: &Clock,
         progress: &dyn Progress,
     ) -> Result<Recipe, OptimiseError> {
         let (quality, count) = (self.recipe.quality, self.sources.len());
-        let fast = |has_silhouettes| RecipeOptions { quality: Quality::Fast, ..self.recipe }.recipe(has_silhouettes);
+        let recipe = self.recipe.recipe(images.has_silhouettes);
+        let fast = RecipeOptions { quality: Quality::Fast, ..self.recipe }.recipe(images.has_silhouettes);
+        // A limited time is the sharp recipe's.
+        let is_free = self.recipe.iterations.is_none() && self.max_time.is_none();
+        let long = if is_free { Recipe { side: recipe.side, ..fast.with(Some(LONG), None) } } else { fast };
         if count < MIN_SOURCES {
-            progress.note(&format!("{count} photographs are too few for {quality}, from {MIN_SOURCES} on: fast"));
-            return Ok(fast(false));
+            let cameras: Vec<Camera> = images.images.iter().map(|image| image.camera).collect();
+            let is_near = count >= FEWEST_LONG && gap_warning(&cameras).is_none();
+            let chosen = if is_near && !images.has_silhouettes { long } else { fast };
+            let iterations = chosen.all_iterations();
+            progress.note(&format!(
+                "{count} photographs are too few for {quality}, from {MIN_SOURCES} on: fast, with {iterations} \
+                    iterations"
+            ));
+            return Ok(chosen);
         }
         let places = held_out(count);
         let (held_out, sources): (Vec<_>, Vec<_>) = (0..count).partition(|place| places.contains(place));
@@ -70,10 +87,6 @@ impl SceneOptimisation<'_> {
         let renderer = field.on(device);
         let mut stage = Stage::prepare(self.scene, album, &sources, renderer.as_ref(), &self.options, &Silent)?;
         let points = point_cloud(&mut stage, &self.weighting, Recipe::cloud(sources.len()), &Silent)?;
-        let fast = fast(stage.images.has_silhouettes);
-        // A limited time is the sharp recipe's.
-        let is_free = self.recipe.iterations.is_none() && self.max_time.is_none();
-        let long = if is_free { fast.with(Some(LONG), None) } else { fast };
         let recipes = [small(long), small(recipe)];
         progress.expect(recipes.iter().map(|recipe| recipe.iterations.iter().sum::<u32>() as usize).sum());
         let trial = SceneOptimisation { sources, held_out, before: None, towards: Vec::new(), ..self.clone() };
