@@ -240,13 +240,14 @@ fn a_page_follows_a_hand_and_a_finger() {
 fn the_page_of_a_command_opens() {
     let browser = &Browser::needed();
     let folder = toy();
-    for output in ["toy.ply", "toy.html"] {
+    // Both hold one colour for all directions.
+    for output in ["toy.splat", "toy.html"] {
         done(&folder, &format!("optimise toy --size 96x96 --sources 0..19 --device cpu --quality fast -o {output}"));
     }
     let chromium = Chromium::start(browser);
     let tab = chromium.open(&address(&folder.join("toy.html")), WINDOW, false);
     tab.wait_for(STILL);
-    let count = GaussianScene::read(&folder.join("toy.ply"), &SceneFrame::FILE).expect("a file").gaussians.len();
+    let count = GaussianScene::read(&folder.join("toy.splat"), &SceneFrame::FILE).expect("a file").gaussians.len();
     let first = tab.text("document.querySelector('header p').textContent");
     assert!(first.contains(&format!(" MB, {count} Gaussians fitted to 20 photographs: ")), "{first}");
     let before = tab.picture();
@@ -258,7 +259,7 @@ fn the_page_of_a_command_opens() {
     let picture = shown(&tab, [WIDTH, WIDTH]);
     let rendered = |view: &str| {
         let options = format!("--targets {view} --sources 8..19 --size {WIDTH}x{WIDTH} --no-sheets --device cpu");
-        done(&folder, &format!("render toy --gaussians toy.ply {options} -o {view}"));
+        done(&folder, &format!("render toy --gaussians toy.splat {options} -o {view}"));
         image::open(folder.join(format!("{view}/00000{view}.png"))).expect("a picture").to_rgb8()
     };
     let (right, other) = (psnr(&picture, &rendered("3")), psnr(&picture, &rendered("5")));
