@@ -291,7 +291,7 @@ fn few_photographs_and_a_short_time_have_fewer_iterations() {
     let few = done(&folder, &format!("{OPTIMISE} --sources 0..9 --quality standard -o a.ply"));
     assert!(few.contains("10 photographs are too few for standard, from 12 on: fast, with 340 iterations\n"), "{few}");
     assert!(few.contains(" after 340 of 340 iterations\n"), "{few}");
-    // Whole photographs 25 degrees apart have the usual iterations; near to one another, more.
+    // Whole photographs 32 degrees apart have the usual iterations; near to one another, more.
     let wide = "--masks ignore --sources 0..9 --quality standard -o a.ply";
     let Outcome { code, stdout, .. } = run(&folder, &format!("{OPTIMISE} {wide}"));
     assert!(code == Some(0) && stdout.contains(": fast, with 240 iterations\n"), "{stdout}");

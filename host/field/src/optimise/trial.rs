@@ -21,11 +21,11 @@ const MAX_ITERATIONS: u32 = 1500;
 const HELD_OUT_EVERY: usize = 8;
 /// Fewest sources of a trial: of fewer, what is held out is far from the others.
 const MIN_SOURCES: usize = 12;
-/// Iterations of the fast recipe at each size where it is tried beside a sharp one, or taken in its place, at the sharp
-/// one's size: some photographs want its Gaussians, but more iterations (`host/results/gaussian_quality.md`).
+/// Iterations of the fast recipe at each size where it is tried beside a sharp one, or taken in its place: some
+/// photographs want its Gaussians, but more iterations (`host/results/gaussian_quality.md`).
 const LONG: u32 = 300;
 /// Fewest whole photographs of which the fast recipe has these without a trial.
-const FEWEST_LONG: usize = 5;
+const MIN_LONG_SOURCES: usize = 5;
 /// How many decibels less than the best score are as good: of such scores the last one ends the recipe, since pictures of
 /// the whole size have more to learn (`host/results/gaussian_quality.md`).
 const AS_GOOD: f64 = 0.05;
@@ -52,7 +52,7 @@ impl SceneOptimisation<'_> {
     /// with [`LONG`] iterations where they prefer it. Where the time is limited a trial ends after a share of it, the
     /// fast one has its own iterations, and it is taken, too, if what is left is less than the recipe took in the trial
     /// to become better. Fewer than [`MIN_SOURCES`] have the fast one without a trial; with [`LONG`] iterations if they
-    /// are whole photographs, at least [`FEWEST_LONG`], and near enough to one another.
+    /// are whole photographs, at least [`MIN_LONG_SOURCES`], and near enough to one another.
     pub(super) fn tried(
         &self,
         device: &AnyDevice,
@@ -66,11 +66,14 @@ impl SceneOptimisation<'_> {
         let fast = RecipeOptions { quality: Quality::Fast, ..self.recipe }.recipe(images.has_silhouettes);
         // A limited time is the sharp recipe's.
         let is_free = self.recipe.iterations.is_none() && self.max_time.is_none();
-        let long = if is_free { Recipe { side: recipe.side, ..fast.with(Some(LONG), None) } } else { fast };
+        let cameras: Vec<Camera> = images.images.iter().map(|image| image.camera).collect();
+        let is_near = gap_warning(&cameras).is_none();
+        // Where whole photographs are far from one another, more pixels fit the sources alone.
+        let side = if is_near || images.has_silhouettes { recipe.side } else { fast.side };
+        let long = if is_free { Recipe { side, ..fast.with(Some(LONG), None) } } else { fast };
         if count < MIN_SOURCES {
-            let cameras: Vec<Camera> = images.images.iter().map(|image| image.camera).collect();
-            let is_near = count >= FEWEST_LONG && gap_warning(&cameras).is_none();
-            let chosen = if is_near && !images.has_silhouettes { long } else { fast };
+            let is_long = is_near && count >= MIN_LONG_SOURCES && !images.has_silhouettes;
+            let chosen = if is_long { long } else { fast };
             let iterations = chosen.all_iterations();
             progress.note(&format!(
                 "{count} photographs are too few for {quality}, from {MIN_SOURCES} on: fast, with {iterations} \
