@@ -11,7 +11,8 @@
 //!
 //! The search begins at the cheapest effort ([`Prepared::efforts`](crate::Prepared::efforts)) whose typical error,
 //! scaled by what the pictures before had, is below the bound. The picture is then checked on pixels drawn for this
-//! purpose, which chose nothing; where the check fails the next effort follows. The error is the root mean square over
+//! purpose, which chose nothing; where the check fails the next effort follows. What omits something and is not cheap
+//! is first tried on few pixels, by which it can only be rejected. The error is the root mean square over
 //! pixels and channels of the difference from the picture of the exact effort, before rounding, colours from 0 to 1.
 
 mod check;

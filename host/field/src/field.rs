@@ -143,6 +143,20 @@ pub trait Prepared {
         Ok(Vec::new())
     }
 
+    /// As [`Prepared::exact_pixels`] under the options that are set, where nothing is interpolated between pixels: what
+    /// these omit of a ray shows before a whole picture is rendered. Nothing from fields that cannot.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    fn pixels(
+        &mut self,
+        _request: &Request<'_>,
+        _pixels: &[u32],
+        _progress: &dyn Progress,
+    ) -> Result<Vec<[f32; 4]>, FieldError> {
+        Ok(Vec::new())
+    }
+
     /// For [`Check::Steps`]: the root mean square difference of the last picture from the exact one, colours from 0 to
     /// 1.
     fn error(&self) -> f32 {

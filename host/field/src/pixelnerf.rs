@@ -295,17 +295,7 @@ impl<D: Device> Views<'_, D> {
         let views = self.used(request.views, &request.view_weights(), Some(&self.cast(request)))?;
         let renderer = self.renderer(&views, request, options, progress);
         let mut evaluated = [Evaluated::default(); 2];
-        let step = if omissions.nodes > 0 { 0 } else { omissions.empty_space };
-        let probes = match step > 1 {
-            true => {
-                let mut work = Evaluated::default();
-                let probes = renderer.probe(&mut workspace, step, &mut work)?;
-                evaluated[0].evaluated += work.evaluated;
-                evaluated[0].unseen += work.unseen;
-                Some(probes)
-            }
-            false => None,
-        };
+        let probes = renderer.probes(&mut workspace, &mut evaluated[0])?;
         let mut rendered = match omissions.nodes {
             0 => renderer.picture(&mut workspace, probes.as_ref(), &mut evaluated)?,
             _ => renderer.picture_between_nodes(&mut workspace, &mut evaluated)?,
@@ -319,6 +309,35 @@ impl<D: Device> Views<'_, D> {
         let views_and_layers = [request.views.len(), self.field.architecture.injected_count].map(|count| count as u64);
         self.counts.add(views_and_layers, omissions.latent_layers, &evaluated);
         Ok(rendered)
+    }
+
+    /// Colours of some pixels under these options, each from a ray of its own.
+    fn pixels_under(
+        &mut self,
+        options: PixelNerfOptions,
+        request: &Request<'_>,
+        pixels: &[u32],
+        progress: &dyn Progress,
+    ) -> Result<Vec<[f32; 4]>, FieldError> {
+        let PixelNerfOptions { sampling, omissions, .. } = options;
+        let most_points = match omissions.nodes {
+            0 => pixels.len() * sampling.coarse_count as usize,
+            _ => node_picture::most_points(pixels.len()),
+        };
+        let mut workspace = self.workspace(request, most_points)?;
+        let views = self.used(request.views, &request.view_weights(), Some(&self.cast(request)))?;
+        let renderer = self.renderer(&views, request, options, progress);
+        let mut evaluated = [Evaluated::default(); 2];
+        let colours = match omissions.nodes {
+            0 => {
+                let probes = renderer.probes(&mut workspace, &mut evaluated[0])?;
+                renderer.pixels_at(&mut workspace, pixels, probes.as_ref(), &mut evaluated)?.0
+            }
+            _ => renderer.pixels_of_nodes(&mut workspace, pixels, &mut evaluated[1])?,
+        };
+        workspace.check(self.device)?;
+        self.workspace = Some(workspace);
+        Ok(colours)
     }
 
     fn encode_view(&mut self, view: usize) -> Result<(), DeviceError> {
@@ -382,16 +401,17 @@ impl<D: Device> Prepared for Views<'_, D> {
         progress: &dyn Progress,
     ) -> Result<Vec<[f32; 4]>, FieldError> {
         // Nothing less than exact: what leaves out empty parts of rays misses mist in its own check.
-        let options = variants::exact(&self.options);
-        let most_points = pixels.len() * options.sampling.coarse_count as usize;
-        let mut workspace = self.workspace(request, most_points)?;
-        let views = self.used(request.views, &request.view_weights(), Some(&self.cast(request)))?;
-        let renderer = self.renderer(&views, request, options, progress);
-        let mut evaluated = [Evaluated::default(); 2];
-        let (colours, _) = renderer.pixels_at(&mut workspace, pixels, None, &mut evaluated)?;
-        workspace.check(self.device)?;
-        self.workspace = Some(workspace);
-        Ok(colours)
+        self.pixels_under(variants::exact(&self.options), request, pixels, progress)
+    }
+
+    fn pixels(
+        &mut self,
+        request: &Request<'_>,
+        pixels: &[u32],
+        progress: &dyn Progress,
+    ) -> Result<Vec<[f32; 4]>, FieldError> {
+        let precision = self.overflow.limit(self.options.precision);
+        self.pixels_under(PixelNerfOptions { precision, ..self.options }, request, pixels, progress)
     }
 
     fn record(&self) -> Record {

@@ -279,6 +279,20 @@ impl<'a> Session<'a> {
         self.prepared.exact_pixels(&request, pixels, progress)
     }
 
+    /// Colours of some pixels under the options that are set ([`Prepared::pixels`]).
+    pub(crate) fn pixels(
+        &mut self,
+        camera: &Camera,
+        weights: &SourceWeights,
+        early_termination: f32,
+        pixels: &[u32],
+        progress: &dyn Progress,
+    ) -> Result<Vec<[f32; 4]>, FieldError> {
+        self.encode(weights, progress)?;
+        let request = Request { camera, weights, views: &self.views(weights), early_termination };
+        self.prepared.pixels(&request, pixels, progress)
+    }
+
     /// The record of the work so far.
     pub(crate) fn record(&self) -> Record {
         let mut record = self.prepared.record();

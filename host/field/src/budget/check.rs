@@ -53,6 +53,12 @@ pub(super) fn draw(picture: &Rendered, count: usize, seed: u64) -> Vec<Draw> {
     draws
 }
 
+/// `count` of so many pixels, drawn evenly: in ascending order, one at random from each of `count` equal parts.
+pub(super) fn draw_evenly(pixel_count: usize, count: usize, seed: u64) -> Vec<u32> {
+    let at = |draw: usize| (draw as f64 + f64::from(uniform(seed, draw as u32, 0))) / count.max(1) as f64;
+    (0..count).map(|draw| ((at(draw) * pixel_count as f64) as u32).min(pixel_count.saturating_sub(1) as u32)).collect()
+}
+
 /// Squared contrast of each pixel with its neighbours, the largest of the channels.
 fn contrasts(picture: &Rendered) -> Vec<f64> {
     let (width, height) = (picture.width as usize, picture.height as usize);
@@ -100,12 +106,30 @@ impl Sample {
         self.terms.extend(vec![error * error; times]);
     }
 
-    /// The error; infinite without draws, or if a difference is not finite.
-    pub(super) fn estimate(&self) -> Estimate {
+    /// Adds evenly drawn pixels' colours with their exact ones.
+    pub(super) fn add_even(&mut self, colours: &[[f32; 4]], exact: &[[f32; 4]]) {
+        self.terms.extend(colours.iter().zip(exact).map(|(colour, exact)| square(colour, exact)));
+    }
+
+    /// Whether the error is above this but for one time in six: by more than a standard error, which the difference of
+    /// a single pixel is not.
+    pub(super) fn is_above(&self, most: f64) -> bool {
+        let (mean, variance) = self.moments();
+        // Not a number is above everything.
+        !(mean - (variance / self.terms.len() as f64).sqrt() <= most * most)
+    }
+
+    /// Mean and variance of the terms.
+    fn moments(&self) -> (f64, f64) {
         let count = self.terms.len() as f64;
         let mean = self.terms.iter().sum::<f64>() / count;
-        let variance = self.terms.iter().map(|term| (term - mean).powi(2)).sum::<f64>() / (count - 1.0);
-        let upper = mean + STANDARD_ERRORS * (variance / count).sqrt();
+        (mean, self.terms.iter().map(|term| (term - mean).powi(2)).sum::<f64>() / (count - 1.0))
+    }
+
+    /// The error; infinite without draws, or if a difference is not finite.
+    pub(super) fn estimate(&self) -> Estimate {
+        let (mean, variance) = self.moments();
+        let upper = mean + STANDARD_ERRORS * (variance / self.terms.len() as f64).sqrt();
         let finite = |value: f64| if value.is_finite() { value.sqrt() } else { f64::INFINITY };
         Estimate { value: finite(mean), upper: finite(upper), pixels: self.terms.len() }
     }
@@ -171,6 +195,25 @@ mod tests {
         // 1 - (23 / 24)^24 is 0.64.
         let share = (0..1000).filter(meets).count() as f64 / 1000.0;
         assert!((share - 0.64).abs() < 0.05, "{share}");
+    }
+
+    #[test]
+    fn one_pixel_tells_nothing_of_a_picture_and_many_do() {
+        let with = |wrong: usize| {
+            let colour = |index: usize| [if index < wrong { 0.5 } else { 0.0 }; 4];
+            let colours: Vec<[f32; 4]> = (0..32).map(colour).collect();
+            let mut sample = Sample::default();
+            sample.expect(1.0e-3, 8);
+            sample.add_even(&colours, &[[0.0; 4]; 32]);
+            sample
+        };
+        assert_eq!([0, 1, 4, 32].map(|wrong| with(wrong).is_above(0.01)), [false, false, true, true]);
+        assert!(!with(4).is_above(0.5));
+        let mut sample = with(0);
+        sample.add_even(&[[f32::NAN; 4]], &[[0.0; 4]]);
+        assert!(sample.is_above(0.01));
+        let evenly = draw_evenly(64, 8, 3);
+        assert_eq!(evenly.iter().map(|pixel| pixel / 8).collect::<Vec<u32>>(), (0..8).collect::<Vec<u32>>());
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! The search for an effort, and what it keeps from picture to picture.
 
-use super::check::{Sample, draw};
+use super::check::{Sample, draw, draw_evenly};
 use super::deadline::Deadline;
-use super::expected::Expected;
+use super::expected::{CHEAP, Expected};
 use super::{Bound, Estimate, Kept, Tried, embedded};
 use crate::session::Session;
 use crate::{Check, FieldError, Rendered, Variant};
@@ -16,6 +16,9 @@ use viewfuse_weighting::sources::SourceWeights;
 const CHECK_WORK: f64 = 0.1;
 const ROUND: [usize; 2] = [24, 256];
 const ROUNDS: usize = 3;
+/// Exact pixels of a trial, in the same way.
+const TRIAL_WORK: f64 = 0.05;
+const TRIAL: [usize; 2] = [8, 32];
 /// What is expected counts as much as this many draws.
 const EXPECTED_DRAWS: usize = 8;
 /// Pictures that keep another picture's choice have this much more error at most.
@@ -55,6 +58,8 @@ pub(crate) struct Controller {
     compared: Option<(usize, Estimate)>,
     /// The effort of the last picture that was checked alone, and its estimate.
     last: Option<(usize, Estimate)>,
+    /// The cheapest effort that a checked picture was within the bound with.
+    proven: usize,
     pictures: u64,
 }
 
@@ -68,6 +73,8 @@ struct Search<'s, 'a> {
     start: Instant,
     encode: Duration,
     tried: Vec<Tried>,
+    /// Evenly drawn pixels with their exact colours, for trials; empty before the first.
+    even: (Vec<u32>, Vec<[f32; 4]>),
 }
 
 impl Controller {
@@ -80,7 +87,8 @@ impl Controller {
             Check::Comparison => OTHER_PICTURES * embedded::SAFETY,
         };
         let expected = Expected::new(session.efforts(), safety);
-        Controller { bound, expected, check, compared: None, last: None, pictures: 0 }
+        let proven = expected.efforts.len();
+        Controller { bound, expected, check, compared: None, last: None, proven, pictures: 0 }
     }
 
     /// The effort that the first picture begins with, so that sources that are encoded before are encoded for it.
@@ -101,7 +109,7 @@ impl Controller {
     ) -> Result<Bounded, FieldError> {
         self.pictures += 1;
         let (start, encode) = (Instant::now(), Duration::ZERO);
-        let mut search = Search { session, view, start, encode, tried: Vec::new() };
+        let mut search = Search { session, view, start, encode, tried: Vec::new(), even: Default::default() };
         if self.check == Check::Steps {
             // The field's steps do not tell what leaving out views costs.
             search.view.used = view.all;
@@ -140,6 +148,10 @@ impl Controller {
             false => self.begin(most),
         };
         loop {
+            if let Some(estimate) = self.rejected(search, effort, termination, most, progress)? {
+                effort = self.go_on(search, effort, estimate, most);
+                continue;
+            }
             let rendered = self.picture(search, effort, termination, progress)?;
             if self.expected.is_exact(effort) {
                 self.last = Some((effort, Estimate::EXACT));
@@ -149,14 +161,57 @@ impl Controller {
                 Check::Steps => by_steps(search.session, termination),
                 _ => self.check(search, &rendered, effort, ROUNDS, most, progress)?,
             };
-            self.expected.learn(effort, estimate);
             if estimate.upper <= most {
+                self.expected.learn(effort, estimate);
+                self.proven = self.proven.min(effort);
                 self.last = Some((effort, estimate));
                 return Ok((rendered, effort, estimate));
             }
-            search.tried.push(self.tried(effort, Some(estimate)));
-            effort = self.expected.after(effort, most);
+            effort = self.go_on(search, effort, estimate, most);
         }
+    }
+
+    /// The effort to try after one whose error is too large.
+    fn go_on(&mut self, search: &mut Search<'_, '_>, effort: usize, estimate: Estimate, most: f64) -> usize {
+        self.expected.learn(effort, estimate);
+        search.tried.push(self.tried(effort, Some(estimate)));
+        self.expected.after(effort, most)
+    }
+
+    /// A trial of an effort that omits something and is not cheap, before its first picture: its error in few pixels,
+    /// where that is clearly too large. In a network's fog a whole picture would be a third of the exact one's work,
+    /// for nothing.
+    fn rejected(
+        &mut self,
+        search: &mut Search<'_, '_>,
+        effort: usize,
+        early_termination: f32,
+        most: f64,
+        progress: &dyn Progress,
+    ) -> Result<Option<Estimate>, FieldError> {
+        let Variant { typical_error, typical_share, omits_nothing, .. } = self.expected.efforts[effort];
+        let is_tried = self.check == Check::Pixels && !omits_nothing && typical_share > CHEAP;
+        if !is_tried || effort >= self.proven {
+            return Ok(None);
+        }
+        self.encode(search, effort, progress)?;
+        let Search { session, view, even: (pixels, exact), .. } = search;
+        if pixels.is_empty() {
+            let count = view.camera.pinhole.width() as usize * view.camera.pinhole.height() as usize;
+            let affordable = TRIAL_WORK * f64::from(typical_share) * count as f64;
+            *pixels = draw_evenly(count, (affordable as usize).clamp(TRIAL[0], TRIAL[1]), self.pictures);
+            *exact = session.exact_pixels(view.camera, view.all, pixels, progress)?;
+        }
+        let colours = match session.pixels(view.camera, view.used, early_termination, pixels, progress) {
+            // The picture repeats that in another precision, or fails.
+            Err(FieldError::NotFinite(_)) => return Ok(None),
+            colours => colours?,
+        };
+        let mut sample = Sample::default();
+        sample.expect(f64::from(typical_error), EXPECTED_DRAWS);
+        sample.add_even(&colours, exact);
+        let estimate = Estimate { pixels: colours.len(), ..sample.estimate() };
+        Ok(sample.is_above(most).then_some(estimate))
     }
 
     /// For fields that tell no errors and whose pixels cannot be computed alone: compares pictures of two efforts.
@@ -266,17 +321,28 @@ impl Controller {
         early_termination: f32,
         progress: &dyn Progress,
     ) -> Result<Rendered, FieldError> {
-        let is_exact = self.expected.is_exact(effort);
+        let weights = self.encode(search, effort, progress)?;
+        let early_termination = if self.expected.is_exact(effort) { 0.0 } else { early_termination };
+        let start = Instant::now();
+        let rendered = search.session.render(search.view.camera, weights, early_termination, progress)?;
+        self.expected.seconds[effort] = Some(start.elapsed().as_secs_f64());
+        Ok(rendered)
+    }
+
+    /// Sets an effort and encodes what it needs: the weights of its picture.
+    fn encode<'s>(
+        &self,
+        search: &mut Search<'s, '_>,
+        effort: usize,
+        progress: &dyn Progress,
+    ) -> Result<&'s SourceWeights, FieldError> {
         let Search { session, view, encode, .. } = search;
-        let (weights, early_termination) = if is_exact { (view.all, 0.0) } else { (view.used, early_termination) };
+        let weights = if self.expected.is_exact(effort) { view.all } else { view.used };
         let start = Instant::now();
         session.set_effort(effort, progress)?;
         session.encode(weights, progress)?;
         *encode += start.elapsed();
-        let start = Instant::now();
-        let rendered = session.render(view.camera, weights, early_termination, progress)?;
-        self.expected.seconds[effort] = Some(start.elapsed().as_secs_f64());
-        Ok(rendered)
+        Ok(weights)
     }
 
     /// Estimates the error of an effort's picture from exact pixels, in rounds until it is clearly on one side of

@@ -9,7 +9,7 @@ const MARGIN: f64 = 1.15;
 const MIN_SCALE: f64 = 0.9;
 /// Trials of so little work may skip this many efforts at most: typical errors tell little of scenes that are not
 /// typical.
-const CHEAP: f32 = 0.1;
+pub(super) const CHEAP: f32 = 0.1;
 const MAX_SKIPPED: usize = 3;
 /// Pictures are compared whose typical errors differ by at least this factor.
 const MIN_RATIO: f32 = 1.5;

@@ -116,6 +116,29 @@ impl<D: Device> Renderer<'_, D> {
         Ok(so_far.picture)
     }
 
+    /// Colours of some pixels, each from all nodes of a ray of its own.
+    pub(super) fn pixels_of_nodes(
+        &self,
+        workspace: &mut Workspace<D>,
+        pixels: &[u32],
+        evaluated: &mut Evaluated,
+    ) -> Result<Vec<[f32; 4]>, FieldError> {
+        let values = vec![EMPTY; pixels.len() * self.omissions.nodes as usize];
+        let marched = self.march(workspace, pixels, &vec![self.all_nodes(); pixels.len()], values, evaluated)?;
+        Ok(self.composite_nodes(pixels, &marched).into_iter().map(|(colour, _)| colour).collect())
+    }
+
+    /// Colours and depths (along the rays) of rays with their nodes' values.
+    fn composite_nodes(&self, pixels: &[u32], marched: &Marched) -> Vec<([f32; 4], f32)> {
+        let (count, sampling, background) = (self.omissions.nodes as usize, &self.sampling, &self.background);
+        map(pixels.len(), 16, |ray| {
+            let values = &marched.values[ray * count..(ray + 1) * count];
+            let found = NodeRay { ray: marched.rays[ray], values }.composite(pixels[ray], sampling, background);
+            let [red, green, blue] = found.channels;
+            ([red, green, blue, found.opacity], found.depth)
+        })
+    }
+
     fn all_nodes(&self) -> u128 {
         bits(self.omissions.nodes as usize)
     }
@@ -142,14 +165,7 @@ impl<D: Device> Renderer<'_, D> {
             so_far.empty[*pixel as usize] = found | self.all_nodes() & !candidates[ray];
             so_far.keep(*pixel as usize, nodes);
         }
-        let (sampling, background, Marched { rays, values, .. }) = (&self.sampling, &self.background, &marched);
-        let results = map(pixels.len(), 16, |ray| {
-            let node_ray = NodeRay { ray: rays[ray], values: &values[ray * count..(ray + 1) * count] };
-            let found = node_ray.composite(pixels[ray], sampling, background);
-            let [red, green, blue] = found.channels;
-            ([red, green, blue, found.opacity], found.depth)
-        });
-        for (pixel, (colour, depth)) in pixels.iter().zip(results) {
+        for (pixel, (colour, depth)) in pixels.iter().zip(self.composite_nodes(pixels, &marched)) {
             so_far.picture.colours[*pixel as usize] = colour;
             so_far.picture.depths[*pixel as usize] = depth;
         }

@@ -12,8 +12,25 @@ use viewfuse_device::Device;
 const SHARES: [f32; 5] = [1.0 / 16.0, 1.0 / 32.0, 1.0 / 64.0, 1.0 / 128.0, 1.0 / 256.0];
 
 impl<D: Device> Renderer<'_, D> {
+    /// The probes of a picture whose omissions need some. Their samples are no part of the picture's.
+    pub(super) fn probes(
+        &self,
+        workspace: &mut Workspace<D>,
+        evaluated: &mut Evaluated,
+    ) -> Result<Option<Probes<D>>, FieldError> {
+        let step = self.omissions.empty_space;
+        if step <= 1 || self.omissions.nodes > 0 {
+            return Ok(None);
+        }
+        let mut work = Evaluated::default();
+        let probes = self.probe(workspace, step, &mut work)?;
+        evaluated.evaluated += work.evaluated;
+        evaluated.unseen += work.unseen;
+        Ok(Some(probes))
+    }
+
     /// Runs the first pass along one ray in every square of `step` pixels, and along those of the last row and column.
-    pub(super) fn probe(
+    fn probe(
         &self,
         workspace: &mut Workspace<D>,
         step: u32,
