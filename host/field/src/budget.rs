@@ -4,7 +4,7 @@
 //! ```text
 //! check        the difference of a picture from the exact one, estimated from few pixels
 //! embedded     the same from two pictures of different efforts, for fields whose pixels are not independent
-//! deadline     cancels what would come too late
+//! deadline     progress of what is tried: no pieces, and cancelled where it would come too late
 //! expected     the errors and times that efforts are expected to have
 //! controller   the search, and what it keeps from picture to picture
 //! ```

@@ -147,19 +147,21 @@ impl Controller {
             true => self.expected.cheapest_as_f32(most),
             false => self.begin(most),
         };
+        let aside = Deadline { progress, end: None };
         loop {
-            if let Some(estimate) = self.rejected(search, effort, termination, most, progress)? {
+            if let Some(estimate) = self.rejected(search, effort, termination, most, &aside)? {
                 effort = self.go_on(search, effort, estimate, most);
                 continue;
             }
-            let rendered = self.picture(search, effort, termination, progress)?;
+            let is_cheap = self.check == Check::Pixels && self.expected.efforts[effort].typical_share <= CHEAP;
+            let rendered = self.picture(search, effort, termination, if is_cheap { &aside } else { progress })?;
             if self.expected.is_exact(effort) {
                 self.last = Some((effort, Estimate::EXACT));
                 return Ok((rendered, effort, Estimate::EXACT));
             }
             let estimate = match self.check {
                 Check::Steps => by_steps(search.session, termination),
-                _ => self.check(search, &rendered, effort, ROUNDS, most, progress)?,
+                _ => self.check(search, &rendered, effort, ROUNDS, most, &aside)?,
             };
             if estimate.upper <= most {
                 self.expected.learn(effort, estimate);
@@ -276,7 +278,7 @@ impl Controller {
         let left = || end.saturating_duration_since(Instant::now()).as_secs_f64();
         let mut effort = self.expected.best_within(left()).unwrap_or(0);
         let mut best = (self.picture(search, effort, search.view.early_termination, progress)?, effort);
-        let deadline = Deadline { progress, end };
+        let deadline = Deadline { progress, end: Some(end) };
         while let Some(better) = self.expected.best_within(left()).filter(|better| *better > effort) {
             effort = better;
             match self.picture(search, effort, search.view.early_termination, &deadline) {

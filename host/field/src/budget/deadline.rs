@@ -1,12 +1,13 @@
-//! Cancels what would come too late.
+//! Progress of what may be for nothing.
 
 use std::time::Instant;
 use viewfuse_job::progress::Progress;
 
-/// Reports to another progress, and cancels at a time.
+/// Passes warnings on, but no pieces: what a search tries and checks is not the picture's progress. It may be cancelled
+/// at a time, because it would come too late.
 pub(super) struct Deadline<'a> {
     pub(super) progress: &'a dyn Progress,
-    pub(super) end: Instant,
+    pub(super) end: Option<Instant>,
 }
 
 impl Progress for Deadline<'_> {
@@ -15,6 +16,6 @@ impl Progress for Deadline<'_> {
     }
 
     fn is_cancelled(&self) -> bool {
-        Instant::now() >= self.end || self.progress.is_cancelled()
+        self.end.is_some_and(|end| Instant::now() >= end) || self.progress.is_cancelled()
     }
 }

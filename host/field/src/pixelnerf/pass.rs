@@ -208,7 +208,11 @@ impl<D: Device> Renderer<'_, D> {
             device.place_points(&block, count, all, &rays.rays, &samples.depths, &mut workspace.points)?;
             evaluated.unseen += network.evaluate_visible(workspace, self.views, count)?;
             device.radiance(count, &workspace.raw, &workspace.points, &mut samples.values)?;
+            self.progress.step();
         }
+        // What is omitted is done, too.
+        let omitted = pieces(workspace, rays.count * samples.count) - pieces(workspace, list.count);
+        (0..omitted).for_each(|_| self.progress.step());
         Ok(())
     }
 
@@ -252,6 +256,11 @@ impl<D: Device> Renderer<'_, D> {
             depth_times_opacity: u32::from(published_depth),
         }
     }
+}
+
+/// Pieces of the evaluation of so many samples, for progress.
+pub(super) fn pieces<D: Device>(workspace: &Workspace<D>, sample_count: u32) -> usize {
+    sample_count.div_ceil(workspace.point_count) as usize
 }
 
 /// Low and high word.

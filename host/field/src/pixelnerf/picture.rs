@@ -1,7 +1,7 @@
 //! A target's picture from rays: which pixels have a ray of their own, and which are interpolated.
 
 use super::network::Workspace;
-use super::pass::{Evaluated, Probes, Renderer, rays_at_once};
+use super::pass::{Evaluated, Probes, Renderer, pieces, rays_at_once};
 use crate::{FieldError, Rendered};
 use viewfuse_device::Device;
 
@@ -108,12 +108,12 @@ impl<D: Device> Renderer<'_, D> {
     ) -> Result<(Vec<[f32; 4]>, Vec<f32>), FieldError> {
         let device = self.device;
         let at_once = rays_at_once(device, &self.sampling);
-        self.progress.expect(pixels.len().div_ceil(at_once));
+        let of_rays = |rays: usize| self.sampling.counts().map(|count| pieces(workspace, rays as u32 * count));
+        self.progress.expect(pixels.chunks(at_once).flat_map(|some| of_rays(some.len())).sum());
         // Nothing is downloaded before all rays are dispatched.
         let mut tiles = Vec::new();
         for some in pixels.chunks(at_once) {
             tiles.push(self.render(workspace, some, probes, evaluated)?);
-            self.progress.step();
         }
         let (mut colours, mut depths) = (Vec::with_capacity(pixels.len()), Vec::with_capacity(pixels.len()));
         for tile in tiles {

@@ -2,7 +2,7 @@
 
 use super::network::Workspace;
 use super::options::MIN_SHARE;
-use super::pass::{Evaluated, Probes, Renderer, rays_at_once};
+use super::pass::{Evaluated, Probes, Renderer, pieces, rays_at_once};
 use crate::FieldError;
 use viewfuse_core::composite::Compositor;
 use viewfuse_device::Device;
@@ -47,6 +47,7 @@ impl<D: Device> Renderer<'_, D> {
         let mut changes = [0.0; SHARES.len()];
         for some in pixels.chunks(rays_at_once(self.device, &self.sampling)) {
             let rays = self.rays(some)?;
+            self.progress.expect(pieces(workspace, rays.count * count));
             let samples = self.first_pass(workspace, &rays, count, None, evaluated)?;
             self.device.weigh_samples(&samples.block(first_ray), rays.count, &samples.values, &mut values)?;
             first_ray += rays.count;

@@ -15,8 +15,9 @@ const TELLING: f64 = 0.02;
 /// Least share over which a rate is measured.
 const MIN_MEASURED: f64 = 0.01;
 
-/// Nothing is told before so much time has passed: what comes first is seldom like the rest.
-const MIN_PASSED: Duration = Duration::from_secs(2);
+/// Nothing is told before rates are measured over so much time: what comes first is seldom like the rest, and stages
+/// that take no time say nothing of one that does.
+const MIN_TIME_MEASURED: Duration = Duration::from_secs(2);
 
 /// So much more than was told, or than a piece was expected to take, is taken for the same.
 const MAX_RISE: Duration = Duration::from_secs(1);
@@ -135,7 +136,8 @@ impl Course {
             return self.said.clone();
         };
         let (passed, expected) = (now.duration_since(since), left.saturating_sub(self.next));
-        if now.duration_since(self.start) < MIN_PASSED || passed > expected + MAX_RISE {
+        let measured = self.mark.0.duration_since(self.start);
+        if measured < MIN_TIME_MEASURED || passed > expected + MAX_RISE {
             return self.said.clone();
         }
         let left = left.saturating_sub(passed).max(self.next);
@@ -315,6 +317,24 @@ mod tests {
             assert!(told.is_none_or(|told| 3.0 * (told as f64 + 1.0) > left), "{told:?} of {left} s: {:?}", faked.told);
         }
         assert!(faked.told_share() > 0.3, "{}", faked.told_share());
+    }
+
+    /// As a network's picture: 60 % of the stages are done at once, and the last one has no pieces for a while.
+    #[test]
+    fn stages_that_take_no_time_promise_nothing() {
+        let mut faked = Faked::new();
+        for stage in 0..3 {
+            faked.stage(stage, 4, 1, |_| 0.01);
+        }
+        faked.course.begin("view", 3..4, 4, faked.now);
+        faked.pass(10.0);
+        assert!(faked.told.iter().all(Option::is_none), "{:?}", faked.told);
+        faked.stage(3, 4, 100, |_| 0.5);
+        faked.never_rises();
+        let told: Vec<u64> = faked.told.iter().flatten().copied().collect();
+        assert!(told.first().is_some_and(|first| *first >= 40), "{told:?}");
+        let half = faked.told[faked.told.len() - 200];
+        assert!(half.is_some_and(|left| left.abs_diff(25) <= 2), "{half:?}: {told:?}");
     }
 
     #[test]
