@@ -91,27 +91,6 @@ struct Sweep<D: Device> {
 }
 
 impl Hull {
-    /// The depth maps of all sources, concatenated, row-major: depths along the principal axis in world units,
-    /// [`NO_SURFACE`] where nothing was found. `relevance[view]` are the weights of all sources for source `view`.
-    ///
-    /// # Errors
-    /// [`FieldError`].
-    pub fn depth_maps<D: Device>(
-        &self,
-        device: &D,
-        sources: &SourceImages,
-        relevance: &[SourceWeights],
-        progress: &dyn Progress,
-    ) -> Result<Vec<f32>, FieldError> {
-        let mut views = self.views(device, sources, progress)?;
-        views.weigh(relevance)?;
-        for view in 0..sources.images.len() {
-            views.encode(view, progress)?;
-        }
-        let depths = views.depths.ok_or_else(|| FieldError::unsuitable(NotWeighed))?;
-        Ok(device.download(&depths.maps)?)
-    }
-
     /// Uploads the photographs to a device and finds the object.
     pub(super) fn views<'a, D: Device>(
         &'a self,
