@@ -181,7 +181,9 @@ fn tables_of_poses() {
         ("x,x,y,z\n", ":1: column \"x\" is there twice"),
         ("x,y,z,look_x,look_y,look_z\n1,2,3,4,5,6\n1,2,3,4,five,6\n", ":3: \"five\" is not a number"),
         ("x,y,z,look_x,look_y,look_z\n1,2,3,4,5\n", "not a table of comma-separated values"),
-        ("x,y,z,qw,qx,qy,qz\n1,2,3,0,0,0,0\n", ":2: not a camera pose"),
+        ("x,y,z,qw,qx,qy,qz\n1,2,3,0,0,0,0\n", ":2: qw qx qy qz are no rotation"),
+        ("x,y,z,look_x,look_y,look_z\n1,2,3,1,2,3\n", ":2: the camera stands at the point that it is to look at"),
+        ("name,x,y,z,qw,qx,qy,qz\na,0,0,0,1,0,0,0\na.png,1,0,0,1,0,0,0\n", ":3: name \"a\" is that of line 2, too"),
         ("x,y,z,look_x,look_y,look_z\n", "the path has no cameras"),
     ] {
         let error = path_of("poses.csv", text).expect_err(part);

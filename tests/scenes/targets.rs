@@ -44,6 +44,38 @@ fn targets_that_would_be_one_file_are_refused() {
     }
 }
 
+/// A second photograph of a pose next to the first shows no depth, and left out it is no test of a new view.
+#[test]
+fn a_pose_is_one_source() {
+    let folder = called(&["a", "b", "c", "d"]);
+    let moved = |by: f64| {
+        let mut pose = WORLD_FROM_CAMERA;
+        pose[3] += by;
+        words(&pose)
+    };
+    folder.write("pose/c.txt", moved(1.0)).write("pose/d.txt", moved(0.2));
+    let scene = open(&folder);
+    let twins = "views 'b' and 'c' have the same pose";
+    assert!(scene.pose_warnings().iter().any(|warning| warning.contains(twins)), "{:?}", scene.pose_warnings());
+    let sources = |targets: &str, sources: Option<&str>| {
+        let selection = Selection {
+            targets: Some(targets.to_owned()),
+            sources: sources.map(str::to_owned),
+            ..Selection::default()
+        };
+        selection.resolve(&scene, 1).expect("a job").sources
+    };
+    assert_eq!(sources("a", None), [1, 3]);
+    // The other one stays where the first is a target, and what is listed is taken.
+    assert_eq!(sources("b", None), [0, 2, 3]);
+    assert_eq!(sources("a", Some("b,c")), [1, 2]);
+    // Nearly the same pose is the same.
+    let near = called(&["a", "b", "c", "d"]);
+    near.write("pose/b.txt", moved(1.0e-5));
+    assert!(open(&near).pose_warnings().iter().any(|warning| warning.contains("have the same pose")));
+    assert_eq!(open(&called(&["a", "b"])).pose_warnings(), Vec::<String>::new());
+}
+
 fn job(scene: &Scene, target: Camera) -> FewShot {
     let target = Target { name: "away".to_owned(), camera: target, truth: None };
     FewShot { sources: (0..8).collect(), targets: vec![target_of(scene, 20), target], frames_per_second: None }

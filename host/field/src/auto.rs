@@ -32,6 +32,7 @@ pub use expectation::{Basis, Beyond, Expected, PixelErrors, TERMS};
 pub use held_out::HOLD_OUT;
 pub use pair::{Measured, Pair};
 
+use crate::budget::Estimate;
 use crate::held_out::nearest;
 use crate::mixture::NearTargets;
 use crate::render::{Finished, Frame, RenderError, RenderOptions, RenderRun, Stage, render_chosen};
@@ -185,14 +186,16 @@ impl Chosen {
         self.basis?.beyond(self.standing(frame), frame.seen)
     }
 
-    /// The expected score of a target's picture; `None` if nothing could be held out, and [`beyond`](Self::beyond) what
-    /// is known.
+    /// The expected score of a target's picture; `None` if nothing could be held out, [`beyond`](Self::beyond) what is
+    /// known, and of a picture that a bound keeps from being exact with an error that nobody knows: held-out sources
+    /// were rendered exactly.
     pub fn expected(&self, frame: &Frame) -> Option<Expected> {
         if self.beyond(frame).is_some() {
             return None;
         }
+        let error = frame.kept.as_ref().map_or(Some(Estimate::EXACT), |kept| kept.error)?;
         let calibrated = self.calibrated(frame);
-        let expected = self.basis?.expected(self.standing(frame), calibrated, frame.seen);
+        let expected = self.basis?.expected(self.standing(frame), calibrated, frame.seen).with_error(&error);
         let scale = |calibrated: f64| 10.0_f64.powf((calibrated - expected.psnr) / 20.0) as f32;
         let pixels = calibrated.map(|calibrated| PixelErrors { scale: scale(calibrated) });
         Some(Expected { pixels, ..expected })

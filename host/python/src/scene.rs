@@ -53,7 +53,7 @@ impl PyScene {
     /// Warnings of reading, a line each.
     #[getter]
     fn warnings(&self) -> Vec<String> {
-        self.scene.warnings.clone()
+        self.scene.warnings.iter().cloned().chain(self.scene.pose_warnings()).collect()
     }
 
     /// The views' names: first those with photographs, then target poses without.

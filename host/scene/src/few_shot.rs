@@ -12,7 +12,9 @@ pub use targets::away_warning;
 use crate::path::arc::Arc;
 use crate::path::{CameraPath, NamedCamera, generated, numbered};
 use crate::rig::{Rig, spread};
+use crate::scene::poses::firsts;
 use crate::{Scene, SceneError, Split, View};
+use std::collections::HashSet;
 use std::path::PathBuf;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::pose::PoseError;
@@ -164,7 +166,7 @@ pub struct Selection {
     pub targets: Option<String>,
     /// Targets that are cameras along a path.
     pub path: Option<PathChoice>,
-    /// `--sources`; otherwise every view with a photograph that is not a target.
+    /// `--sources`; otherwise every view with a photograph that is not a target, but one of each pose.
     pub sources: Option<String>,
     /// `--views`: at most this many of the sources, spread as far apart as possible.
     pub view_count: Option<usize>,
@@ -219,9 +221,12 @@ impl Selection {
                 }
                 sources
             }
-            None => (0..scene.views.len())
-                .filter(|view| scene.views[*view].image.is_some() && !targets.contains(view))
-                .collect(),
+            None => {
+                let is_source = |view: &usize| scene.views[*view].image.is_some() && !targets.contains(view);
+                let firsts = firsts(&scene.views);
+                let mut poses = HashSet::new();
+                (0..scene.views.len()).filter(is_source).filter(|view| poses.insert(firsts[*view])).collect()
+            }
         };
         if let Some(count) = self.view_count {
             let centres: Vec<_> = sources.iter().map(|&view| scene.views[view].camera.pose.centre_world()).collect();

@@ -90,6 +90,7 @@ pub fn inspect(
     let cameras: Vec<Camera> = scene.views.iter().map(|view| view.camera).collect();
     let rig = Rig::of(&cameras);
     let mut warnings = scene.warnings.clone();
+    warnings.extend(scene.pose_warnings());
     warnings.extend(rig_warnings(scene, &rig));
     let is_photographed = |view: &&View| view.image.is_some();
     let photographed: Vec<Camera> = scene.views.iter().filter(is_photographed).map(|view| view.camera).collect();
@@ -162,15 +163,6 @@ fn elevations(rig: &Rig, cameras: &[Camera]) -> [f32; 2] {
 /// Warnings about the cameras.
 fn rig_warnings(scene: &Scene, rig: &Rig) -> Vec<String> {
     let mut warnings = Vec::new();
-    let cameras = || scene.views.iter().map(|view| &view.camera);
-    let away = cameras().filter(|c| (rig.focus - c.pose.centre_world()).dot(c.pose.forward_world()) < 0.0).count();
-    let count = scene.views.len();
-    if count > 1 && 2 * away > count {
-        warnings.push(format!(
-            "{away} of {count} cameras look away from the point that their axes come nearest to: the axes look flipped \
-             (OpenGL poses read as OpenCV, or the other way round)"
-        ));
-    }
     if rig.axis_miss > MAX_AXIS_MISS * rig.distance {
         warnings.push(format!(
             "the cameras do not look at a common point: their axes miss the nearest one by {:.3} at a distance of \
@@ -184,16 +176,6 @@ fn rig_warnings(scene: &Scene, rig: &Rig) -> Vec<String> {
              in units in which this is {SRN_DISTANCE}",
             rig.distance, USUAL_DISTANCES.0, USUAL_DISTANCES.1
         ));
-    }
-    let twin = |(index, view): (usize, &View)| {
-        let other = scene.views[..index].iter().find(|other| other.camera.pose == view.camera.pose)?;
-        Some((other.name.clone(), view.name.clone()))
-    };
-    let twins: Vec<(String, String)> = scene.views.iter().enumerate().filter_map(twin).collect();
-    if let Some((first, second)) = twins.first() {
-        let more =
-            if twins.len() > 1 { format!(", and so have {} more views", twins.len() - 1) } else { String::new() };
-        warnings.push(format!("views '{first}' and '{second}' have the same pose{more}"));
     }
     let first = &scene.views[0].camera.pinhole;
     if let Some(view) = scene.views.iter().find(|view| {

@@ -30,8 +30,8 @@ pub enum PhotographsError {
     Size(String, u32, u32, PinholeError),
     /// The background, for which this colour was assumed, covers the whole photograph, or nothing of it.
     #[error(
-        "{0}: shows no object in front of the background ({1}); give the background's colour, or photographs with an \
-         alpha channel"
+        "{0}: shows no object in front of the background ({1}); give the colour that the photographs' background has, \
+         or photographs with an alpha channel"
     )]
     NoSilhouette(String, String),
     /// The person stopped the work.

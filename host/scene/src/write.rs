@@ -239,6 +239,14 @@ fn lost(scene: &Scene, layout: Layout) -> Vec<String> {
     if layout != Layout::Llff && !(layout == Layout::Neus && neus::has_unit_sphere(scene)) && depths > 0 {
         lines.push(format!("near and far depths of {depths} views"));
     }
+    let has_object = scene.views.iter().any(|view| scene.has_object_mask(view));
+    if layout == Layout::Neus && !neus::has_unit_sphere(scene) && !has_object {
+        let (_, radius) = neus::sphere(scene);
+        lines.push(format!(
+            "of whole photographs what is farther than {radius:.3} from the point that the cameras look at: programs \
+             that read this layout look for surfaces within that sphere"
+        ));
+    }
     let parts = views(|view| view.split.is_some());
     if layout != Layout::Transforms && parts > 0 {
         lines.push(format!("the part of the scene that {parts} views belong to"));

@@ -63,7 +63,8 @@ impl PictureOptions {
 /// What any field may omit.
 #[derive(Args)]
 pub(crate) struct OmissionOptions {
-    /// Leave out the least relevant sources while their weights together stay at or below this
+    /// Leave out the least relevant sources while their weights together stay at or below this; without a network
+    /// pictures of whole photographs are made from the nine most relevant at most, unless this is 0
     #[arg(long, value_name = "TOTAL", default_value_t = DEFAULT_LEAVE_OUT, value_parser = parse_share,
         help_heading = EFFORTS)]
     leave_out: f32,

@@ -36,7 +36,11 @@ pub(crate) fn complain(message: impl Display) {
 
 /// Says the warnings of a scene: what of its files is not used.
 pub(crate) fn warn_of(scene: &Scene) {
-    scene.warnings.iter().for_each(|warning| complain(format_args!("warning: {warning}")));
+    scene
+        .warnings
+        .iter()
+        .chain(&scene.pose_warnings())
+        .for_each(|warning| complain(format_args!("warning: {warning}")));
 }
 
 /// Prints what is wrong with the arguments, which takes several lines.

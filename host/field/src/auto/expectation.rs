@@ -12,6 +12,7 @@
 
 use super::calibration::Calibration;
 use super::held_out::Outcome;
+use crate::budget::Estimate;
 use crate::render::Seen;
 use crate::standing::Standing;
 use serde::{Deserialize, Serialize};
@@ -59,6 +60,17 @@ pub struct PixelErrors {
     /// A pixel's expected root mean square error, as a share of a colour's range, is this times that of its confidence
     /// in the calibration ([`Calibration`](super::Calibration)): so the whole picture has the expected score.
     pub scale: f32,
+}
+
+impl Expected {
+    /// The same of a picture with this error beside the exact one, whose squares add up; the interval's lower end is
+    /// that of the error's upper one.
+    pub(super) fn with_error(self, error: &Estimate) -> Expected {
+        let with = |psnr: f64, error: f64| -10.0 * (10.0_f64.powf(-0.1 * psnr) + error * error).log10();
+        let [low, high] = self.interval;
+        let interval = [with(low, error.upper), with(high, error.value)];
+        Expected { psnr: with(self.psnr, error.value), interval, ..self }
+    }
 }
 
 /// The statistics of the held-out sources.
@@ -152,6 +164,17 @@ pub(super) fn decibels(square: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_a_bound_costs_is_not_expected() {
+        let expected = Expected { psnr: 25.0, interval: [22.0, 28.0], pixels: None };
+        assert!((expected.with_error(&Estimate::EXACT).psnr - 25.0).abs() < 1.0e-9);
+        // As much error as the picture has at 25 dB: half of the square is lost.
+        let as_much = Estimate { value: 10.0_f64.powf(-1.25), upper: 2.0 * 10.0_f64.powf(-1.25), pixels: 0 };
+        let bounded = expected.with_error(&as_much);
+        assert!((bounded.psnr - 21.99).abs() < 0.01, "{bounded:?}");
+        assert!(bounded.interval[0] < 18.0 && bounded.interval[1] < 24.0, "{bounded:?}");
+    }
 
     #[test]
     fn nothing_is_expected_beyond_what_was_measured() {

@@ -127,15 +127,24 @@ impl PoseRow<'_> {
         let centre = DVec3::from_array(self.numbers(CENTRE)?);
         let rotation = if matches!(form, Form::Rotation) {
             let [w, x, y, z] = self.numbers(ROTATION)?;
-            DMat3::from_quat(DQuat::from_xyzw(x, y, z, w).normalize())
+            let rotation = DQuat::from_xyzw(x, y, z, w).normalize();
+            if !rotation.is_finite() {
+                return Err(self.no_pose("qw qx qy qz are no rotation: their length is 0 or no number"));
+            }
+            DMat3::from_quat(rotation)
         } else {
-            let forward = (DVec3::from_array(self.numbers(LOOK)?) - centre).normalize();
-            let right = forward.cross(up).normalize();
+            let direction = |vector: DVec3, why: &str| vector.try_normalize().ok_or_else(|| self.no_pose(why));
+            let look = DVec3::from_array(self.numbers(LOOK)?);
+            let forward = direction(look - centre, "the camera stands at the point that it is to look at")?;
+            let right = direction(forward.cross(up), "the camera looks straight up or down: state its rotation")?;
             DMat3::from_cols(right, forward.cross(right), forward)
         };
-        // A zero quaternion and a view straight along `up` give no numbers here, and no pose.
         let row = |row: usize| [rotation.x_axis, rotation.y_axis, rotation.z_axis, centre].map(|column| column[row]);
         Ok([row(0), row(1), row(2), LAST])
+    }
+
+    fn no_pose(&self, why: &str) -> SceneError {
+        self.place().fault(FileFault::Row(why.to_owned()))
     }
 
     fn intrinsics(&self) -> Result<Option<RawIntrinsics>, SceneError> {
@@ -162,14 +171,19 @@ pub(super) fn read(path: &Path, text: &str, scene: &Scene) -> Result<RawPath, Sc
     let form = columns.form().map_err(wrong)?;
     let cameras: Vec<Camera> = scene.views.iter().map(|view| view.camera).collect();
     let up = Rig::of(&cameras).up.as_dvec3();
-    let mut views = Vec::new();
+    let (mut views, mut lines) = (Vec::new(), BTreeMap::new());
     for cells in reader.records() {
         let cells = &cells.map_err(not_a_table)?;
         let line = cells.position().map_or(0, |position| position.line() as usize);
         let row = PoseRow { path, line, columns: &columns, cells };
         let pose = RawPose { matrix: row.matrix(form, up)?, form: PoseForm::WorldFromOpenCv, place: row.place() };
         let name = columns.places.get(NAME).and_then(|place| cells.get(*place)).map(stem_of);
-        views.push(RawView::new(name.unwrap_or_default(), None, pose, row.intrinsics()?));
+        let name = name.unwrap_or_default();
+        if let Some(earlier) = lines.insert(name.clone(), line).filter(|_| !name.is_empty()) {
+            let twice = format!("name {name:?} is that of line {earlier}, too");
+            return Err(row.place().fault(FileFault::Row(twice)));
+        }
+        views.push(RawView::new(name, None, pose, row.intrinsics()?));
     }
     Ok(RawPath { views, frames_per_second: None })
 }

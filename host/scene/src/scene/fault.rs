@@ -238,6 +238,9 @@ pub enum FileFault {
     /// A column of a table of poses is missing, unknown, or there twice; and the columns that there can be.
     #[error("{0}; the columns are {1}")]
     Columns(String, &'static str),
+    /// A row of a table of poses is no pose, or has the name of another one: why.
+    #[error("{0}")]
+    Row(String),
     /// It ends too early: after so many bytes, inside this.
     #[error("ends after {0} bytes, inside {1}")]
     Truncated(usize, &'static str),

@@ -1,0 +1,59 @@
+//! What is wrong with a scene's poses as a whole.
+
+use super::View;
+use crate::rig::Rig;
+use viewfuse_core::camera::Camera;
+
+/// Cameras nearer to one another than this share of their distance from what they look at show no depth: half a pixel
+/// at a focal length of 500.
+const MIN_BASELINE: f32 = 1.0e-3;
+/// Least cosine of the angle between the axes of two cameras with the same pose: of 0.6 degrees.
+const MIN_COSINE: f32 = 0.999_95;
+
+/// The first of these views that has the same pose as each of them: that view itself, if it is the only one. A second
+/// photograph of a pose shows nothing new, and next to it no depth is found.
+pub(crate) fn firsts(views: &[View]) -> Vec<usize> {
+    let cameras: Vec<Camera> = views.iter().map(|view| view.camera).collect();
+    let baseline = MIN_BASELINE * Rig::of(&cameras).distance;
+    let same = |a: &Camera, b: &Camera| {
+        let (a, b) = (&a.pose, &b.pose);
+        a.centre_world().distance(b.centre_world()) <= baseline
+            && a.forward_world().dot(b.forward_world()) >= MIN_COSINE
+            && a.down_world().dot(b.down_world()) >= MIN_COSINE
+    };
+    let mut firsts: Vec<usize> = Vec::with_capacity(cameras.len());
+    for (index, camera) in cameras.iter().enumerate() {
+        let first = (0..index).find(|other| firsts[*other] == *other && same(camera, &cameras[*other]));
+        firsts.push(first.unwrap_or(index));
+    }
+    firsts
+}
+
+/// Warnings about the poses, a line each.
+pub(super) fn warnings(views: &[View]) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let cameras: Vec<Camera> = views.iter().map(|view| view.camera).collect();
+    let (rig, count) = (Rig::of(&cameras), cameras.len());
+    let looks_away = |c: &&Camera| (rig.focus - c.pose.centre_world()).dot(c.pose.forward_world()) < 0.0;
+    let away = cameras.iter().filter(looks_away).count();
+    if count > 1 && 2 * away > count {
+        warnings.push(format!(
+            "{away} of {count} cameras look away from the point that their axes come nearest to: the axes look flipped \
+             (OpenGL poses read as OpenCV, or the other way round), or the poses inverted"
+        ));
+    }
+    let firsts = firsts(views);
+    let mut twins = firsts.iter().enumerate().filter(|(index, first)| index != *first);
+    if let Some((second, first)) = twins.next() {
+        let more = match twins.count() {
+            0 => String::new(),
+            more => format!(", and so have {more} more views"),
+        };
+        warnings.push(format!(
+            "views '{}' and '{}' have the same pose{more}: of photographs of one pose the first is a source, unless \
+             sources are listed, and the score of another one beside it is of no new view",
+            views[*first].name, views[second].name
+        ));
+    }
+    warnings
+}
