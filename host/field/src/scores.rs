@@ -23,7 +23,8 @@ pub fn psnr_of_seen(prediction: &RgbImage, truth: &RgbImage, seen: Option<&GrayI
 /// [`psnr_of_seen`] after each of the prediction's channels was corrected by the gain and offset that fit it best, by
 /// least squares over the seen pixels, to the truth's; corrected levels are clamped to 0..=255 and not rounded. What it
 /// is above PSNR is the price of the camera's exposure and white balance, which no other view tells. Never below PSNR,
-/// rounding aside. A channel of one level gets an offset alone.
+/// rounding aside. A channel of one level, in either picture, gets an offset alone: a gain of 0 would hide
+/// all of a picture.
 ///
 /// As the `cc_psnr` of nerfstudio and the `color_correct` of multinerf (RawNeRF, Zip-NeRF), with an affine function of
 /// each channel for their quadratic one of all three.
@@ -35,10 +36,10 @@ pub fn corrected_psnr_of_seen(prediction: &RgbImage, truth: &RgbImage, seen: Opt
     for channel in 0..3 {
         let levels = || pairs.iter().map(|(_, (p, t))| [f64::from(p.0[channel]), f64::from(t.0[channel])]);
         // Whole numbers below 2^53: the sums are exact.
-        let [p, t, pp, pt] =
-            levels().fold([0.0; 4], |sum, [p, t]| [sum[0] + p, sum[1] + t, sum[2] + p * p, sum[3] + p * t]);
-        let variation = count * pp - p * p;
-        let gain = if variation > 0.0 { (count * pt - p * t) / variation } else { 1.0 };
+        let [p, t, pp, pt, tt] = levels()
+            .fold([0.0; 5], |sum, [p, t]| [sum[0] + p, sum[1] + t, sum[2] + p * p, sum[3] + p * t, sum[4] + t * t]);
+        let [variation, of_truth] = [count * pp - p * p, count * tt - t * t];
+        let gain = if variation > 0.0 && of_truth > 0.0 { (count * pt - p * t) / variation } else { 1.0 };
         let offset = (t - gain * p) / count;
         error += levels().map(|[p, t]| ((gain * p + offset).clamp(0.0, 255.0) - t).powi(2)).sum::<f64>();
     }
@@ -137,6 +138,7 @@ mod tests {
         assert_eq!(corrected_psnr_of_seen(&truth, &truth, None), f64::INFINITY);
         let flat = RgbImage::from_pixel(23, 17, Rgb([7, 80, 200]));
         assert_eq!(corrected_psnr_of_seen(&flat, &RgbImage::from_pixel(23, 17, Rgb([9, 9, 9])), None), f64::INFINITY);
+        assert!(corrected_psnr_of_seen(&dark, &flat, None) < 30.0, "a picture of a wall is no wall");
         let seen = GrayImage::from_fn(23, 17, |x, _| Luma([u8::from(x > 5)]));
         let mut other = dark.clone();
         other.enumerate_pixels_mut().filter(|(x, _, _)| *x <= 5).for_each(|(_, _, pixel)| pixel.0 = [255, 0, 255]);

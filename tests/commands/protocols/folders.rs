@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use viewfuse_core::attention::POSE_FEATURES;
-use viewfuse_tests::command::{Outcome, f32_bytes, names_in, safetensors, toy, toy_twice};
+use viewfuse_tests::command::{Outcome, change_poses, f32_bytes, names_in, safetensors, toy, toy_twice};
 
 viewfuse_tests::trials![
     shards_together_are_the_whole,
@@ -137,7 +137,7 @@ fn other_settings_are_refused() {
     // Another camera: another scene of the same name.
     let pose = folder.join("toy/pose/000003.txt");
     let text = fs::read_to_string(&pose).expect("a pose");
-    fs::write(&pose, fs::read_to_string(folder.join("toy/pose/000004.txt")).expect("a pose")).expect("a file");
+    change_poses(&folder, |view, matrix| matrix[3] += if view == 3 { 0.1 } else { 0.0 });
     refused(&first, &["cameras of toy: "]);
     fs::write(&pose, text).expect("a file");
 

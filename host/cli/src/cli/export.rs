@@ -34,7 +34,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let written = write(&scene, arguments.layout, &arguments.output, &progress)?;
     drop(progress);
     say(format_args!("read       {} ({})", scene.path.display(), scene.layout))?;
-    scene.warnings.iter().try_for_each(|warning| say(format_args!("warning    {warning}")))?;
+    let warnings = scene.pose_warnings();
+    scene.warnings.iter().chain(&warnings).try_for_each(|warning| say(format_args!("warning    {warning}")))?;
     say(format_args!(
         "written    {} ({}): {} photographs",
         written.folder.display(),

@@ -32,8 +32,11 @@ pub(super) fn seen(camera: &Camera, [width, height]: [u32; 2], depths: &[f32], m
             if depth > 0.0 {
                 let point = camera.centre_world() + camera.towards(column as f32 + 0.5, row as f32 + 0.5) * depth;
                 let away = |map: &DepthMap| (map.camera.centre_world() - camera.centre_world()).length();
-                let confirms = |map: &DepthMap| if away(map) <= SAME_PLACE * depth { 2 } else { 1 };
-                match maps.iter().filter(|map| map.shows(point)).take(2).map(confirms).sum::<u32>() {
+                let confirms = |map: &DepthMap| match away(map) <= SAME_PLACE * depth {
+                    true => 2 * u32::from(map.camera.project(point).in_image),
+                    false => u32::from(map.shows(point)),
+                };
+                match maps.iter().map(confirms).filter(|shows| *shows > 0).take(2).sum::<u32>() {
                     0 => none += 1,
                     1 => one += 1,
                     _ => {}
@@ -84,6 +87,8 @@ mod tests {
         for (x, by_one) in [(0.01, 0.0), (0.011, 0.0), (0.02, 1.0)] {
             assert_eq!(of(2.0, &[far_away.clone(), map(x, 2.0, 1.0)]), [0.0, by_one], "{x}");
         }
+        // Its own depth may be wrong.
+        assert_eq!(of(2.0, &[map(0.01, 1.0, 1.0)]), [0.0, 0.0]);
     }
 
     #[test]

@@ -10,8 +10,8 @@ const MIN_BASELINE: f32 = 1.0e-3;
 /// Least cosine of the angle between the axes of two cameras with the same pose: of 0.6 degrees.
 const MIN_COSINE: f32 = 0.999_95;
 
-/// The first of these views that has the same pose as each of them: that view itself, if it is the only one. A second
-/// photograph of a pose shows nothing new, and next to it no depth is found.
+/// The first of these views that has the same pose as each of them, and is of the same split: that view itself, if it
+/// is the only one. A second photograph of a pose shows nothing new, and next to it no depth is found.
 pub(crate) fn firsts(views: &[View]) -> Vec<usize> {
     let cameras: Vec<Camera> = views.iter().map(|view| view.camera).collect();
     let baseline = MIN_BASELINE * Rig::of(&cameras).distance;
@@ -23,7 +23,9 @@ pub(crate) fn firsts(views: &[View]) -> Vec<usize> {
     };
     let mut firsts: Vec<usize> = Vec::with_capacity(cameras.len());
     for (index, camera) in cameras.iter().enumerate() {
-        let first = (0..index).find(|other| firsts[*other] == *other && same(camera, &cameras[*other]));
+        let is_of_split = |other: &usize| views[*other].split == views[index].split;
+        let is_first = |other: &usize| firsts[*other] == *other && is_of_split(other) && same(camera, &cameras[*other]);
+        let first = (0..index).find(is_first);
         firsts.push(first.unwrap_or(index));
     }
     firsts

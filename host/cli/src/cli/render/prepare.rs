@@ -55,10 +55,10 @@ impl Prepared {
         // Finding poses takes minutes: what can be refused without them is.
         let device = arguments.device.open()?;
         let (folder, scene) = arguments.pose.open(&arguments.scene, &arguments.picture.masks)?;
-        warn_of(&scene);
         if !arguments.is_stream() {
             keep_folder_apart([&scene], &arguments.output)?;
         }
+        warn_of(&scene);
         let open_time = start.elapsed();
         let field = arguments.field(&scene)?;
         let about = field.about();
