@@ -21,8 +21,8 @@ const MAX_ITERATIONS: u32 = 1500;
 const HELD_OUT_EVERY: usize = 8;
 /// Fewest sources of a trial: of fewer, what is held out is far from the others.
 const MIN_SOURCES: usize = 12;
-/// Iterations of the fast recipe at each size where it is tried beside a sharp one, or taken in its place: some
-/// photographs want its Gaussians, but more iterations (`host/results/gaussian_quality.md`).
+/// Iterations of the fast recipe at each size where it is tried beside its own and a sharp one, or taken in its place:
+/// some photographs want its Gaussians, but more iterations (`host/results/gaussian_quality.md`).
 const LONG: u32 = 300;
 /// Fewest whole photographs of which the fast recipe has these without a trial.
 const MIN_LONG_SOURCES: usize = 5;
@@ -48,9 +48,9 @@ fn small(recipe: Recipe) -> Recipe {
 }
 
 impl SceneOptimisation<'_> {
-    /// The recipe for these sources, with fewer iterations where held-out ones are better after fewer, or the fast one
-    /// with [`LONG`] iterations where they prefer it. Where the time is limited a trial ends after a share of it, the
-    /// fast one has its own iterations, and it is taken, too, if what is left is less than the recipe took in the trial
+    /// The recipe for these sources, with fewer iterations where held-out ones are better after fewer, or the fast one,
+    /// with its own or with [`LONG`] iterations, where they prefer that. Where the time is limited a trial ends after a
+    /// share of it, the fast one has its own iterations, and it is taken, too, if what is left is less than the recipe took in the trial
     /// to become better. Fewer than [`MIN_SOURCES`] have the fast one without a trial; with [`LONG`] iterations if they
     /// are whole photographs, at least [`MIN_LONG_SOURCES`], and near enough to one another.
     pub(super) fn tried(
@@ -90,13 +90,14 @@ impl SceneOptimisation<'_> {
         let renderer = field.on(device);
         let mut stage = Stage::prepare(self.scene, album, &sources, renderer.as_ref(), &self.options, &Silent)?;
         let points = point_cloud(&mut stage, &self.weighting, Recipe::cloud(sources.len()), &Silent)?;
-        let recipes = [small(long), small(recipe)];
+        let quick = if is_free { vec![fast, long] } else { vec![fast] };
+        let recipes: Vec<Recipe> = quick.iter().chain([&recipe]).map(|recipe| small(*recipe)).collect();
         progress.expect(recipes.iter().map(|recipe| recipe.iterations.iter().sum::<u32>() as usize).sum());
         let trial = SceneOptimisation { sources, held_out, before: None, towards: Vec::new(), ..self.clone() };
         let photographed = &Photographed::new(device, album, &stage.images);
         let until = clock.end_of_trial();
         let (mut curves, mut begun) = (Vec::new(), Instant::now());
-        for recipe in recipes {
+        for &recipe in &recipes {
             begun = Instant::now();
             let mut optimisation = trial.begin(device, &stage.images, &points, recipe)?;
             let mut scores = Vec::new();
@@ -105,28 +106,32 @@ impl SceneOptimisation<'_> {
             progress.check().map_err(|error| OptimiseError::Render(crate::FieldError::from(error).into()))?;
             curves.push(scores);
         }
+        let sharp = curves.pop().unwrap_or_default();
         // The fast recipe ends where it ends.
-        let long_score = curves[0].last().map_or(f64::NEG_INFINITY, |score| score.1);
-        let (end, score) = last_good(&curves[1]);
+        let last = |scores: &Vec<(u32, f64)>| scores.last().map_or(f64::NEG_INFINITY, |score| score.1);
+        let quick = quick.into_iter().zip(curves.iter().map(last));
+        let (quick, quick_score) =
+            quick.reduce(|best, next| if next.1 > best.1 { next } else { best }).unwrap_or((fast, f64::NEG_INFINITY));
+        let (end, score) = last_good(&sharp);
         if score == f64::NEG_INFINITY {
             progress.note(&format!("the time is too short for a trial of {quality}: fast is used"));
             return Ok(fast);
         }
         let is_over = until.is_some_and(|until| until <= Instant::now());
-        let ahead = curves[1].iter().find(|(_, score)| *score > long_score).map_or(0, |(iteration, _)| *iteration);
-        let tried = curves[1].last().map_or(1, |(iteration, _)| *iteration);
+        let ahead = sharp.iter().find(|(_, score)| *score > quick_score).map_or(0, |(iteration, _)| *iteration);
+        let tried = sharp.last().map_or(1, |(iteration, _)| *iteration);
         let side = stage.images.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
         let pixels = (f64::from(side.min(recipe.side)) / f64::from(side.min(small(recipe).side))).powi(2);
         let least = begun.elapsed().mul_f64(pixels * f64::from(ahead) / f64::from(tried));
-        let (chosen, words) = if score <= long_score {
-            (long, "fast is used".to_owned())
+        let (chosen, words) = if score <= quick_score {
+            (quick, "fast is used".to_owned())
         } else if clock.left().is_some_and(|left| left < least) {
             (fast, format!("the time that is left is too short for {quality}, and fast is used"))
         } else if is_over {
             (recipe, format!("{quality} is used"))
         } else {
             let [.., finest] = small(recipe).iterations;
-            let before = recipes[1].iterations.iter().sum::<u32>() - finest;
+            let before = small(recipe).iterations.iter().sum::<u32>() - finest;
             let share = end.saturating_sub(before) as f32 / finest.max(1) as f32;
             let chosen = if share < EARLY { ended_early(recipe, share) } else { recipe };
             let [.., iterations] = chosen.iterations;
@@ -134,9 +139,9 @@ impl SceneOptimisation<'_> {
         };
         let held_out_count = trial.held_out.len();
         progress.note(&format!(
-            "{held_out_count} of {count} photographs left out of a trial have {long_score:.2} dB with {} iterations \
+            "{held_out_count} of {count} photographs left out of a trial have {quick_score:.2} dB with {} iterations \
                 of fast and {score:.2} dB with {quality}: {words}",
-            long.all_iterations()
+            quick.all_iterations()
         ));
         Ok(chosen)
     }
