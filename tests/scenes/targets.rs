@@ -66,8 +66,9 @@ fn a_pose_is_one_source() {
         selection.resolve(&scene, 1).expect("a job").sources
     };
     assert_eq!(sources("a", None), [1, 3]);
-    // The other one stays where the first is a target, and what is listed is taken.
-    assert_eq!(sources("b", None), [0, 2, 3]);
+    // With the other one as a source a target would be no new view; what is listed is taken.
+    assert_eq!(sources("b", None), [0, 3]);
+    assert_eq!(sources("b", Some("a,c")), [0, 2]);
     assert_eq!(sources("a", Some("b,c")), [1, 2]);
     // Nearly the same pose is the same.
     let near = called(&["a", "b", "c", "d"]);

@@ -11,8 +11,8 @@ pub use targets::away_warning;
 
 use crate::path::arc::Arc;
 use crate::path::{CameraPath, NamedCamera, generated, numbered};
+use crate::poses::firsts;
 use crate::rig::{Rig, spread};
-use crate::scene::poses::firsts;
 use crate::{Scene, SceneError, Split, View};
 use std::collections::HashSet;
 use std::path::PathBuf;
@@ -166,7 +166,8 @@ pub struct Selection {
     pub targets: Option<String>,
     /// Targets that are cameras along a path.
     pub path: Option<PathChoice>,
-    /// `--sources`; otherwise every view with a photograph that is not a target, but one of each pose.
+    /// `--sources`; otherwise every view with a photograph that is not a target, but one of each pose, and none with the
+    /// pose of a target that has a photograph.
     pub sources: Option<String>,
     /// `--views`: at most this many of the sources, spread as far apart as possible.
     pub view_count: Option<usize>,
@@ -224,7 +225,9 @@ impl Selection {
             None => {
                 let is_source = |view: &usize| scene.views[*view].image.is_some() && !targets.contains(view);
                 let firsts = firsts(&scene.views);
-                let mut poses = HashSet::new();
+                // A photograph with a target's own pose would be its truth.
+                let scored = targets.iter().filter(|view| scene.views[**view].image.is_some());
+                let mut poses: HashSet<usize> = scored.map(|view| firsts[*view]).collect();
                 (0..scene.views.len()).filter(is_source).filter(|view| poses.insert(firsts[*view])).collect()
             }
         };

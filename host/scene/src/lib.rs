@@ -11,6 +11,7 @@
 //! gaussians     scenes of Gaussians and their files: GaussianScene
 //! dataset       folders of many scenes: Dataset, Split
 //! rig           the cameras as a whole: focus, up
+//! poses         what is wrong with the poses as a whole: views of one pose, flipped axes
 //! unit          the unit of length of weightings and networks: RigUnit
 //! coverage      how much of a camera's picture the photographs show
 //! path          cameras without photographs: from files, or generated
@@ -33,6 +34,7 @@ mod parser_world;
 pub mod path;
 pub mod photographs;
 pub mod ply;
+mod poses;
 pub mod rig;
 mod scene;
 pub mod unit;

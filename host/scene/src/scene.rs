@@ -35,7 +35,6 @@ mod middlebury;
 mod missing;
 mod neus;
 mod numpy;
-pub(crate) mod poses;
 pub mod reader;
 mod split;
 mod srn;
@@ -255,11 +254,6 @@ impl Scene {
             0 => SceneFault::UnknownLayout(looked_for(readers)),
             count => SceneFault::BarePhotographs(count),
         }))
-    }
-
-    /// Warnings about the poses as a whole, a line each: cameras that look away from everything, views of one pose.
-    pub fn pose_warnings(&self) -> Vec<String> {
-        poses::warnings(&self.views)
     }
 
     /// Its name: that of its folder, for any spelling of the path.

@@ -1,11 +1,13 @@
 //! What is wrong with a scene's poses as a whole.
 
-use super::View;
 use crate::rig::Rig;
+use crate::{Scene, View};
+use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
 
 /// Cameras nearer to one another than this share of their distance from what they look at show no depth: half a pixel
-/// at a focal length of 500.
+/// at a focal length of 500. Nor is that more than this share of their median distance from their middle: where axes
+/// are nearly parallel, what they look at may seem to be anywhere, and a single wrong pose moves a mean.
 const MIN_BASELINE: f32 = 1.0e-3;
 /// Least cosine of the angle between the axes of two cameras with the same pose: of 0.6 degrees.
 const MIN_COSINE: f32 = 0.999_95;
@@ -14,7 +16,10 @@ const MIN_COSINE: f32 = 0.999_95;
 /// is the only one. A second photograph of a pose shows nothing new, and next to it no depth is found.
 pub(crate) fn firsts(views: &[View]) -> Vec<usize> {
     let cameras: Vec<Camera> = views.iter().map(|view| view.camera).collect();
-    let baseline = MIN_BASELINE * Rig::of(&cameras).distance;
+    let centres = || cameras.iter().map(|camera| camera.pose.centre_world());
+    let middle = Vec3::from_array([0, 1, 2].map(|axis| median(centres().map(|centre| centre[axis]))));
+    let spread = median(centres().map(|centre| centre.distance(middle)));
+    let baseline = MIN_BASELINE * Rig::of(&cameras).distance.min(spread);
     let same = |a: &Camera, b: &Camera| {
         let (a, b) = (&a.pose, &b.pose);
         a.centre_world().distance(b.centre_world()) <= baseline
@@ -31,8 +36,21 @@ pub(crate) fn firsts(views: &[View]) -> Vec<usize> {
     firsts
 }
 
-/// Warnings about the poses, a line each.
-pub(super) fn warnings(views: &[View]) -> Vec<String> {
+/// The upper one of the middle values; 0 of none.
+fn median(values: impl Iterator<Item = f32>) -> f32 {
+    let mut sorted: Vec<f32> = values.collect();
+    sorted.sort_by(f32::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}
+
+impl Scene {
+    /// Warnings about the poses as a whole, a line each: cameras that look away from everything, views of one pose.
+    pub fn pose_warnings(&self) -> Vec<String> {
+        warnings(&self.views)
+    }
+}
+
+fn warnings(views: &[View]) -> Vec<String> {
     let mut warnings = Vec::new();
     let cameras: Vec<Camera> = views.iter().map(|view| view.camera).collect();
     let (rig, count) = (Rig::of(&cameras), cameras.len());
@@ -52,8 +70,8 @@ pub(super) fn warnings(views: &[View]) -> Vec<String> {
             more => format!(", and so have {more} more views"),
         };
         warnings.push(format!(
-            "views '{}' and '{}' have the same pose{more}: of photographs of one pose the first is a source, unless \
-             sources are listed, and the score of another one beside it is of no new view",
+            "views '{}' and '{}' have the same pose{more}: unless sources are listed, one photograph of a pose is a \
+             source, and none where another one is a target",
             views[*first].name, views[second].name
         ));
     }
