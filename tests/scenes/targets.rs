@@ -44,7 +44,7 @@ fn targets_that_would_be_one_file_are_refused() {
     }
 }
 
-/// A second photograph of a pose next to the first shows no depth, and left out it is no test of a new view.
+/// A second photograph of a pose next to the first shows no depth, and held out it is no test of a new view.
 #[test]
 fn a_pose_is_one_source() {
     let folder = called(&["a", "b", "c", "d"]);

@@ -108,6 +108,9 @@ fn every_layout_that_can_hold_a_scene_gives_it_back() {
         let kept = read.views[1].near_far == Some([0.5, 9.5]);
         assert_eq!(kept, layout == Layout::Llff);
         assert_eq!(written.lost.iter().any(|line| line.contains("near and far depths of 2 views")), !kept);
+        // Of a whole scene the sphere holds what the cameras look at.
+        let is_cut = written.lost.iter().any(|line| line.contains("within that sphere"));
+        assert_eq!(is_cut, layout == Layout::Neus, "{layout}: {:?}", written.lost);
     }
 }
 
@@ -174,7 +177,8 @@ fn lenses_and_masks() {
         assert_eq!((&before.pixels, before.has_alpha), (&after.pixels, after.has_alpha));
         assert!(read.views[0].lens.is_none() && read.views[0].mask.is_none());
         // NeuS has its masks beside the photographs.
-        let (folder, read, _) = self::written(&scene, Layout::Neus);
+        let (folder, read, in_sphere) = self::written(&scene, Layout::Neus);
+        assert!(!in_sphere.lost.iter().any(|line| line.contains("within that sphere")), "{:?}", in_sphere.lost);
         let after = read.photograph(0).expect("the other");
         assert!(before.pixels == after.pixels && after.has_alpha && read.views[0].lens.is_none());
         assert_eq!(read.views[0].mask, Some(folder.join("out/mask/1.png")));
