@@ -2,7 +2,7 @@
 
 use sha2::{Digest, Sha256};
 use std::fs::File;
-use std::io;
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 
 /// The digest of a file's bytes.
@@ -10,11 +10,21 @@ use std::path::Path;
 /// # Errors
 /// If it cannot be read.
 pub fn sha256_of(path: &Path) -> io::Result<String> {
+    sha256_of_part(path, 0, u64::MAX)
+}
+
+/// The digest of at most `length` of a file's bytes, from byte `start` on.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn sha256_of_part(path: &Path, start: u64, length: u64) -> io::Result<String> {
     let mut digest = Sha256::new();
     let mut file = File::open(path)?;
+    file.seek(SeekFrom::Start(start))?;
+    let mut file = file.take(length);
     let mut piece = vec![0; 1 << 20];
     loop {
-        match io::Read::read(&mut file, &mut piece)? {
+        match file.read(&mut piece)? {
             0 => return Ok(hexadecimal(&digest.finalize())),
             length => digest.update(&piece[..length]),
         }

@@ -27,6 +27,7 @@ mod safe;
 mod sizes;
 mod snapshot;
 mod state_dict;
+mod values;
 mod write;
 
 pub use element::Element;
@@ -37,12 +38,13 @@ pub use sizes::{MAX_SIZE, Sizes};
 pub use state_dict::PLACES;
 pub use write::{Precision, Written};
 
+use bytemuck::allocation::try_zeroed_vec;
 use error::{Problem, shortened};
-use location::{CHUNK_BYTES, TensorLocation, TensorLocations, element_count};
+use location::{TensorLocation, TensorLocations, element_count};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use values::{Fault, PIECE_BYTES};
 
 /// The most memory that opening a file takes, in bytes: for the pickles that are in memory at once.
 pub const OPENING_BYTES: u64 = 3 * pickle::PICKLE_BYTES;
@@ -71,8 +73,8 @@ pub struct Checkpoint {
 enum Content {
     /// They are computed at each read.
     Computed(Formula),
-    /// The file, behind a lock: readers move its cursor.
-    File(Mutex<File>, TensorLocations),
+    /// The file.
+    File(File, TensorLocations),
 }
 
 /// Computes the values of a tensor.
@@ -127,7 +129,7 @@ impl Checkpoint {
                 });
             }
             let shapes = places.iter().map(|(name, place)| (name.clone(), place.shape.clone())).collect();
-            let content = Content::File(Mutex::new(file), places);
+            let content = Content::File(file, places);
             Ok(Checkpoint { path: path.to_path_buf(), origin, shapes, metadata, content })
         };
         opened().map_err(|problem| problem.of(path))
@@ -228,32 +230,29 @@ impl Checkpoint {
     /// [`CheckpointError`] if there is none of that name, if it cannot be read, or if it holds a NaN, an infinity, or
     /// a number beyond `f32`.
     pub fn tensor(&self, name: &str) -> Result<Vec<f32>, CheckpointError> {
-        if let Content::Computed(formula) = &self.content {
-            let values = self.by_formula(formula, name)?;
-            return match values.iter().position(|number| !number.is_finite()) {
-                None => Ok(values),
-                Some(index) => Err(self.not_finite(name, index as u64, values[index].into())),
-            };
-        }
-        let count = self.shapes.get(name).and_then(|shape| element_count(shape)).unwrap_or(0);
-        let mut values = Vec::new();
-        values.try_reserve_exact(count as usize).map_err(|_| {
-            let name = shortened(name);
-            let what = format!("tensor '{name}' takes {} bytes, which this machine does not have", 4 * count);
-            CheckpointError::Content(self.path.clone(), what)
-        })?;
-        self.read(name, |element, bytes| {
-            let first = values.len();
-            element.push_numbers(bytes, &mut values);
-            match values[first..].iter().position(|number| !number.is_finite()) {
-                None => Ok(()),
-                Some(index) => {
-                    let value = element.values(bytes).nth(index).unwrap_or(f64::NAN);
-                    Err(self.not_finite(name, (first + index) as u64, value))
+        match &self.content {
+            Content::Computed(formula) => {
+                let values = self.by_formula(formula, name)?;
+                match values.iter().position(|number| !number.is_finite()) {
+                    None => Ok(values),
+                    Some(index) => Err(self.not_finite(name, index as u64, values[index].into())),
                 }
             }
-        })?;
-        Ok(values)
+            Content::File(file, places) => {
+                let place = places.get(name).ok_or_else(|| self.no_tensor(name))?;
+                let mut values = try_zeroed_vec(place.count() as usize).map_err(|()| {
+                    let (name, bytes) = (shortened(name), 4 * place.count());
+                    let what = format!("tensor '{name}' takes {bytes} bytes, which this machine does not have");
+                    CheckpointError::Content(self.path.clone(), what)
+                })?;
+                let elements = place.elements(file).map_err(|cause| Problem::from(cause).of(&self.path))?;
+                elements.round(&mut values).map_err(|fault| match fault {
+                    Fault::Unreadable(cause) => Problem::from(cause).of(&self.path),
+                    Fault::NotFinite(index, value) => self.not_finite(name, index, value),
+                })?;
+                Ok(values)
+            }
+        }
     }
 
     /// Hands out a tensor's elements as it holds them, row-major, in pieces of whole elements.
@@ -264,15 +263,23 @@ impl Checkpoint {
     ) -> Result<(), CheckpointError> {
         match &self.content {
             Content::Computed(formula) => {
-                self.by_formula(formula, name)?.chunks(CHUNK_BYTES / 4).try_for_each(|chunk| {
-                    let bytes: Vec<u8> = chunk.iter().flat_map(|value| value.to_le_bytes()).collect();
+                self.by_formula(formula, name)?.chunks(PIECE_BYTES / 4).try_for_each(|piece| {
+                    let bytes: Vec<u8> = piece.iter().flat_map(|value| value.to_le_bytes()).collect();
                     take(Element::F32, &bytes)
                 })
             }
             Content::File(file, places) => {
                 let place = places.get(name).ok_or_else(|| self.no_tensor(name))?;
-                let file = file.lock().unwrap_or_else(PoisonError::into_inner);
-                place.read(&file, &self.path, |bytes| take(place.element, bytes))
+                let failed = |cause| Problem::from(cause).of(&self.path);
+                let (elements, count) = (place.elements(file).map_err(failed)?, place.count() as usize);
+                let size = place.element.size();
+                let mut bytes = vec![0; PIECE_BYTES.min(count * size)];
+                for first in (0..count).step_by(PIECE_BYTES / size) {
+                    let piece = &mut bytes[..PIECE_BYTES.min((count - first) * size)];
+                    elements.read(first, piece).map_err(failed)?;
+                    take(place.element, piece)?;
+                }
+                Ok(())
             }
         }
     }

@@ -90,17 +90,6 @@ impl Element {
         bytes.chunks_exact(self.size()).map(move |element| self.value(element))
     }
 
-    /// Adds the elements of these bytes to `numbers`, which rounds those of 64 bits. An incomplete last element is
-    /// omitted.
-    pub(super) fn push_numbers(self, bytes: &[u8], numbers: &mut Vec<f32>) {
-        // Nearly all elements of all checkpoints.
-        if self == Element::F32 {
-            numbers.extend(bytes.chunks_exact(4).map(|four| f32::from_le_bytes([four[0], four[1], four[2], four[3]])));
-        } else {
-            numbers.extend(self.values(bytes).map(|value| value as f32));
-        }
-    }
-
     fn value(self, bytes: &[u8]) -> f64 {
         let byte = |at: usize| bytes.get(at).copied().unwrap_or(0);
         let four = [byte(0), byte(1), byte(2), byte(3)];

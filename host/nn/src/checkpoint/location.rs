@@ -1,12 +1,9 @@
-//! The position of a tensor's elements in a file, and reading them.
+//! The position of a tensor's elements in a file.
 
 use super::element::Element;
-use super::error::{CheckpointError, Problem};
+use super::error::Problem;
 use super::state_dict::{Claim, Storage};
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
-use std::path::Path;
 
 /// The most memory of one tensor as `f32`, in bytes.
 pub const MAX_TENSOR_BYTES: u64 = 4 << 30;
@@ -14,8 +11,6 @@ pub const MAX_TENSOR_BYTES: u64 = 4 << 30;
 pub const MAX_TOTAL_BYTES: u64 = 16 << 30;
 /// The most elements of a tensor whose storage has fewer.
 const MAX_REPEATED: u64 = 1 << 20;
-/// Bytes that are read at once.
-pub(super) const CHUNK_BYTES: usize = 1 << 16;
 
 /// The tensors of a file by name.
 pub(super) type TensorLocations = BTreeMap<String, TensorLocation>;
@@ -110,57 +105,5 @@ impl TensorLocation {
     /// Its number of elements.
     pub(super) fn count(&self) -> u64 {
         element_count(&self.shape).unwrap_or(0)
-    }
-
-    /// Memory for reading it, beside the result, in bytes.
-    pub(super) fn working_bytes(&self) -> u64 {
-        let window = self.strides.as_ref().map_or(0, |_| self.extent * self.element.size() as u64);
-        window + CHUNK_BYTES as u64
-    }
-
-    /// Calls `take` with its elements as bytes, row-major, whole elements in each piece. `path` is the file's, for
-    /// errors.
-    pub(super) fn read(
-        &self,
-        mut file: &File,
-        path: &Path,
-        mut take: impl FnMut(&[u8]) -> Result<(), CheckpointError>,
-    ) -> Result<(), CheckpointError> {
-        let failed = |cause: std::io::Error| Problem::from(cause).of(path);
-        let size = self.element.size();
-        file.seek(SeekFrom::Start(self.start)).map_err(failed)?;
-        let Some(strides) = &self.strides else {
-            let mut left = self.count() * size as u64;
-            let mut chunk = vec![0; CHUNK_BYTES.min(left as usize)];
-            while left > 0 {
-                let piece = &mut chunk[..CHUNK_BYTES.min(left as usize)];
-                file.read_exact(piece).map_err(failed)?;
-                take(piece)?;
-                left -= piece.len() as u64;
-            }
-            return Ok(());
-        };
-        let mut window = vec![0; self.extent as usize * size];
-        file.read_exact(&mut window).map_err(failed)?;
-        let mut chunk = Vec::with_capacity(CHUNK_BYTES);
-        let mut index = vec![0; self.shape.len()];
-        let mut at = 0;
-        for _ in 0..self.count() {
-            chunk.extend_from_slice(&window[at * size..(at + 1) * size]);
-            if chunk.len() == CHUNK_BYTES {
-                take(&chunk)?;
-                chunk.clear();
-            }
-            for axis in (0..index.len()).rev() {
-                index[axis] += 1;
-                at += strides[axis];
-                if index[axis] < self.shape[axis] {
-                    break;
-                }
-                at -= index[axis] * strides[axis];
-                index[axis] = 0;
-            }
-        }
-        take(&chunk)
     }
 }

@@ -3,11 +3,16 @@
 use anyhow::Context;
 use std::collections::BTreeMap;
 use std::fmt::Write;
+use std::io;
 use std::path::Path;
 use std::time::UNIX_EPOCH;
-use viewfuse_job::digest::{sha256, sha256_of};
+use viewfuse_device::parallel::try_map;
+use viewfuse_job::digest::{sha256, sha256_of_part};
 use viewfuse_scene::few_shot::Target;
 use viewfuse_scene::{Scene, View};
+
+/// Bytes of a file that a core looks at at once.
+const PIECE: u64 = 4 << 20;
 
 /// Options that change no frame.
 const NO_CHANGE: [&str; 6] = ["output", "replace", "threads", "time-limit", "video", "fps"];
@@ -40,9 +45,17 @@ pub(super) fn settings(
     }
     writeln!(text, "{sources:?} {}", scene.points.len())?;
     for file in files {
-        writeln!(text, "{}", sha256_of(file).with_context(|| file.display().to_string())?)?;
+        writeln!(text, "{}", content(file).with_context(|| file.display().to_string())?)?;
     }
     Ok(sha256(text.as_bytes()))
+}
+
+/// The digest of a file's length and of the digests of its pieces, which all cores find: of a network's file of
+/// hundreds of megabytes one core would need longer than a GPU for its pictures.
+fn content(path: &Path) -> io::Result<String> {
+    let length = std::fs::metadata(path)?.len();
+    let pieces = try_map(length.div_ceil(PIECE) as usize, |piece| sha256_of_part(path, piece as u64 * PIECE, PIECE))?;
+    Ok(sha256(format!("{length} {}", pieces.concat()).as_bytes()))
 }
 
 /// The digest of a run of these settings.
