@@ -9,8 +9,8 @@
 
 use crate::record::PictureRecord;
 use crate::request::Layer;
-use image::codecs::jpeg::JpegEncoder;
 use image::{DynamicImage, ImageError, RgbImage};
+use jpeg_encoder::{ColorType, EncodingError};
 use serde::Serialize;
 use viewfuse_field::render::Frame;
 use viewfuse_scene::coverage::Coverage;
@@ -60,13 +60,24 @@ struct LayerPart {
     has_gaps: bool,
 }
 
+/// Why a picture has no answer.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum AnswerError {
+    /// A full picture.
+    #[error(transparent)]
+    Png(#[from] ImageError),
+    /// A coarse picture.
+    #[error(transparent)]
+    Jpeg(#[from] EncodingError),
+}
+
 /// The bytes of an answer: of a full picture if there is a record of it.
 pub(crate) fn bytes(
     frame: &Frame,
     coverage: &Coverage,
     layer: Layer,
     record: Option<PictureRecord>,
-) -> Result<Vec<u8>, ImageError> {
+) -> Result<Vec<u8>, AnswerError> {
     let is_full = record.is_some();
     let (media_type, picture) = match is_full {
         true => ("image/png", encode_png(&DynamicImage::ImageRgb8(frame.picture.clone()))?),
@@ -105,9 +116,11 @@ pub(crate) fn bytes(
 }
 
 /// A picture as JPEG, for thumbnails and coarse pictures.
-pub(crate) fn jpeg(picture: &RgbImage) -> Result<Vec<u8>, ImageError> {
+pub(crate) fn jpeg(picture: &RgbImage) -> Result<Vec<u8>, EncodingError> {
     let mut bytes = Vec::new();
-    picture.write_with_encoder(JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY))?;
+    // Pictures are far smaller than what 16 bits say.
+    let [width, height] = [picture.width(), picture.height()].map(|side| u16::try_from(side).unwrap_or(u16::MAX));
+    jpeg_encoder::Encoder::new(&mut bytes, JPEG_QUALITY).encode(picture, width, height, ColorType::Rgb)?;
     Ok(bytes)
 }
 

@@ -212,7 +212,7 @@ pub(crate) fn run(viewer: &Viewer<'_>, shared: &Shared, outer: &dyn Progress) ->
             renderer: renderer.as_ref(),
             coarse: None,
             full: None,
-            pace: Pace::of(about.is_live),
+            pace: Pace::of(about.is_live, viewer.size[0].max(viewer.size[1])),
             full_time: None,
             choice: Choice::of(&viewer.viewed),
             film: None,
@@ -270,7 +270,14 @@ impl<'a> RenderLoop<'a> {
                     return Err(error);
                 }
                 Err(error) => refusal(&error),
-                Ok((frame, is_full)) => self.answer(&frame, request, is_full),
+                Ok((frame, is_full)) => {
+                    let start = Instant::now();
+                    let answer = self.answer(&frame, request, is_full);
+                    if request.is_moving && !is_full {
+                        self.pace.took(frame.time + start.elapsed());
+                    }
+                    answer
+                }
             };
             self.shared.mailbox.finish();
             job.reply.send(answer).ok();
@@ -361,14 +368,11 @@ impl<'a> RenderLoop<'a> {
         let camera = self.camera(request);
         let most = request.most_side.min(self.viewer.size[0].max(self.viewer.size[1]));
         let size = scaled_size(&camera, self.pace.side(most)).into();
-        let start = Instant::now();
         let Some(renderer) = self.coarse.as_mut().or(self.full.as_mut()) else {
             self.prepare(&watch)?;
             return self.soon(request);
         };
-        let frame = renderer.stage.frame_of_size(&request.weighting, &camera, size, &watch)?;
-        self.pace.took(start.elapsed());
-        Ok((frame, false))
+        Ok((renderer.stage.frame_of_size(&request.weighting, &camera, size, &watch)?, false))
     }
 
     /// The full picture. Makes way for requests that press.

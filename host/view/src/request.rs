@@ -6,8 +6,8 @@ use viewfuse_weighting::{Weighting, WeightingError, WeightingSpec};
 
 /// Longest side of coarse pictures, in pixels.
 pub const COARSE_SIDE: u32 = 160;
-/// Longest side of pictures of a live field while the camera moves, in pixels.
-pub(crate) const LIVE_SIDE: u32 = 320;
+/// Longest side of pictures of a live field while the camera moves, at most, in pixels.
+pub(crate) const MAX_LIVE_SIDE: u32 = 1024;
 
 /// Most frames of a video: ten seconds.
 pub(crate) const MAX_FRAMES: usize = 240;
@@ -99,7 +99,7 @@ impl Request {
             weighting,
             layer,
             is_moving: moving,
-            most_side: side.unwrap_or(COARSE_SIDE).clamp(1, LIVE_SIDE),
+            most_side: side.unwrap_or(COARSE_SIDE).clamp(1, MAX_LIVE_SIDE),
         })
     }
 }
@@ -148,7 +148,7 @@ impl VideoRequest {
 
 #[cfg(test)]
 mod tests {
-    use super::{COARSE_SIDE, LIVE_SIDE, Layer, Request};
+    use super::{COARSE_SIDE, Layer, MAX_LIVE_SIDE, Request};
     use viewfuse_core::pose::Pose;
     use viewfuse_weighting::Weighting;
 
@@ -182,6 +182,6 @@ mod tests {
             let error = read(|request| request[key] = value.clone()).expect_err(key);
             assert!(error.contains(part), "{key}: {error}");
         }
-        assert_eq!(read(|request| request["side"] = 100_000.into()).expect("a request").most_side, LIVE_SIDE);
+        assert_eq!(read(|request| request["side"] = 100_000.into()).expect("a request").most_side, MAX_LIVE_SIDE);
     }
 }

@@ -113,13 +113,14 @@ impl Subject {
         let Viewed { scene, sources, weighting, chooses, .. } = *viewed;
         let cameras: Vec<Camera> = sources.iter().map(|&view| scene.views[view].camera).collect();
         let rig = Rig::of(&cameras);
+        let size = [full.pinhole.width(), full.pinhole.height()];
         let others = (0..scene.views.len()).filter(|view| !sources.contains(view));
         Subject {
             name: scene.name(),
             field: about.name,
             device,
-            size: [full.pinhole.width(), full.pinhole.height()],
-            moving_side: Pace::of(viewed.field.about().is_live).largest,
+            size,
+            moving_side: Pace::of(about.is_live, size[0].max(size[1])).largest,
             lens: Intrinsics::of(full),
             start: start(&cameras, &rig).to_opencv(),
             focus: rig.focus.to_array(),

@@ -15,7 +15,7 @@ use viewfuse_tests::viewer::Program;
 const MOVES: usize = 400;
 
 /// Longest sides of coarse pictures as 16ths of the finest: late ones are coarser.
-const SIXTEENTHS: [f64; 6] = [16.0, 13.0, 10.0, 8.0, 6.0, 4.0];
+const SIXTEENTHS: [f64; 9] = [16.0, 13.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0];
 
 /// So many pictures are waited for while dragging.
 const PICTURES: f64 = 30.0;

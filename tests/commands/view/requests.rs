@@ -405,7 +405,7 @@ fn gaussians_are_shown() {
     assert!(picture == expected, "it is not the picture of render");
     let mut moving = request("a", pose, true);
     moving["side"] = found["moving_side"].clone();
-    assert_eq!(found["moving_side"], 320);
+    assert_eq!(found["moving_side"], 64, "as large as at rest, where a device is fast enough");
     for _ in 0..3 {
         let (coarse, picture) = connection.picture(&moving).unpacked();
         assert_eq!(coarse["full"], false);

@@ -11,8 +11,8 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
 use viewfuse_device::choice::Chosen;
-use viewfuse_field::AnyField;
 use viewfuse_field::gaussians::GivenGaussians;
+use viewfuse_field::render::RenderOptions;
 use viewfuse_job::shell::quoted;
 use viewfuse_view::{Commands, ViewError, Viewed, Viewer};
 use viewfuse_weighting::{Weighting, WeightingChoice};
@@ -68,13 +68,14 @@ pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> 
     let (folder, scene) = arguments.pose.open(&arguments.scene, &arguments.picture.masks)?;
     warn_of(&scene);
     let field = match &arguments.gaussians {
-        Some(path) => AnyField::new(GivenGaussians::open(path, &scene)?),
+        Some(path) => GivenGaussians::open(path, &scene)?.into(),
         None => arguments.model.open(arguments.seed, None)?,
     };
     let about = field.about();
     let sources = arguments.sources.to_selection(None, None).sources_without(&scene, &[], about.least_sources)?;
     let options = arguments.omissions.omitting(arguments.picture.to_render_options(), arguments.model.exact, &about)?;
     let options = arguments.bound.bounded(options, &about, arguments.model.says_omissions());
+    let options = RenderOptions { is_rounded: true, ..options };
     let Chosen { device, reason } = arguments.device.open()?;
     on_threads(arguments.picture.threads, || -> anyhow::Result<()> {
         let viewed = Viewed {

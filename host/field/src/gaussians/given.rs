@@ -3,7 +3,7 @@
 use super::covers;
 use super::harmonics::terms_of;
 use super::picture::Splatter;
-use crate::{About, Encoding, Field, FieldError, Prepared, Rendered, Request, Rounded};
+use crate::{About, AnyField, Encoding, Field, FieldError, Prepared, Rendered, Request, Rounded};
 use std::path::Path;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::CameraBlock;
@@ -66,6 +66,14 @@ const KERNELS: [Kernel; 9] = [
     Kernel::StartTiles,
     Kernel::BlendSplats,
 ];
+
+/// Here and not where it is asked for, which may be a crate that is not optimised: the code for every device comes with
+/// it.
+impl From<GivenGaussians> for AnyField {
+    fn from(field: GivenGaussians) -> AnyField {
+        AnyField::new(field)
+    }
+}
 
 impl Field for GivenGaussians {
     /// The Gaussians are only drawn.
