@@ -12,6 +12,7 @@ python3-numpy, python3-safetensors, python3-pil). Examples:
 
     genvs.py tests/data/toy --sources 0,8,16 --target 20           # the published run: 25 steps, 49 calls
     genvs.py tests/data/toy --steps 0 --repeat 5                   # times of the parts alone
+    genvs.py tests/data/toy --device cuda --precision f16          # with factors of products rounded
     genvs.py --check genvs_srn.safetensors                         # against numbers of the official code
     genvs.py --write genvs_small.safetensors                       # reference values of the small member of the family
 """
@@ -20,7 +21,6 @@ import argparse
 import json
 import math
 import platform
-import time
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +30,8 @@ from PIL import Image
 from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
-from pixelnerf import by_formula, compare, read_scene, uniform_pairs
+import pixelnerf
+from pixelnerf import PRECISIONS, by_formula, compare, now, read_scene, rounding, uniform_pairs, use
 
 LISTS = {"published": "genvs_tensors.txt", "small": "genvs_small_tensors.txt"}
 RATES = (12, 24, 36)  # of the dilated convolutions
@@ -258,9 +259,9 @@ def timed(work, repeat):
     """What it gives, and the median of its times."""
     times = []
     for _ in range(repeat):
-        start = time.perf_counter()
+        start = now()
         result = work()
-        times.append(time.perf_counter() - start)
+        times.append(now() - start)
     return result, sorted(times)[len(times) // 2]
 
 
@@ -284,6 +285,8 @@ def render(options):
         "blas": "mkl" if torch.backends.mkl.is_available() else "other",
         "instructions": torch.backends.cpu.get_cpu_capability(),
         "threads": torch.get_num_threads(),
+        "device": torch.cuda.get_device_name() if pixelnerf.DEVICE.type == "cuda" else "cpu",
+        "precision": options.precision,
         "python": platform.python_version(),
         "encode": encode_time,
         "features": feature_time,
@@ -292,9 +295,10 @@ def render(options):
     if options.steps:
         picture, picture_time = timed(lambda: model.sample(latents, image, options.steps), 1)
         result["picture"] = feature_time + picture_time
+        result["calls"] = 2 * options.steps - 1
     print(json.dumps(result))
     if options.steps:
-        picture = (0.5 * (picture[0] + 1)).float().clamp(0, 1).permute(1, 2, 0)
+        picture = (0.5 * (picture[0] + 1)).float().clamp(0, 1).permute(1, 2, 0).cpu()
         if options.output:
             levels = (picture.numpy() * 255 + 0.5).astype(np.uint8)
             Image.fromarray(levels).save(options.output)
@@ -407,10 +411,11 @@ def main():
     parser.add_argument("--threads", type=int, help="default: all cores")
     parser.add_argument("--output", help="write the picture here (.png)")
     parser.add_argument("--compare", metavar="PNG", help="compare with a picture of viewfuse")
+    parser.add_argument("--device", default="cpu", help="cpu, or cuda")
+    parser.add_argument("--precision", default="f32", choices=PRECISIONS, help="of products and convolutions on a GPU [default: f32]")
     options = parser.parse_args()
-    if options.threads:
-        torch.set_num_threads(options.threads)
-    with torch.inference_mode():
+    use(options)
+    with torch.inference_mode(), rounding(options):
         if options.check:
             check(options.check)
         elif options.write:

@@ -41,6 +41,28 @@ WIDTH, BLOCKS, INJECTED, OCTAVES, FREQUENCY = 512, 5, 3, 6, 1.5
 DEVICE = torch.device("cpu")
 
 
+# Of products and convolutions on a GPU.
+PRECISIONS = ["f32", "tf32", "f16"]
+
+
+def use(options):
+    """Takes all work to options.device, in options.precision, on options.threads."""
+    global DEVICE
+    DEVICE = torch.device(options.device)
+    # The CPU is the default; older PyTorch cannot set it.
+    if DEVICE.type != "cpu":
+        torch.set_default_device(DEVICE)
+    rounded = options.precision == "tf32"
+    torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = rounded
+    if options.threads:
+        torch.set_num_threads(options.threads)
+
+
+def rounding(options):
+    """What products run in: as they are, or with factors rounded to f16 where PyTorch does that."""
+    return torch.autocast(DEVICE.type, torch.float16, enabled=options.precision == "f16")
+
+
 # Parameters
 
 
@@ -350,6 +372,7 @@ def render(options):
         "instructions": torch.backends.cpu.get_cpu_capability() if hasattr(torch.backends, "cpu") else "not told",
         "threads": torch.get_num_threads(),
         "device": torch.cuda.get_device_name() if DEVICE.type == "cuda" else "cpu",
+        "precision": options.precision,
         "python": platform.python_version(),
         "encode": encode_time,
         "render": render_time,
@@ -426,17 +449,10 @@ def main():
     parser.add_argument("--output", help="write the picture here (.png)")
     parser.add_argument("--compare", metavar="PNG", help="compare with a picture of viewfuse")
     parser.add_argument("--device", default="cpu", help="cpu, or cuda")
+    parser.add_argument("--precision", default="f32", choices=PRECISIONS, help="of products and convolutions on a GPU [default: f32]")
     options = parser.parse_args()
-    global DEVICE
-    DEVICE = torch.device(options.device)
-    # The CPU is the default; older PyTorch cannot set it.
-    if DEVICE.type != "cpu":
-        torch.set_default_device(DEVICE)
-    # The same precision as everywhere else.
-    torch.backends.cudnn.allow_tf32 = False
-    if options.threads:
-        torch.set_num_threads(options.threads)
-    with torch.inference_mode():
+    use(options)
+    with torch.inference_mode(), rounding(options):
         if options.check:
             check(options.check)
         elif options.scene:
