@@ -1,6 +1,6 @@
 //! Videos and animated pictures of paths: their content by other readers, and runs that are killed and continued.
 
-use super::{command, done, killed_when, list_of, number_of, numbers, read_json};
+use super::{assert_refused, command, done, killed_when, list_of, number_of, numbers, read_json};
 use image::codecs::webp::WebPDecoder;
 use image::{AnimationDecoder, Rgb, RgbImage};
 use serde_json::{Value, json};
@@ -223,6 +223,12 @@ fn an_ffmpeg_gets_the_video_or_there_is_y4m() {
     let folder = toy();
     let programs = folder.join("programs");
     fs::create_dir(&programs).expect("a folder");
+    // What is written in its place must not be a person's own.
+    folder.write("mine/video.y4m", "mine");
+    let run = with_programs(&folder, &programs, &format!("{PATH} --video mp4 -o mine"));
+    assert_eq!(run.code, Some(1));
+    assert!(run.stderr.contains("mine/video.y4m: no earlier run wrote this file"), "{}", run.stderr);
+    assert_eq!(fs::read_to_string(folder.join("mine/video.y4m")).expect("a file"), "mine");
     let run = with_programs(&folder, &programs, &format!("{PATH} --video mp4 -o out"));
     assert_eq!(run.code, Some(0), "{}", run.stderr);
     assert_eq!(run.stderr, "viewfuse: out/video.y4m, not mp4, is written: there is no ffmpeg on the path\n");
@@ -233,7 +239,14 @@ fn an_ffmpeg_gets_the_video_or_there_is_y4m() {
     }
     // A program of that name that keeps what it reads, and says how it was called.
     folder.script("programs/ffmpeg", "for last; do :; done\nexec /bin/cat > \"$last\"\n");
-    let run = with_programs(&folder, &programs, &format!("{PATH} --video mp4 -o out"));
+    // A video that this run does not write stays until a person says otherwise.
+    for no_video_or_another in ["", "--video mp4"] {
+        let run = with_programs(&folder, &programs, &format!("{PATH} {no_video_or_another} -o out"));
+        assert_eq!(run.code, Some(1));
+        assert!(run.stderr.contains("1 files of an earlier run, video.y4m for one"), "{}", run.stderr);
+        assert!(fs::read(folder.join("out/video.y4m")).expect("a video") == video);
+    }
+    let run = with_programs(&folder, &programs, &format!("{PATH} --video mp4 --replace -o out"));
     assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
     assert!(fs::read(folder.join("out/video.mp4")).expect("a video") == video, "the program got another video");
     assert!(!folder.join("out/video.y4m").exists(), "the video of the run before is left");
@@ -319,5 +332,22 @@ fn camera_paths_from_files() {
         assert!(png(&folder.join("path"), "view.png") == png(&folder.join("view"), "000020.png"), "{file}");
         let video = y4m::decode(File::open(folder.join("path/video.y4m")).expect("a file")).expect("y4m");
         assert_eq!(video.get_framerate().num, if file == "poses.json" { 10 } else { 30 });
+        fs::remove_file(folder.join("path/video.y4m")).expect("it is there");
     }
+    // A rate that no video has, and pictures of two sizes, are refused before the first picture.
+    let path = "render toy --camera-path poses.json --sources 0..11 --size 24x24 --device cpu -o other";
+    for rate in [0.0, -3.0, 1000.0] {
+        folder.write("poses.json", json!({ "frames": [frame], "fps": rate }).to_string());
+        let said = [format!("states {rate} frames per second; give --fps, from 0.1 to 240")];
+        assert_refused(&folder, &format!("{path} --video y4m"), &[&said[0]]);
+        assert_refused(&folder, &path.replace("other", "-"), &[&said[0]]);
+    }
+    folder.write(
+        "poses.csv",
+        "name,x,y,z,look_x,look_y,look_z,fx,fy,cx,cy,width,height\n\
+         a,1,0.7,0.5,0,0,0,60,60,24,16,48,32\nb,1,0.7,0.5,0,0,0,60,60,16,24,32,48\n",
+    );
+    let path = "render toy --camera-path poses.csv --sources 0..11 --device cpu -o other --video webp";
+    assert_refused(&folder, path, &["that of a has 48x32 pixels, that of b 32x48"]);
+    assert!(!folder.join("other").exists());
 }

@@ -20,7 +20,9 @@ mod stage;
 
 pub use error::RenderError;
 pub use frame::{Frame, Truth};
-pub use options::{DEFAULT_EARLY_TERMINATION, DEFAULT_LEAVE_OUT, RenderOptions, open_album, working_side};
+pub use options::{
+    DEFAULT_EARLY_TERMINATION, DEFAULT_LEAVE_OUT, RenderOptions, open_album, picture_size, working_side,
+};
 pub use seen::Seen;
 pub(crate) use stage::SceneSources;
 pub use stage::{Stage, StageCosts};

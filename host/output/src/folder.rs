@@ -25,9 +25,9 @@ pub enum OutputError {
     /// A file that no run wrote is in the way.
     #[error("{0}: no earlier run wrote this file, which would be replaced; give another folder, or move it")]
     NotWritten(PathBuf),
-    /// An earlier run wrote other pictures there.
+    /// An earlier run wrote other pictures, or a video, there.
     #[error(
-        "{}: has {count} files of an earlier run, {example} for one, which are not of these targets, and cannot be \
+        "{}: has {count} files of an earlier run, {example} for one, which this run does not write, and cannot be \
          added to: {reason}", folder.display()
     )]
     OtherRun {
@@ -94,19 +94,17 @@ pub fn check_folder(folder: &Path, planned: &Planned<'_>) -> Result<Vec<FrameRec
     if path.exists() && recorded_targets(folder).is_none() {
         return Err(OutputError::OtherRecord(path));
     }
-    let written: BTreeSet<String> = targets.iter().flat_map(|target| files_of(&target.name)).collect();
+    let videos: Vec<String> = videos.iter().map(|format| format!("video.{format}")).collect();
+    let written: BTreeSet<String> = targets.iter().flat_map(|target| files_of(&target.name)).chain(videos).collect();
     let earlier = earlier_files(folder);
     // What a run was writing when it was killed is in no list yet.
     if !was_interrupted(folder) {
-        let videos = videos.iter().map(|format| format!("video.{format}"));
         let is_in_the_way = |file: &String| !earlier.contains(file) && folder.join(file).symlink_metadata().is_ok();
-        if let Some(file) = written.iter().cloned().chain(videos).find(is_in_the_way) {
+        if let Some(file) = written.iter().find(|file| is_in_the_way(file)) {
             return Err(OutputError::NotWritten(folder.join(file)));
         }
     }
-    // A video is of the whole run, and goes with its record.
-    let mut others: Vec<String> = earlier.difference(&written).cloned().collect();
-    others.retain(|name| !name.starts_with("video."));
+    let others: Vec<String> = earlier.difference(&written).cloned().collect();
     match others.first() {
         Some(example) if !replaces => frames_that_stay(folder, planned, &others).map_err(|reason| {
             let (folder, count, example) = (folder.to_path_buf(), others.len(), example.clone());

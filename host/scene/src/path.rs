@@ -95,7 +95,7 @@ impl CameraPath {
         let cameras = views.iter().map(|view| camera_in(view, pinhole, &scene.frame)).collect::<Result<Vec<_>, _>>()?;
         let names = names(path, views)?;
         let cameras = names.into_iter().zip(cameras).map(|(name, camera)| NamedCamera { name, camera }).collect();
-        Ok(CameraPath { cameras, frames_per_second: frames_per_second.filter(|rate| *rate > 0.0) })
+        Ok(CameraPath { cameras, frames_per_second })
     }
 }
 

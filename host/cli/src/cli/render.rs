@@ -28,7 +28,7 @@ use viewfuse_weighting::{Weighting, WeightingChoice};
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     viewfuse render photos/ --orbit 24 -o out\n      24 views around what the cameras look at, from photograph to \
-    photograph\n  viewfuse render dino/ --targets 1,4,7 --size 160x120 -o out\n      views 1, 4 and 7 from the other \
+    photograph\n  viewfuse render dino/ --targets '#1,#4,#7' --size 160x120 -o out\n      views 1, 4 and 7 from the other \
     thirteen, with scores\n  viewfuse render car/ --targets 5 --sources all/3 --weights mean -o out\n      view 5 from \
     every third view, averaged instead of weighted\n  viewfuse render photos/ --between 3 7 --frames 120 --video \
     webp,mp4 -o out\n      the way from view 3 to view 7 as a video\n  viewfuse render photos/ --camera-path \
@@ -93,7 +93,7 @@ impl Arguments {
     /// The field that renders the scene.
     fn field(&self, scene: &Scene) -> anyhow::Result<AnyField> {
         match &self.gaussians {
-            Some(path) => Ok(AnyField::new(GivenGaussians::open(path, scene)?)),
+            Some(path) => Ok(GivenGaussians::open(path, scene)?.into()),
             None => self.model.open(self.seed, Some(&self.sequence)),
         }
     }

@@ -3,8 +3,9 @@
 use super::RenderError;
 use crate::budget::Bound;
 use crate::{AnyOptions, Mixture, Renderer};
+use viewfuse_core::camera::Camera;
 use viewfuse_job::progress::Progress;
-use viewfuse_scene::photographs::{Album, BackgroundChoice, longest_side, scaled_size};
+use viewfuse_scene::photographs::{Album, BackgroundChoice, longest_side, reduced_size, scaled_size};
 use viewfuse_scene::{Scene, View};
 
 /// The options of a render.
@@ -74,6 +75,30 @@ pub fn working_side(scene: &Scene, options: &RenderOptions, longest: u32) -> Res
         }
     }
     Ok(width.max(height))
+}
+
+/// Width and height of the picture that a render of a scene makes at a camera.
+///
+/// # Errors
+/// As [`working_side`].
+pub fn picture_size(
+    scene: &Scene,
+    options: &RenderOptions,
+    longest: u32,
+    camera: &Camera,
+) -> Result<[u32; 2], RenderError> {
+    let side = working_side(scene, options, longest)?;
+    Ok(size_at(camera, options.size, scene.views.first().map(|view| &view.camera), side))
+}
+
+/// The size of a picture: that of the options at a camera like the `first`, otherwise with its longest side `side`.
+pub(super) fn size_at(camera: &Camera, size: Option<[u32; 2]>, first: Option<&Camera>, side: u32) -> [u32; 2] {
+    let shape = |camera: &Camera| [camera.pinhole.width(), camera.pinhole.height()];
+    match (size, first) {
+        (Some(size), Some(first)) if shape(first) == shape(camera) => size,
+        (Some(_), _) => scaled_size(camera, side).into(),
+        (None, _) => reduced_size(camera, side).into(),
+    }
 }
 
 /// The photographs of these views, decoded no larger than a render with these options needs them.

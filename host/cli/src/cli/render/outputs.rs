@@ -1,11 +1,17 @@
 //! Options of what a render writes.
 
+use crate::cli::printing::complain;
 use crate::cli::wrong::not_built;
+use anyhow::Context;
 use clap::Args;
+use std::path::Path;
 use viewfuse_output::depth::{DepthFormat, UnknownDepthFormat};
 use viewfuse_output::rate::FrameRate;
 use viewfuse_output::run::Outputs;
 use viewfuse_output::video::{UnknownVideoFormat, VideoFormat};
+
+/// What a rate may be.
+const RATES: &str = "from 0.1 to 240";
 
 /// Heading of these options in the help.
 const FILES: &str = "Files";
@@ -40,9 +46,35 @@ impl OutputOptions {
         Outputs { alpha: self.alpha, depths: self.depth.clone(), sheet: !self.no_sheets }
     }
 
-    /// `stated` is what the camera path's file says.
-    pub(crate) fn rate(&self, stated: Option<f64>) -> FrameRate {
-        self.fps.or_else(|| stated.and_then(FrameRate::new)).unwrap_or(FrameRate::DEFAULT)
+    /// The rate of a video. `stated` is what the camera path's file says.
+    pub(crate) fn rate(&self, stated: Option<f64>) -> anyhow::Result<FrameRate> {
+        let of_file = |stated: f64| {
+            let said = || format!("the camera path's file states {stated} frames per second; give --fps, {RATES}");
+            FrameRate::new(stated).with_context(said)
+        };
+        match (self.fps, stated) {
+            (Some(given), _) => Ok(given),
+            (None, Some(stated)) => of_file(stated),
+            (None, None) => Ok(FrameRate::DEFAULT),
+        }
+    }
+
+    /// The formats of videos, y4m in place of MP4 where there is no ffmpeg, of which a line about `folder` is printed.
+    pub(crate) fn video_formats(&self, folder: &Path) -> Vec<VideoFormat> {
+        let mut formats = Vec::new();
+        for format in &self.video {
+            let format = if format.is_possible() {
+                *format
+            } else {
+                let path = folder.join("video.y4m");
+                complain(format_args!("{}, not mp4, is written: there is no ffmpeg on the path", path.display()));
+                VideoFormat::Y4m
+            };
+            if !formats.contains(&format) {
+                formats.push(format);
+            }
+        }
+        formats
     }
 }
 
@@ -59,5 +91,5 @@ fn parse_video(text: &str) -> Result<VideoFormat, String> {
 
 fn parse_rate(text: &str) -> Result<FrameRate, String> {
     let rate = text.parse().ok().and_then(FrameRate::new);
-    rate.ok_or_else(|| "frames per second from 0.1 to 240".to_owned())
+    rate.ok_or_else(|| format!("frames per second {RATES}"))
 }

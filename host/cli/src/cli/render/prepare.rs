@@ -9,16 +9,17 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use viewfuse_device::choice::Chosen;
-use viewfuse_field::render::{RenderOptions, RenderRun};
+use viewfuse_field::render::{RenderOptions, RenderRun, picture_size};
 use viewfuse_field::{AnyField, Renderer};
 use viewfuse_job::files::check_writable;
 use viewfuse_job::progress::Progress;
 use viewfuse_output::folder::{Planned, check_folder};
 use viewfuse_output::rate::FrameRate;
 use viewfuse_output::record::{FrameRecord, RECORD, view_names};
+use viewfuse_output::video::VideoFormat;
 use viewfuse_scene::Scene;
 use viewfuse_scene::coverage::Coverage;
-use viewfuse_scene::few_shot::FewShot;
+use viewfuse_scene::few_shot::{FewShot, Target};
 use viewfuse_weighting::Weighting;
 
 /// The inputs of a run, opened and checked.
@@ -37,11 +38,32 @@ pub(super) struct Prepared {
     pub(super) options: RenderOptions,
     /// Of a video.
     pub(super) rate: FrameRate,
+    /// The formats in which the pictures are written as a video.
+    pub(super) videos: Vec<VideoFormat>,
     pub(super) device: Chosen,
     /// See [`settings`].
     pub(super) settings: Option<String>,
     /// Frames of an earlier run that it adds to.
     pub(super) earlier: Vec<FrameRecord>,
+}
+
+/// Refuses targets whose pictures are no frames of one video.
+fn check_sizes(scene: &Scene, options: &RenderOptions, longest: u32, targets: &[Target]) -> anyhow::Result<()> {
+    let mut first = None;
+    for Target { name, camera, .. } in targets {
+        let size = picture_size(scene, options, longest, camera)?;
+        let (first_name, first) = *first.get_or_insert((name, size));
+        anyhow::ensure!(
+            size == first,
+            "the frames of a video have one size: that of {first_name} has {}x{} pixels, that of {name} {}x{}; name \
+             targets of one size",
+            first[0],
+            first[1],
+            size[0],
+            size[1]
+        );
+    }
+    Ok(())
 }
 
 impl Prepared {
@@ -72,7 +94,12 @@ impl Prepared {
             arguments.model.says_omissions() || !arguments.sequence.is_empty(),
         );
         let options = RenderOptions { is_rounded: !arguments.outputs.outputs().alpha, ..options };
-        let rate = arguments.outputs.rate(job.frames_per_second);
+        let is_moving = arguments.is_stream() || !arguments.outputs.video.is_empty();
+        let rate = arguments.outputs.rate(job.frames_per_second.filter(|_| is_moving))?;
+        if is_moving {
+            check_sizes(&scene, &options, about.longest_side, &job.targets)?;
+        }
+        let videos = arguments.outputs.video_formats(&arguments.output);
         let (mut identity, mut earlier) = (None, Vec::new());
         if !arguments.is_stream() {
             check_writable(&arguments.output.join(RECORD))?;
@@ -85,7 +112,7 @@ impl Prepared {
             let planned = Planned {
                 targets: &job.targets,
                 sources: &view_names(&scene, &job.sources),
-                videos: &arguments.outputs.video,
+                videos: &videos,
                 settings: identity.as_deref(),
                 frame: &scene.frame,
                 replaces: arguments.outputs.replace,
@@ -103,6 +130,7 @@ impl Prepared {
             field,
             options,
             rate,
+            videos,
             device,
             settings,
             earlier,

@@ -4,7 +4,7 @@ use super::Arguments;
 use super::identity::run_identity;
 use super::prepare::Prepared;
 use super::summary::print;
-use crate::cli::printing::{complain, say};
+use crate::cli::printing::say;
 use crate::cli::terminal::Terminal;
 use crate::cli::threads::on_threads;
 use viewfuse_field::auto::{self, Chosen};
@@ -24,7 +24,6 @@ pub(super) fn to_folder(
     warning: Option<String>,
     progress: Terminal,
 ) -> anyhow::Result<()> {
-    let formats = progress.aside(|| video_formats(arguments));
     let before = prepared.weighting.clone().unwrap_or_else(Weighting::default_scheme);
     let label = prepared.folder.display().to_string();
     let mut writer = RunWriter::new(&arguments.output, &prepared.scene, label, &prepared.job, &before);
@@ -36,7 +35,7 @@ pub(super) fn to_folder(
         let finished = writer.resume(&run_identity(settings, &prepared.job.targets)?)?;
         prepared.job.targets.retain(|target| !finished.contains(&target.name));
     }
-    let written = || written(arguments, &prepared, writer, &formats, &progress);
+    let written = || written(arguments, &prepared, writer, &progress);
     let (record, videos) = on_threads(arguments.picture.threads, written)??;
     drop(progress);
     print(&record, &arguments.output)?;
@@ -49,9 +48,9 @@ fn written(
     arguments: &Arguments,
     prepared: &Prepared,
     mut writer: RunWriter,
-    formats: &[VideoFormat],
     progress: &dyn Progress,
 ) -> anyhow::Result<(RunRecord, Vec<String>)> {
+    let formats = &prepared.videos;
     let renderer = prepared.field.on(&prepared.device.device);
     // A frame of a video takes a part of the time that it took to render.
     let frames = 10 * prepared.job.targets.len().max(1);
@@ -75,24 +74,6 @@ fn written(
         total_time: prepared.start.elapsed(),
     };
     Ok((writer.finish(renderer.as_ref(), &prepared.options, finished, circumstances)?, videos))
-}
-
-/// The formats of videos, y4m in place of MP4 where there is no ffmpeg: a person learns it before the work.
-fn video_formats(arguments: &Arguments) -> Vec<VideoFormat> {
-    let mut formats = Vec::new();
-    for format in &arguments.outputs.video {
-        let format = if format.is_possible() {
-            *format
-        } else {
-            let path = arguments.output.join("video.y4m");
-            complain(format_args!("{}, not mp4, is written: there is no ffmpeg on the path", path.display()));
-            VideoFormat::Y4m
-        };
-        if !formats.contains(&format) {
-            formats.push(format);
-        }
-    }
-    formats
 }
 
 /// Writes the pictures as videos; returns a line about each.

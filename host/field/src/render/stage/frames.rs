@@ -4,6 +4,7 @@ use super::{SceneSources, Stage, timed};
 use crate::budget::View;
 use crate::render::compared::comparable;
 use crate::render::most_views::weight_beyond;
+use crate::render::options::size_at;
 use crate::render::seen::seen;
 use crate::render::{Frame, RenderError, Truth};
 use crate::{DepthMap, Drawing, Encoding, Rendered, Rounded};
@@ -13,7 +14,7 @@ use viewfuse_core::camera::Camera;
 use viewfuse_core::weights::Omission;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::few_shot::Target;
-use viewfuse_scene::photographs::{reduced_size, scaled_size, to_rgb8};
+use viewfuse_scene::photographs::to_rgb8;
 use viewfuse_weighting::Weighting;
 use viewfuse_weighting::sources::{MAX_SOURCES, SourceWeights};
 
@@ -180,11 +181,7 @@ impl Stage<'_> {
     /// # Errors
     /// [`RenderError::Size`].
     pub fn at_working_size(&self, camera: &Camera) -> Result<Camera, RenderError> {
-        let (width, height) = match (self.options.size, &self.first) {
-            (Some([width, height]), Some(first)) if same_size(first, camera) => (width, height),
-            (Some(_), _) => scaled_size(camera, self.side),
-            (None, _) => reduced_size(camera, self.side),
-        };
+        let [width, height] = size_at(camera, self.options.size, self.first.as_ref(), self.side);
         let pinhole =
             camera.pinhole.resized(width, height).map_err(|error| RenderError::Size { width, height, error })?;
         Ok(Camera { pinhole, ..*camera })
@@ -215,8 +212,4 @@ impl From<Rounded> for Pixels {
         let confidences = pixels.iter().map(|[.., confidence]| f32::from(*confidence) / 255.0).collect();
         Pixels { colours: Vec::new(), picture, depths, confidences }
     }
-}
-
-fn same_size(a: &Camera, b: &Camera) -> bool {
-    a.pinhole.width() == b.pinhole.width() && a.pinhole.height() == b.pinhole.height()
 }
