@@ -274,6 +274,33 @@ fn layouts_without_ignore_masks_hold_them_as_transparency_or_not_at_all() {
     assert!(error.contains("cannot hold this scene: its masks say where the object is"), "{error}");
 }
 
+/// A person's word on masks holds for what is exported: no alpha channel where it is not used, a line where it cannot be
+/// said again.
+#[test]
+fn what_is_said_of_alpha_channels_is_exported_or_told() {
+    let folder = toy();
+    let path = folder.join("toy");
+    let cut = image::RgbaImage::from_fn(128, 128, |x, _| image::Rgba([90, 120, 150, if x < 64 { 0 } else { 255 }]));
+    cut.save(folder.file("toy/rgb/000003.png")).expect("a photograph");
+    let out = Folder::new();
+    for (choice, has_alpha) in [(MaskChoice::Auto, true), (MaskChoice::Object, true), (MaskChoice::None, false)] {
+        let scene = Scene::open_masked(&path, choice).expect("a scene");
+        for layout in [Layout::Transforms, Layout::ColmapBinary] {
+            let folder = out.join(format!("{choice:?}-{layout}"));
+            // SRN's poses without photographs are not held there.
+            let photographed = Scene {
+                views: scene.views.iter().filter(|view| view.image.is_some()).cloned().collect(),
+                ..scene.clone()
+            };
+            let written = write(&photographed, layout, &folder, &Silent).expect("written");
+            let picture = image::open(folder.join("images/000003.png")).expect("a photograph");
+            assert_eq!(picture.color().has_alpha(), has_alpha, "{choice:?} {layout}");
+            let is_told = written.lost.iter().any(|line| line.contains("must be said of this folder, too"));
+            assert_eq!(is_told, choice == MaskChoice::Object, "{:?}", written.lost);
+        }
+    }
+}
+
 #[test]
 fn what_is_hidden_before_an_objects_background_is_background() {
     let folder = toy();

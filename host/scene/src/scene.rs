@@ -33,7 +33,7 @@ mod llff;
 pub(crate) mod masks;
 mod middlebury;
 mod missing;
-mod neus;
+pub(crate) mod neus;
 mod numpy;
 pub mod reader;
 mod split;
@@ -300,10 +300,15 @@ impl Scene {
         let (mut photograph, turn) = images::decode(self.photograph_file(view)?, self.size(view)?)?;
         match &self.view(view)?.mask {
             Some(mask) => masks::apply(mask, &mut photograph, &turn, self.masks)?,
-            None if self.mask_choice == MaskChoice::None => photograph = photograph.without_alpha(),
+            None if !self.uses_alpha() => photograph = photograph.without_alpha(),
             None => {}
         }
         Ok(photograph)
+    }
+
+    /// Whether alpha channels are used: a person may say that they are not.
+    pub(crate) fn uses_alpha(&self) -> bool {
+        self.mask_choice != MaskChoice::None
     }
 
     /// Whether a view has an object's mask.

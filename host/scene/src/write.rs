@@ -29,7 +29,8 @@ use viewfuse_job::files::WholeFolder;
 use viewfuse_job::progress::{Interrupted, Progress};
 
 use crate::scene::camera_models::KeyedLens;
-use crate::{Scene, SceneError, View};
+use crate::scene::files::has_extension;
+use crate::{MaskChoice, Scene, SceneError, View};
 pub use names::check_name;
 
 /// A layout in which scenes can be written.
@@ -179,7 +180,8 @@ pub fn write_with(
 
     let unfinished = WholeFolder::create(folder).map_err(failed)?;
     let draft = unfinished.path();
-    let mut out = Draft { folder: &draft, scene, progress };
+    let names = names_in(scene, layout);
+    let mut out = Draft { folder: &draft, scene, names: names.clone(), progress };
     progress.expect(scene.views.iter().filter(|view| view.image.is_some()).count());
     let photograph_count = match layout {
         Layout::Transforms => transforms::write(&mut out)?,
@@ -190,7 +192,7 @@ pub fn write_with(
         Layout::Llff => llff::write(&mut out)?,
         Layout::Neus => neus::write(&mut out)?,
     };
-    readback::check(scene, layout, &draft).map_err(unfit)?;
+    readback::check(scene, layout, &draft, &names).map_err(unfit)?;
     beside.iter().try_for_each(|(name, bytes)| out.put(name, bytes))?;
     unfinished.finish().map_err(failed)?;
     Ok(Written { folder: folder.to_path_buf(), photograph_count, lost: lost(scene, layout) })
@@ -200,6 +202,8 @@ pub fn write_with(
 struct Draft<'a> {
     folder: &'a Path,
     scene: &'a Scene,
+    /// Those of its views in the layout.
+    names: Vec<String>,
     progress: &'a dyn Progress,
 }
 
@@ -218,6 +222,13 @@ impl Draft<'_> {
         let path = self.file(name)?;
         fs::write(&path, contents).map_err(|cause| WriteSceneError::Io(path, cause))
     }
+}
+
+/// The names of a scene's views in a layout: their own, unless that numbers them.
+fn names_in(scene: &Scene, layout: Layout) -> Vec<String> {
+    let own = || scene.views.iter().map(|view| view.name.clone()).collect();
+    let numbered = (layout == Layout::Neus).then(|| neus::numbered(scene)).flatten();
+    numbered.unwrap_or_else(own)
 }
 
 /// Refuses poses without a photograph.
@@ -239,7 +250,28 @@ fn lost(scene: &Scene, layout: Layout) -> Vec<String> {
     if layout != Layout::Llff && !(layout == Layout::Neus && neus::has_unit_sphere(scene)) && depths > 0 {
         lines.push(format!("near and far depths of {depths} views"));
     }
+    if layout == Layout::Neus && neus::numbered(scene).is_some() {
+        lines.push("the names of the photographs, which are numbered".to_owned());
+    }
+    if layout.is_colmap() && scene.points.iter().any(|point| !point.views.is_empty()) {
+        lines.push(
+            "where features were found in the photographs: the points' projections stand there, so that a bundle \
+             adjustment has nothing to refine"
+                .to_owned(),
+        );
+    }
+    let is_said = |view: &View| {
+        let may_have_alpha = |file: &Path| !has_extension(file, &["jpg", "jpeg"]);
+        view.mask.is_none() && view.image.as_deref().is_some_and(may_have_alpha)
+    };
+    if scene.mask_choice == MaskChoice::Object && scene.views.iter().any(is_said) {
+        lines.push("that alpha channels say where the object is, which must be said of this folder, too".to_owned());
+    }
     let has_object = scene.views.iter().any(|view| scene.has_object_mask(view));
+    if layout == Layout::Neus && !has_object {
+        lines
+            .push("masks, of which there are none: NeuS's own program wants mask/, where white pictures do".to_owned());
+    }
     if layout == Layout::Neus && !neus::has_unit_sphere(scene) && !has_object {
         let (_, radius) = neus::sphere(scene);
         lines.push(format!(

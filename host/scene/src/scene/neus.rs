@@ -10,7 +10,7 @@
 //! otherwise to that of its position. `mask/` holds masks of the same names or numbers. Pixel `(0, 0)` is the centre of
 //! the top left pixel there; here that is `(0.5, 0.5)`.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
@@ -77,7 +77,12 @@ impl Reader for Neus {
             let place = FilePlace::file(if worlds.is_empty() { file } else { &folder });
             return Err(place.fault(SceneFault::NoViews("photographs in image/, world_mat_0 in the archive")));
         }
-        let numbers = numbers_of(file, &images, &worlds)?;
+        let stems: Vec<String> = images.iter().map(|image| files::stem(image)).collect();
+        let stems: Vec<&str> = stems.iter().map(String::as_str).collect();
+        let numbers = matrices_of(&stems, &worlds.keys().copied().collect()).ok_or_else(|| {
+            let (of, expected, found) = ("matrices world_mat_N (one a photograph)", images.len(), worlds.len());
+            FilePlace::file(file).fault(FileFault::WrongCount { of, expected, found })
+        })?;
         let masks = masks(&root, &images)?;
         let mut missing = Missing::default();
         for number in worlds.keys() {
@@ -107,21 +112,16 @@ fn numbered(name: &str, prefix: &str) -> Option<u64> {
     name.strip_prefix(prefix)?.parse().ok()
 }
 
-/// The matrix of each photograph: those of different numbers in their names, if the archive has all of them.
-fn numbers_of(file: &Path, images: &[PathBuf], worlds: &BTreeMap<u64, &NumpyArray>) -> Result<Vec<u64>, SceneError> {
-    let by_name: Option<Vec<u64>> = images.iter().map(|image| files::trailing_number(&files::stem(image))).collect();
+/// The matrix of each photograph, by their names in the order in which they are listed: those of different numbers in
+/// the names, if the archive has all of them; otherwise one after the other, if there are as many; otherwise none.
+pub(crate) fn matrices_of(names: &[&str], worlds: &BTreeSet<u64>) -> Option<Vec<u64>> {
+    let by_name: Option<Vec<u64>> = names.iter().map(|name| files::trailing_number(name)).collect();
     let fit = |numbers: &Vec<u64>| {
         let mut seen = HashSet::new();
-        numbers.iter().all(|number| worlds.contains_key(number) && seen.insert(*number))
+        numbers.iter().all(|number| worlds.contains(number) && seen.insert(*number))
     };
-    if let Some(numbers) = by_name.filter(fit) {
-        return Ok(numbers);
-    }
-    if images.len() == worlds.len() {
-        return Ok(worlds.keys().copied().collect());
-    }
-    let (of, expected, found) = ("matrices world_mat_N (one a photograph)", images.len(), worlds.len());
-    Err(FilePlace::file(file).fault(FileFault::WrongCount { of, expected, found }))
+    let in_order = || (names.len() == worlds.len()).then(|| worlds.iter().copied().collect());
+    by_name.filter(fit).or_else(in_order)
 }
 
 /// Masks by the number that their names end in; those with a photograph's name are found by it ([`super::masks`]).

@@ -14,7 +14,10 @@ pub fn check_name(layout: Layout, name: &str) -> Result<(), String> {
     let reason = match layout {
         _ if !is_name(name) => "is no name of a file",
         Layout::Colmap if has_breaks => "has a line break in it",
-        Layout::Colmap if name.starts_with(char::is_whitespace) => "begins with a blank",
+        // Our own reader gives it back, but that of COLMAP and others end names there.
+        Layout::Colmap if name.contains(char::is_whitespace) => {
+            "has a blank in it, where other programs end a name of the text form; colmap-binary holds it"
+        }
         Layout::Transforms | Layout::Colmap | Layout::ColmapBinary | Layout::Middlebury if name.contains('\\') => {
             "has a backslash in it, which separates folders there"
         }

@@ -5,10 +5,10 @@
 //! in common: the ball around the point nearest to their principal axes ([`Rig::subject_radius`]). A scene that was
 //! read in this layout is in the sphere's coordinates already, and keeps them.
 //!
-//! `N` is the number that the view's name ends in, if these differ; otherwise its place in natural order. Photographs
-//! of a pinhole and their masks are copied; others are written undistorted, with the mask as a picture of its own.
+//! `N` is the photograph's place in the order of the files' names, byte by byte, from 0, where NeuS's own program looks
+//! for it; it reads PNGs alone. Where our reader would take a name's number for another one, photographs are numbered.
+//! PNGs of a pinhole and their masks are copied; others are written undistorted, with the mask as a picture of its own.
 
-use std::collections::HashSet;
 use std::io::{Cursor, Write};
 
 use glam::DVec3;
@@ -19,7 +19,8 @@ use zip::{CompressionMethod, ZipWriter};
 use super::{Draft, Layout, WriteSceneError, camera_from_world};
 use crate::numpy::npy;
 use crate::rig::Rig;
-use crate::scene::files::{natural_order, trailing_number};
+use crate::scene::files::natural_order;
+use crate::scene::neus::matrices_of;
 use crate::{Scene, View};
 
 /// Whether the scene is in the coordinates of a unit sphere that this layout gave it.
@@ -41,8 +42,8 @@ pub(super) fn fits(scene: &Scene) -> Result<(), String> {
 
 pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
     let count = out.scene.views.len();
-    let files = (0..count).map(|view| photograph(out, view)).collect::<Result<Vec<_>, _>>()?;
-    let numbers = numbers(&out.scene.views, &files);
+    (0..count).try_for_each(|view| photograph(out, view))?;
+    let numbers = places(&out.names);
     let (centre, radius) = sphere(out.scene);
     let scale = [
         [radius, 0.0, 0.0, centre.x],
@@ -65,31 +66,47 @@ pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
     Ok(count)
 }
 
-/// Writes the photograph of a view and its mask; the photograph's name in its folder.
-fn photograph(out: &Draft, index: usize) -> Result<String, WriteSceneError> {
+/// The only format that NeuS's own program reads.
+const PNG: [&str; 1] = ["png"];
+
+/// Writes the photograph of a view and its mask.
+fn photograph(out: &Draft, index: usize) -> Result<(), WriteSceneError> {
     let view = &out.scene.views[index];
     match (&view.lens, &view.mask) {
         (None, _) => {
-            let file = out.stored_photograph(index, "image")?;
-            out.mask(index, "mask", &view.name)?;
-            Ok(file)
+            out.stored_photograph(index, "image", &PNG)?;
+            out.mask(index, "mask", &out.names[index], &PNG)?;
         }
-        (Some(_), None) => out.pinhole_photograph(index, "image"),
-        (Some(_), Some(_)) => out.pinhole_photograph_and_mask(index, "image", "mask"),
+        (Some(_), None) => drop(out.pinhole_photograph(index, "image")?),
+        (Some(_), Some(_)) => drop(out.pinhole_photograph_and_mask(index, "image", "mask")?),
     }
+    Ok(())
 }
 
-/// The matrix of each view.
-fn numbers(views: &[View], files: &[String]) -> Vec<u64> {
-    let named: Option<Vec<u64>> = views.iter().map(|view| trailing_number(&view.name)).collect();
-    let differ = |numbers: &Vec<u64>| numbers.iter().collect::<HashSet<_>>().len() == numbers.len();
-    named.filter(differ).unwrap_or_else(|| {
-        let mut order: Vec<usize> = (0..files.len()).collect();
-        order.sort_by(|&a, &b| natural_order(&files[a], &files[b]));
-        let mut places = vec![0; files.len()];
-        order.into_iter().enumerate().for_each(|(place, view)| places[view] = place as u64);
-        places
-    })
+/// The place of each name in the order of the files, byte by byte.
+fn places(names: &[String]) -> Vec<u64> {
+    let files: Vec<String> = names.iter().map(|name| format!("{name}.png")).collect();
+    let mut order: Vec<usize> = (0..files.len()).collect();
+    order.sort_by(|&a, &b| files[a].cmp(&files[b]));
+    let mut places = vec![0; files.len()];
+    order.into_iter().enumerate().for_each(|(place, view)| places[view] = place as u64);
+    places
+}
+
+/// Names of a scene's views that are numbers, in natural order of their own; `None` where they can keep these.
+pub(super) fn numbered(scene: &Scene) -> Option<Vec<String>> {
+    let own: Vec<String> = scene.views.iter().map(|view| view.name.clone()).collect();
+    let mut order: Vec<usize> = (0..own.len()).collect();
+    order.sort_by(|&a, &b| natural_order(&format!("{}.png", own[a]), &format!("{}.png", own[b])));
+    let listed: Vec<&str> = order.iter().map(|&view| own[view].as_str()).collect();
+    let places = places(&own);
+    let read = matrices_of(&listed, &(0..own.len() as u64).collect());
+    if read.is_some_and(|read| order.iter().zip(read).all(|(&view, number)| places[view] == number)) {
+        return None;
+    }
+    let mut names = vec![String::new(); own.len()];
+    order.into_iter().enumerate().for_each(|(place, view)| names[view] = format!("{place:06}"));
+    Some(names)
 }
 
 /// Centre and radius of the sphere in the coordinates of the scene's files.

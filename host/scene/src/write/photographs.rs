@@ -6,17 +6,36 @@ use std::path::Path;
 use image::{DynamicImage, GrayImage};
 
 use super::{Draft, WriteSceneError};
-use crate::{Photograph, encode_png};
+use crate::scene::files::has_extension;
+use crate::{Photograph, encode_png, read_picture};
+
+/// Extensions of files that have no alpha channel.
+const JPEG: [&str; 2] = ["jpg", "jpeg"];
 
 impl Draft<'_> {
     /// Writes the stored photograph of a view, not undistorted, as `FOLDER/NAME.EXTENSION`; returns its name in the
-    /// folder. A file is copied unchanged, unless it carries an orientation.
-    pub(super) fn stored_photograph(&self, view: usize, folder: &str) -> Result<String, WriteSceneError> {
+    /// folder. A file is copied unchanged, unless it carries an orientation, or an alpha channel that a person says is
+    /// not used, or `only` has other extensions.
+    pub(super) fn stored_photograph(
+        &self,
+        view: usize,
+        folder: &str,
+        only: &[&str],
+    ) -> Result<String, WriteSceneError> {
         self.progress.check()?;
-        let name = &self.scene.views[view].name;
-        let written = match self.scene.upright_file(view)? {
+        let (name, uses_alpha) = (&self.names[view], self.scene.uses_alpha());
+        let source = self.scene.upright_file(view)?.filter(|file| is_of(file, only));
+        let is_as_used = match source {
+            Some(file) => uses_alpha || has_extension(file, &JPEG) || !self.scene.stored_photograph(view)?.has_alpha,
+            None => false,
+        };
+        let written = match source.filter(|_| is_as_used) {
             Some(source) => self.copied(source, folder, name)?,
-            None => self.png(folder, name, rgb_or_rgba(self.scene.stored_photograph(view)?))?,
+            None => {
+                let photograph = self.scene.stored_photograph(view)?;
+                let photograph = if uses_alpha { photograph } else { photograph.without_alpha() };
+                self.png(folder, name, rgb_or_rgba(photograph))?
+            }
         };
         self.progress.step();
         Ok(written)
@@ -24,11 +43,18 @@ impl Draft<'_> {
 
     /// Writes the mask of a view, if it has one, for its stored photograph as [`Draft::stored_photograph`] writes it;
     /// returns its name in the folder: `name` with the mask's extension. A file is copied unchanged, unless it or the
-    /// photograph carries an orientation.
-    pub(super) fn mask(&self, view: usize, folder: &str, name: &str) -> Result<Option<String>, WriteSceneError> {
+    /// photograph carries an orientation, or `only` has other extensions.
+    pub(super) fn mask(
+        &self,
+        view: usize,
+        folder: &str,
+        name: &str,
+        only: &[&str],
+    ) -> Result<Option<String>, WriteSceneError> {
         let Some(source) = &self.scene.views[view].mask else { return Ok(None) };
         Ok(Some(match self.scene.stored_mask(view)? {
-            None => self.copied(source, folder, name)?,
+            None if is_of(source, only) => self.copied(source, folder, name)?,
+            None => self.png(folder, name, read_picture(source)?)?,
             Some(mask) => self.png(folder, name, mask.into())?,
         }))
     }
@@ -39,12 +65,12 @@ impl Draft<'_> {
     pub(super) fn stored_photograph_and_mask(&self, index: usize) -> Result<(String, Option<String>), WriteSceneError> {
         let view = &self.scene.views[index];
         if !self.scene.has_object_mask(view) {
-            let name = self.stored_photograph(index, "images")?;
-            let mask = self.mask(index, "masks", &name)?;
+            let name = self.stored_photograph(index, "images", &[])?;
+            let mask = self.mask(index, "masks", &name, &[])?;
             return Ok((name, mask));
         }
         self.progress.check()?;
-        let name = self.png("images", &view.name, rgb_or_rgba(self.scene.masked_photograph(index)?))?;
+        let name = self.png("images", &self.names[index], rgb_or_rgba(self.scene.masked_photograph(index)?))?;
         self.progress.step();
         Ok((name, None))
     }
@@ -54,14 +80,14 @@ impl Draft<'_> {
     pub(super) fn pinhole_photograph(&self, view: usize, folder: &str) -> Result<String, WriteSceneError> {
         let changed = &self.scene.views[view];
         if changed.lens.is_none() && changed.mask.is_none() {
-            return self.stored_photograph(view, folder);
+            return self.stored_photograph(view, folder, &[]);
         }
         self.progress.check()?;
         let mut photograph = self.scene.photograph(view)?;
         if changed.mask.is_some() && !self.scene.has_object_mask(changed) {
             photograph = with_hidden(photograph);
         }
-        let name = self.png(folder, &changed.name, rgb_or_rgba(photograph))?;
+        let name = self.png(folder, &self.names[view], rgb_or_rgba(photograph))?;
         self.progress.step();
         Ok(name)
     }
@@ -89,7 +115,7 @@ impl Draft<'_> {
     ) -> Result<String, WriteSceneError> {
         self.progress.check()?;
         let Photograph { pixels, seen, .. } = self.scene.photograph(view)?;
-        let name = &self.scene.views[view].name;
+        let name = &self.names[view];
         let (width, height) = pixels.dimensions();
         let mask = match seen {
             Some(seen) if !self.scene.has_object_mask(&self.scene.views[view]) => seen,
@@ -116,6 +142,11 @@ impl Draft<'_> {
         self.put(&format!("{folder}/{file}"), encoded.map_err(failed)?)?;
         Ok(file)
     }
+}
+
+/// Whether a file's extension is one of these; any is if there are none.
+fn is_of(file: &Path, only: &[&str]) -> bool {
+    only.is_empty() || has_extension(file, only)
 }
 
 /// The photograph with what does not count in it transparent.

@@ -12,8 +12,8 @@ const MAX_SHARES: [f64; 2] = [1.0e-3, 1.0e-5];
 /// Most radians that a principal axis may turn.
 const MAX_TURN: f32 = 1.0e-2;
 
-/// Checks that the files in `draft` are the scene.
-pub(super) fn check(scene: &Scene, layout: Layout, draft: &Path) -> Result<(), String> {
+/// Checks that the files in `draft` are the scene, whose views have these names there.
+pub(super) fn check(scene: &Scene, layout: Layout, draft: &Path, names: &[String]) -> Result<(), String> {
     let read = Scene::open(draft).map_err(|error| {
         let place = format!("{}{}", draft.display(), std::path::MAIN_SEPARATOR);
         format!("read back, {}", error.to_string().replace(&place, ""))
@@ -28,9 +28,9 @@ pub(super) fn check(scene: &Scene, layout: Layout, draft: &Path) -> Result<(), S
     let most = MAX_SHARES[0] * sizes[0] + MAX_SHARES[1] * sizes[1].max(1.0e-9);
     // NeuS's world is the unit sphere.
     let (origin, unit) = if layout == Layout::Neus { neus::sphere(scene) } else { (DVec3::ZERO, 1.0) };
-    for (view, centre) in scene.views.iter().zip(&centres) {
-        let Some(back) = read.views.iter().find(|back| back.name == view.name) else {
-            return Err(format!("the name {:?} is not read back", view.name));
+    for ((view, name), centre) in scene.views.iter().zip(names).zip(&centres) {
+        let Some(back) = read.views.iter().find(|back| back.name == *name) else {
+            return Err(format!("the name {name:?} is not read back"));
         };
         let moved = (origin + unit * place(&read, back)).distance(*centre);
         if moved > most || view.camera.pose.axis_angle(&back.camera.pose) > MAX_TURN {
