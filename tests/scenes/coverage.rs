@@ -4,6 +4,7 @@ use std::f32::consts::TAU;
 use viewfuse::scene::coverage::Coverage;
 use viewfuse::scene::path::arc::Arc;
 use viewfuse::scene::path::generated::orbit;
+use viewfuse::scene::rig::Rig;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::pose::Pose;
@@ -58,6 +59,27 @@ fn an_orbit_is_the_arc_from_photograph_to_photograph() {
     assert!(Arc::covered(&cameras(&circle)).is_full() && !Arc::covered(&cameras(&circle[..5])).is_full());
     let full = Arc::full(&cameras(&circle[..2]));
     assert!(full.is_full() && full.width == TAU);
+}
+
+/// Cameras that were turned on their sides, or over, do not tilt what the others call up.
+#[test]
+fn a_few_rolled_cameras_tilt_nothing() {
+    let upright = cameras(&[0.0, 30.0, 60.0, 90.0, 120.0, 150.0, 180.0]);
+    let up = Rig::of(&upright).up;
+    let mut rolled = upright.clone();
+    for (camera, turns) in [(1, 1), (3, 1), (5, 2)] {
+        let matrix = upright[camera].pose.to_opencv();
+        let turned = matrix.map(|[right, down, forward, centre]| match turns {
+            1 => [down, -right, forward, centre],
+            _ => [-right, -down, forward, centre],
+        });
+        rolled[camera].pose = Pose::from_opencv(&turned).expect("a pose");
+    }
+    let tilt = Rig::of(&rolled).up.dot(up).clamp(-1.0, 1.0).acos().to_degrees();
+    assert!(tilt < 6.0, "{tilt} degrees");
+    // What all agree on is their mean, to the bit.
+    let mean = upright.iter().map(|camera| -camera.pose.down_world()).sum::<Vec3>() / 7.0;
+    assert_eq!(up, mean.normalize());
 }
 
 #[test]

@@ -117,14 +117,19 @@ pub fn nearest_point_to_lines(lines: &[(Vec3, Vec3)]) -> Option<Vec3> {
     frame::nearest_point_to_lines(&lines).map(|point| point.as_vec3())
 }
 
-/// Mean up direction of the cameras; where rolled cameras cancel it, the axis of least variance of their centres, on
-/// the side on which the cameras are.
+/// Least length of a mean of up directions that says where up is: upright cameras at up to 70 degrees of elevation keep
+/// a third of theirs.
+const MIN_UP: f32 = 0.3;
+/// Cosine of the roll from which on a camera is turned on its side, or over.
+const MAX_ROLL_COSINE: f32 = std::f32::consts::FRAC_1_SQRT_2;
+
+/// Mean up direction of the cameras, without those of a minority that are turned on their sides or over; where rolled
+/// cameras cancel it, the axis of least variance of their centres, on the side on which the cameras are.
 fn up_direction(cameras: &[Camera], focus: Vec3) -> Vec3 {
     let count = cameras.len().max(1) as f32;
     let mean_up = cameras.iter().map(|c| -c.pose.down_world()).sum::<Vec3>() / count;
-    // Upright cameras at up to 70 degrees of elevation keep a third of their up directions.
-    if mean_up.length() > 0.3 {
-        return mean_up.normalize();
+    if mean_up.length() > MIN_UP {
+        return upright_mean(cameras, mean_up).normalize();
     }
     let centroid = cameras.iter().map(|c| c.pose.centre_world()).sum::<Vec3>() / count;
     let mut covariance = glam::DMat3::ZERO;
@@ -144,4 +149,24 @@ fn up_direction(cameras: &[Camera], focus: Vec3) -> Vec3 {
     }
     let axis = axis.as_vec3();
     if (centroid - focus).dot(axis) < 0.0 { -axis } else { axis }
+}
+
+/// The mean up direction of the cameras that are upright by this one, which is all but a few's, and by what it becomes.
+fn upright_mean(cameras: &[Camera], mut mean_up: Vec3) -> Vec3 {
+    let mut kept = cameras.len();
+    loop {
+        let up = mean_up.normalize();
+        let is_upright = |camera: &&Camera| {
+            let forward = camera.pose.forward_world();
+            let in_picture = up - forward * up.dot(forward);
+            // A camera that looks up or down has no roll.
+            in_picture.length() < MIN_UP || -camera.pose.down_world().dot(up) >= MAX_ROLL_COSINE * in_picture.length()
+        };
+        let upright: Vec<Vec3> = cameras.iter().filter(is_upright).map(|c| -c.pose.down_world()).collect();
+        let mean = upright.iter().sum::<Vec3>() / upright.len().max(1) as f32;
+        if upright.len() >= kept || 2 * upright.len() <= cameras.len() || mean.length() <= MIN_UP {
+            return mean_up;
+        }
+        (mean_up, kept) = (mean, upright.len());
+    }
 }
