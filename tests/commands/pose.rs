@@ -130,7 +130,7 @@ fn worst_rotation(scene: &Scene) -> f32 {
 fn eight_photographs_to_a_picture() {
     let folder = bare(0..8);
     let said = done_with_warnings(&folder, "pose bare -o posed --seed 3").stdout;
-    assert!(said.starts_with("registered 8 of 8 photographs\n") && said.contains("from EXIF; 320x240"), "{said}");
+    assert!(said.starts_with("registered 8 of 8 photographs\n") && said.contains("refined from EXIF's 2"), "{said}");
     let scene = Scene::open(folder.join("posed")).expect("a scene");
     assert_eq!((scene.layout, scene.views.len()), ("colmap", 8));
     assert!(scene.points.len() > 100, "{} points", scene.points.len());
@@ -160,13 +160,17 @@ fn what_does_not_belong_is_excluded_by_name() {
     let cut = room(5);
     folder.write("bare/cut.jpg", &cut[..cut.len() / 2]);
     folder.write("bare/twice.jpg", with_exif(&room(2), &[(FILM, ROOM_FILM)]));
+    // What a messenger makes of a photograph: smaller, and compressed more.
+    let small = imageops::resize(&decoded(1), 160, 120, imageops::FilterType::Triangle);
+    folder.write("bare/000 copy.jpg", with_exif(&jpeg(small), &[(FILM, ROOM_FILM)]));
     folder.write("bare/blurred.jpg", with_exif(&jpeg(imageops::blur(&decoded(6), 6.0)), &[(FILM, ROOM_FILM)]));
     let other = image::open(data("toy/rgb/000003.png")).expect("another scene").to_rgb8();
     let other = imageops::resize(&other, 320, 240, imageops::FilterType::Triangle);
     folder.write("bare/other.jpg", with_exif(&jpeg(other), &[(FILM, ROOM_FILM)]));
     let said = done_with_warnings(&folder, "pose bare -o posed").stdout;
-    assert!(said.starts_with("registered 5 of 9 photographs\n"), "{said}");
+    assert!(said.starts_with("registered 5 of 10 photographs\n"), "{said}");
     for (name, reason) in [
+        ("000 copy.jpg", "the same picture as 001.jpg"),
         ("cut.jpg", "the file ends before the picture does"),
         ("twice.jpg", "the same picture as 002.jpg"),
         ("blurred.jpg", "blurred"),

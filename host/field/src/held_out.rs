@@ -47,7 +47,12 @@ impl HoldOut {
 
     /// The others that a photograph is rendered from, the nearest first.
     pub fn neighbours(&self, poses: &[Pose], view: usize) -> Vec<usize> {
-        let others = (0..poses.len()).filter(|other| *other != view);
+        self.neighbours_among(poses, view, |_| true)
+    }
+
+    /// As [`HoldOut::neighbours`], of those that `is_one` says.
+    pub fn neighbours_among(&self, poses: &[Pose], view: usize, is_one: impl Fn(usize) -> bool) -> Vec<usize> {
+        let others = (0..poses.len()).filter(|other| *other != view && is_one(*other));
         nearest(others, |other| poses[other].distance(&poses[view]), self.max_neighbours)
     }
 }

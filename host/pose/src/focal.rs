@@ -4,6 +4,9 @@
 use crate::intake::Photo;
 use crate::solution::CameraGuess;
 
+/// Most that a known focal length may change, as a share of it.
+const MAX_KNOWN_CHANGE: f64 = 0.15;
+
 /// Where a focal length comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -66,6 +69,12 @@ impl Cameras {
             of_photo.push(place);
         }
         Cameras { groups: groups.into_iter().map(|(_, group)| group).collect(), of_photo }
+    }
+
+    /// Of the focal lengths that were found the first that is another one than is known: it, and the known one.
+    pub fn changed_focal(&self, found: &[f64]) -> Option<[f64; 2]> {
+        let known = found.iter().zip(&self.groups).filter_map(|(found, group)| Some([*found, group.focal?]));
+        known.into_iter().find(|[found, known]| (found / known - 1.0).abs() > MAX_KNOWN_CHANGE)
     }
 
     /// Whether every focal length is known.

@@ -13,6 +13,7 @@
 use glam::DVec3;
 use image::RgbImage;
 use rayon::prelude::*;
+use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::pose::Pose;
 use viewfuse_device::cpu::Cpu;
@@ -25,10 +26,14 @@ use viewfuse_field::{Field, On, Surfaces};
 use viewfuse_job::progress::{Progress, Quiet};
 use viewfuse_scene::Scene;
 use viewfuse_scene::photographs::{Album, BackgroundChoice, GroundTruth, SourceImages, scaled_size};
+use viewfuse_scene::rig::Rig;
 use viewfuse_weighting::Weighting;
 
 /// Every photograph is held out, and rendered from few others: all of them must agree with its pose.
 const HOLD_OUT: HoldOut = HoldOut { max_views: usize::MAX, max_neighbours: 4, side: 128 };
+
+/// Most distance between two photographs of one place, as a share of that to what the cameras look at: a degree.
+const MAX_SAME_PLACE: f32 = 0.0175;
 
 /// The turn of disturbed poses.
 const DISTURBANCE_DEGREES: f64 = 2.0;
@@ -88,11 +93,13 @@ impl HeldOutPhotographs<'_> {
         let scene = (self.scene, self.album);
         let photographs = held_out::Photographs::new(scene, views, &self.all, surfaces, HOLD_OUT, &field.about())?;
         let poses: Vec<Pose> = self.scene.views.iter().map(|view| view.camera.pose).collect();
+        let cameras: Vec<Camera> = self.scene.views.iter().map(|view| view.camera).collect();
+        let focus = Rig::of(&cameras).focus;
         let weighting = Weighting::default_scheme();
         let one = |&view: &usize| {
             progress.check().map_err(|stopped| RenderError::Field(stopped.into()))?;
             let quiet = &Quiet(progress);
-            let neighbours = HOLD_OUT.neighbours(&poses, view);
+            let neighbours = neighbours(&poses, focus, view);
             let mut held_out = photographs.hold_out(view, neighbours, &renderer, &options, quiet)?;
             held_out.stage.weigh(&weighting, quiet)?;
             let camera = self.scene.views[view].camera;
@@ -126,6 +133,15 @@ impl HeldOutPhotographs<'_> {
         let warp = rendered.truth.score(&Baseline::WarpedCopy.picture(&near, &target, depth));
         Ok(HeldOutScores { photograph: self.scene.views[view].name.clone(), score, copy, warp, disturbed })
     }
+}
+
+/// The photographs that one is rendered from: none that was taken from its own place, which would be met by its copy as
+/// well as by what is rendered from it, unless there are no two others.
+fn neighbours(poses: &[Pose], focus: Vec3, view: usize) -> Vec<usize> {
+    let place = |view: usize| poses[view].centre_world();
+    let reach = MAX_SAME_PLACE * place(view).distance(focus);
+    let elsewhere = HOLD_OUT.neighbours_among(poses, view, |other| place(other).distance(place(view)) > reach);
+    if elsewhere.len() > 1 { elsewhere } else { HOLD_OUT.neighbours(poses, view) }
 }
 
 /// A held-out photograph, rendered from its neighbours.
@@ -212,4 +228,27 @@ impl Truth {
 fn field() -> TrainingFree {
     let sweep = Sweep { consistency_share: 0.0, ..Sweep::default() };
     TrainingFree { sweep, ..TrainingFree::default() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Cameras on a line, which look ahead at what is 4 away.
+    fn poses(places: &[f32]) -> Vec<Pose> {
+        let pose = |x: &f32| {
+            Pose::from_opencv(&[[1.0, 0.0, 0.0, *x], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+        };
+        places.iter().map(|x| pose(x).expect("a pose")).collect()
+    }
+
+    #[test]
+    fn a_photograph_is_not_rendered_from_its_twin() {
+        let focus = Vec3::new(0.0, 0.0, 4.0);
+        let of = |places: &[f32], view| neighbours(&poses(places), focus, view);
+        assert_eq!(of(&[0.0, 0.01, 0.5, 1.0], 0), [2, 3]);
+        assert_eq!(of(&[0.0, 0.01, 0.5, 1.0], 2), [1, 0, 3]);
+        assert_eq!(of(&[0.0, 0.1, 0.5, 1.0], 0), [1, 2, 3], "a degree and a half beside");
+        assert_eq!(of(&[0.0, 0.01, 0.5], 0), [1, 2], "there are no two others");
+    }
 }

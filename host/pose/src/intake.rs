@@ -159,13 +159,18 @@ impl Intake {
         }
         let (mut photos, mut unusable) = (Vec::new(), Vec::new());
         for (path, photo) in files.iter().zip(read) {
-            let mut refuse = |reason| unusable.push(Unusable { name: place_in(&root, path), reason });
             match photo {
-                Ok(photo) => match photos.iter().find(|other| is_same(&photo, other)) {
-                    Some(Photo { file, .. }) => refuse(format!("the same picture as {file}")),
+                Ok(photo) => match photos.iter_mut().find(|other| is_same(&photo, other)) {
+                    // Of copies the largest is the photograph.
+                    Some(other) => {
+                        let is_larger = |a: &Photo, b: &Photo| a.size[0] * a.size[1] > b.size[0] * b.size[1];
+                        let copy = if is_larger(&photo, other) { std::mem::replace(other, photo) } else { photo };
+                        let reason = format!("the same picture as {}", other.file);
+                        unusable.push(Unusable { name: copy.file, reason });
+                    }
                     None => photos.push(photo),
                 },
-                Err(Refused::Photograph(reason)) => refuse(reason),
+                Err(Refused::Photograph(reason)) => unusable.push(Unusable { name: place_in(&root, path), reason }),
                 Err(Refused::Work(error)) => return Err(error),
             }
         }
@@ -264,7 +269,7 @@ fn files(folder: &Path, every: usize) -> Result<Listed, IntakeError> {
     for path in &files {
         let name = name_in(&root, path);
         // Those of every layout that a scene is written in.
-        for layout in [Layout::Colmap, Layout::Transforms] {
+        for layout in [Layout::ColmapBinary, Layout::Transforms] {
             check_name(layout, &name).map_err(|reason| IntakeError::Name(path.clone(), reason))?;
         }
         if !names.insert(name.clone()) {

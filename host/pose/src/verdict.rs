@@ -30,8 +30,6 @@ use viewfuse_scene::Scene;
 const MIN_PHOTOGRAPHS: usize = 3;
 /// Plausible focal lengths, in widths of the photograph.
 const PLAUSIBLE_WIDTHS: std::ops::RangeInclusive<f64> = 0.5..=3.0;
-/// Most that a known focal length may change, as a share of it.
-const MAX_KNOWN_CHANGE: f64 = 0.15;
 /// Most that unknown focal lengths of two attempts may differ, as a share.
 const MAX_FOCAL_DIFFERENCE: f64 = 0.1;
 /// Least median parallax in degrees.
@@ -160,9 +158,9 @@ fn implausible(cameras: &Cameras, attempt: &Attempt) -> Option<String> {
         if !PLAUSIBLE_WIDTHS.contains(&(focal / width)) && group.focal.is_none() {
             return Some(format!("a focal length of {:.2} widths is not plausible", focal / width));
         }
-        if let Some(known) = group.focal.filter(|known| (focal / known - 1.0).abs() > MAX_KNOWN_CHANGE) {
-            return Some(format!("the focal length became {focal:.0} pixels where {known:.0} are known"));
-        }
+    }
+    if let Some([focal, known]) = cameras.changed_focal(&tried.focal) {
+        return Some(format!("the focal length became {focal:.0} pixels where {known:.0} are known"));
     }
     let support = tried.support?;
     if support.parallax < MIN_PARALLAX {

@@ -58,8 +58,23 @@ pub struct CameraRecord {
     pub focal: f64,
     /// Where the focal length comes from; it is refined with the poses.
     pub focal_from: FocalSource,
+    /// What was given, or the photographs state, in pixels.
+    pub stated_focal: Option<f64>,
     /// Radial distortion `k1`.
     pub k1: f64,
+}
+
+/// Most that a lens of at least its width's focal length displaces the corners of a photograph, as a share of their
+/// distance from the middle.
+const MAX_BEND: f64 = 0.03;
+
+impl CameraRecord {
+    /// Whether the lens bends more than lenses of such a focal length do: what crops that differ make of it.
+    pub fn is_doubtful(&self) -> bool {
+        let [width, height] = self.size.map(f64::from);
+        let corner = width.hypot(height) / 2.0 / self.focal;
+        self.focal >= width.max(height) && self.k1.abs() * corner * corner > MAX_BEND
+    }
 }
 
 impl Found {
@@ -93,6 +108,7 @@ impl Found {
             photographs: group.photos.iter().filter(|photo| verdict.photos.contains(photo)).count(),
             focal: attempt.tried.focal.get(index).copied().unwrap_or_default(),
             focal_from: group.source,
+            stated_focal: group.focal,
             k1: k1(index),
         });
         Record {

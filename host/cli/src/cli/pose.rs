@@ -23,8 +23,8 @@ use viewfuse_pose::{
 };
 use viewfuse_scene::inspect::inspect;
 use viewfuse_scene::photographs::BackgroundChoice;
-use viewfuse_scene::write::Layout;
-use viewfuse_scene::{encode_png, reads_below};
+use viewfuse_scene::write::{Layout, check_name};
+use viewfuse_scene::{Scene, encode_png, reads_below};
 
 /// Most photographs of which a refusal tells which others they match.
 const MAX_ROWS: usize = 24;
@@ -55,7 +55,8 @@ pub(crate) struct Arguments {
     /// Take every Nth photograph, in the order of the names
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     every: u16,
-    /// How to lay the scene out: colmap, colmap-binary or transforms
+    /// How to lay the scene out: colmap (text; binary where a photograph's name has a blank), colmap-binary or
+    /// transforms
     #[arg(long, default_value = "colmap", value_parser = parse_layout)]
     layout: Layout,
     /// Seed of every random draw
@@ -112,10 +113,17 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let found = on_threads(arguments.threads, work)??;
     let Ok(verdict) = &found.verdict else { bail!("{}: no verdict", photographs.display()) };
     print(&found, verdict, &found.record(verdict, &options))?;
-    say(format_args!("written    {} ({}): {} photographs", output.display(), arguments.layout, verdict.photos.len()))?;
+    let layout = holding(arguments.layout, &verdict.scene);
+    say(format_args!("written    {} ({layout}): {} photographs", output.display(), verdict.photos.len()))?;
     let word = quoted(output.as_os_str());
     say(format_args!("next       viewfuse render {word} --orbit 24 -o out"))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The binary form of a layout whose text form does not hold the names of a scene's photographs.
+fn holding(layout: Layout, scene: &Scene) -> Layout {
+    let are_held = scene.views.iter().all(|view| check_name(layout, &view.name).is_ok());
+    if layout == Layout::Colmap && !are_held { Layout::ColmapBinary } else { layout }
 }
 
 /// Removes the attempts that were kept for a scene that is there: a kill may have come between both. What cannot be
@@ -192,20 +200,29 @@ fn written(
             told(&found, refusal, &progress);
             drop(progress);
             table_of_matches(&found, matches.is_some());
-            bail!(
-                "{}: no poses that can be trusted ({}); {}{}",
-                photographs.display(),
-                refusal.main(),
-                found.matches.diagnosis(),
-                if found.cameras.are_known() { "" } else { "; or give the focal length with --focal" }
-            );
+            bail!("{}: no poses that can be trusted ({}); {}", photographs.display(), refusal.main(), advice(&found));
         }
     };
     let picture = camera_map(&verdict.scene, &inspect(&verdict.scene, BackgroundChoice::None, &progress)?);
     let files = [("cameras.png", encode_png(&DynamicImage::ImageRgb8(picture))?)];
     progress.stage("writing the scene", 9..10, 10);
-    write(&found, verdict, options, (layout, output), &files, &progress)?;
+    write(&found, verdict, options, (holding(layout, &verdict.scene), output), &files, &progress)?;
     Ok(found)
+}
+
+/// What a person can do where no poses were found.
+fn advice(found: &Found) -> String {
+    let is_stated = found.cameras.groups.iter().any(|group| group.source == FocalSource::Exif);
+    let changed = found.attempts.iter().find_map(|attempt| found.cameras.changed_focal(&attempt.tried.focal));
+    let way = found.matches.diagnosis();
+    match changed {
+        Some([focal, _]) if is_stated => format!(
+            "what EXIF states is not what the photographs show, as after a crop or with a digital zoom: try --focal \
+             {focal:.0}; or {way}"
+        ),
+        _ if found.cameras.are_known() => way,
+        _ => format!("{way}; or give the focal length with --focal"),
+    }
 }
 
 /// Which photographs cannot be used, and why attempts were refused: each reason once.
@@ -263,16 +280,23 @@ fn print(found: &Found, verdict: &Verdict, record: &Record<'_>) -> std::io::Resu
     }
     for camera in &record.cameras {
         let [width, height] = camera.size;
+        let stated = camera.stated_focal.unwrap_or(camera.focal);
         let from = match camera.focal_from {
-            FocalSource::Given => "given",
-            FocalSource::Exif => "from EXIF",
-            FocalSource::Unknown => "found with the poses",
+            FocalSource::Given => format!("refined from the given {stated:.0}"),
+            FocalSource::Exif => format!("refined from EXIF's {stated:.0}"),
+            FocalSource::Unknown => "found with the poses".to_owned(),
         };
         let (focal, widths) = (camera.focal, camera.focal / f64::from(width));
         say(format_args!(
             "focal      {focal:.0} pixels ({widths:.2} widths), {from}; {width}x{height}, k1 {:.4}",
             camera.k1
         ))?;
+        if camera.is_doubtful() {
+            say(format_args!(
+                "doubtful   the lens of {width}x{height}: it bends more than one of such a focal length does, as where \
+                 photographs were cropped differently; poses and lens are then wrong by some percent"
+            ))?;
+        }
     }
     let tried = record.attempts[record.attempt];
     let (solver, points, error) = (&tried.solver, tried.points, record.reprojection_error);
