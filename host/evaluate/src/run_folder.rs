@@ -85,6 +85,14 @@ pub enum FolderError {
         /// Its number.
         job: usize,
     },
+    /// A finished job is of an evaluation with other settings, whose lines were put here.
+    #[error("{}: job {job} was done with other settings than {SETTINGS} states; use another folder", path.display())]
+    OtherSettings {
+        /// The folder.
+        path: PathBuf,
+        /// Its number.
+        job: usize,
+    },
     /// Another process runs the same shard.
     #[error("{}: another process is writing to it", path.display())]
     Busy {

@@ -140,6 +140,12 @@ fn other_settings_are_refused() {
     change_poses(&folder, |view, matrix| matrix[3] += if view == 3 { 0.1 } else { 0.0 });
     refused(&first, &["cameras of toy: "]);
     fs::write(&pose, text).expect("a file");
+    // Another photograph under the same name.
+    let photograph = folder.join("toy/rgb/000003.png");
+    let before = fs::read(&photograph).expect("a photograph");
+    fs::copy(folder.join("toy/rgb/000004.png"), &photograph).expect("another one");
+    refused(&first, &["cameras of toy: "]);
+    fs::write(&photograph, before).expect("a file");
 
     // Damage is told with file and line.
     let journal = folder.join("out/scores-0-of-1.jsonl");
@@ -148,6 +154,9 @@ fn other_settings_are_refused() {
     refused(&first, &["out/scores-0-of-1.jsonl:2: is not of an evaluation"]);
     fs::write(&journal, whole.replace("\"scene\":0,", "\"scene\":1,")).expect("a file");
     refused(&first, &["out: job 0 has other views"]);
+    // Lines of another evaluation, put beside these.
+    fs::write(&journal, whole.replace("\"settings\":\"", "\"settings\":\"0")).expect("a file");
+    refused(&first, &["out: job 0 was done with other settings than run.json states"]);
     fs::write(folder.join("out/run.json"), "{}").expect("a file");
     refused(&first, &["out/run.json: is not of an evaluation"]);
 }

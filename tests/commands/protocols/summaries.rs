@@ -31,7 +31,7 @@ fn job(number: usize, scene: usize, source_count: usize, values: [[f64; 2]; 3]) 
     let scores = [NEAREST_COPY, "mean", "other"].into_iter().zip(values).map(score).collect();
     let sources = (0..source_count).map(|view| view.to_string()).collect();
     let (scene_name, device) = (format!("scene {scene}"), "cpu".to_owned());
-    Finished { job: number, scene, scene_name, trial: 0, device, sources, scores }
+    Finished { job: number, scene, scene_name, trial: 0, device, settings: String::new(), sources, scores }
 }
 
 fn value(table: &Table, row: usize, column: usize) -> f64 {

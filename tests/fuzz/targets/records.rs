@@ -76,6 +76,7 @@ pub(crate) fn evaluation() -> Records {
             scene_name: "toy".to_owned(),
             trial: job as u32,
             device: "CPU".to_owned(),
+            settings: String::new(),
             sources: vec!["000001".to_owned(); count],
             scores: vec![
                 score("nearest view", psnr - 3.0, count),

@@ -42,7 +42,7 @@ use viewfuse_weighting::{OpenedChoice, WeightingChoice};
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
-    viewfuse evaluate dino/ --targets 1,4,7,10,13,16 --size 160x120\n      each of six views from all others, every \
+    viewfuse evaluate dino/ --targets '#1,#4,#7,#10,#13' --size 160x120\n      each of five views from all others, every \
     scheme\n  viewfuse evaluate cars/*/ --sources all/3 --weights mean --weights error:alpha=1 -o cars.csv\n      the \
     other views from every third, two schemes\n  viewfuse evaluate fern/ --protocol llff:3\n      as few-shot papers \
     do on LLFF, with their figures beside\n  viewfuse evaluate scene/ --protocol nearest:4 --targets 2,5 --json\n      \

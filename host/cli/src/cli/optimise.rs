@@ -7,6 +7,7 @@ use super::printing::{say, warn_of};
 use super::terminal::Terminal;
 use super::threads::on_threads;
 use crate::shared::wrong;
+use anyhow::bail;
 use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use std::path::{Path, PathBuf};
@@ -26,8 +27,8 @@ const SHARP_SOURCES: usize = 20;
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  viewfuse optimise photos/ -o photos.ply\n  \
-    viewfuse optimise dino/ --left-out 3 -o dino.ply\n      view 3 is kept back, and scored as the Gaussians become \
-    better\n  viewfuse optimise dino/ --towards 3 --left-out 3 -o dino.ply\n      at last for view 3: its nearest \
+    viewfuse optimise dino/ --left-out '#3' -o dino.ply\n      view 3 is kept back, and scored as the Gaussians become \
+    better\n  viewfuse optimise dino/ --towards '#3' --left-out '#3' -o dino.ply\n      at last for view 3: its nearest \
     photographs count most\n  viewfuse optimise photos/ --quality standard -o photos.ply\n      sharper, in minutes; \
     --max-time 10m says how many\n  viewfuse optimise photos/ -o photos.html\n      one page for any browser, without \
     a server: to share\n  viewfuse render photos/ --gaussians photos.ply --orbit 24 -o out\n\n\
@@ -55,7 +56,7 @@ pub(crate) struct Arguments {
     /// standard at 800 and by high at 1600 [default: fast, for a page of 20 photographs and more standard]
     #[arg(long, value_name = "fast|standard|high")]
     quality: Option<Quality>,
-    /// As many iterations as fit into this time with standard or high: seconds, or minutes as 10m
+    /// At most this time for standard or high, with as many iterations as fit into it: seconds, or minutes as 10m
     #[arg(long, value_name = "TIME", value_parser = parse_time)]
     max_time: Option<Duration>,
     #[arg(long, value_name = "N", help = count_help(),
@@ -120,6 +121,11 @@ fn beside(output: &Path) -> PathBuf {
     output.with_extension(format!("unfinished.{extension}"))
 }
 
+/// Whether two paths are of one file.
+fn is_same(a: &Path, b: &Path) -> bool {
+    a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))
+}
+
 /// A file of a format that is written.
 fn known_file(path: PathBuf) -> Result<PathBuf, &'static str> {
     check_name(&path).map(|()| path)
@@ -162,6 +168,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     // For --resume, if the program is killed. A file that is there stays as it is until there is a finished one.
     let is_resumable = output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ply"));
     let unfinished = if output.exists() { beside(output) } else { output.clone() };
+    if output.exists()
+        && unfinished.exists()
+        && !arguments.resume.as_ref().is_some_and(|from| is_same(from, &unfinished))
+    {
+        bail!(
+            "{}: is of an optimisation that was stopped, and would be replaced; go on from it with --resume, or remove it",
+            unfinished.display()
+        );
+    }
     let mut is_kept = false;
     let keep = |so_far: &GaussianScene| {
         is_kept |= is_resumable;

@@ -34,7 +34,7 @@ use viewfuse_weighting::WeightingSpec;
     viewfuse pareto car/ --targets 5 --sources all/3 --model body:64 --size 64x64 -o out\n      each omission alone, \
     all together, and fewer samples, on every device\n  viewfuse pareto car/ --targets 5 --sources all/3 --model \
     genvs:small --size 32x32 --only all -o out\n      only settings whose words begin with all\n  viewfuse pareto \
-    dino/ --targets 1,7 --size 160x120 --device cpu --repeat 5 -o out\n      the training-free field, on the CPU\n\n\
+    dino/ --targets '#1,#7' --size 160x120 --device cpu --repeat 5 -o out\n      the training-free field, on the CPU\n\n\
     Writes pareto.csv, pareto.svg and pareto.json. The first setting, exact, leaves nothing out; the others are \
     compared with its pictures before rounding. The setting `all` has --leave-out, --early-termination and every \
     omission of the network. Times are medians over rounds through all settings; other load on the machine still \

@@ -18,7 +18,7 @@ use viewfuse_scene::unit::{RigUnit, SRN_DISTANCE};
 use viewfuse_weighting::WeightingSpec;
 
 #[derive(Args)]
-#[command(after_help = "Examples:\n  viewfuse weights dino/ --target 4 --weights error:alpha=0.5 --json\n  \
+#[command(after_help = "Examples:\n  viewfuse weights dino/ --target '#4' --weights error:alpha=0.5 --json\n  \
     viewfuse weights dino/ --orbit 36 --weights mean --weights cars=attention:cars.safetensors --csv\n  \
     viewfuse weights dino/ --targets all/4 --npy weights.npy\n\n\
     CSV has a line for each scheme, target and source. The array is [scheme][target][source]; what its indices mean is \

@@ -60,6 +60,9 @@ pub struct Finished {
     pub trial: u32,
     /// The device that ran it.
     pub device: String,
+    /// The evaluation's settings ([`Settings::digest`](super::Settings::digest)).
+    #[serde(default)]
+    pub settings: String,
     /// Names of the sources.
     pub sources: Vec<String>,
     /// Scores of every scheme at every target.

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use viewfuse_job::digest::hexadecimal;
 use viewfuse_scene::Scene;
 
@@ -47,9 +48,12 @@ pub struct SceneSettings {
     /// Width and height of the pictures at its first view.
     #[serde(default)]
     pub size: [u32; 2],
-    /// SHA-256 of the names, poses and sizes of its views, the first eight bytes.
+    /// SHA-256 of the names, poses and sizes of its views and of the lengths of their files, the first eight bytes.
     pub cameras: String,
 }
+
+/// What follows from the other settings.
+const FOLLOWING: [&str; 2] = ["job_count", "notes"];
 
 impl SceneSettings {
     /// The properties of a scene whose pictures have this size.
@@ -63,6 +67,10 @@ impl SceneSettings {
             [view.camera.pinhole.width(), view.camera.pinhole.height()]
                 .iter()
                 .for_each(|side| digest.update(side.to_le_bytes()));
+            // Other photographs under the same names have other lengths; a file's time is that of its copy.
+            let length = |file: &PathBuf| std::fs::metadata(file).map_or(0, |file| file.len());
+            let files = view.image.iter().chain(&view.mask);
+            files.for_each(|file| digest.update(length(file).to_le_bytes()));
         }
         let cameras = hexadecimal(&digest.finalize()[..8]);
         let masks = scene.views.iter().filter(|view| view.mask.is_some()).count();
@@ -71,14 +79,21 @@ impl SceneSettings {
 }
 
 impl Settings {
+    /// SHA-256 of all of them but what follows from the others, the first eight bytes.
+    pub fn digest(&self) -> String {
+        let all = self.flat();
+        let lines = all.iter().filter(|(key, _)| !FOLLOWING.contains(&key.as_str()));
+        let text: String = lines.map(|(key, value)| format!("{key} {value}\n")).collect();
+        hexadecimal(&Sha256::digest(text)[..8])
+    }
+
     /// The differences from `found`, in words: key, value here, value there.
     pub fn differences(&self, found: &Settings) -> Vec<String> {
         let (here, there) = (self.flat(), found.flat());
         let keys = here.keys().chain(there.keys().filter(|key| !here.contains_key(*key)));
         let differs = |key: &&String| here.get(*key) != there.get(*key);
-        // The number of jobs and the notes follow from the rest.
         let all: Vec<&String> = keys.filter(differs).collect();
-        let causes: Vec<&String> = all.iter().copied().filter(|key| *key != "job_count" && *key != "notes").collect();
+        let causes: Vec<&String> = all.iter().copied().filter(|key| !FOLLOWING.contains(&key.as_str())).collect();
         let told = if causes.is_empty() { all } else { causes };
         let words = |values: &BTreeMap<String, String>, key: &String| {
             let text = values.get(key).map_or("none", String::as_str);

@@ -72,7 +72,10 @@ impl Clock {
         self.fit(optimisation, one);
         let left = optimisation.iteration_count() - optimisation.done();
         progress.note(&match self.limit {
-            Some(_) => format!("some {left} iterations more, as many as fit into the time"),
+            Some(_) if optimisation.done_at_finest() + left < self.wanted => {
+                format!("some {left} iterations more, as many as fit into the time")
+            }
+            Some(_) => format!("{left} iterations more, which fit into the time"),
             None => format!("{left} iterations more, about {}", words(f64::from(left) * one)),
         });
         Ok(true)

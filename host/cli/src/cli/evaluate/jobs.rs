@@ -46,8 +46,9 @@ impl Jobs<'_> {
         let folder = self.path.map(|path| RunFolder::begin(path, self.settings.clone())).transpose()?;
         let mut journal = folder.as_ref().map(|folder| folder.journal(shard)).transpose()?;
         let mut finished = folder.as_ref().map_or_else(|| Ok(BTreeMap::new()), RunFolder::finished)?;
+        let settings = self.settings.digest();
         for (number, done) in &finished {
-            self.check(*number, done)?;
+            self.check(*number, done, &settings)?;
         }
         // What fields may see of the scenes.
         let shown: Vec<Scene> = match self.protocol.hides_masks() {
@@ -88,6 +89,7 @@ impl Jobs<'_> {
                 scene_name: scene.name(),
                 trial: job.trial,
                 device: device.name(),
+                settings: settings.clone(),
                 sources,
                 scores,
             };
@@ -103,12 +105,16 @@ impl Jobs<'_> {
     }
 
     /// A finished job must be the one that would be done now.
-    fn check(&self, number: usize, done: &Finished) -> Result<(), FolderError> {
+    fn check(&self, number: usize, done: &Finished, settings: &str) -> Result<(), FolderError> {
+        let path = || self.path.unwrap_or(Path::new("")).to_path_buf();
+        if done.settings != settings {
+            return Err(FolderError::OtherSettings { path: path(), job: number });
+        }
         let same =
             |job: &Job| done.scene == job.scene && done.sources == view_names(&self.scenes[job.scene], &job.sources);
-        match (self.plan.jobs.get(number), self.path) {
-            (Some(job), _) if same(job) => Ok(()),
-            (_, path) => Err(FolderError::OtherJob { path: path.unwrap_or(Path::new("")).to_path_buf(), job: number }),
+        match self.plan.jobs.get(number) {
+            Some(job) if same(job) => Ok(()),
+            _ => Err(FolderError::OtherJob { path: path(), job: number }),
         }
     }
 }
