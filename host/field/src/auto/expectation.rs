@@ -8,7 +8,8 @@
 //! these scores, beyond which a run has seen little; `E`: of the scores
 //! that their confidences say by the calibration; `g`, `e`: the target's gap and score by its confidences; `D`: the
 //! decibels that the coarse pictures do not show, see [`Basis::detail`]; `n`: the share of its surfaces that no
-//! photograph shows ([`Seen::by_none`]); `s`: 1 for objects with silhouettes, 0 for whole photographs.
+//! photograph shows ([`Seen::by_none`]); `s`: 1 for objects with silhouettes, whose `D` there is at most
+//! [`MAX_DETAIL`], 0 for whole photographs.
 
 use super::calibration::Calibration;
 use super::held_out::Outcome;
@@ -19,6 +20,9 @@ use serde::{Deserialize, Serialize};
 
 /// `c0` to `c6`, fitted to the targets of 11 scenes (`host/results/training_free.md`, "What auto chooses and expects").
 const CONSTANTS: [f64; TERMS] = [1.38, 2.30, 0.80, 0.085, -14.5, 1.68, 1.84];
+/// Most decibels that count as lost detail of an object: of pictures as small as the coarse ones, which lack none, more
+/// was expected than there is (1.4 dB in the mean of four objects at 48 to 96 pixels).
+const MAX_DETAIL: f64 = -0.75;
 /// The most that is expected above the best held-out source, decibels.
 const MAX_ABOVE: f64 = 3.0;
 /// Half of the interval, decibels: the error that four of five targets of scenes that the fit has not seen stay below
@@ -129,7 +133,7 @@ impl Basis {
         let gap = self.log_gap - standing.gap.log2();
         let (unseen, none) = (self.unseen(), seen.map_or(0.0, |seen| f64::from(seen.by_none)));
         let object = f64::from(u8::from(self.has_silhouettes));
-        [1.0, gap, surer, unseen, none, object, object * unseen]
+        [1.0, gap, surer, unseen, none, object, object * unseen.min(MAX_DETAIL)]
     }
 
     /// Whether a target of this geometry, with so much of it seen by few, is beyond what is known; why, if it is.
@@ -174,6 +178,25 @@ mod tests {
         let bounded = expected.with_error(&as_much);
         assert!((bounded.psnr - 21.99).abs() < 0.01, "{bounded:?}");
         assert!(bounded.interval[0] < 18.0 && bounded.interval[1] < 24.0, "{bounded:?}");
+    }
+
+    /// Of an object whose pictures are as small as the coarse ones no more is expected than where a little is lost.
+    #[test]
+    fn a_small_picture_of_an_object_is_no_better() {
+        let basis = |detail: f64| Basis {
+            psnr: 25.0,
+            best: 30.0,
+            log_gap: -2.0,
+            greatest_gap: 0.4,
+            calibrated: None,
+            detail,
+            has_silhouettes: true,
+        };
+        let expected = |detail: f64| basis(detail).expected(Standing { gap: 0.25, outside: 0.5 }, None, None).psnr;
+        // A sixth of the error's square is 0.67 dB.
+        let error = 10.0_f64.powf(-2.5);
+        assert!((expected(0.0) - expected(error / 6.0)).abs() < 0.1, "{} {}", expected(0.0), expected(error / 6.0));
+        assert!(expected(error) < expected(0.0) - 3.0, "{}", expected(error));
     }
 
     #[test]
