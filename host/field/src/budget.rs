@@ -63,7 +63,7 @@ pub struct Kept {
 pub struct Estimate {
     /// The estimate.
     pub value: f64,
-    /// The error is below this in 19 of 20 pictures.
+    /// The error is below this in 19 of 20 pictures: the bound, where drawn pixels say that it is kept.
     pub upper: f64,
     /// Exact pixels that it was made from; 0 if it was made from two pictures of different efforts, or is exact.
     pub pixels: usize,
