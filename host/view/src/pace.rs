@@ -138,7 +138,7 @@ mod tests {
         assert_eq!(settled(4000, 0.02), 1024, "the largest");
         assert_eq!(settled(1024, 0.2), 384);
         assert_eq!(settled(1024, 10.0), 128, "the coarsest");
-        assert_eq!(settled(100, 100.0), 43, "the coarsest of a small scene");
+        assert_eq!(settled(100, 100.0), 50, "the coarsest of a small scene");
     }
 
     #[test]
