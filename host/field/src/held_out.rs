@@ -50,9 +50,9 @@ impl HoldOut {
         self.neighbours_among(poses, view, |_| true)
     }
 
-    /// As [`HoldOut::neighbours`], of those that `is_one` says.
-    pub fn neighbours_among(&self, poses: &[Pose], view: usize, is_one: impl Fn(usize) -> bool) -> Vec<usize> {
-        let others = (0..poses.len()).filter(|other| *other != view && is_one(*other));
+    /// As [`HoldOut::neighbours`], of those that `is_candidate` allows.
+    pub fn neighbours_among(&self, poses: &[Pose], view: usize, is_candidate: impl Fn(usize) -> bool) -> Vec<usize> {
+        let others = (0..poses.len()).filter(|other| *other != view && is_candidate(*other));
         nearest(others, |other| poses[other].distance(&poses[view]), self.max_neighbours)
     }
 }

@@ -73,8 +73,8 @@ impl Cameras {
 
     /// Of the focal lengths that were found the first that is another one than is known: it, and the known one.
     pub fn changed_focal(&self, found: &[f64]) -> Option<[f64; 2]> {
-        let known = found.iter().zip(&self.groups).filter_map(|(found, group)| Some([*found, group.focal?]));
-        known.into_iter().find(|[found, known]| (found / known - 1.0).abs() > MAX_KNOWN_CHANGE)
+        let mut known = found.iter().zip(&self.groups).filter_map(|(found, group)| Some([*found, group.focal?]));
+        known.find(|[found, known]| (found / known - 1.0).abs() > MAX_KNOWN_CHANGE)
     }
 
     /// Whether every focal length is known.
@@ -91,5 +91,18 @@ impl Cameras {
             CameraGuess { focal: scale * group.focal.unwrap_or(guess * longest), is_guess: group.focal.is_none() }
         };
         self.groups.iter().map(guessed).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_known_may_change_a_little() {
+        let group = |focal| CameraGroup { focal, source: FocalSource::Exif, size: [4, 3], photos: Vec::new() };
+        let cameras = Cameras { groups: vec![group(None), group(Some(462.0))], of_photo: Vec::new() };
+        assert_eq!(cameras.changed_focal(&[300.0, 470.0]), None);
+        assert_eq!(cameras.changed_focal(&[300.0, 296.0]), Some([296.0, 462.0]));
     }
 }

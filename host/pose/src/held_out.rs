@@ -243,12 +243,12 @@ mod tests {
     }
 
     #[test]
-    fn a_photograph_is_not_rendered_from_its_twin() {
+    fn a_photograph_is_not_rendered_from_one_of_the_same_place() {
         let focus = Vec3::new(0.0, 0.0, 4.0);
-        let of = |places: &[f32], view| neighbours(&poses(places), focus, view);
-        assert_eq!(of(&[0.0, 0.01, 0.5, 1.0], 0), [2, 3]);
-        assert_eq!(of(&[0.0, 0.01, 0.5, 1.0], 2), [1, 0, 3]);
-        assert_eq!(of(&[0.0, 0.1, 0.5, 1.0], 0), [1, 2, 3], "a degree and a half beside");
-        assert_eq!(of(&[0.0, 0.01, 0.5], 0), [1, 2], "there are no two others");
+        let found = |places: &[f32], view| neighbours(&poses(places), focus, view);
+        assert_eq!(found(&[0.0, 0.01, 0.5, 1.0], 0), [2, 3]);
+        assert_eq!(found(&[0.0, 0.01, 0.5, 1.0], 2), [1, 0, 3]);
+        assert_eq!(found(&[0.0, 0.1, 0.5, 1.0], 0), [1, 2, 3], "a degree and a half beside");
+        assert_eq!(found(&[0.0, 0.01, 0.5], 0), [1, 2], "there are no two others");
     }
 }

@@ -64,16 +64,16 @@ pub struct CameraRecord {
     pub k1: f64,
 }
 
-/// Most that a lens of at least its width's focal length displaces the corners of a photograph, as a share of their
-/// distance from the middle.
-const MAX_BEND: f64 = 0.03;
+/// Most distortion at the corners of a photograph by a lens whose focal length is at least its longer side, as a share
+/// of their distance from the middle.
+const MAX_DISTORTION: f64 = 0.03;
 
 impl CameraRecord {
-    /// Whether the lens bends more than lenses of such a focal length do: what crops that differ make of it.
+    /// Whether the lens distorts more than lenses of such a focal length do: what crops that differ make of it.
     pub fn is_doubtful(&self) -> bool {
         let [width, height] = self.size.map(f64::from);
         let corner = width.hypot(height) / 2.0 / self.focal;
-        self.focal >= width.max(height) && self.k1.abs() * corner * corner > MAX_BEND
+        self.focal >= width.max(height) && self.k1.abs() * corner * corner > MAX_DISTORTION
     }
 }
 
@@ -171,4 +171,24 @@ pub fn is_current(posed: &Path, photographs: &Path) -> Result<bool, IntakeError>
     let now = files_in(photographs)?;
     let record = std::fs::read(posed.join(RECORD)).unwrap_or_default();
     Ok(serde_json::from_slice::<Earlier>(&record).is_ok_and(|earlier| earlier.files == now))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_lens_that_distorts_is_doubtful() {
+        let camera = |focal: f64, k1: f64| CameraRecord {
+            size: [240, 180],
+            photographs: 8,
+            focal,
+            focal_from: FocalSource::Unknown,
+            stated_focal: None,
+            k1,
+        };
+        assert!(camera(388.0, -0.342).is_doubtful(), "what crops that differ gave");
+        assert!(!camera(388.0, -0.02).is_doubtful());
+        assert!(!camera(140.0, -0.25).is_doubtful(), "a wide angle");
+    }
 }

@@ -226,9 +226,8 @@ impl Draft<'_> {
 
 /// The names of a scene's views in a layout: their own, unless that numbers them.
 fn names_in(scene: &Scene, layout: Layout) -> Vec<String> {
-    let own = || scene.views.iter().map(|view| view.name.clone()).collect();
     let numbered = (layout == Layout::Neus).then(|| neus::numbered(scene)).flatten();
-    numbered.unwrap_or_else(own)
+    numbered.unwrap_or_else(|| scene.views.iter().map(|view| view.name.clone()).collect())
 }
 
 /// Refuses poses without a photograph.
@@ -269,8 +268,10 @@ fn lost(scene: &Scene, layout: Layout) -> Vec<String> {
     }
     let has_object = scene.views.iter().any(|view| scene.has_object_mask(view));
     if layout == Layout::Neus && !has_object {
-        lines
-            .push("masks, of which there are none: NeuS's own program wants mask/, where white pictures do".to_owned());
+        lines.push(
+            "masks, of which there are none: NeuS's own program needs mask/, in which white pictures will do"
+                .to_owned(),
+        );
     }
     if layout == Layout::Neus && !neus::has_unit_sphere(scene) && !has_object {
         let (_, radius) = neus::sphere(scene);

@@ -124,7 +124,7 @@ mod tests {
     #[test]
     fn a_fast_device_draws_full_pictures() {
         let at = |pace: &Pace| pace.side(u32::MAX);
-        let settled = |full_side: u32, second_a_megapixel: f64| {
+        let final_side = |full_side: u32, second_a_megapixel: f64| {
             let mut pace = Pace::of(true, full_side);
             assert!(at(&pace) <= 320, "at first {}", at(&pace));
             for _ in 0..50 {
@@ -133,12 +133,12 @@ mod tests {
             }
             at(&pace)
         };
-        assert_eq!(settled(1024, 0.02), 1024);
-        assert_eq!(settled(512, 0.02), 512);
-        assert_eq!(settled(4000, 0.02), 1024, "the largest");
-        assert_eq!(settled(1024, 0.2), 384);
-        assert_eq!(settled(1024, 10.0), 128, "the coarsest");
-        assert_eq!(settled(100, 100.0), 50, "the coarsest of a small scene");
+        assert_eq!(final_side(1024, 0.02), 1024);
+        assert_eq!(final_side(512, 0.02), 512);
+        assert_eq!(final_side(4000, 0.02), 1024, "the largest");
+        assert_eq!(final_side(1024, 0.2), 384);
+        assert_eq!(final_side(1024, 10.0), 128, "the coarsest");
+        assert_eq!(final_side(100, 100.0), 50, "the coarsest of a small scene");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::ending::INTERRUPTED;
 use super::options::{DeviceOptions, PictureOptions, SourceOptions};
-use super::outputs::keep_file_apart;
+use super::outputs::{is_same, keep_file_apart};
 use super::printing::{say, warn_of};
 use super::terminal::Terminal;
 use super::threads::on_threads;
@@ -121,11 +121,6 @@ fn beside(output: &Path) -> PathBuf {
     output.with_extension(format!("unfinished.{extension}"))
 }
 
-/// Whether two paths are of one file.
-fn is_same(a: &Path, b: &Path) -> bool {
-    a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))
-}
-
 /// A file of a format that is written.
 fn known_file(path: PathBuf) -> Result<PathBuf, &'static str> {
     check_name(&path).map(|()| path)
@@ -168,10 +163,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     // For --resume, if the program is killed. A file that is there stays as it is until there is a finished one.
     let is_resumable = output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ply"));
     let unfinished = if output.exists() { beside(output) } else { output.clone() };
-    if output.exists()
-        && unfinished.exists()
-        && !arguments.resume.as_ref().is_some_and(|from| is_same(from, &unfinished))
-    {
+    let goes_on_from_it = arguments.resume.as_ref().is_some_and(|from| is_same(from, &unfinished));
+    if unfinished.exists() && !goes_on_from_it {
         bail!(
             "{}: is of an optimisation that was stopped, and would be replaced; go on from it with --resume, or remove it",
             unfinished.display()

@@ -103,13 +103,16 @@ fn inside(scene: &Scene, path: &Path, what: &str) -> anyhow::Error {
 /// # Errors
 /// That of wrong arguments.
 pub fn keep_input(input: &Path, output: &Path) -> anyhow::Result<()> {
-    match (canonicalize(input), canonicalize(output)) {
-        (Ok(from), Ok(to)) if from == to => {
-            let (input, output) = (input.display(), output.display());
-            Err(wrong(format_args!("{output}: is the input {input} itself, which is not replaced; give another name")))
-        }
-        _ => Ok(()),
+    if !is_same(input, output) {
+        return Ok(());
     }
+    let (input, output) = (input.display(), output.display());
+    Err(wrong(format_args!("{output}: is the input {input} itself, which is not replaced; give another name")))
+}
+
+/// Whether two paths, under any spelling, are those of one file that is there.
+pub(crate) fn is_same(a: &Path, b: &Path) -> bool {
+    canonicalize(a).is_ok_and(|a| canonicalize(b).is_ok_and(|b| a == b))
 }
 
 #[cfg(test)]

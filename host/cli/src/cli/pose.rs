@@ -293,7 +293,7 @@ fn print(found: &Found, verdict: &Verdict, record: &Record<'_>) -> std::io::Resu
         ))?;
         if camera.is_doubtful() {
             say(format_args!(
-                "doubtful   the lens of {width}x{height}: it bends more than one of such a focal length does, as where \
+                "doubtful   the lens of {width}x{height}: it distorts more than one of such a focal length does, as where \
                  photographs were cropped differently; poses and lens are then wrong by some percent"
             ))?;
         }

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 /// `c0` to `c6`, fitted to the targets of 11 scenes (`host/results/training_free.md`, "What auto chooses and expects").
 const CONSTANTS: [f64; TERMS] = [1.38, 2.30, 0.80, 0.085, -14.5, 1.68, 1.84];
 /// Most decibels that count as lost detail of an object: of pictures as small as the coarse ones, which lack none, more
-/// was expected than there is (1.4 dB in the mean of four objects at 48 to 96 pixels).
+/// was expected than there is (1.5 dB in the mean of five objects at 48 to 96 pixels).
 const MAX_DETAIL: f64 = -0.75;
 /// The most that is expected above the best held-out source, decibels.
 const MAX_ABOVE: f64 = 3.0;

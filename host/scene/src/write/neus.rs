@@ -95,16 +95,16 @@ fn places(names: &[String]) -> Vec<u64> {
 
 /// Names of a scene's views that are numbers, in natural order of their own; `None` where they can keep these.
 pub(super) fn numbered(scene: &Scene) -> Option<Vec<String>> {
-    let own: Vec<String> = scene.views.iter().map(|view| view.name.clone()).collect();
-    let mut order: Vec<usize> = (0..own.len()).collect();
-    order.sort_by(|&a, &b| natural_order(&format!("{}.png", own[a]), &format!("{}.png", own[b])));
-    let listed: Vec<&str> = order.iter().map(|&view| own[view].as_str()).collect();
-    let places = places(&own);
-    let read = matrices_of(&listed, &(0..own.len() as u64).collect());
+    let given: Vec<String> = scene.views.iter().map(|view| view.name.clone()).collect();
+    let mut order: Vec<usize> = (0..given.len()).collect();
+    order.sort_by(|&a, &b| natural_order(&format!("{}.png", given[a]), &format!("{}.png", given[b])));
+    let listed: Vec<&str> = order.iter().map(|&view| given[view].as_str()).collect();
+    let places = places(&given);
+    let read = matrices_of(&listed, &(0..given.len() as u64).collect());
     if read.is_some_and(|read| order.iter().zip(read).all(|(&view, number)| places[view] == number)) {
         return None;
     }
-    let mut names = vec![String::new(); own.len()];
+    let mut names = vec![String::new(); given.len()];
     order.into_iter().enumerate().for_each(|(place, view)| names[view] = format!("{place:06}"));
     Some(names)
 }
