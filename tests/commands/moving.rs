@@ -256,6 +256,11 @@ fn an_ffmpeg_gets_the_video_or_there_is_y4m() {
     assert_eq!(run.code, Some(1));
     assert!(run.stderr.contains("video.mp4: ffmpeg could not write it: no such encoder"), "{}", run.stderr);
     assert!(names_in(&folder.join("out")).iter().all(|name| !name.ends_with("mp4")));
+    // It failed before the last frame, and no picture is lost by that.
+    let run = with_programs(&folder, &programs, &format!("{PATH} --video mp4 -o failed"));
+    assert_eq!(run.code, Some(1));
+    let pictures = |name: &&String| name.starts_with("between-") && name.ends_with("png");
+    assert_eq!(names_in(&folder.join("failed")).iter().filter(pictures).count(), 10, "pictures and depth maps");
 }
 
 /// The numbers of a `.npy` file of `<f4`, with its header.

@@ -2,7 +2,8 @@
 
 use crate::rate::FrameRate;
 pub(crate) use gif::EncodingError;
-use gif::{Encoder, Frame, Repeat};
+pub(crate) use gif::Frame;
+use gif::{Encoder, Repeat};
 use image::RgbImage;
 use std::io::{self, Write};
 
@@ -42,6 +43,11 @@ impl<W: Write> Gif<W> {
         self.written += delay;
         frame.delay = delay as u16;
         self.encoder.write_frame(&frame)
+    }
+
+    /// Writes the end, and returns the writer.
+    pub(crate) fn finish(self) -> Result<W, EncodingError> {
+        self.encoder.into_inner()
     }
 }
 

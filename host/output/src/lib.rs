@@ -25,6 +25,7 @@
 //! journal  what an interrupted run continues from
 //! earlier  what an earlier run left in a folder
 //! unwritten  frames whose files other threads write
+//! videos   videos that grow with the frames
 //! run      all of it in a folder
 //! folder   checks of that folder before work begins
 //! ```
@@ -52,6 +53,7 @@ pub mod selected;
 pub mod sheet;
 mod unwritten;
 pub mod video;
+mod videos;
 pub mod webp;
 pub mod weights;
 pub mod y4m;

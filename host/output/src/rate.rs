@@ -4,6 +4,13 @@
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameRate(f64);
 
+impl Default for FrameRate {
+    /// 30.
+    fn default() -> FrameRate {
+        FrameRate::DEFAULT
+    }
+}
+
 impl FrameRate {
     /// The default.
     pub const DEFAULT: FrameRate = FrameRate(30.0);

@@ -6,7 +6,7 @@
 use crate::depth::{DepthFormat, write_depth};
 use crate::earlier::earlier_files;
 use crate::journal::{FrameJournal, files_of};
-use crate::png::{without_background, write_png};
+use crate::png::write_png;
 use crate::rate::FrameRate;
 use crate::record::{
     ChosenRecord, DepthUnits, FrameRecord, RunRecord, background_record, kernel_records, times_record, view_names,
@@ -14,7 +14,8 @@ use crate::record::{
 pub use crate::record::{RECORD, SUFFIXES};
 use crate::sheet::{Sheet, SheetSource, depth_picture};
 use crate::unwritten::{File, Frames};
-use crate::video::{VideoError, VideoFormat, write_video};
+use crate::video::{VideoError, VideoFormat};
+use crate::videos::{Background, Videos, picture_of};
 use image::{DynamicImage, ImageBuffer, Luma, RgbImage};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -53,6 +54,7 @@ impl Default for Outputs {
 pub struct RunWriter {
     // Dropped before the lock: what it began to write is written then.
     frames: Frames,
+    videos: Videos,
     folder: PathBuf,
     /// What is written for the frames that follow.
     pub outputs: Outputs,
@@ -112,6 +114,7 @@ impl RunWriter {
     pub fn new(folder: &Path, scene: &Scene, scene_label: String, job: &FewShot, weighting: &Weighting) -> RunWriter {
         RunWriter {
             frames: Frames::default(),
+            videos: Videos::default(),
             folder: folder.to_path_buf(),
             outputs: Outputs::default(),
             has_begun: false,
@@ -133,6 +136,12 @@ impl RunWriter {
             warnings: Vec::new(),
             chosen: None,
         }
+    }
+
+    /// The pictures of all targets are written as `video.FORMAT`, too, while they are rendered.
+    pub fn make_videos(&mut self, formats: &[VideoFormat], rate: FrameRate) {
+        let files = self.target_names.iter().map(|name| self.folder.join(format!("{name}.png"))).collect();
+        self.videos = Videos::new(formats, rate, files);
     }
 
     /// Adds a warning to the record.
@@ -200,8 +209,15 @@ impl RunWriter {
         let record = FrameRecord::of(&frame, &self.source_names, &self.coverage, &self.space)
             .expecting(self.chosen.as_ref(), &frame);
         let bytes = bytes_of(&frame);
-        let files = self.files(&Arc::new(frame))?;
-        self.frames.add(record, files, bytes)
+        let frame = Arc::new(frame);
+        let files = self.files(&frame)?;
+        self.frames.add(record, files, bytes)?;
+        self.videos.add(&self.folder, &frame, self.background());
+        Ok(())
+    }
+
+    fn background(&self) -> Background {
+        if self.outputs.alpha { Background::Transparent(self.background) } else { Background::Shown(self.background) }
     }
 
     /// The files of a frame. Those of an earlier run that it does not have would belong to another picture, and are
@@ -217,14 +233,8 @@ impl RunWriter {
             }
             Ok(())
         };
-        let (shown, is_transparent, background) = (Arc::clone(frame), self.outputs.alpha, self.background);
-        let picture: Writing = Box::new(move |path| {
-            let picture = match is_transparent {
-                true => DynamicImage::ImageRgba8(without_background(&shown.colours, size, background)),
-                false => DynamicImage::ImageRgb8(shown.picture.clone()),
-            };
-            write_png(path, &picture)
-        });
+        let (shown, background) = (Arc::clone(frame), self.background());
+        let picture: Writing = Box::new(move |path| write_png(path, &picture_of(&shown, background)));
         add(format!("{target}.png"), Some(picture))?;
         for format in DepthFormat::ALL {
             let (shown, space) = (Arc::clone(frame), self.space);
@@ -270,24 +280,13 @@ impl RunWriter {
         if self.earlier.is_empty() { remove_if_there(&self.folder.join(RECORD)) } else { Ok(()) }
     }
 
-    /// Writes the pictures of all targets, which were given, as `video.FORMAT`; returns its path. For before the
-    /// record.
+    /// Ends the videos, once all frames were given, and returns their paths. For before the record.
     ///
     /// # Errors
     /// [`VideoError`].
-    pub fn write_video(
-        &mut self,
-        format: VideoFormat,
-        rate: FrameRate,
-        progress: &dyn Progress,
-    ) -> Result<PathBuf, VideoError> {
+    pub fn finish_videos(&mut self, progress: &dyn Progress) -> Result<Vec<PathBuf>, VideoError> {
         self.frames.settle()?;
-        let path = self.folder.join(format!("video.{format}"));
-        let frames: Vec<PathBuf> =
-            self.target_names.iter().map(|name| self.folder.join(format!("{name}.png"))).collect();
-        let background = self.background.map(|value| (value * 255.0).round() as u8);
-        write_video(&path, format, &frames, rate, background, progress)?;
-        Ok(path)
+        self.videos.finish(progress)
     }
 
     /// Writes the record.

@@ -1,27 +1,23 @@
 //! The frames of a run as one file: an animated picture, or a video.
 
+mod ffmpeg;
+
+use self::ffmpeg::{FFMPEG, Ffmpeg};
 use crate::gif::{self, Gif};
 use crate::rate::FrameRate;
-use crate::webp::{self, Animation};
+use crate::webp::{self, Animation, EncodedFrame};
 use crate::y4m::Y4m;
-use image::{DynamicImage, ImageError, Rgb, RgbImage};
+use image::{DynamicImage, Rgb, RgbImage};
+use std::error::Error;
 use std::fmt;
-use std::io::{self, BufWriter, Read, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::str::FromStr;
-use std::sync::Arc;
 use viewfuse_device::queue::{Queue, width};
 use viewfuse_job::files::{WholeFile, WriteError, write_whole};
-use viewfuse_job::process::Process;
 use viewfuse_job::progress::{Interrupted, Progress};
-use viewfuse_scene::{SceneError, picture_size, read_picture};
-
-/// The program that compresses videos, where a person has it.
-const FFMPEG: &str = "ffmpeg";
-
-/// Most bytes of what it says that are read.
-const MAX_SAID: u64 = 1 << 16;
+use viewfuse_scene::SceneError;
 
 /// A format of moving pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,15 +80,12 @@ pub enum VideoError {
     /// A frame could not be read.
     #[error(transparent)]
     Frame(#[from] SceneError),
-    /// The frames differ in size: a frame's file, its width and height, and those of the first frame.
+    /// The frames differ in size: the video, a frame's width and height, and those of the first frame.
     #[error(
-        "{}: has {}x{} pixels, the first frame {}x{}; the frames of a video have one size",
+        "{}: a frame has {}x{} pixels, the first one {}x{}; the frames of a video have one size",
         .0.display(), .1[0], .1[1], .2[0], .2[1]
     )]
     Sizes(PathBuf, [u32; 2], [u32; 2]),
-    /// There is no frame.
-    #[error("a video needs at least one frame")]
-    NoFrames,
     /// There is no `ffmpeg` on this machine.
     #[error("there is no {FFMPEG} on the path, which mp4 needs")]
     NoProgram,
@@ -104,107 +97,134 @@ pub enum VideoError {
     Interrupted(#[from] Interrupted),
 }
 
-/// Writes pictures that are there as files, all of one size, as a moving picture, completely or not at all.
-/// Transparency is kept in WebP, and laid over `background` in the others.
-///
-/// # Errors
-/// [`VideoError`]; [`VideoError::NoProgram`] if the format is MP4 and there is no `ffmpeg`.
-pub fn write_video(
-    path: &Path,
-    format: VideoFormat,
-    frames: &[PathBuf],
-    rate: FrameRate,
-    background: [u8; 3],
-    progress: &dyn Progress,
-) -> Result<(), VideoError> {
-    let first = frames.first().ok_or(VideoError::NoFrames)?;
-    let frames = Frames { files: frames, size: picture_size(first)?, background, progress };
-    match format {
-        VideoFormat::Webp => {
-            let mut animation = Animation::new(frames.size, rate);
-            let encode = |cause: ImageError| WriteError::Encode { path: path.to_path_buf(), cause: cause.into() };
-            frames.each(
-                |frame| webp::encoded(&frame),
-                |frame| {
-                    animation.add(&frame.map_err(encode)?);
-                    Ok(())
-                },
-            )?;
-            Ok(write_whole(path, &animation.finish())?)
-        }
-        VideoFormat::Gif => {
-            let encode =
-                |cause: gif::EncodingError| WriteError::Encode { path: path.to_path_buf(), cause: cause.into() };
-            let mut file = WholeFile::create(path)?;
-            let mut output = Unfailing(&mut file);
-            let mut animation = Gif::begin(&mut output, frames.size, rate).map_err(encode)?;
-            frames.each(
-                move |frame| gif::frame(&over(frame, background)),
-                |frame| Ok(frame.and_then(|frame| animation.add(frame)).map_err(encode)?),
-            )?;
-            // The end of the file is written when the encoder goes.
-            drop(animation);
-            Ok(file.finish()?)
-        }
-        VideoFormat::Y4m => {
-            let mut file = WholeFile::create(path)?;
-            frames.stream(&mut Unfailing(&mut file), rate, |cause| io_error(path, cause))?;
-            Ok(file.finish()?)
-        }
-        VideoFormat::Mp4 => compress(path, &frames, rate),
-    }
-}
-
-/// Pictures that are there as files.
-struct Frames<'a> {
-    files: &'a [PathBuf],
+/// A moving picture that is written frame by frame, while the next frames are made, and appears when it is finished.
+/// Other threads encode, those of the current pool.
+pub struct VideoWriter {
+    path: PathBuf,
     size: [u32; 2],
+    encode: fn(DynamicImage, [u8; 3]) -> Result<Encoded, Cause>,
     background: [u8; 3],
-    progress: &'a dyn Progress,
+    /// Frames that are not written yet.
+    frames: Queue<Result<Encoded, VideoError>>,
+    output: Output,
 }
 
-impl Frames<'_> {
-    /// Reads each picture and gives it to `encode` on other threads; `deliver` gets what becomes of it, in order.
-    fn each<T: Send + 'static>(
-        &self,
-        encode: impl Fn(DynamicImage) -> T + Send + Sync + 'static,
-        mut deliver: impl FnMut(T) -> Result<(), VideoError>,
-    ) -> Result<(), VideoError> {
-        self.progress.expect(self.files.len());
-        let (encode, first) = (Arc::new(encode), self.size);
-        let mut queue: Queue<Result<T, VideoError>> = Queue::default();
-        let mut paths = self.files.iter();
-        for _ in self.files {
-            self.progress.check()?;
-            for path in paths.by_ref().take(width() - queue.len()) {
-                let (path, encode) = (path.clone(), Arc::clone(&encode));
-                queue.add(move || {
-                    let frame = read_picture(&path)?;
-                    let size = [frame.width(), frame.height()];
-                    if size != first {
-                        return Err(VideoError::Sizes(path, size, first));
-                    }
-                    Ok(encode(frame))
-                });
+type Cause = Box<dyn Error + Send + Sync>;
+
+/// A frame as its format wants it.
+enum Encoded {
+    Webp(EncodedFrame),
+    Gif(gif::Frame<'static>),
+    Plain(RgbImage),
+}
+
+/// Where frames go.
+enum Output {
+    Webp(Animation),
+    Gif(Box<Gif<Whole>>),
+    Y4m(Y4m<Whole>),
+    Mp4(Ffmpeg),
+}
+
+impl VideoWriter {
+    /// Begins a video whose frames have this width and height. Transparency is kept in WebP, and laid over
+    /// `background` in the others.
+    ///
+    /// # Errors
+    /// [`VideoError::Write`]; [`VideoError::NoProgram`] if the format is MP4 and there is no `ffmpeg`.
+    pub fn begin(
+        path: &Path,
+        format: VideoFormat,
+        size: [u32; 2],
+        rate: FrameRate,
+        background: [u8; 3],
+    ) -> Result<VideoWriter, VideoError> {
+        let file = || WholeFile::create(path).map(Whole);
+        let (encode, output): (fn(DynamicImage, [u8; 3]) -> Result<Encoded, Cause>, Output) = match format {
+            VideoFormat::Webp => {
+                (|frame, _| Ok(Encoded::Webp(webp::encoded(&frame)?)), Output::Webp(Animation::new(size, rate)))
             }
-            queue.next_result().map_or(Ok(()), |frame| deliver(frame?))?;
-            self.progress.step();
+            VideoFormat::Gif => {
+                let animation = Gif::begin(file()?, size, rate).map_err(|cause| encode_error(path, cause))?;
+                (|frame, behind| Ok(Encoded::Gif(gif::frame(&over(frame, behind))?)), Output::Gif(Box::new(animation)))
+            }
+            VideoFormat::Y4m => {
+                let video = Y4m::begin(file()?, size, rate).map_err(|cause| io_error(path, cause))?;
+                (plain, Output::Y4m(video))
+            }
+            VideoFormat::Mp4 => (plain, Output::Mp4(Ffmpeg::begin(path, size, rate)?)),
+        };
+        Ok(VideoWriter { path: path.to_path_buf(), size, encode, background, frames: Queue::default(), output })
+    }
+
+    /// Begins to encode the next frame, which another thread makes or reads. While as many wait as there are threads,
+    /// it waits for the oldest.
+    ///
+    /// # Errors
+    /// Those of this frame's predecessors: nothing may follow.
+    pub fn add(
+        &mut self,
+        picture: impl FnOnce() -> Result<DynamicImage, SceneError> + Send + 'static,
+    ) -> Result<(), VideoError> {
+        while self.frames.len() >= width() {
+            self.write_oldest()?;
+        }
+        let (encode, background, first, path) = (self.encode, self.background, self.size, self.path.clone());
+        self.frames.add(move || {
+            let picture = picture()?;
+            let size = [picture.width(), picture.height()];
+            match size == first {
+                true => encode(picture, background).map_err(|cause| encode_error(&path, cause)),
+                false => Err(VideoError::Sizes(path, size, first)),
+            }
+        });
+        Ok(())
+    }
+
+    /// Writes the oldest frame that is not written.
+    fn write_oldest(&mut self) -> Result<(), VideoError> {
+        let Some(frame) = self.frames.next_result() else { return Ok(()) };
+        match (&mut self.output, frame?) {
+            (Output::Webp(animation), Encoded::Webp(frame)) => animation.add(&frame),
+            (Output::Gif(animation), Encoded::Gif(frame)) => {
+                animation.add(frame).map_err(|cause| encode_error(&self.path, cause))?;
+            }
+            (Output::Y4m(video), Encoded::Plain(frame)) => {
+                video.frame(&frame).map_err(|cause| io_error(&self.path, cause))?;
+            }
+            (Output::Mp4(program), Encoded::Plain(frame)) => program.frame(&frame)?,
+            // Frames are encoded for the output.
+            _ => {}
         }
         Ok(())
     }
 
-    /// As y4m.
-    fn stream(
-        &self,
-        writer: &mut dyn Write,
-        rate: FrameRate,
-        failed: impl Fn(io::Error) -> VideoError,
-    ) -> Result<(), VideoError> {
-        let mut video = Y4m::begin(writer, self.size, rate).map_err(&failed)?;
-        let background = self.background;
-        self.each(move |frame| over(frame, background), |frame| video.frame(&frame).map_err(&failed))?;
-        video.finish().map_err(&failed).map(drop)
+    /// Writes the frames that wait, and puts the file in its place.
+    ///
+    /// # Errors
+    /// [`VideoError`]; then there is no file.
+    pub fn finish(mut self, progress: &dyn Progress) -> Result<PathBuf, VideoError> {
+        progress.expect(self.frames.len());
+        while !self.frames.is_empty() {
+            progress.check()?;
+            self.write_oldest()?;
+            progress.step();
+        }
+        let VideoWriter { path, output, .. } = self;
+        match output {
+            Output::Webp(animation) => write_whole(&path, &animation.finish())?,
+            Output::Gif(animation) => {
+                animation.finish().map_err(|cause| encode_error(&path, cause))?.0.finish()?;
+            }
+            Output::Y4m(video) => video.finish().map_err(|cause| io_error(&path, cause))?.0.finish()?,
+            Output::Mp4(program) => program.finish()?,
+        }
+        Ok(path)
     }
+}
+
+fn plain(frame: DynamicImage, background: [u8; 3]) -> Result<Encoded, Cause> {
+    Ok(Encoded::Plain(over(frame, background)))
 }
 
 /// A picture over a background of one colour.
@@ -221,9 +241,9 @@ fn over(picture: DynamicImage, background: [u8; 3]) -> RgbImage {
 }
 
 /// A file that appears when it is whole, as a writer.
-struct Unfailing<'a>(&'a mut WholeFile);
+struct Whole(WholeFile);
 
-impl Write for Unfailing<'_> {
+impl Write for Whole {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.0.write(bytes).map_err(|error| match error {
             WriteError::Io { cause, .. } => cause,
@@ -241,43 +261,6 @@ fn io_error(path: &Path, cause: io::Error) -> VideoError {
     WriteError::Io { path: path.to_path_buf(), cause }.into()
 }
 
-/// Frames as y4m to the standard input of `ffmpeg`, which writes the file. It is named otherwise until it is whole.
-fn compress(path: &Path, frames: &Frames<'_>, rate: FrameRate) -> Result<(), VideoError> {
-    let draft = WholeFile::create(path)?;
-    let mut command = Command::new(FFMPEG);
-    command.args(["-hide_banner", "-loglevel", "error", "-y", "-f", "yuv4mpegpipe", "-i", "-"]);
-    // Half the resolution of colours, as every player expects, needs even sides.
-    command.args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]);
-    // Players would guess by the size which matrix the colours were made with.
-    command.args(["-colorspace", "smpte170m", "-color_primaries", "bt709", "-color_trc", "iec61966-2-1"]);
-    command.args(["-color_range", "tv", "-f", "mp4"]).arg(draft.path());
-    command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
-    let process = Process::start(&mut command).map_err(|cause| match cause.kind() {
-        io::ErrorKind::NotFound => VideoError::NoProgram,
-        _ => io_error(path, cause),
-    })?;
-    let (input, _, errors) = process.pipes();
-    let sent = match input {
-        Some(input) => frames.stream(&mut BufWriter::new(input), rate, |cause| io_error(path, cause)),
-        None => Ok(()),
-    };
-    if matches!(sent, Err(VideoError::Interrupted(_) | VideoError::Frame(_) | VideoError::Sizes { .. })) {
-        // It would make a video of the frames that it got.
-        process.end();
-    }
-    let mut said = String::new();
-    if let Some(errors) = errors {
-        errors.take(MAX_SAID).read_to_string(&mut said).ok();
-    }
-    let ended = process.wait().map_err(|cause| io_error(path, cause));
-    let outcome = match (sent, ended) {
-        (Err(error @ (VideoError::Interrupted(_) | VideoError::Frame(_) | VideoError::Sizes { .. })), _) => Err(error),
-        (_, Err(error)) => Err(error),
-        (sent, Ok(status)) if status.success() => sent,
-        (_, Ok(status)) => {
-            let said = if said.trim().is_empty() { status.to_string() } else { said.trim().replace('\n', "; ") };
-            Err(VideoError::Program(path.to_path_buf(), said))
-        }
-    };
-    outcome.and_then(|()| Ok(draft.finish()?))
+fn encode_error(path: &Path, cause: impl Into<Cause>) -> VideoError {
+    WriteError::Encode { path: path.to_path_buf(), cause: cause.into() }.into()
 }

@@ -13,9 +13,8 @@ use std::time::Duration;
 use viewfuse_core::pose::Pose;
 use viewfuse_job::files::Scratch;
 use viewfuse_job::progress::Progress;
-use viewfuse_output::png::write_png;
 use viewfuse_output::rate::FrameRate;
-use viewfuse_output::video::{VideoError, VideoFormat, write_video};
+use viewfuse_output::video::{VideoError, VideoFormat, VideoWriter};
 use viewfuse_weighting::Weighting;
 
 /// Frames a second, as the page plays a path.
@@ -140,32 +139,38 @@ impl Turn<'_> {
             Ok(scratch) => scratch,
             Err(error) => return failed(&error),
         };
-        let mut files = Vec::new();
-        while files.len() < of {
-            self.status.film(Some([files.len(), of]));
+        let file = scratch.path().join(format!("video.{format}"));
+        let rate = FrameRate::new(RATE).unwrap_or_default();
+        let (mut video, mut count) = (None, 0);
+        while count < of {
+            self.status.film(Some([count, of]));
             let frame = frames.recv_timeout(LOOK);
             if is_gone() {
                 return None;
             }
             match frame {
                 Ok(Ok(picture)) => {
-                    let file = scratch.path().join(format!("{:04}.png", files.len()));
-                    if let Err(error) = write_png(&file, &DynamicImage::ImageRgb8(picture)) {
+                    let size = picture.dimensions().into();
+                    let begin = || VideoWriter::begin(&file, format, size, rate, [0; 3]);
+                    let mut writer = match video.take().map_or_else(begin, Ok) {
+                        Ok(writer) => writer,
+                        Err(error) => return failed(&error),
+                    };
+                    if let Err(error) = writer.add(move || Ok(DynamicImage::ImageRgb8(picture))) {
                         return failed(&error);
                     }
-                    files.push(file);
+                    video = Some(writer);
+                    count += 1;
                 }
                 Ok(Err(answer)) => return Some(answer),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return None,
             }
         }
-        let file = scratch.path().join(format!("video.{format}"));
-        let rate = FrameRate::new(RATE).unwrap_or(FrameRate::DEFAULT);
-        match write_video(&file, format, &files, rate, [0; 3], &Wanted(is_gone)) {
+        match video?.finish(&Wanted(is_gone)) {
             Err(VideoError::Interrupted(_)) => return None,
             Err(error) => return failed(&error),
-            Ok(()) => {}
+            Ok(_) => {}
         }
         let media_type = if format == VideoFormat::Mp4 { "video/mp4" } else { "image/webp" };
         std::fs::read(&file).map_or_else(|error| failed(&error), |bytes| Some(Answer::of(media_type, bytes)))

@@ -10,10 +10,8 @@ use crate::cli::threads::on_threads;
 use viewfuse_field::auto::{self, Chosen};
 use viewfuse_field::render::Frame;
 use viewfuse_job::progress::{Part, Progress};
-use viewfuse_output::rate::FrameRate;
 use viewfuse_output::record::RunRecord;
 use viewfuse_output::run::{Circumstances, RunWriter};
-use viewfuse_output::video::VideoFormat;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_weighting::Weighting;
 
@@ -29,6 +27,7 @@ pub(super) fn to_folder(
     let mut writer = RunWriter::new(&arguments.output, &prepared.scene, label, &prepared.job, &before);
     writer.lock()?;
     writer.outputs = arguments.outputs.outputs();
+    writer.make_videos(&prepared.videos, prepared.rate);
     warning.into_iter().for_each(|warning| writer.warn(warning));
     writer.earlier = std::mem::take(&mut prepared.earlier);
     if let Some(settings) = &prepared.settings {
@@ -43,18 +42,17 @@ pub(super) fn to_folder(
     Ok(())
 }
 
-/// The record of a run whose pictures and videos are written, with a line about each video.
+/// The record of a run whose pictures and videos are written, and the names of the videos.
 fn written(
     arguments: &Arguments,
     prepared: &Prepared,
     mut writer: RunWriter,
     progress: &dyn Progress,
 ) -> anyhow::Result<(RunRecord, Vec<String>)> {
-    let formats = &prepared.videos;
     let renderer = prepared.field.on(&prepared.device.device);
-    // A frame of a video takes a part of the time that it took to render.
-    let frames = 10 * prepared.job.targets.len().max(1);
-    let parts = frames + prepared.job.targets.len() * formats.len();
+    // Of videos only their end is left after the last frame.
+    let frames = prepared.job.targets.len().max(1);
+    let parts = frames + prepared.videos.len();
     let part = Part::begin(progress, "", 0..frames, parts);
     let write = |sources: &SourceImages, frame: Frame, chosen: Option<&Chosen>| {
         chosen.into_iter().for_each(|chosen| writer.set_chosen(chosen));
@@ -62,7 +60,8 @@ fn written(
     };
     let run = prepared.run(renderer.as_ref(), &part);
     let (finished, _) = auto::render(&run, prepared.weighting.as_ref(), write)?;
-    let videos = videos(&mut writer, formats, prepared.rate, &Part::begin(progress, "", frames..parts, parts))?;
+    let videos = writer.finish_videos(&Part::begin(progress, "", frames..parts, parts))?;
+    let videos = videos.iter().map(|path| path.display().to_string()).collect();
     let circumstances = Circumstances {
         program: env!("CARGO_PKG_VERSION"),
         device_reason: prepared.device.reason.clone(),
@@ -74,19 +73,4 @@ fn written(
         total_time: prepared.start.elapsed(),
     };
     Ok((writer.finish(renderer.as_ref(), &prepared.options, finished, circumstances)?, videos))
-}
-
-/// Writes the pictures as videos; returns a line about each.
-fn videos(
-    writer: &mut RunWriter,
-    formats: &[VideoFormat],
-    rate: FrameRate,
-    progress: &dyn Progress,
-) -> anyhow::Result<Vec<String>> {
-    let mut lines = Vec::new();
-    for (index, format) in formats.iter().enumerate() {
-        progress.stage(&format!("writing video.{format}"), index..index + 1, formats.len());
-        lines.push(writer.write_video(*format, rate, progress)?.display().to_string());
-    }
-    Ok(lines)
 }
