@@ -15,7 +15,26 @@ tests!(
     a_form_with_other_results_is_not_used,
     a_form_of_other_subgroups_is_not_used,
     kernels_are_compiled_ahead,
+    tiles_stay_in_registers,
 );
+
+/// Most registers of an invocation of any device.
+const MAX_REGISTERS: f64 = 256.0;
+
+/// What a driver says of each form of a product: no invocation has more registers than there are. Most say nothing.
+fn tiles_stay_in_registers(candidate: &Candidate) -> Result<(), Failed> {
+    let gpu = candidate.gpu(&GpuOptions::default())?;
+    for kernel in [Kernel::Linear, Kernel::Convolve] {
+        let forms = kernel.forms().iter().chain(kernel.rounded_forms()).chain(&Form::FUSED);
+        for form in forms.copied().filter(|form| candidate.adapter.runs(*form)) {
+            let statistics = gpu.statistics(kernel, form)?;
+            println!("{} {}: {statistics:?}", kernel.name(), form.name());
+            let registers = statistics.iter().filter(|(name, _)| name.to_lowercase().contains("register count"));
+            registers.for_each(|(name, count)| assert!((1.0..=MAX_REGISTERS).contains(count), "{name}: {count}"));
+        }
+    }
+    Ok(())
+}
 
 fn numbers(count: u32) -> Vec<f32> {
     (0..count).map(|at| (at * 7919 % 1000) as f32 / 1000.0 - 0.5).collect()

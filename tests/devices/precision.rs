@@ -37,6 +37,7 @@ tests!(
     little_work_is_exact,
     bounds_choose_among_precisions,
     a_form_that_is_wrong_is_told_once,
+    fused_products_take_the_place_of_units,
     rates_of_rounded_products,
 );
 
@@ -85,7 +86,7 @@ fn picture(
 
 /// Pictures in f16 and in two parts are a little off the exact one. On a device without units all are the same.
 fn assert_close<F: Field + Sync>(candidate: &Candidate, field: impl Fn(Precision) -> F) -> Result<(), Failed> {
-    let without = candidate.vulkan(&GpuOptions::default())?;
+    let without = candidate.vulkan(&GpuOptions { min_fused_gain: f64::INFINITY, ..GpuOptions::default() })?;
     let (exact, _) = picture(&without, &field(Precision::Exact), &Silent)?;
     if !candidate.adapter.has_matrices {
         assert!(without.precisions().is_empty());
@@ -208,6 +209,31 @@ fn efforts_round_where_a_device_does(candidate: &Candidate) -> Result<(), Failed
         assert!(cheaper.iter().cloned().eq(expected), "{cheaper:?}");
         assert!(without.iter().all(|label| !label.contains("products")), "{without:?}");
     }
+    Ok(())
+}
+
+/// A device without units has efforts of fused products where these gain something, and pictures that differ from the
+/// exact one by as little as two roundings do.
+fn fused_products_take_the_place_of_units(candidate: &Candidate) -> Result<(), Failed> {
+    let open = |stand_ins, min_fused_gain| {
+        candidate.vulkan(&GpuOptions { stand_ins, min_fused_gain, min_rounded_work: 0, ..GpuOptions::default() })
+    };
+    if candidate.adapter.has_matrices {
+        assert!(!open(None, 0.0)?.precisions().contains(&Precision::Fused), "beside units");
+        return Ok(());
+    }
+    if takes_stand_ins(&candidate.adapter) {
+        assert_eq!(open(Some(stand_ins()), 0.0)?.precisions(), Precision::ROUNDED);
+    }
+    assert!(open(None, f64::INFINITY)?.precisions().is_empty());
+    let (device, checkpoint) = (open(None, 0.0)?, body());
+    assert_eq!(device.precisions(), [Precision::Fused]);
+    let labels = labels(&device, &pixelnerf(&checkpoint, Precision::Exact))?;
+    let (exact, fused) = labels.split_last().expect("efforts");
+    assert!(exact == "exact" && fused.iter().all(|label| label.ends_with("fused products")), "{labels:?}");
+    let (exact, _) = picture(&device, &pixelnerf(&checkpoint, Precision::Exact), &Silent)?;
+    let (fused, record) = picture(&device, &pixelnerf(&checkpoint, Precision::Fused), &Silent)?;
+    assert!(record.notes.is_empty() && rms(&fused, &exact) < 1e-5, "{}", rms(&fused, &exact));
     Ok(())
 }
 

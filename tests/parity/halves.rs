@@ -1,6 +1,6 @@
-//! Products of factors in f16, in one part and in two, against `f64` within the bounds that follow from the roundings:
-//! by a device's matrix units where it has them, and on lavapipe by what stands in for them, which has the same places,
-//! barriers and roundings.
+//! Products that are not exact against `f64` within the bounds that follow from the roundings. Of factors in f16, in one
+//! part and in two: by a device's matrix units where it has them, and on lavapipe by what stands in for them, which has
+//! the same places, barriers and roundings. Fused with sums: on every device.
 
 use super::trial_on;
 use libtest_mimic::{Failed, Trial};
@@ -11,14 +11,20 @@ use viewfuse_kernels::network::convolve::{ConvolveBlock, patch_value};
 use viewfuse_kernels::network::linear::LinearBlock;
 use viewfuse_tests::devices::{exchanged_stand_ins, stand_ins, takes_stand_ins};
 use viewfuse_vulkan::kernel::{Form, Kernel};
-use viewfuse_vulkan::{Adapter, Gpu, GpuOptions, Instance};
+use viewfuse_vulkan::{Adapter, AdapterKind, Gpu, GpuOptions, Instance};
 
 /// The trials of a device.
 pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> {
-    if !takes_stand_ins(adapter) {
-        return Vec::new();
+    let mut trials = vec![trial_on(instance, adapter, "fused_products_are_tried", fused_products_are_tried)];
+    for form in Form::FUSED.into_iter().filter(|form| adapter.has_room_for(*form)) {
+        let options = GpuOptions { form: Some(form), ..GpuOptions::default() };
+        trials.push(trial_on(instance, adapter, form.name(), move |instance, adapter| {
+            is_within_its_bound(instance, adapter, &options, form)
+        }));
     }
-    let mut trials = Vec::new();
+    if !takes_stand_ins(adapter) {
+        return trials;
+    }
     for form in Form::ROUNDED {
         for (what, stand_ins) in [("stands_in", Some(stand_ins())), ("units", None)] {
             if stand_ins.is_none() && !adapter.has_matrices || !adapter.has_room_for(form) {
@@ -55,6 +61,7 @@ fn compare(form: Form, product: &Product, outputs: &[f32]) -> Result<f64, Failed
     let Product { left, weights, first, columns } = product;
     let inners = weights.len() / columns;
     let (relative, absolute) = match form {
+        form if form.may_fuse() => (0.0, 0.0),
         Form::Half | Form::HalfSmall | Form::HalfTiny => (2_f64.powi(-11), 2_f64.powi(-14)),
         _ => (2_f64.powi(-22), 2_f64.powi(-25)),
     };
@@ -63,7 +70,7 @@ fn compare(form: Form, product: &Product, outputs: &[f32]) -> Result<f64, Failed
     for (element, found) in outputs.iter().enumerate() {
         let (row, column) = (element / columns, element % columns);
         let left = &left[row * inners..(row + 1) * inners];
-        if left.iter().any(|number| number.abs() > 65_504.0) {
+        if form.needs_matrices() && left.iter().any(|number| number.abs() > 65_504.0) {
             if !found.is_nan() {
                 return Err(format!("{found} hides a factor that is too large").into());
             }
@@ -77,7 +84,8 @@ fn compare(form: Form, product: &Product, outputs: &[f32]) -> Result<f64, Failed
             bound += off(a) * b.abs() + off(b) * a.abs() + off(a) * off(b);
             bound += if form.sizes()[0] == Form::TwoHalves { (a * b).abs() * relative } else { 0.0 };
         }
-        bound += (inners + 4) as f64 * 2_f64.powi(-22) * total;
+        // Half a unit a product and half a unit a sum, where units of matrices may cut instead.
+        bound += (inners + 4) as f64 * if form.may_fuse() { 2_f64.powi(-23) } else { 2_f64.powi(-22) } * total;
         let share = (f64::from(*found) - sum).abs() / bound;
         if share.is_nan() || share > 1.0 {
             return Err(format!("row {row}, column {column}: {found} instead of {sum}, bound {bound}").into());
@@ -103,7 +111,7 @@ fn is_within_its_bound(
         let (bias, residual) = (numbers(columns, 3), numbers(rows * columns, 4));
         if rows > 100 {
             left[inners + 1] = 70_000.0;
-            left[3 * inners] = f32::NEG_INFINITY;
+            left[3 * inners] = if form.needs_matrices() { f32::NEG_INFINITY } else { -1e9 };
             left[5 * inners] = 60_000.0;
             left[5 * inners + 1] = 3e-6;
         }
@@ -151,6 +159,23 @@ fn is_within_its_bound(
         let first = (0..pixels as usize * columns).map(|element| bias[element % columns]).collect();
         compare(form, &Product { left, weights, first, columns }, &device.download(&outputs)?)?;
     }
+    Ok(())
+}
+
+/// Fused products are used where they gain something, which they do on no processor.
+fn fused_products_are_tried(instance: &Arc<Instance>, adapter: &Adapter) -> Result<(), Failed> {
+    let kernels = [Kernel::Linear, Kernel::Convolve];
+    let open = |min_fused_gain| Gpu::open(instance, adapter, &GpuOptions { min_fused_gain, ..GpuOptions::default() });
+    let (usual, whenever_right, never) = (open(1.1)?, open(0.0)?, open(f64::INFINITY)?);
+    for (kernel, form) in kernels.into_iter().flat_map(|kernel| Form::FUSED.map(|form| (kernel, form))) {
+        let is_trusted = usual.trusts(kernel, form)?;
+        println!("{} {}: {is_trusted}", kernel.name(), form.name());
+        assert!(!is_trusted || adapter.kind != AdapterKind::Software, "a processor gained by {}", form.name());
+        assert_eq!(whenever_right.trusts(kernel, form)?, adapter.has_room_for(form), "{}", form.name());
+        assert!(!never.trusts(kernel, form)?, "no form is so much faster");
+    }
+    assert!(!whenever_right.trusts(Kernel::MatrixProduct, Form::Fused)?, "a kernel without the form");
+    assert!(never.distrusted_forms().is_empty(), "what gains nothing is no fault");
     Ok(())
 }
 

@@ -26,6 +26,9 @@ const VARIABLE: u32 = 59;
 const DECORATE: u32 = 71;
 const MEMBER_DECORATE: u32 = 72;
 
+/// A decoration: a device must not fuse the operation with another.
+const NO_CONTRACTION: u32 = 42;
+
 /// The instructions of a module, each with its number.
 fn instructions(module: &[u32]) -> impl Iterator<Item = (u32, &[u32])> {
     instructions_of(module.get(HEADER..).unwrap_or_default())
@@ -107,8 +110,9 @@ impl Index {
         Index { head: HEADER.min(head)..head, words, functions, order, places, variables }
     }
 
-    /// The module of one entry point; without one of this name it has none.
-    pub(crate) fn excerpt(&self, entry_point: &str) -> Vec<u32> {
+    /// The module of one entry point; without one of this name it has none. If it `may_fuse`, a device may fuse its
+    /// operations.
+    pub(crate) fn excerpt(&self, entry_point: &str, may_fuse: bool) -> Vec<u32> {
         let is_named = |words: &[u32]| {
             let bytes: &[u8] = bytemuck::cast_slice(words);
             bytes.strip_prefix(entry_point.as_bytes()).is_some_and(|rest| rest.first() == Some(&0))
@@ -137,6 +141,7 @@ impl Index {
             let is_kept = match (code, words) {
                 (NAME | MEMBER_NAME, _) => false,
                 (ENTRY_POINT, [_, _, id, ..]) | (EXECUTION_MODE, [_, id, ..]) => entry == Some(*id),
+                (DECORATE, [_, _, NO_CONTRACTION]) if may_fuse => false,
                 (DECORATE | MEMBER_DECORATE, [_, id, ..]) => !is_unused(id) && is_placed(id),
                 (VARIABLE, [_, _, id, ..]) => !is_unused(id),
                 _ => true,
@@ -189,7 +194,7 @@ mod tests {
                     Form::Subgroup => (&subgroups, &OF_SUBGROUPS[..]),
                     _ => (&kernels, &[][..]),
                 };
-                let module = module.excerpt(kernel.entry_point(form));
+                let module = module.excerpt(kernel.entry_point(form), false);
                 let coded = |wanted| instructions(&module).filter(move |(code, _)| *code == wanted);
                 assert_eq!(coded(ENTRY_POINT).count(), 1, "{} {}", kernel.name(), form.name());
                 for (_, capability) in coded(CAPABILITY) {
@@ -202,12 +207,27 @@ mod tests {
         assert!(seen >= 2 * Kernel::ALL.len());
     }
 
+    /// What may be fused differs in nothing else, and nothing that may not be is fused.
+    #[test]
+    fn an_excerpt_may_allow_to_fuse() {
+        let index = Index::new(MODULE);
+        for form in Form::FUSED {
+            let name = Kernel::Linear.entry_point(form);
+            let (strict, free) = (index.excerpt(name, false), index.excerpt(name, true));
+            let is_mark = |(code, words): &(u32, &[u32])| *code == DECORATE && words[2..] == [NO_CONTRACTION];
+            let marks = |module: &[u32]| instructions(module).filter(is_mark).count();
+            assert!(marks(&strict) > 0 && marks(&free) == 0, "{name}");
+            let others = instructions(&strict).filter(|instruction| !is_mark(instruction));
+            assert!(others.eq(instructions(&free)) && strict[..HEADER] == free[..HEADER], "{name}");
+        }
+    }
+
     #[test]
     fn an_excerpt_declares_the_workgroup_memory_of_its_kernel() {
         let (index, module) = (Index::new(MODULE), words(MODULE));
         for kernel in Kernel::ALL {
             for form in kernel.forms().iter().filter(|form| !form.needs_subgroups()) {
-                let part = index.excerpt(kernel.entry_point(*form));
+                let part = index.excerpt(kernel.entry_point(*form), false);
                 let declared =
                     |module| instructions(module).filter(|(code, words)| *code == VARIABLE && words[3] == WORKGROUP);
                 let shared = declared(&part).count();
@@ -222,10 +242,10 @@ mod tests {
         let (index, module) = (Index::new(MODULE), words(MODULE));
         let count = |module: &[u32], wanted| instructions(module).filter(|(code, _)| *code == wanted).count();
         for kernel in Kernel::ALL {
-            let part = index.excerpt(kernel.entry_point(Form::Single));
+            let part = index.excerpt(kernel.entry_point(Form::Single), false);
             assert_eq!((count(&part, ENTRY_POINT), count(&part, EXECUTION_MODE)), (1, 1), "{}", kernel.name());
             assert!(count(&part, FUNCTION) >= 1 && part.len() < module.len() / 4, "{}", kernel.name());
         }
-        assert_eq!(count(&index.excerpt("fuse"), ENTRY_POINT), 0, "only whole names");
+        assert_eq!(count(&index.excerpt("fuse", false), ENTRY_POINT), 0, "only whole names");
     }
 }

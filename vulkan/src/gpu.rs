@@ -25,6 +25,9 @@ pub(crate) const WIDEST_PAGED: u64 = 16;
 /// largest GPUs, half a second on those of a tenth of their rate.
 const MIN_ROUNDED_WORK: u64 = 1 << 39;
 
+/// [`GpuOptions::min_fused_gain`] where nothing else is said.
+const MIN_FUSED_GAIN: f64 = 1.1;
+
 /// Options of an opened device.
 #[derive(Clone, Copy, Debug)]
 pub struct GpuOptions {
@@ -39,7 +42,7 @@ pub struct GpuOptions {
     /// Limits that apply where they are lower than the device's own, so that tests can split work on any device.
     pub limits: Limits,
     /// The form of all tiled kernels; `None` for the fastest, which is measured. The results of [`Form::ALL`] are the
-    /// same bits. A form of [`Form::ROUNDED`] is that of the kernels that have it.
+    /// same bits. A form of [`Form::ROUNDED`] or [`Form::FUSED`] is that of the kernels that have it.
     pub form: Option<Form>,
     /// A module whose entry points take the place of those for matrix units, so that tests see the same places,
     /// barriers and roundings on any device; `None` for the device's own units.
@@ -47,6 +50,9 @@ pub struct GpuOptions {
     /// Multiply-adds of a picture from which on forms of rounded factors are worth their trial, which compiles for
     /// seconds in a first process, and gains less than that for less work.
     pub min_rounded_work: u64,
+    /// How much faster than two roundings a form of [`Form::FUSED`] has to be, in its trial, to be used. Of 0 it is used
+    /// wherever it is right, also on a software driver; otherwise those do not try it.
+    pub min_fused_gain: f64,
     /// The longest time that a piece of a dispatch may be expected to take; `None` for the device's default:
     /// [`GpuOptions::longest_piece_on`]. The results are the same bits.
     pub longest_piece: Option<Duration>,
@@ -84,6 +90,7 @@ impl Default for GpuOptions {
             form: None,
             stand_ins: None,
             min_rounded_work: MIN_ROUNDED_WORK,
+            min_fused_gain: MIN_FUSED_GAIN,
             longest_piece: None,
             faults: Faults::default(),
         }
@@ -136,6 +143,8 @@ pub struct Gpu {
     pub(crate) faults: Faults,
     pub(crate) has_stand_ins: bool,
     min_rounded_work: u64,
+    /// [`GpuOptions::min_fused_gain`].
+    pub(crate) min_fused_gain: f64,
 }
 
 pub(crate) struct State {
@@ -223,6 +232,7 @@ impl Gpu {
             faults: options.faults,
             has_stand_ins: options.stand_ins.is_some(),
             min_rounded_work: options.min_rounded_work,
+            min_fused_gain: options.min_fused_gain,
         })
     }
 
@@ -234,6 +244,15 @@ impl Gpu {
     /// Whether it has what a form of tiled kernels needs, or what stands in for it.
     pub(crate) fn runs(&self, form: Form) -> bool {
         self.handle.runs(form) || form.needs_matrices() && self.has_stand_ins && self.handle.has_room_for(form)
+    }
+
+    /// What the driver says of a kernel in a form as it compiles it, in its own words: registers of an invocation, for
+    /// one. Empty where it says nothing.
+    ///
+    /// # Errors
+    /// If it does not compile.
+    pub fn statistics(&self, kernel: Kernel, form: Form) -> Result<Vec<(String, f64)>, VulkanError> {
+        self.pipelines.statistics(kernel, form)
     }
 
     /// [`GpuOptions::min_rounded_work`].

@@ -125,6 +125,34 @@ impl Handle {
         reports.first().map(|report| report.subgroup_size).filter(|size| *size > 0)
     }
 
+    /// Whether the driver reports of pipelines.
+    pub(crate) fn reports_pipelines(&self) -> bool {
+        self.executables.is_some()
+    }
+
+    /// The statistics of a compute pipeline that was made to keep them, with the driver's names.
+    pub(crate) fn statistics(&self, pipeline: vk::Pipeline) -> Vec<(String, f64)> {
+        let info = vk::PipelineExecutableInfoKHR::default().pipeline(pipeline);
+        // SAFETY: the pipeline is the device's and keeps its statistics, and the device has the extension and its
+        // feature. A compute pipeline has an executable 0.
+        let found = self.executables.as_ref().map(|known| unsafe { known.get_pipeline_executable_statistics(&info) });
+        let statistic = |known: &vk::PipelineExecutableStatisticKHR<'_>| {
+            let name = known.name_as_c_str().map_or_else(|_| String::new(), |name| name.to_string_lossy().into_owned());
+            use vk::PipelineExecutableStatisticFormatKHR as Kind;
+            // SAFETY: the format says which of the numbers it is.
+            let value = unsafe {
+                match known.format {
+                    Kind::BOOL32 => f64::from(known.value.b32),
+                    Kind::INT64 => known.value.i64 as f64,
+                    Kind::UINT64 => known.value.u64 as f64,
+                    _ => known.value.f64,
+                }
+            };
+            (name, value)
+        };
+        found.and_then(Result::ok).unwrap_or_default().iter().map(statistic).collect()
+    }
+
     /// Whether this many more bytes are available.
     pub(crate) fn has_room(&self, bytes: u64) -> bool {
         self.used.load(Ordering::Relaxed).saturating_add(bytes) <= self.limits.memory

@@ -135,7 +135,11 @@ impl Pipelines {
     pub(crate) fn get(&self, key: Key) -> Result<Pipeline, VulkanError> {
         let (set_layout, layout) = self.layouts(key.0)?;
         let made = locked(&self.made).entry(key).or_default().clone();
-        Ok(Pipeline { raw: made.get_or_init(|| self.create(key, layout)).clone()?, layout, set_layout })
+        Ok(Pipeline {
+            raw: made.get_or_init(|| self.create(key, layout, vk::PipelineCreateFlags::empty())).clone()?,
+            layout,
+            set_layout,
+        })
     }
 
     /// Makes the pipelines that are not there side by side: a driver takes up to seconds for each.
@@ -177,6 +181,21 @@ impl Pipelines {
         asked.filter_map(|(_, made)| made.get()?.as_ref().ok()).find_map(|pipeline| self.reported_of(*pipeline))
     }
 
+    /// What the driver says of a kernel as it compiles it, in its own words: registers of an invocation, for one. Empty
+    /// where it says nothing.
+    pub(crate) fn statistics(&self, kernel: Kernel, form: Form) -> Result<Vec<(String, f64)>, VulkanError> {
+        if !self.handle.reports_pipelines() {
+            return Ok(Vec::new());
+        }
+        let (_, layout) = self.layouts(kernel)?;
+        let kept = vk::PipelineCreateFlags::CAPTURE_STATISTICS_KHR;
+        let pipeline = self.create((kernel, form, 0), layout, kept)?;
+        let statistics = self.handle.statistics(pipeline);
+        // SAFETY: nothing else knows it.
+        unsafe { self.handle.device.destroy_pipeline(pipeline, None) };
+        Ok(statistics)
+    }
+
     fn layouts(&self, kernel: Kernel) -> Result<(vk::DescriptorSetLayout, vk::PipelineLayout), VulkanError> {
         let mut known = locked(&self.layouts);
         if let Some(layouts) = known.get(&kernel) {
@@ -214,7 +233,12 @@ impl Pipelines {
         Ok((set_layout, layout))
     }
 
-    fn create(&self, (kernel, form, page_shift): Key, layout: vk::PipelineLayout) -> Result<vk::Pipeline, VulkanError> {
+    fn create(
+        &self,
+        (kernel, form, page_shift): Key,
+        layout: vk::PipelineLayout,
+        flags: vk::PipelineCreateFlags,
+    ) -> Result<vk::Pipeline, VulkanError> {
         let subgroup_size = match form.needs_matrices() {
             true => matrices::SUBGROUP,
             false => self.handle.subgroup_size().unwrap_or_default(),
@@ -237,7 +261,7 @@ impl Pipelines {
             Form::Subgroup => &INDICES[1],
             _ => &INDICES[0],
         };
-        let module = self.module(&index.excerpt(&entry_point))?;
+        let module = self.module(&index.excerpt(&entry_point, form.may_fuse()))?;
         // No kernel's name has a zero in it.
         let name = CString::new(entry_point).unwrap_or_default();
         let mut stage = vk::PipelineShaderStageCreateInfo::default()
@@ -251,7 +275,7 @@ impl Pipelines {
             let full = vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS_EXT;
             stage = stage.flags(full).push_next(&mut required);
         }
-        let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
+        let info = [vk::ComputePipelineCreateInfo::default().flags(flags).stage(stage).layout(layout)];
         let cache = self.shared_cache();
         // SAFETY: the module has an entry point of this name with these bindings: a test reads it back. The cache may
         // be used by several threads.

@@ -1,4 +1,5 @@
-//! Whether forms of rounded factors ([`Form::ROUNDED`]) give on a device what they promise: a product is tried first.
+//! Whether forms that are not exact ([`Form::ROUNDED`], [`Form::FUSED`]) give on a device what they promise: a product is
+//! tried first, and of fused ones the time, too.
 
 use crate::buffer::{Bound, Buffer};
 use crate::error::VulkanError;
@@ -7,15 +8,19 @@ use crate::gpu::Gpu;
 use crate::kernel::{Form, Kernel};
 use bytemuck::bytes_of;
 use std::ops::Range;
+use std::time::{Duration, Instant};
 use viewfuse_kernels::network::convolve::{ConvolveBlock, patch_value};
 use viewfuse_kernels::network::linear::LinearBlock;
 use viewfuse_kernels::network::tile::Shape;
 
 /// The largest f16.
 const LARGEST: f32 = 65_504.0;
+/// Measurements of a form's time, and dispatches of each.
+const ROUNDS: u32 = 3;
+const REPEATS: u32 = 4;
 
 impl Gpu {
-    /// As [`Gpu::dispatch`], with a form of rounded factors ([`Form::ROUNDED`]) where this device is trusted with it
+    /// As [`Gpu::dispatch`], with a form that is not [exact](Form::is_exact) where this device is trusted with it
     /// ([`Gpu::trusts`]) and the arrays lie in fours ([`Kernel::is_in_fours`]): other numbers, within that form's
     /// bound; otherwise as `dispatch`. Of the form's [sizes](Form::sizes) that is taken which suits the product, where
     /// the device is trusted with it as well as with the largest one.
@@ -31,7 +36,7 @@ impl Gpu {
         arrays: &[Bound<'_>],
     ) -> Result<(), VulkanError> {
         let form = match kernel.shape(parameters) {
-            Some(shape) if form.needs_matrices() && kernel.is_in_fours(parameters) => Some(self.sized(form, shape)),
+            Some(shape) if !form.is_exact() && kernel.is_in_fours(parameters) => Some(self.sized(form, shape)),
             _ => None,
         };
         let form = match form {
@@ -59,17 +64,20 @@ impl Gpu {
         sizes.iter().find(has_enough).copied().unwrap_or(sizes[sizes.len() - 1])
     }
 
-    /// Whether this device is trusted with a form of rounded factors of a kernel: it has the units, and a product of
-    /// made-up numbers was within the form's bound of the exact result, with NaN where a factor was too large. The
-    /// product is computed at the first question; other forms are always trusted, and other kernels have no such form.
+    /// Whether this device is trusted with a form of a kernel that is not [exact](Form::is_exact): it has the units, and
+    /// a product of made-up numbers was within the form's bound of the exact result, with NaN where a factor was too
+    /// large. One of [`Form::FUSED`] must be [faster](crate::GpuOptions::min_fused_gain), too. All that is tried at the
+    /// first question; exact forms are always trusted, and other kernels have no such form.
     ///
     /// # Errors
     /// If the device fails, or failed before.
     pub fn trusts(&self, kernel: Kernel, form: Form) -> Result<bool, VulkanError> {
-        if !form.needs_matrices() {
+        if form.is_exact() {
             return Ok(true);
         }
-        if !kernel.rounded_forms().contains(&form) || !self.runs(form) {
+        // A processor's driver fuses nothing, and would take a second to show it.
+        let has_no_use = form.may_fuse() && self.is_software && self.min_fused_gain > 0.0;
+        if !kernel.has_inexact(form) || !self.runs(form) || has_no_use {
             return Ok(false);
         }
         if let Some(is_trusted) = self.lock().verdicts.get(kernel, form) {
@@ -77,7 +85,9 @@ impl Gpu {
         }
         // A driver that does not compile it is only not trusted.
         let is_compiled = self.pipelines.get((kernel, form, 0)).is_ok();
-        let is_trusted = is_compiled && Probe::new(kernel).is_kept_by(self, form)?;
+        let is_right = is_compiled && Probe::new(kernel).is_kept_by(self, form)?;
+        let is_any_gain_enough = !form.may_fuse() || self.min_fused_gain <= 0.0;
+        let is_trusted = is_right && (is_any_gain_enough || self.gain(kernel, form)? >= self.min_fused_gain);
         self.lock().verdicts.set(kernel, form, is_trusted);
         Ok(is_trusted)
     }
@@ -85,13 +95,64 @@ impl Gpu {
     /// Compiles what [`Gpu::trusts`] will try, side by side: a driver takes a second for each of these forms.
     pub fn compile_trials(&self, trials: &[(Kernel, Form)]) {
         let is_open = |(kernel, form): &&(Kernel, Form)| {
-            kernel.rounded_forms().contains(form)
-                && self.runs(*form)
-                && self.lock().verdicts.get(*kernel, *form).is_none()
+            kernel.has_inexact(*form) && self.runs(*form) && self.lock().verdicts.get(*kernel, *form).is_none()
         };
         let keys: Vec<_> = trials.iter().filter(is_open).map(|(kernel, form)| (*kernel, *form, 0)).collect();
         // What does not compile is not trusted.
         let _ = self.pipelines.prepare(&keys);
+    }
+
+    /// The time of a product that keeps a GPU busy in the form of the same [code](Form::code), over that in this form.
+    fn gain(&self, kernel: Kernel, form: Form) -> Result<f64, VulkanError> {
+        let side = 64;
+        let block = ConvolveBlock {
+            in_height: side,
+            in_width: side,
+            in_channels: side,
+            out_height: side,
+            out_width: side,
+            out_channels: 512,
+            size: 3,
+            stride: 1,
+            padding: 1,
+            ..ConvolveBlock::default()
+        };
+        let (parameters, shape) = match kernel {
+            Kernel::Convolve => {
+                let shape = Shape { row_count: side * side, inner_count: 9 * side, column_count: 512 };
+                (bytes_of(&block.packed()).to_vec(), shape)
+            }
+            _ => {
+                let shape = Shape { row_count: 4096, inner_count: 512, column_count: 512 };
+                let Shape { row_count, inner_count, column_count } = shape;
+                (
+                    bytes_of(&LinearBlock { row_count, inner_count, column_count, ..LinearBlock::default() }).to_vec(),
+                    shape,
+                )
+            }
+        };
+        let Shape { row_count, inner_count, column_count } = shape;
+        let zeros = |count: u32| self.zeros::<f32>(count as usize);
+        let (inputs, weights) = (zeros(row_count * inner_count)?, zeros(inner_count * column_count)?);
+        let (bias, outputs) = (zeros(column_count)?, zeros(row_count * column_count)?);
+        let arrays = [inputs.bind(), weights.bind(), bias.bind(), bias.bind(), outputs.bind()];
+        let elements = || 0..Form::Single.elements(row_count, column_count);
+        let run = |form, count| {
+            (0..count).try_for_each(|_| self.dispatch_in(kernel, Some(form), &parameters, elements(), &arrays))?;
+            self.wait()
+        };
+        let mut times = [Duration::MAX; 2];
+        for round in 0..=ROUNDS {
+            for (time, form) in times.iter_mut().zip([form.code(), form]) {
+                let start = Instant::now();
+                run(form, REPEATS)?;
+                // What is made at the first use is not measured.
+                if round > 0 {
+                    *time = start.elapsed().min(*time);
+                }
+            }
+        }
+        Ok(times[0].as_secs_f64() / times[1].as_secs_f64().max(1e-9))
     }
 
     /// The forms of rounded factors that were asked for and are not used: their results were beyond their bounds, or
@@ -185,7 +246,7 @@ impl Probe {
             let (row, column) = (element / column_count, element % column_count);
             let left = &self.left[row * inner_count..(row + 1) * inner_count];
             let (found, first) = (outputs[element], f64::from(self.bias[column]));
-            if left.iter().any(|number| number.abs() > LARGEST) {
+            if form.needs_matrices() && left.iter().any(|number| number.abs() > LARGEST) {
                 return found.is_nan();
             }
             let right = self.weights.iter().skip(column).step_by(column_count);
@@ -195,13 +256,16 @@ impl Probe {
                 total += (left * right).abs();
                 bound += product_bound(form, left, right);
             }
-            (f64::from(found) - sum.max(0.0)).abs() <= bound + sum_bound(inner_count, total)
+            (f64::from(found) - sum.max(0.0)).abs() <= bound + sum_bound(form, inner_count, total)
         })
     }
 }
 
 /// The most that rounded factors change of a product.
 fn product_bound(form: Form, left: f64, right: f64) -> f64 {
+    if form.may_fuse() {
+        return 0.0;
+    }
     let (relative, absolute) = match form {
         Form::Half | Form::HalfSmall | Form::HalfTiny => (2_f64.powi(-11), 2_f64.powi(-14)),
         _ => (2_f64.powi(-22), 2_f64.powi(-25)),
@@ -213,9 +277,10 @@ fn product_bound(form: Form, left: f64, right: f64) -> f64 {
 }
 
 /// The most that sums in f32 change whose magnitudes add up to `total`: units cut what rounding would round, and align
-/// several summands at once.
-fn sum_bound(inner_count: usize, total: f64) -> f64 {
-    (inner_count + 4) as f64 * 2_f64.powi(-22) * total
+/// several summands at once. What may be fused is rounded twice at the most, by half of 2^-23 each.
+fn sum_bound(form: Form, inner_count: usize, total: f64) -> f64 {
+    let unit = if form.may_fuse() { 2_f64.powi(-23) } else { 2_f64.powi(-22) };
+    (inner_count + 4) as f64 * unit * total
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! What was found out about forms of rounded factors ([`Form::ROUNDED`]): a text, for later processes.
+//! What was found out about forms of [`Form::ROUNDED`] and [`Form::FUSED`]: a text, for later processes.
 
 use crate::kernel::{Form, Kernel};
 use std::collections::BTreeMap;
@@ -19,8 +19,10 @@ impl Verdicts {
         self.has_new |= self.forms.insert((kernel, form), is_trusted) != Some(is_trusted);
     }
 
+    /// Without those of [`Form::FUSED`], which most devices have no use for.
     pub(crate) fn distrusted(&self) -> Vec<(Kernel, Form)> {
-        self.forms.iter().filter(|(_, is_trusted)| !**is_trusted).map(|(form, _)| *form).collect()
+        let distrusted = self.forms.iter().filter(|((_, form), is_trusted)| !form.may_fuse() && !**is_trusted);
+        distrusted.map(|(form, _)| *form).collect()
     }
 
     /// Adds another process's verdicts on forms without one.
@@ -49,7 +51,7 @@ impl Verdicts {
             let words: Vec<&str> = line.split(' ').collect();
             let &[kernel, form, is_trusted] = &words[..] else { return None };
             let kernel = Kernel::ALL.into_iter().find(|known| known.name() == kernel)?;
-            let form = Form::ROUNDED.into_iter().find(|known| known.name() == form)?;
+            let form = Form::ROUNDED.into_iter().chain(Form::FUSED).find(|known| known.name() == form)?;
             Some(((kernel, form), is_trusted.parse().ok()?))
         };
         Some(Verdicts { forms: text.lines().map(parse_line).collect::<Option<_>>()?, has_new: false })
@@ -65,6 +67,7 @@ mod tests {
         let mut verdicts = Verdicts::default();
         verdicts.set(Kernel::Linear, Form::Half, true);
         verdicts.set(Kernel::Convolve, Form::TwoHalves, false);
+        verdicts.set(Kernel::Linear, Form::FusedTiny, false);
         let parsed = Verdicts::parse(&verdicts.text()).expect("verdicts");
         assert_eq!((&parsed.forms, parsed.has_new(), verdicts.has_new()), (&verdicts.forms, false, true));
         assert_eq!(parsed.distrusted(), [(Kernel::Convolve, Form::TwoHalves)]);

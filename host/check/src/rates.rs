@@ -13,7 +13,8 @@
 //!
 //! Where a device has matrix units, linear layers and convolutions are measured in their forms of rounded factors as
 //! well. Their limit is that of multiply-adds in registers, since no kernel here measures the units alone: a share
-//! above 1 is what the units gain over the best that exact products could reach.
+//! above 1 is what the units gain over the best that exact products could reach. Where it has none and gains by fusing,
+//! they are measured in fused forms: one operation takes the place of two there, so their limit is twice as high.
 
 mod limits;
 mod networks;
@@ -84,7 +85,8 @@ pub struct DeviceRates {
     pub multiply_add_giga_operations: f64,
     /// Billions of bilinear look-ups of four channels a second.
     pub giga_look_ups: f64,
-    /// The forms of rounded factors that it has: products by matrix units, tried and found within their bounds.
+    /// The forms that are not exact that it has: products by matrix units or fused ones, tried and found within their
+    /// bounds.
     pub rounded_forms: Vec<&'static str>,
     /// What of it is not used because its results were wrong.
     pub faults: Vec<String>,
@@ -231,6 +233,9 @@ impl Limits {
         let copying = work.bytes / self.bytes;
         let (computing, limit) = match work.work {
             Operations::Uncounted => (0.0, Limit::Copy),
+            Operations::Fused(count) if work.form.is_some_and(Form::may_fuse) => {
+                (count / (2.0 * self.operations), Limit::MultiplyAdd)
+            }
             Operations::Fused(count) => (count / self.operations, Limit::MultiplyAdd),
             Operations::Single(count) => (2.0 * count / self.operations, Limit::MultiplyAdd),
             Operations::LookUps(count) => (count / self.look_ups, Limit::LookUp),

@@ -53,8 +53,8 @@ macro_rules! device {
             /// If the device has no memory left.
             fn weights(&self, shape: &LayerShape, weights: &[f32]) -> Result<Self::Weights, DeviceError>;
 
-            /// Whether it computes linear layers and convolutions in this precision: it has units for that, and a
-            /// product that was tried on them was within its bound. `false` means that [`Device::linear_in`] and
+            /// Whether it computes linear layers and convolutions in this precision: it gains by that, and a product that
+            /// was tried was within its bound. `false` means that [`Device::linear_in`] and
             /// [`Device::convolve_in`] are exact. The first question of a precision takes the time of a trial.
             fn rounds(&self, _precision: Precision) -> bool {
                 false
@@ -62,7 +62,7 @@ macro_rules! device {
 
             /// The precisions that it has besides the exact one, the coarsest first.
             fn precisions(&self) -> Vec<Precision> {
-                Precision::ROUNDED.into_iter().filter(|precision| self.rounds(*precision)).collect()
+                Vec::new()
             }
 
             /// Those of [`Device::precisions`] where pictures of so many multiply-adds of layers gain from them; none
@@ -82,7 +82,7 @@ macro_rules! device {
             }
 
             /// As [`Device::linear`], in another precision where the device [rounds](Device::rounds) so. A factor
-            /// beyond 65,504 then makes its outputs NaN.
+            /// beyond 65,504 makes outputs of [`Precision::ROUNDED`] NaN.
             ///
             /// # Errors
             /// If the device is lost.
@@ -101,7 +101,7 @@ macro_rules! device {
             }
 
             /// As [`Device::convolve`], in another precision where the device [rounds](Device::rounds) so. A factor
-            /// beyond 65,504 then makes its outputs NaN.
+            /// beyond 65,504 makes outputs of [`Precision::ROUNDED`] NaN.
             ///
             /// # Errors
             /// If the device is lost.

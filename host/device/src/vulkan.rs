@@ -240,7 +240,13 @@ macro_rules! dispatches {
                 let forms = || Precision::ROUNDED.into_iter().filter_map(Precision::form).map(|form| self.gpu.largest(form));
                 let trials = ROUNDED_KERNELS.into_iter().flat_map(|kernel| forms().map(move |form| (kernel, form)));
                 self.gpu.compile_trials(&trials.collect::<Vec<_>>());
-                Precision::ROUNDED.into_iter().filter(|precision| self.rounds(*precision)).collect()
+                let rounded: Vec<Precision> =
+                    Precision::ROUNDED.into_iter().filter(|precision| self.rounds(*precision)).collect();
+                // Two parts are faster than fused products wherever there are matrix units.
+                match rounded.is_empty() && self.rounds(Precision::Fused) {
+                    true => vec![Precision::Fused],
+                    false => rounded,
+                }
             }
 
             fn precisions_for(&self, multiply_adds: u64) -> Vec<Precision> {

@@ -1,5 +1,5 @@
-//! Efforts of a product: a learned field's variants on a device that multiplies faster where factors may be rounded
-//! ([`Precision`]). What rounding costs is far below what is omitted by default, so every effort but the exact one
+//! Efforts of a product: a learned field's variants on a device that multiplies faster where factors may be rounded, or
+//! products and sums fused ([`Precision`]). What rounding costs is far below what is omitted by default, so every effort but the exact one
 //! rounds, and two that omit nothing stand next to the exact one.
 //!
 //! Views are encoded exactly in all of them: what a bound is checked with is rendered from the same encodings, and a
@@ -23,7 +23,7 @@ pub(crate) struct Rounding {
 /// Whether a precision rounds about as much as `f32` does in another order of its sums. f16 does not: where a field's
 /// density is steep, a sample that moves a little changes a single pixel by much.
 const fn is_as_f32(precision: Precision) -> bool {
-    matches!(precision, Precision::Exact | Precision::TwoHalves)
+    !matches!(precision, Precision::Half)
 }
 
 /// Efforts, the exact one last, on a device with these precisions: each but the exact one in the coarsest, and the
@@ -31,7 +31,7 @@ const fn is_as_f32(precision: Precision) -> bool {
 pub(crate) fn rounded<O: Clone>(
     mut efforts: Vec<Variant<O>>,
     precisions: &[Precision],
-    roundings: &[Rounding; 2],
+    roundings: &[Rounding],
     set: impl Fn(&O, Precision) -> O,
 ) -> Vec<Variant<O>> {
     let has = |rounding: &&Rounding| precisions.contains(&rounding.precision);
@@ -70,7 +70,7 @@ impl Overflow {
 
     /// Whether work that ended so in a precision is to be repeated exactly.
     pub(crate) fn is_repeated<T>(outcome: &Result<T, FieldError>, precision: Precision) -> bool {
-        precision != Precision::Exact && matches!(outcome, Err(FieldError::NotFinite(_)))
+        Precision::ROUNDED.contains(&precision) && matches!(outcome, Err(FieldError::NotFinite(_)))
     }
 
     /// The exact repetition succeeded.
@@ -94,9 +94,10 @@ const OVERFLOW: &str = "numbers of this network are too large for products in f1
 mod tests {
     use super::*;
 
-    const ROUNDINGS: [Rounding; 2] = [
+    const ROUNDINGS: [Rounding; 3] = [
         Rounding { precision: Precision::Half, typical_error: 3e-3, typical_share: 0.25 },
         Rounding { precision: Precision::TwoHalves, typical_error: 1e-5, typical_share: 0.5 },
+        Rounding { precision: Precision::Fused, typical_error: 5e-6, typical_share: 0.75 },
     ];
 
     fn labels(precisions: &[Precision]) -> Vec<(String, Precision, f32, f32)> {
@@ -123,6 +124,10 @@ mod tests {
         assert_eq!(labels(&Precision::ROUNDED), [first, half, parts.clone(), exact.clone()]);
         // Where f16 is not trusted, the efforts take what is.
         let first = some("some, products in two parts", Precision::TwoHalves, 4e-3_f32.hypot(1e-5), 0.05);
-        assert_eq!(labels(&[Precision::TwoHalves]), [first, parts, exact]);
+        assert_eq!(labels(&[Precision::TwoHalves]), [first, parts, exact.clone()]);
+        // Without matrix units.
+        let fused = some("fused products", Precision::Fused, 5e-6, 0.75);
+        let first = some("some, fused products", Precision::Fused, 4e-3_f32.hypot(5e-6), 0.075);
+        assert_eq!(labels(&[Precision::Fused]), [first, fused, exact]);
     }
 }

@@ -102,7 +102,7 @@ pub enum VideoError {
 pub struct VideoWriter {
     path: PathBuf,
     size: [u32; 2],
-    encode: fn(DynamicImage, [u8; 3]) -> Result<Encoded, Cause>,
+    encode: Encode,
     background: [u8; 3],
     /// Frames that are not written yet.
     frames: Queue<Result<Encoded, VideoError>>,
@@ -110,6 +110,9 @@ pub struct VideoWriter {
 }
 
 type Cause = Box<dyn Error + Send + Sync>;
+
+/// Encodes a frame, over a background where its format has no transparency.
+type Encode = fn(DynamicImage, [u8; 3]) -> Result<Encoded, Cause>;
 
 /// A frame as its format wants it.
 enum Encoded {
@@ -140,7 +143,7 @@ impl VideoWriter {
         background: [u8; 3],
     ) -> Result<VideoWriter, VideoError> {
         let file = || WholeFile::create(path).map(Whole);
-        let (encode, output): (fn(DynamicImage, [u8; 3]) -> Result<Encoded, Cause>, Output) = match format {
+        let (encode, output): (Encode, Output) = match format {
             VideoFormat::Webp => {
                 (|frame, _| Ok(Encoded::Webp(webp::encoded(&frame)?)), Output::Webp(Animation::new(size, rate)))
             }

@@ -20,7 +20,7 @@ pub const fn tile_elements(row_count: u32, column_count: u32) -> u32 {
 }
 
 /// How a workgroup computes a tile of a matrix product. The sums of an output run along the inner index in every form
-/// of [`Form::ALL`]: the results are the same bits. Those of [`Form::ROUNDED`] are other numbers.
+/// of [`Form::ALL`]: the results are the same bits. Those of [`Form::ROUNDED`] and of [`Form::FUSED`] are other numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[repr(u32)]
 pub enum Form {
@@ -54,6 +54,15 @@ pub enum Form {
     TwoHalvesSmall,
     /// The same in tiles of 32 times 32 outputs.
     TwoHalvesTiny,
+    /// The code of [`Form::Large`], in which a device may fuse a product and the sum that follows it, so that both are
+    /// rounded once: an output is off by no more than two roundings of each product and sum would make it.
+    Fused,
+    /// The same in the tiles of [`Form::Small`].
+    FusedSmall,
+    /// The same in the tiles of [`Form::Tiny`].
+    FusedTiny,
+    /// The same in the tiles of [`Form::Least`].
+    FusedLeast,
 }
 
 impl Form {
@@ -66,42 +75,65 @@ impl Form {
     /// The forms of rounded factors, for devices with matrix units.
     pub const ROUNDED: [Form; 6] =
         [Form::Half, Form::HalfSmall, Form::HalfTiny, Form::TwoHalves, Form::TwoHalvesSmall, Form::TwoHalvesTiny];
+    /// The forms of fused multiply-adds, for devices without matrix units, in the order of [`Form::IN_FOURS`].
+    pub const FUSED: [Form; 4] = [Form::Fused, Form::FusedSmall, Form::FusedTiny, Form::FusedLeast];
+
+    /// Whether a device may fuse products and sums in it.
+    pub const fn may_fuse(self) -> bool {
+        matches!(self, Form::Fused | Form::FusedSmall | Form::FusedTiny | Form::FusedLeast)
+    }
+
+    /// The form whose code it is: of a fused one that of two roundings, of another one itself.
+    pub const fn code(self) -> Form {
+        match self {
+            Form::Fused => Form::Large,
+            Form::FusedSmall => Form::Small,
+            Form::FusedTiny => Form::Tiny,
+            Form::FusedLeast => Form::Least,
+            form => form,
+        }
+    }
+
+    /// Whether its results are the bits of [`Form::ALL`].
+    pub const fn is_exact(self) -> bool {
+        !self.needs_matrices() && !self.may_fuse()
+    }
 
     /// Rows of its tiles.
     pub const fn rows(self) -> u32 {
-        match self {
+        match self.code() {
             Form::Large | Form::Half | Form::TwoHalves => 128,
-            Form::Single | Form::Small | Form::Subgroup | Form::HalfSmall | Form::TwoHalvesSmall => TILE,
             Form::Tiny | Form::HalfTiny | Form::TwoHalvesTiny => 32,
             Form::Least => 16,
+            _ => TILE,
         }
     }
 
     /// Columns of its tiles.
     pub const fn columns(self) -> u32 {
-        match self {
+        match self.code() {
             Form::Large => 64,
-            _ => self.rows(),
+            form => form.rows(),
         }
     }
 
     /// Invocations of a workgroup.
     pub const fn invocations(self) -> u32 {
-        match self {
+        match self.code() {
             Form::Large | Form::Small | Form::TwoHalves => 256,
             Form::Half | Form::HalfSmall | Form::HalfTiny | Form::TwoHalvesSmall | Form::TwoHalvesTiny => 128,
-            Form::Single | Form::Tiny | Form::Least | Form::Subgroup => WORKGROUP,
+            _ => WORKGROUP,
         }
     }
 
     /// Most bytes of memory that a workgroup shares.
     pub const fn shared_bytes(self) -> usize {
-        match self {
+        match self.code() {
             Form::TwoHalves => 3 * SHARED_BYTES,
             Form::Large | Form::Small | Form::Tiny | Form::Half | Form::TwoHalvesSmall | Form::TwoHalvesTiny => {
                 2 * SHARED_BYTES
             }
-            Form::Single | Form::Least | Form::Subgroup | Form::HalfSmall | Form::HalfTiny => SHARED_BYTES,
+            _ => SHARED_BYTES,
         }
     }
 
@@ -141,14 +173,15 @@ impl Form {
         !matches!(self, Form::Single | Form::Subgroup)
     }
 
-    /// The same products in tiles of other sizes, the largest first: of a form of rounded factors those, of another one
-    /// itself.
+    /// The same numbers or others within the same bound in tiles of other sizes, the largest first: of a form that is
+    /// not [exact](Form::is_exact) those, of another one itself.
     pub const fn sizes(self) -> &'static [Form] {
         match self {
             Form::Half | Form::HalfSmall | Form::HalfTiny => &[Form::Half, Form::HalfSmall, Form::HalfTiny],
             Form::TwoHalves | Form::TwoHalvesSmall | Form::TwoHalvesTiny => {
                 &[Form::TwoHalves, Form::TwoHalvesSmall, Form::TwoHalvesTiny]
             }
+            Form::Fused | Form::FusedSmall | Form::FusedTiny | Form::FusedLeast => &Form::FUSED,
             Form::Single => &[Form::Single],
             Form::Large => &[Form::Large],
             Form::Small => &[Form::Small],
@@ -173,6 +206,10 @@ impl Form {
             Form::TwoHalves => "two_halves",
             Form::TwoHalvesSmall => "two_halves_small",
             Form::TwoHalvesTiny => "two_halves_tiny",
+            Form::Fused => "fused",
+            Form::FusedSmall => "fused_small",
+            Form::FusedTiny => "fused_tiny",
+            Form::FusedLeast => "fused_least",
         }
     }
 }
@@ -320,8 +357,7 @@ macro_rules! list {
 
             /// Name of its entry point for a form of tiles; only tiled kernels have others than [`Form::Single`].
             pub const fn entry_point(self, form: Form) -> &'static str {
-                match form {
-                    Form::Single => self.name(),
+                match form.code() {
                     Form::Large => match self {
                         $(Kernel::$Kernel => concat!(stringify!($method), "::large"),)+
                     },
@@ -355,6 +391,7 @@ macro_rules! list {
                     Form::TwoHalvesTiny => match self {
                         $(Kernel::$Kernel => concat!(stringify!($method), "::two_halves_tiny"),)+
                     },
+                    _ => self.name(),
                 }
             }
 
@@ -423,6 +460,11 @@ impl Kernel {
             Kernel::Linear | Kernel::Convolve => &Form::ROUNDED,
             _ => &[],
         }
+    }
+
+    /// Whether it has a form, which is not [exact](Form::is_exact).
+    pub const fn has_inexact(self, form: Form) -> bool {
+        !form.is_exact() && matches!(self, Kernel::Linear | Kernel::Convolve)
     }
 
     /// Whether the arrays of a kernel with these parameters lie in fours, as [some forms](Form::needs_fours) need it.

@@ -84,8 +84,8 @@ fn print_device(rates: &DeviceRates) -> std::io::Result<()> {
     say(rows)?;
     rates.faults.iter().try_for_each(say)?;
     match rates.rounded_forms.is_empty() {
-        true => say("linear and convolve by matrix units: none that fit, or none that is trusted\n"),
-        false => say(format_args!("linear and convolve by matrix units: {}\n", rates.rounded_forms.join(", "))),
+        true => say("linear and convolve in other than exact products: by no matrix units, and fusing gains nothing\n"),
+        false => say(format_args!("linear and convolve in other products: {}\n", rates.rounded_forms.join(", "))),
     }
 }
 

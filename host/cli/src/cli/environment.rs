@@ -1,6 +1,7 @@
 //! The environment variables of the command.
 
 use std::env;
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::time::Duration;
 use viewfuse_device::choice::DeviceOptions;
@@ -26,7 +27,7 @@ pub(crate) fn time_between_lines() -> Duration {
 
 /// The environment's Vulkan, with these device options.
 pub(crate) fn device_options(gpu: GpuOptions) -> DeviceOptions {
-    DeviceOptions { instance: instance_options(), gpu, memory: cache_folder() }
+    DeviceOptions { instance: instance_options(), gpu, memory: cache_folder(|name| env::var_os(name)) }
 }
 
 /// The program that finds poses: `VIEWFUSE_OPENMVG`, or the one that lies beside this command; where neither is, one of
@@ -49,11 +50,11 @@ pub(crate) fn python() -> PathBuf {
 
 /// Where devices remember what they compiled and measured: `VIEWFUSE_CACHE`, or the folder for such files that the
 /// system has for the user. Nowhere if the variable is empty.
-fn cache_folder() -> Option<PathBuf> {
-    if let Some(folder) = env::var_os("VIEWFUSE_CACHE") {
+fn cache_folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
+    if let Some(folder) = variable("VIEWFUSE_CACHE") {
         return (!folder.is_empty()).then(|| folder.into());
     }
-    let folder = |name| env::var_os(name).map(PathBuf::from).filter(|folder: &PathBuf| folder.is_absolute());
+    let folder = |name| variable(name).map(PathBuf::from).filter(|folder: &PathBuf| folder.is_absolute());
     let caches = if cfg!(windows) {
         folder("LOCALAPPDATA")
     } else if cfg!(target_os = "macos") {
@@ -62,4 +63,24 @@ fn cache_folder() -> Option<PathBuf> {
         folder("XDG_CACHE_HOME").or_else(|| folder("HOME").map(|home| home.join(".cache")))
     };
     caches.map(|caches| caches.join("viewfuse"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder(set: &[(&str, &str)]) -> Option<PathBuf> {
+        cache_folder(|name| set.iter().find(|(of, _)| *of == name).map(|(_, value)| OsString::from(value)))
+    }
+
+    #[test]
+    fn an_empty_variable_switches_the_cache_off() {
+        let system = [("XDG_CACHE_HOME", "/x"), ("HOME", "/h"), ("LOCALAPPDATA", "/l")];
+        assert!(folder(&system).is_some_and(|folder| folder.ends_with("viewfuse")));
+        assert_eq!(folder(&[&[("VIEWFUSE_CACHE", "mine")], &system[..]].concat()), Some("mine".into()));
+        assert_eq!(folder(&[&[("VIEWFUSE_CACHE", "")], &system[..]].concat()), None);
+        assert_eq!(folder(&[]), None, "no folder of the person's");
+        #[cfg(target_os = "linux")]
+        assert_eq!(folder(&[("XDG_CACHE_HOME", "beside"), ("HOME", "/h")]), Some("/h/.cache/viewfuse".into()));
+    }
 }

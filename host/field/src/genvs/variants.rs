@@ -41,9 +41,11 @@ enum Relative {
 /// What rounded products are typically worth. Errors: emulated on the network of the published size, with an encoder
 /// and feature images that are rounded too, 61.5 and 89 dB from the exact picture; times: what convolutions take of a
 /// picture, at the rates of prototypes on a GPU (`host/results/efforts.md`).
-const ROUNDINGS: [Rounding; 2] = [
+const ROUNDINGS: [Rounding; 3] = [
     Rounding { precision: Precision::Half, typical_error: 8.4e-4, typical_share: 0.7 },
     Rounding { precision: Precision::TwoHalves, typical_error: 3.6e-5, typical_share: 0.8 },
+    // No coarser than two parts, which round more.
+    Rounding { precision: Precision::Fused, typical_error: 3.6e-5, typical_share: 0.8 },
 ];
 /// What rounding changes in a picture over what it changes in an estimate at the largest level, both with colours from
 /// 0 to 1 (`host/results/efforts.md`).

@@ -28,9 +28,11 @@ const NODES: [(u32, f32, f32, f32); 9] = [
 /// What rounded products are typically worth. Errors: emulated on the network of the published size, 62.7 dB from the
 /// exact picture and more than 90; times: what products take of a picture, at the rates of prototypes on a GPU
 /// (`host/results/efforts.md`).
-const ROUNDINGS: [Rounding; 2] = [
+const ROUNDINGS: [Rounding; 3] = [
     Rounding { precision: Precision::Half, typical_error: 8e-4, typical_share: 0.4 },
     Rounding { precision: Precision::TwoHalves, typical_error: 3e-5, typical_share: 0.55 },
+    // No coarser than two parts, which round more.
+    Rounding { precision: Precision::Fused, typical_error: 3e-5, typical_share: 0.7 },
 ];
 
 /// Both passes, without nodes.
