@@ -1,6 +1,8 @@
 //! Every form of every tiled kernel that a device can run: against `f64` as the first form is, with the same bits as
-//! that one and as itself in pieces, and chosen by measuring where none is asked for.
+//! that one, which has those of the kernel's body, and as itself in pieces, and chosen by measuring where none is asked
+//! for.
 
+use super::bodies::Bodies;
 use super::{Parity, trial_on};
 use libtest_mimic::{Failed, Trial};
 use std::ops::RangeInclusive;
@@ -12,7 +14,7 @@ use viewfuse::device::vulkan::Vulkan;
 use viewfuse::device::{Device, Layer, LayerShape, Memory};
 use viewfuse_kernels::network::linear::LinearBlock;
 use viewfuse_vulkan::kernel::{Form, Kernel};
-use viewfuse_vulkan::{Adapter, GpuOptions, Instance, Limits};
+use viewfuse_vulkan::{Adapter, GpuOptions, Instance, Limits, VulkanError};
 
 /// The trials of a device.
 pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> {
@@ -23,13 +25,21 @@ pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> 
             pieces_have_the_same_bits(instance, adapter, kernel)
         })
     };
+    let of_body = |kernel: Kernel| {
+        let name = format!("{}::as_the_body", kernel.name());
+        trial_on(instance, adapter, &name, move |instance, adapter| {
+            let device = open(instance, adapter, Form::Single)?;
+            visit(kernel, SameBits { one: &Bodies::PLAIN, other: &device, seeds: 1..=3 })
+        })
+    };
     let is_there = |form: &&Form| **form != Form::Single && adapter.runs(**form);
     let others = |kernel: Kernel| kernel.forms().iter().filter(is_there).map(move |form| (kernel, *form));
     let other = |(kernel, form): (Kernel, Form)| {
         let name = format!("{}::{}", kernel.name(), form.name());
         trial_on(instance, adapter, &name, move |instance, adapter| is_as_the_first(instance, adapter, kernel, form))
     };
-    let mut trials: Vec<Trial> = tiled().map(in_pieces).chain(tiled().flat_map(others).map(other)).collect();
+    let mut trials: Vec<Trial> =
+        tiled().map(in_pieces).chain(tiled().map(of_body)).chain(tiled().flat_map(others).map(other)).collect();
     if adapter.subgroup_size.is_none() {
         trials.push(trial_on(instance, adapter, "a_form_that_the_device_lacks_is_refused", refused));
         return trials;
@@ -42,11 +52,14 @@ pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> 
     trials
 }
 
+fn open(instance: &Arc<Instance>, adapter: &Adapter, form: Form) -> Result<Vulkan, VulkanError> {
+    Vulkan::open(instance, adapter, &GpuOptions { form: Some(form), ..GpuOptions::default() })
+}
+
 fn is_as_the_first(instance: &Arc<Instance>, adapter: &Adapter, kernel: Kernel, form: Form) -> Result<(), Failed> {
-    let open = |form| Vulkan::open(instance, adapter, &GpuOptions { form: Some(form), ..GpuOptions::default() });
-    let device = open(form)?;
+    let device = open(instance, adapter, form)?;
     visit(kernel, Parity { device: &device })?;
-    visit(kernel, SameBits { one: &open(Form::Single)?, other: &device, seeds: 3..=3 })
+    visit(kernel, SameBits { one: &open(instance, adapter, Form::Single)?, other: &device, seeds: 3..=3 })
 }
 
 /// Lavapipe's usual subgroups have eight invocations. In another process it has some of sixteen, which take another

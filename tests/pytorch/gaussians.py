@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Steps of an optimisation of Gaussians in plain PyTorch, on the CPU: projection, blending by tiles, L1 and SSIM, autograd, Adam.
+"""Steps of an optimisation of Gaussians in plain PyTorch, on the CPU or with CUDA: projection, blending by tiles, L1 and SSIM, autograd, Adam.
 
 The formulas are those of viewfuse-core's `gaussian` and of viewfuse-field's `gaussians::loss`. The tiles of a picture are blended
 together, those with lists of like length in one batch: a loop over single tiles takes longer. Prints one line of JSON; with
@@ -174,13 +174,11 @@ def picture(gaussians, view, near, behind):
     return whole.reshape(3, rows * TILE, columns * TILE)[:, :height, :width], index[number > 0]
 
 
-WINDOW = torch.exp(-torch.arange(-4, 5.0) ** 2 / (2 * 1.5**2))
-WINDOW = WINDOW / WINDOW.sum()
-
-
 def blurred(pictures):
-    rows = functional.conv2d(pictures[:, None], WINDOW[None, None, None], padding=(0, 4))
-    return functional.conv2d(rows, WINDOW[None, None, :, None], padding=(4, 0))[:, 0]
+    window = torch.exp(-torch.arange(-4, 5.0) ** 2 / (2 * 1.5**2))
+    window = window / window.sum()
+    rows = functional.conv2d(pictures[:, None], window[None, None, None], padding=(0, 4))
+    return functional.conv2d(rows, window[None, None, :, None], padding=(4, 0))[:, 0]
 
 
 def loss_of(own, photograph):
@@ -326,7 +324,7 @@ def write_ply(path, tensors):
     rest = rest.transpose(1, 2).reshape(len(rest), 45)
     table = torch.cat([position, (colour - 0.5) / SH_0, rest, logit[:, None], log_scales, rotation], 1)
     head = ["ply", "format binary_little_endian 1.0", f"element vertex {len(table)}", *(f"property float {own}" for own in names)]
-    path.write_bytes("\n".join([*head, "end_header\n"]).encode() + table.numpy().astype("<f4").tobytes())
+    path.write_bytes("\n".join([*head, "end_header\n"]).encode() + table.cpu().numpy().astype("<f4").tobytes())
 
 
 def main():
@@ -336,6 +334,7 @@ def main():
     parser.add_argument("--side", type=int, default=280, help="longest side of the views")
     parser.add_argument("--iterations", type=int, default=10, help="that are timed")
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--device", default="cpu", help="cpu, or cuda")
     parser.add_argument("--render", nargs=2, metavar=("VIEW", "PNG"), help="write the picture of a view")
     parser.add_argument("--whole", type=Path, metavar="PLY", help="optimise as --quality standard does, and write the Gaussians")
     parser.add_argument("--surfaces", type=Path, metavar="PLY", help="points whose median depth is the scene's [default: the Gaussians]")
@@ -343,6 +342,9 @@ def main():
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     torch.set_num_threads(options.threads)
+    # The CPU is the default; older PyTorch cannot set it.
+    if options.device != "cpu":
+        torch.set_default_device(options.device)
     left_out = {int(own) for own in options.left_out.split(",") if own}
     views = [own for index, own in enumerate(read_views(options.scene, options.side)) if index not in left_out]
     gaussians = read_ply(options.gaussians)
@@ -352,7 +354,7 @@ def main():
     if options.render:
         with torch.no_grad():
             shown, _ = picture(gaussians, views[int(options.render[0])], 0.1 * depth, behind)
-        levels = (shown.clamp(0, 1) * 255).round().byte().permute(1, 2, 0).numpy()
+        levels = (shown.clamp(0, 1) * 255).round().byte().permute(1, 2, 0).cpu().numpy()
         Image.fromarray(levels).save(options.render[1])
     if options.whole:
         begun, computed = time.perf_counter(), time.process_time()
