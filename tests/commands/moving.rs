@@ -16,6 +16,7 @@ viewfuse_tests::trials![
     a_run_that_was_killed_twice_ends_with_the_same_bytes,
     more_frames_than_a_gif_can_show_keep_their_pace,
     another_run_begins_anew,
+    nothing_beside_the_pictures,
     an_ffmpeg_gets_the_video_or_there_is_y4m,
     depths_and_opacity_for_other_programs,
     camera_paths_from_files;
@@ -270,6 +271,19 @@ fn npy(path: &Path) -> (String, Vec<f32>) {
     let end = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
     let values = bytes[end..].chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
     (String::from_utf8(bytes[10..end].to_vec()).expect("text"), values)
+}
+
+fn nothing_beside_the_pictures() {
+    let folder = toy();
+    done(&folder, &format!("{PATH} -o out"));
+    let whole = names_in(&folder.join("out"));
+    let refused = Outcome::of(command(&folder, &format!("{PATH} --pictures-only --depth npy -o out")));
+    assert!(refused.code == Some(2) && refused.stderr.contains("--pictures-only"), "{}", refused.stderr);
+    // Depth maps of pictures that are replaced do not stay beside the new ones.
+    done(&folder, &format!("{PATH} --pictures-only --video y4m -o out"));
+    let pictures: Vec<String> = (0..5).map(|frame| format!("between-{frame:03}.png")).collect();
+    assert!(pictures.iter().all(|name| whole.contains(name)) && whole.len() > pictures.len() + 1, "{whole:?}");
+    assert_eq!(names_in(&folder.join("out")), [&pictures[..], &["run.json".into(), "video.y4m".into()]].concat());
 }
 
 fn depths_and_opacity_for_other_programs() {

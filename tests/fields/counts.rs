@@ -1,4 +1,4 @@
-//! What the published networks ask of a GPU, counted without one: dispatches, transfers, and how many workgroups each
+//! What the published and the included networks ask of a GPU, counted without one: dispatches, transfers, and how many workgroups each
 //! matrix product has. The same counts are in `host/results/vulkan.md`.
 
 mod device;
@@ -14,20 +14,25 @@ use viewfuse::field::render::{RenderError, RenderOptions, RenderRun, Stage};
 use viewfuse::field::training_free::TrainingFree;
 use viewfuse::field::{Field, On, auto, genvs, pixelnerf};
 use viewfuse::job::progress::Silent;
+use viewfuse::nn::checkpoint::Checkpoint;
 use viewfuse::scene::few_shot::Selection;
 use viewfuse::scene::gaussians::{Gaussian, GaussianScene};
 use viewfuse_core::random::uniform;
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::weights::Weights;
-use viewfuse_kernels::rows::{Form, GainBlock, HarmonicTerm, Kernel};
+use viewfuse_kernels::rows::{Form, GainBlock, HarmonicTerm, Kernel, SHARED_BYTES};
 use viewfuse_tests::cloud::{small_recipe, toy_cloud};
 use viewfuse_tests::fields;
 use viewfuse_tests::lorry::{photographs, target};
+use viewfuse_tests::places::repository;
 
 const SIDE: u32 = 128;
 const SOURCES: u32 = 3;
 /// Twice the units of the GPU with the most that this project was run on.
 const ENOUGH_WORKGROUPS: u32 = 264;
+/// Most dispatches of an included network's picture.
+const MOST_OF_PIXELNERF: u64 = 600;
+const MOST_OF_GENVS: u64 = 1500;
 
 /// A picture of 128x128 from three views, counted.
 fn counted(field: &(impl Field + Sync)) -> Counted {
@@ -115,6 +120,32 @@ fn a_call_of_the_denoiser_is_few_dispatches() {
     assert!(waits(&long) - waits(&short) <= 1, "a call waits more than once");
     let (share, small) = filling(&long);
     assert!(share > 0.93, "{share}: {small:?}");
+}
+
+/// The included networks have the published ones' layers in a few channels: their products are small, and take forms
+/// that every device's workgroups have room for.
+#[test]
+fn the_included_networks_fill_a_gpu_where_they_can() {
+    let open = |name: &str| Checkpoint::open(&repository().join("host/models").join(name)).expect("a checkpoint");
+    let options = pixelnerf::PixelNerfOptions { omissions: pixelnerf::Omissions::NONE, ..Default::default() };
+    let network = pixelnerf::PixelNerf::new(&open("pixelnerf_cars.safetensors"), options).expect("a network");
+    let options = genvs::GenvsOptions { omissions: genvs::Omissions::NONE, ..Default::default() };
+    let denoising = genvs::Genvs::new(open("genvs_cars.safetensors"), options).expect("a network");
+    for (name, counted, most, least_share) in [
+        ("included PixelNeRF, 128x128, three views, exact", counted(&network), MOST_OF_PIXELNERF, 0.99),
+        // Nearly all of the rest has 256 workgroups, or is an encoder's.
+        ("included GeNVS, 128x128, three views, exact", counted(&denoising), MOST_OF_GENVS, 0.6),
+    ] {
+        print(name, &counted);
+        assert!(counted.all() <= most, "{name}: {} dispatches", counted.all());
+        let (share, small) = filling(&counted);
+        assert!(share > least_share, "{name}: {share}: {small:?}");
+    }
+    // What Vulkan promises of a workgroup's memory, and what all but small devices have.
+    let is_within = |form: &Form| form.shared_bytes() <= if form.needs_fours() { 32 << 10 } else { SHARED_BYTES };
+    assert!(Form::ALL.iter().chain(&Form::FUSED).all(is_within));
+    let wanting: Vec<&Form> = Form::ROUNDED.iter().filter(|form| !is_within(form)).collect();
+    assert_eq!(wanting, [&Form::TwoHalves], "a stated need of 48 KiB");
 }
 
 /// `render tests/data/room` with its three targets under what is chosen for it, in small pictures: transfers do not

@@ -39,14 +39,16 @@ pub struct Outputs {
     pub alpha: bool,
     /// Formats of the depth map.
     pub depths: Vec<DepthFormat>,
+    /// Write the confidence map, of fields that have one.
+    pub confidence: bool,
     /// Write the contact sheet.
     pub sheet: bool,
 }
 
 impl Default for Outputs {
-    /// No alpha channel, the depth map as PNG, the contact sheet.
+    /// No alpha channel, the depth map as PNG, the confidence map, the contact sheet.
     fn default() -> Outputs {
-        Outputs { alpha: false, depths: vec![DepthFormat::Png], sheet: true }
+        Outputs { alpha: false, depths: vec![DepthFormat::Png], confidence: true, sheet: true }
     }
 }
 
@@ -250,7 +252,8 @@ impl RunWriter {
             Some(map) => write_png(path, &DynamicImage::ImageLuma8(map)),
             None => Ok(()),
         });
-        add(format!("{target}_confidence.png"), (!frame.confidences.is_empty()).then_some(confidence))?;
+        let is_written = !frame.confidences.is_empty() && self.outputs.confidence;
+        add(format!("{target}_confidence.png"), is_written.then_some(confidence))?;
         let sheet = self.outputs.sheet.then(|| {
             let (shown, title, sources) = (Arc::clone(frame), self.title(frame), self.sheet_sources(frame));
             let write: Writing =

@@ -29,6 +29,9 @@ pub(crate) struct OutputOptions {
     /// Write no contact sheets
     #[arg(long, help_heading = FILES)]
     no_sheets: bool,
+    /// Write nothing beside the pictures: no depth maps, no confidences, no contact sheets
+    #[arg(long, conflicts_with = "depth", help_heading = FILES)]
+    pictures_only: bool,
     /// Remove what an earlier run wrote to the folder and this one does not replace
     #[arg(long, help_heading = FILES)]
     pub(crate) replace: bool,
@@ -43,7 +46,13 @@ pub(crate) struct OutputOptions {
 
 impl OutputOptions {
     pub(crate) fn outputs(&self) -> Outputs {
-        Outputs { alpha: self.alpha, depths: self.depth.clone(), sheet: !self.no_sheets }
+        let depths = if self.pictures_only { Vec::new() } else { self.depth.clone() };
+        Outputs {
+            alpha: self.alpha,
+            depths,
+            confidence: !self.pictures_only,
+            sheet: !self.no_sheets && !self.pictures_only,
+        }
     }
 
     /// The rate of a video. `stated` is what the camera path's file says.
