@@ -12,7 +12,7 @@
 use crate::camera::CameraBlock;
 use crate::composite::Compositor;
 use crate::fetch::Fetch;
-use crate::math::{clamp, exp, has_finite_bits, ln, max, min, norm3, sqrt};
+use crate::math::{abs, clamp, exp, has_finite_bits, ln, max, min, norm3, sqrt};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
@@ -84,6 +84,16 @@ const _: () = assert!(size_of::<ProjectedGaussian>() == 64);
 #[inline]
 pub fn axes(rotation: [f32; 4]) -> [Vec3; 3] {
     let [w, x, y, z] = rotation;
+    // Quotients of subnormal numbers would be coarse, and the length of the largest numbers infinite.
+    let largest = max(max(abs(w), abs(x)), max(abs(y), abs(z)));
+    let scale = if largest < 1.0e-30 {
+        1.0e38
+    } else if largest > 1.0e37 {
+        1.0e-30
+    } else {
+        1.0
+    };
+    let (w, x, y, z) = (scale * w, scale * x, scale * y, scale * z);
     let vector = norm3(x, y, z);
     let length = norm3(w, vector, 0.0);
     if !(length > 0.0 && has_finite_bits(length)) {

@@ -32,6 +32,10 @@ use core::ops::{Add, Div, Mul, Sub};
 const MAX_STEPS: u32 = 24;
 /// Halvings of a step that does not reduce the residual, at most.
 const MAX_HALVINGS: u32 = 12;
+/// Radius from which on a start for Newton's method is looked for. Nearer to the centre, points themselves will do.
+const WIDE: f32 = 1.0;
+/// Radii at which it is looked for.
+const STARTS: u32 = 64;
 /// Greatest magnitude of a coefficient: powers of eight of them stay finite in `f32`.
 pub const MAX_COEFFICIENT: f64 = 1.0e4;
 /// Coefficients `[k1, k2, k3, k4, k5, k6, p1, p2, q4]`; a fisheye ignores all but the first four.
@@ -314,12 +318,14 @@ fn radial_slope(is_fisheye: bool, coefficients: &Coefficients<f64>, radius: f64)
     factor + 2.0 * squared * slope
 }
 
-/// The ideal point that appears at a point of the photograph: Newton's method from the point itself, each step halved
-/// until it reduces the residual. It ends if no step does, after 24 steps at most. Total: if no ideal point maps to the
-/// given one, or it is not finite, the residual is large or not finite.
+/// The ideal point that appears at a point of the photograph: Newton's method, each step halved until it reduces the
+/// residual, from the point itself, and beyond a radius of 1 from where the lens, seen from the centre, is about to reach
+/// it. It ends if no step helps, after 24 steps at most. Total: if no ideal point maps to the given one, or it is not
+/// finite, the residual is large or not finite.
 ///
 /// Inside [`Lens::reach`] the residual is a few units in the last place of the point (in `f64` below 1e-14 for points
-/// up to 10; in `f32` below 2e-6).
+/// up to 10; in `f32` below 2e-6), but close to a fold, where the inverse has no slope. A small residual does not say that
+/// the point is inside: beyond a fold other ones map to the same.
 #[inline]
 pub fn undistort<T: Real>(is_fisheye: bool, coefficients: &Coefficients<T>, point: [T; 2]) -> Undistorted<T> {
     let guess = if is_fisheye { unbent(coefficients, point) } else { straightened(coefficients, point) };
@@ -335,6 +341,29 @@ fn missed<T: Real>(is_fisheye: bool, coefficients: &Coefficients<T>, guess: [T; 
     x * x + y * y
 }
 
+/// Where Newton's method starts: the last of some radii up to `most` at which `value`, which rises from the centre to a
+/// fold, is below `radius`.
+#[inline]
+fn start_of<T: Real>(radius: T, most: T, value: impl Fn(T) -> T) -> T {
+    let zero = T::of(0.0);
+    if !(radius > T::of(WIDE)) {
+        return most;
+    }
+    let (mut start, mut before) = (zero, zero);
+    let mut step = 1;
+    while step <= STARTS {
+        let at = most * T::of(step as f32 / STARTS as f32);
+        let now = value(at);
+        if now > before && now < radius {
+            (start, before) = (at, now);
+            step += 1;
+        } else {
+            step = STARTS + 1;
+        }
+    }
+    start
+}
+
 /// Newton's method on a fisheye's angle.
 #[inline]
 fn unbent<T: Real>(coefficients: &Coefficients<T>, point: [T; 2]) -> [T; 2] {
@@ -344,7 +373,8 @@ fn unbent<T: Real>(coefficients: &Coefficients<T>, point: [T; 2]) -> [T; 2] {
         return point;
     }
     let widest = T::of(WIDEST);
-    let mut angle = if radius < widest { radius } else { widest };
+    let most = if radius < widest { radius } else { widest };
+    let mut angle = start_of(radius, if radius > T::of(WIDE) { widest } else { most }, |at| bent(coefficients, at));
     let mut miss = bent(coefficients, angle) - radius;
     let mut step = 0;
     while step < MAX_STEPS {
@@ -379,7 +409,9 @@ fn straightened<T: Real>(coefficients: &Coefficients<T>, point: [T; 2]) -> [T; 2
     let p1 = coefficients[6];
     let p2 = coefficients[7];
     let (two, six) = (T::of(2.0), T::of(6.0));
-    let mut guess = point;
+    let radius = (point[0] * point[0] + point[1] * point[1]).root();
+    let start = start_of(radius, radius, |at| at * factor_and_slope(coefficients, at * at).0);
+    let mut guess = if start < radius { [point[0] * (start / radius), point[1] * (start / radius)] } else { point };
     let mut miss = missed(false, coefficients, guess, point);
     let mut step = 0;
     while step < MAX_STEPS {

@@ -162,7 +162,9 @@ pub fn ln(x: f32) -> f32 {
 #[inline]
 pub fn ln_ratio(a: f32, b: f32) -> f32 {
     // Twice the inverse hyperbolic tangent of z; the difference of numbers within a factor of 2 is exact.
-    let z = (a - b) / (a + b);
+    // The sum of the largest would overflow.
+    let scale = if max(a, b) > 1.0e38 { 0.5 } else { 1.0 };
+    let z = (scale * a - scale * b) / (scale * a + scale * b);
     if abs(z) < 0.17 {
         let square = z * z;
         let rest = square * (1.0 / 3.0 + square * (1.0 / 5.0 + square * (1.0 / 7.0 + square * (1.0 / 9.0))));

@@ -50,7 +50,7 @@ impl fmt::Display for PoseError {
                 write!(f, "the entry in row {}, column {} is not finite as a 32-bit number", row + 1, column + 1)
             }
             PoseError::TooFar => {
-                write!(f, "the camera's centre is further than {MAX_COORDINATE:e} from the origin")
+                write!(f, "a coordinate of the camera's centre is beyond {MAX_COORDINATE:e}")
             }
             PoseError::LastRow => f.write_str("the last row is not 0 0 0 1"),
             PoseError::NotRigid { deviation } => {
@@ -141,8 +141,8 @@ impl Pose {
     /// From a row-major camera-to-world matrix in OpenCV axes (x right, y down, z forward).
     ///
     /// # Errors
-    /// [`PoseError`] if an entry is not finite, the block is not a rotation to within [`RIGID_TOLERANCE`], or the
-    /// last row is not `0 0 0 1`.
+    /// [`PoseError`] if an entry is not finite, a coordinate is beyond 1e30, the block is not a rotation to within
+    /// [`RIGID_TOLERANCE`], or the last row is not `0 0 0 1` to within that.
     pub fn from_opencv(world_from_camera: &[[f32; 4]; 4]) -> Result<Pose, PoseError> {
         let m = world_from_camera;
         let mut row = 0;
@@ -210,7 +210,8 @@ impl Pose {
     /// it can be.
     ///
     /// # Errors
-    /// [`PoseError::NotRigid`] if the two points coincide or `up_world` is parallel to the line between them.
+    /// [`PoseError::NotRigid`] if the two points coincide, `up_world` is parallel to the line between them, or a number
+    /// is not finite or so large that a product overflows.
     pub fn look_at(centre_world: Vec3, point_world: Vec3, up_world: Vec3) -> Result<Pose, PoseError> {
         let degenerate = PoseError::NotRigid { deviation: 1.0 };
         let forward = unit(point_world - centre_world).ok_or(degenerate)?;

@@ -203,7 +203,7 @@ impl HeunStep {
     /// that would overflow are the largest finite number.
     pub fn between(sigma: f32, next: f32) -> HeunStep {
         let remaining = if sigma > 0.0 { min(next / sigma, f32::MAX) } else { 0.0 };
-        let correction = if next > 0.0 { clamp(0.5 * ((sigma - next) / next), -0.5, f32::MAX) } else { 0.0 };
+        let correction = if next > 0.0 { clamp(0.5 * (sigma - next) / next, -0.5, f32::MAX) } else { 0.0 };
         HeunStep { remaining, correction }
     }
 

@@ -19,7 +19,7 @@
 //! | L1 | 12 | 6.6 |
 //! | Frobenius | 7.5; 9.5 where norms are scaled | 7.3 |
 //! | relative Frobenius | `12 + (18 abs(c_t) + abs(c_s)) / e`, as its translation may cancel | 8.0; 34 on a ring of radius 800 |
-//! | Gaussian | 8; beyond a distance or beta of 1e6 `11 beta (d^2 + n^2) + 4 beta abs(d^2 - n^2) + 4`, `n` the nearest distance | 6.1 within 1e6; then grows with the exponent |
+//! | Gaussian | `8 + 40 beta (d^2 + n^2) / 2^24`, `n` the nearest distance; beyond a distance or beta of 1e6 `11 beta (d^2 + n^2) + 4 beta abs(d^2 - n^2) + 4` | 6.8 while `beta d^2` is below 1e7, 15 at 1e8, 47 at 3e8 |
 //!
 //! The Gaussian's exponent is kept with its rounding error, because an error of an exponent is a relative error of the
 //! weight; where squares approach overflow it is not. Weights below 4e-38 may be 0.

@@ -38,6 +38,12 @@ impl<const S: usize> Omission<S> {
     }
 }
 
+/// An error of at least 0, or infinity.
+#[inline(always)]
+fn or_infinite(error: f32) -> f32 {
+    if error >= 0.0 { error } else { f32::INFINITY }
+}
+
 impl<const S: usize> Weights<S> {
     /// Equal weights. `count` is limited to `[1, S]`.
     pub fn mean(count: u32) -> Weights<S> {
@@ -86,7 +92,7 @@ impl<const S: usize> Weights<S> {
         let mut smallest = f32::INFINITY;
         let mut view = 0;
         while view < count as usize {
-            smallest = min(if errors[view] >= 0.0 { errors[view] } else { f32::INFINITY }, smallest);
+            smallest = min(or_infinite(errors[view]), smallest);
             view += 1;
         }
         // The largest score is exactly 1, so the scores need no scaling before they are summed.
@@ -94,8 +100,9 @@ impl<const S: usize> Weights<S> {
         let mut sum = 0.0;
         view = 0;
         while view < count as usize {
-            let error = errors[view];
-            values[view] = if error > smallest { smallest / error } else { (error == smallest) as u32 as f32 };
+            // Not less first: if all are infinite they share the weight.
+            let error = or_infinite(errors[view]);
+            values[view] = if error > smallest { smallest / error } else { 1.0 };
             sum += values[view];
             view += 1;
         }
@@ -116,8 +123,9 @@ impl<const S: usize> Weights<S> {
         let mut scores = [0.0; S];
         view = 0;
         while view < count as usize {
-            // Equality first: infinity minus infinity is NaN.
-            scores[view] = if logits[view] == largest { 1.0 } else { exp(logits[view] - largest) };
+            // Not less first: infinity minus infinity is NaN.
+            let logit = if logits[view] > f32::NEG_INFINITY { logits[view] } else { f32::NEG_INFINITY };
+            scores[view] = if logit < largest { exp(logit - largest) } else { 1.0 };
             view += 1;
         }
         Weights::from_scores(&scores, count)

@@ -103,6 +103,20 @@ fn an_unknown_max_pool_is_told() {
         let arguments = format!("convert a.safetensors c.safetensors --set {value}");
         assert_wrong_arguments(&folder, &arguments, &["--set", "for example viewfuse.first_pool=0"]);
     }
+    // Values that no network understands, and keys that this one does not read.
+    for (value, part) in [
+        ("viewfuse.first_pool=2", "viewfuse.first_pool"),
+        ("viewfuse.source_side=abc", "viewfuse.source_side"),
+        ("viewfuse.estimate=colours", "nothing reads that of such a network"),
+    ] {
+        let arguments = format!("convert a.safetensors c.safetensors --set viewfuse.first_pool=0 --set {value}");
+        let arguments = if value.contains("first_pool") {
+            arguments.replacen("--set viewfuse.first_pool=0 ", "", 1)
+        } else {
+            arguments
+        };
+        assert_refused(&folder, &arguments, &["a.safetensors", part]);
+    }
     let keys = [&pixelnerf::KEYS[..], &genvs::KEYS[..]].concat();
     let refusal = format!("nothing reads the key viewfuse.first_pol; those that exist are {}", keys.join(", "));
     let misspelled = "convert a.safetensors c.safetensors --set viewfuse.first_pol=0";

@@ -124,6 +124,12 @@ fn nothing_counts_twice_in_a_table() {
     ] {
         assert_wrong_arguments(&scene, &format!("{run} {more}"), &[part]);
     }
+    // The same photographs by another file are the same scene.
+    fs::create_dir(scene.join("a")).expect("a folder");
+    done(&scene, "export toy --layout transforms -o a/b");
+    let again =
+        run.replace("evaluate toy", "evaluate a/b a/b/transforms.json").replace("--targets 20", "--targets #20");
+    assert_wrong_arguments(&scene, &again, &["the scene is given twice: its photographs are those of a/b"]);
     assert_wrong_arguments(&scene, "inspect toy -o cameras.jpg", &["PNG", "cameras.png"]);
 }
 

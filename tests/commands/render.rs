@@ -112,7 +112,7 @@ fn orbits() {
     let scene = toy();
     done(&scene, "render toy --orbit 3 --size 32x32 -o out");
     let expected: Vec<String> = (0..3)
-        .flat_map(|frame| ["", "_depth", "_sheet"].map(|part| format!("orbit-{frame:03}{part}.png")))
+        .flat_map(|frame| ["", "_depth"].map(|part| format!("orbit-{frame:03}{part}.png")))
         .chain(["run.json".to_owned()])
         .collect();
     assert_eq!(names_in(&scene.join("out")), expected);

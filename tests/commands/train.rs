@@ -6,6 +6,7 @@ use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::Stdio;
+use viewfuse::job::files::FolderLock;
 use viewfuse_tests::command::{interrupt, names_in};
 use viewfuse_tests::patience;
 use viewfuse_tests::scenes::Folder;
@@ -40,9 +41,9 @@ fn bytes(folder: &Path, name: &str) -> Vec<u8> {
     fs::read(folder.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
-/// Starts a run and kills it without a warning as soon as it has written its state.
-fn kill(folder: &Path, arguments: &str, state: &str) {
-    killed_when(folder, arguments, || folder.join(state).exists());
+/// Starts a run and kills it without a warning as soon as it has written a model.
+fn kill(folder: &Path, arguments: &str, model: &str) {
+    killed_when(folder, arguments, || folder.join(model).exists());
 }
 
 fn a_killed_run_goes_on_and_ends_in_the_same_numbers() {
@@ -57,7 +58,7 @@ fn a_killed_run_goes_on_and_ends_in_the_same_numbers() {
     assert_eq!((&record["steps"], record["scores"].as_array().map(Vec::len)), (&30.into(), Some(3)));
     assert!(String::from_utf8_lossy(&bytes(&folder, "whole/curve.svg")).starts_with("<svg"));
 
-    kill(&folder, &format!("{PIXELNERF} -o parts"), "parts/state.safetensors");
+    kill(&folder, &format!("{PIXELNERF} -o parts"), "parts/model.safetensors");
     let half = read_json(folder.join("parts/record.json"));
     assert!(half["steps"].as_u64() < Some(30), "it was killed too late to tell anything");
     // On another number of threads, too.
@@ -80,6 +81,26 @@ fn a_killed_run_goes_on_and_ends_in_the_same_numbers() {
     );
     assert_eq!(bytes(&folder, "whole/state.safetensors"), before);
 
+    // Neither is a network replaced whose state is gone, nor one that another process trains.
+    fs::create_dir(folder.join("kept")).expect("a folder");
+    fs::copy(folder.join("whole/model.safetensors"), folder.join("kept/model.safetensors")).expect("a copy");
+    assert_refused(
+        &folder,
+        &format!("{PIXELNERF} -o kept"),
+        &["kept/model.safetensors: a network is there and no state"],
+    );
+    assert_eq!(names_in(&folder.join("kept")), ["model.safetensors"]);
+    let lock = FolderLock::take(&folder.join("whole")).expect("the lock");
+    assert_refused(&folder, &format!("{PIXELNERF} -o whole"), &["whole: another process is writing to this folder"]);
+    drop(lock);
+    // A folder of one split is not the other one's, too.
+    let set = PIXELNERF.replace("learn/cars", "learn/cars_train");
+    assert_refused(
+        &folder,
+        &format!("{set} -o set"),
+        &["learn/cars_train: is the folder of the train split", "learn/cars"],
+    );
+
     // The weighting for it: the same again, with both embeddings; a scheme that evaluate knows.
     for embedding in ["fourier", "flat"] {
         let weighting = format!(
@@ -87,7 +108,7 @@ fn a_killed_run_goes_on_and_ends_in_the_same_numbers() {
              --validate-every 4 --write-every 0"
         );
         done(&folder, &format!("{weighting} -o {embedding}"));
-        kill(&folder, &format!("{weighting} -o {embedding}2"), &format!("{embedding}2/state.safetensors"));
+        kill(&folder, &format!("{weighting} -o {embedding}2"), &format!("{embedding}2/model.safetensors"));
         done(&folder, &format!("{weighting} -o {embedding}2"));
         let model = format!("{embedding}/model.safetensors");
         assert_eq!(bytes(&folder, &format!("{embedding}2/model.safetensors")), bytes(&folder, &model));
@@ -280,7 +301,7 @@ fn curves_are_there_while_it_runs() {
     let curve = || fs::read_to_string(folder.join("run/curve.csv")).unwrap_or_default();
     patience::wait_while_running(&mut child, || curve().lines().count() > 2);
     done(&folder, "report --training run -o page.html");
-    assert!(!folder.join("run/state.safetensors").exists());
+    assert!(!folder.join("run/model.safetensors").exists());
     child.kill().expect("a process to kill");
     let said = String::from_utf8(child.wait_with_output().expect("a dead process").stderr).expect("text");
     let live = said.lines().filter(|line| line.contains(" %, training: step "));

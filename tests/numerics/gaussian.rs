@@ -48,6 +48,13 @@ fn what_can_not_be_drawn_covers_nothing() {
         assert_eq!(axes(rotation), [Vec3::X, Vec3::Y, Vec3::Z]);
         assert_eq!(project(&GaussianBlock { rotation, ..good }, &camera, NEAR), project(&good, &camera, NEAR));
     }
+    // Of any length: the smallest and the largest numbers.
+    for (length, of) in [(1.4e-45, [1.0, 1.0, 0.0, 0.0]), (1.0e-41, [1.0; 4]), (3.0e38, [1.0; 4])] {
+        let (found, unit) = (axes(of.map(|number: f32| number * length)), axes(of));
+        for (a, b) in found.into_iter().zip(unit) {
+            assert!(a.distance(b) < 1e-6, "{length:e} {of:?}: {found:?}");
+        }
+    }
     let broken = [
         GaussianBlock { position: [0.0, 0.0, -2.0], ..good },
         GaussianBlock { position: [0.0, 0.0, 0.05], ..good },

@@ -2,6 +2,7 @@
 //! that what is distorted is undistorted, over whole pictures.
 
 use serde::Deserialize;
+use viewfuse::check::poses::Random;
 use viewfuse_core::lens::{Lens, LensBlock, LensError, MAX_COEFFICIENT, Projection};
 
 /// Points before the camera, at depth 1.
@@ -119,4 +120,40 @@ fn coefficients_are_checked() {
     let pinhole = Lens::new(Projection::Perspective, [0.0; 9]).expect("a pinhole");
     assert!(pinhole.is_pinhole() && !Lens::new(Projection::Fisheye, [0.0; 9]).expect("a lens").is_pinhole());
     assert_eq!((pinhole.block(), pinhole.distort([0.3, 0.4])), (LensBlock::default(), [0.3, 0.4]));
+}
+
+/// Lenses of wide angles, whose folds are near: Newton's method from the point itself would leave the part that grows.
+#[test]
+fn points_of_wide_lenses_are_found() {
+    let mut random = Random::new(3);
+    let perspective = |random: &mut Random| {
+        let radial = [(0.0, 0.3), (-0.1, 0.1), (-0.03, 0.03)].map(|(from, to)| random.range(from, to));
+        (Projection::Perspective, [radial[0], radial[1], radial[2], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    };
+    let fisheye = |random: &mut Random| {
+        let [k1, k2, k3, k4] = [0.1, 0.05, 0.02, 0.005].map(|most| random.range(-most, most));
+        (Projection::Fisheye, [k1, k2, k3, k4, 0.0, 0.0, 0.0, 0.0, 0.0])
+    };
+    let mut lenses: Vec<_> =
+        (0..200).map(|index| if index % 2 == 0 { perspective(&mut random) } else { fisheye(&mut random) }).collect();
+    lenses.push((Projection::Fisheye, [0.0814, 0.04, -0.01785, -0.00475, 0.0, 0.0, 0.0, 0.0, 0.0]));
+    lenses.push((Projection::Perspective, [0.29928, 0.01779, -0.02004, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]));
+    lenses.push((Projection::Perspective, [0.09406, 0.08508, -0.00387, 0.0, 0.0, 0.0, -0.00034, -0.00096, 0.0]));
+    for (projection, coefficients) in lenses {
+        let lens = Lens::new(projection, coefficients).expect("a lens");
+        // Right before a fold the inverse has no slope.
+        let reach = match projection {
+            Projection::Fisheye => (0.97 * lens.reach(10.0).atan()).tan(),
+            Projection::Perspective => 0.97 * lens.reach(2.0),
+        };
+        for step in 1..=200 {
+            let (radius, angle) = (reach * f64::from(step) / 200.0, f64::from(step));
+            let point = [radius * angle.cos(), radius * angle.sin()];
+            let found = lens.undistort(lens.distort(point));
+            assert!(found.residual < 1e-13, "{projection:?} {coefficients:?}: {point:?}: {found:?}");
+            assert!(distance(found.point, point) < 1e-9 * (1.0 + radius), "{coefficients:?}: {point:?}: {found:?}");
+            let single = lens.block().undistort(lens.distort(point).map(|value| value as f32));
+            assert!(single.residual < 1e-5, "{projection:?} {coefficients:?}: {point:?}: {single:?}");
+        }
+    }
 }

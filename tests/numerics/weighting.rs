@@ -67,6 +67,35 @@ fn random_poses_of_all_sizes() {
     }
 }
 
+/// Two sources at nearly the distance of subnormal numbers: one at the target's place, one beside it.
+#[test]
+fn subnormal_distances_count() {
+    let at = |x: f32| pose_of(&rotation_about([0.0, 0.0, 1.0], 0.0), [f64::from(x), 0.0, 0.0]);
+    for x in [1.0e-45, 1.0e-40, 1.0e-38, 1.0e-31, 1.0e-29] {
+        let found =
+            weights(Scheme::error(0.5, AngleKind::FullRotation).expect("a scheme"), &[at(0.0), at(x)], &at(0.0));
+        assert!(found[0] > 0.999_99 && found[1] < 1.0e-5, "{x:e}: {found:?}");
+    }
+}
+
+/// The squares of nearly equal distances differ by less than they are rounded by.
+#[test]
+fn cameras_on_a_shell_far_away() {
+    let mut random = Random::new(15);
+    for radius in [10.0, 100.0, 1.0e3, 3.0e3, 1.0e4] {
+        let scenes: Vec<_> = (0..400)
+            .map(|index| {
+                let sources = (0..COUNTS[index % 7]).map(|_| {
+                    let (direction, beyond) = (normalised(random.vector()), random.log_range(1.0e-8, 1.0e-3));
+                    pose_of(&random.rotation(), direction.map(|along| along * radius * (1.0 + beyond)))
+                });
+                (sources.collect::<Vec<_>>(), Pose::IDENTITY)
+            })
+            .collect();
+        check_all(&format!("shell of radius {radius:e}"), &scenes);
+    }
+}
+
 #[test]
 fn distances_of_very_different_sizes() {
     let mut random = Random::new(12);

@@ -137,6 +137,11 @@ fn degenerate_scores() {
     for errors in [[0.0; 3], [f32::NAN; 3], [-1.0; 3], [f32::INFINITY; 3], [f32::MAX; 3], [1.0e-30; 3]] {
         assert_eq!(Weights::from_errors(&errors, 3).values(), &third, "{errors:?}");
     }
+    // What counts as infinite counts as what is.
+    for error in [f32::NAN, -1.0] {
+        assert_eq!(Weights::from_errors(&[error, f32::INFINITY], 2).values(), &[0.5; 2], "{error}");
+    }
+    assert_eq!(Weights::from_logits(&[f32::NAN, f32::NEG_INFINITY], 2).values(), &[0.5; 2]);
     assert_eq!(Weights::from_errors(&[0.0, 1.0, 0.0], 3).values(), &[0.5, 0.0, 0.5]);
     assert_eq!(Weights::from_errors(&[f32::NAN, 1.0, f32::INFINITY], 3).values(), &[0.0, 1.0, 0.0]);
     for logits in [[0.0; 3], [f32::NAN; 3], [f32::NEG_INFINITY; 3], [f32::INFINITY; 3], [1.0e30; 3], [-1.0e30; 3]] {

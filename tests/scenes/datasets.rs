@@ -55,6 +55,18 @@ fn the_chairs_have_a_folder_more() {
     assert_found(&folder, "chairs_train", Split::Train, "chairs_2.0", &both);
 }
 
+/// What is completed to one split's folder is not taken for another one: validation would be on what was learned.
+#[test]
+fn a_folder_of_one_split_is_not_another_one() {
+    let folder = folder(&["srn/cars_train/a", "srn/cars_val/c"]);
+    assert_found(&folder, "srn/cars_train", Split::Train, "cars_train", &["srn/cars_train/a"]);
+    for split in [Split::Validation, Split::Test] {
+        let error = open(&folder, "srn/cars_train", split).expect_err("another split").to_string();
+        assert!(error.contains("cars_train: is the folder of the train split by its name; for the"), "{error}");
+        assert!(error.ends_with("srn/cars"), "{error}");
+    }
+}
+
 #[test]
 fn a_folder_of_scenes_serves_every_split() {
     let folder = folder(&["mine/b", "mine/a", "mine/.unfinished-1/c"]);

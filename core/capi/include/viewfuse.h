@@ -55,7 +55,7 @@ enum viewfuse_status
    */
   VIEWFUSE_STATUS_POSE_NOT_FINITE = 5,
   /*
-   A camera is further than 1e30 from the origin.
+   A coordinate of a camera's place is beyond 1e30.
    */
   VIEWFUSE_STATUS_POSE_TOO_FAR = 6,
   /*

@@ -20,7 +20,7 @@ pub enum Status {
     Parameter = 4,
     /// An entry of a pose is NaN or infinite.
     PoseNotFinite = 5,
-    /// A camera is further than 1e30 from the origin.
+    /// A coordinate of a camera's place is beyond 1e30.
     PoseTooFar = 6,
     /// The last row of a pose is not 0 0 0 1.
     PoseLastRow = 7,

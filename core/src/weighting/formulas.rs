@@ -42,15 +42,17 @@ pub(super) fn error<const S: usize>(sources: &Sources<S>, target: &Pose, choice:
     let count = sources.count();
     // A term whose factor is 0 is left out: it can change nothing.
     let (mut errors, largest) = if alpha < 1.0 { distances(sources, target) } else { ([0.0; S], 0.0) };
-    // All centres at the target's: the published 0 / 0 is a distance term of 0.
-    let translation_factor = if largest > 0.0 { (1.0 - alpha) / largest } else { 0.0 };
+    // All centres at the target's: the published 0 / 0 is a distance term of 0. The reciprocal of a subnormal distance
+    // would be infinite, so such ones are enlarged.
+    let unit = if largest < 1.0e-30 { 1.0e30 } else { 1.0 };
+    let translation_factor = if largest > 0.0 { (1.0 - alpha) / (largest * unit) } else { 0.0 };
     let mut angles = [0.0; S];
     if alpha > 0.0 {
         angles_between(sources, target, angle, &mut angles);
     }
     let mut view = 0;
     while view < count as usize {
-        errors[view] = alpha * (angles[view] * FRAC_1_PI) + translation_factor * errors[view] + ERROR_OFFSET;
+        errors[view] = alpha * (angles[view] * FRAC_1_PI) + translation_factor * (errors[view] * unit) + ERROR_OFFSET;
         view += 1;
     }
     Weights::from_errors(&errors, count)
@@ -113,35 +115,50 @@ pub(super) fn distance<const S: usize>(sources: &Sources<S>, target: &Pose, powe
 /// Weights proportional to `exp(-beta d^2)`.
 pub(super) fn gaussian<const S: usize>(sources: &Sources<S>, target: &Pose, _: u32, beta: f32) -> Weights<S> {
     let count = sources.count() as usize;
-    let (distances, largest) = distances(sources, target);
-    let (mut nearest, mut least) = (0, distances[0]);
-    let mut view = 1;
+    let mut squares = [(0.0, 0.0); S];
+    // The nearest by squares and their rests: of two that are rounded to one number, the wrong one would have the whole
+    // weight where beta is large.
+    let (mut least, mut is_exact) = ((f32::INFINITY, 0.0), beta <= MAX_EXACT_BETA);
+    let mut view = 0;
     while view < count {
-        if distances[view] < least {
-            (nearest, least) = (view, distances[view]);
+        let (square, rest) = squared_distance(sources.pose(view as u32), target);
+        squares[view] = (square, rest);
+        if square < least.0 || (square == least.0 && rest < least.1) {
+            least = (square, rest);
         }
+        // False for a square that overflowed, too.
+        is_exact &= square <= MAX_EXACT_DISTANCE * MAX_EXACT_DISTANCE;
         view += 1;
     }
-    // The limit only tells the compiler that the nearest is one of them.
-    let nearest_squared = squared_distance(sources.pose(nearest.min(S - 1) as u32), target);
     let mut scores = [0.0; S];
-    view = 0;
-    while view < count {
-        // Relative to the nearest source, so that the largest weight never underflows.
-        let squared = squared_distance(sources.pose(view as u32), target);
-        // A relative error of an exponent is an absolute error of the logarithm of a weight: an exponent of 40 in f32
-        // alone would cost 5e-6. So it is kept with its rounding error, and the exponential corrected by that.
-        let (excess, rest) = two_sum(squared.0, -nearest_squared.0);
-        let rest = rest + (squared.1 - nearest_squared.1);
-        scores[view] = if largest > MAX_EXACT_DISTANCE || beta > MAX_EXACT_BETA {
-            // So far away the squares overflow; d^2 - n^2 = (d - n)(d + n).
-            let (far, near) = (distances[view], least);
-            if far > near && beta > 0.0 { exp(-(beta * (far - near)) * (far + near)) } else { 1.0 }
-        } else {
-            let (exponent, error) = two_product(beta, excess);
-            exp(-exponent) * (1.0 - (error + beta * rest))
-        };
-        view += 1;
+    if is_exact {
+        view = 0;
+        while view < count {
+            // Relative to the nearest source, so that the largest weight never underflows.
+            let (excess, rest) = two_sum(squares[view].0, -least.0);
+            let rest = rest + (squares[view].1 - least.1);
+            // A relative error of an exponent is an absolute error of the logarithm of a weight: an exponent of 40 in
+            // f32 alone would cost 5e-6. So it is kept with its rounding error, and the exponential corrected by that.
+            let (product, error) = two_product(beta, excess);
+            let (exponent, error) = two_sum(product, error + beta * rest);
+            scores[view] = exp(-exponent) * (1.0 - error);
+            view += 1;
+        }
+    } else {
+        // So far away the squares overflow; d^2 - n^2 = (d - n)(d + n).
+        let (distances, _) = distances(sources, target);
+        let mut near = f32::INFINITY;
+        view = 0;
+        while view < count {
+            near = min(distances[view], near);
+            view += 1;
+        }
+        view = 0;
+        while view < count {
+            let far = distances[view];
+            scores[view] = if far > near && beta > 0.0 { exp(-(beta * (far - near)) * (far + near)) } else { 1.0 };
+            view += 1;
+        }
     }
     Weights::from_scores(&scores, sources.count())
 }
@@ -151,7 +168,8 @@ const MAX_EXACT_DISTANCE: f32 = 1.0e6;
 /// The same for `beta`.
 const MAX_EXACT_BETA: f32 = 1.0e6;
 
-/// Squared distance of two cameras' centres, as the rounded value and the rest.
+/// Squared distance of two cameras' centres, as the rounded value and the rest. Where the square overflows, neither is
+/// below infinity.
 fn squared_distance(a: &Pose, b: &Pose) -> (f32, f32) {
     let (a, b) = (a.centre_world().to_array(), b.centre_world().to_array());
     let (mut sum, mut rest) = (0.0, 0.0);
@@ -164,7 +182,7 @@ fn squared_distance(a: &Pose, b: &Pose) -> (f32, f32) {
         rest += carry + (error + 2.0 * difference * lost);
         axis += 1;
     }
-    (sum, rest)
+    two_sum(sum, rest)
 }
 
 /// `x^power` for `power` in 1..=3.

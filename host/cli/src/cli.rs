@@ -117,6 +117,7 @@ enum Command {
 }
 
 pub(crate) use ending::INTERRUPTED;
+pub use ending::be_patient;
 pub(crate) use hints::{hint, is_of_arguments};
 pub use outputs::keep_input;
 pub use parse::parse_size;

@@ -305,6 +305,14 @@ fn kept_in_words(pictures: &[Kept]) -> Option<String> {
     (!pictures.is_empty()).then(words)
 }
 
+/// Checks that [`Evaluator::score_all`] can choose the sources and targets of a scene.
+///
+/// # Errors
+/// [`EvaluateError`], as that gives it.
+pub fn check_selection(scene: &Scene, selection: &Selection, least_sources: usize) -> Result<(), EvaluateError> {
+    source_groups(scene, selection, least_sources).map(drop)
+}
+
 /// Sets of sources, each with the targets that are rendered from it.
 type SourceGroups = Vec<(Vec<usize>, Vec<usize>)>;
 

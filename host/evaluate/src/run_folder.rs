@@ -180,11 +180,14 @@ impl RunFolder {
     /// Every finished job of every shard, by number. For a job that was run twice, the first shard's result.
     ///
     /// # Errors
-    /// [`FolderError`].
+    /// [`FolderError`]; [`FolderError::OtherSettings`] for a job of an evaluation with other settings.
     pub fn finished(&self) -> Result<BTreeMap<usize, Finished>, FolderError> {
-        let mut finished = BTreeMap::new();
+        let (mut finished, settings) = (BTreeMap::new(), self.settings.digest());
         for journal in journal::journals(&self.path)? {
             for line in journal::read(&journal)? {
+                if line.settings != settings {
+                    return Err(FolderError::OtherSettings { path: self.path.clone(), job: line.job });
+                }
                 finished.entry(line.job).or_insert(line);
             }
         }

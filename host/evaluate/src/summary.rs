@@ -49,6 +49,8 @@ pub struct Table {
     pub scene_count: usize,
     /// Number of pictures of every scheme.
     pub target_count: usize,
+    /// Different views that these show.
+    pub view_count: usize,
     /// The sampling unit of the intervals.
     pub unit: Unit,
     /// The metrics, in the order of their columns.
@@ -167,8 +169,8 @@ pub fn tables<'a>(finished: impl IntoIterator<Item = &'a Finished>, by_source_co
     groups.values().map(|observations| table(observations)).collect()
 }
 
-/// A sampling unit: a scene, or a target of a job.
-type Counted<'a> = (usize, usize, &'a str);
+/// A sampling unit: a scene, or a view.
+type Counted<'a> = (usize, &'a str);
 
 /// One table of these scores.
 pub fn table(observations: &[Observation<'_>]) -> Table {
@@ -188,10 +190,11 @@ pub fn table(observations: &[Observation<'_>]) -> Table {
     // By scheme and metric: every scene's, or view's, values.
     let mut values: BTreeMap<(&str, &str), BTreeMap<Counted<'_>, Vec<f64>>> = BTreeMap::new();
     let mut times: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
-    for Observation { scene, job, score } in observations {
+    for Observation { scene, score, .. } in observations {
         let counted = match unit {
-            Unit::Scenes => (*scene, 0, ""),
-            Unit::Views => (0, *job, score.target.as_str()),
+            Unit::Scenes => (*scene, ""),
+            // However often a view is drawn, it is one.
+            Unit::Views => (0, score.target.as_str()),
         };
         for (name, value) in &score.values {
             values.entry((&score.scheme, name)).or_default().entry(counted).or_default().push(*value);
@@ -232,6 +235,7 @@ pub fn table(observations: &[Observation<'_>]) -> Table {
             .collect(),
         scene_count,
         target_count: times.values().map(Vec::len).max().unwrap_or(0),
+        view_count: observations.iter().map(|one| (one.scene, &one.score.target)).collect::<BTreeSet<_>>().len(),
         unit,
         comparisons: verdict::comparisons(&rows, difference),
         metrics,

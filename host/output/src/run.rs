@@ -1,5 +1,5 @@
 //! The output folder of a run: `NAME.png`, `NAME_depth.png` (16 bit; also `.exr` and `.npy`), `NAME_confidence.png` (8
-//! bit) and `NAME_sheet.png` for each target, and `run.json` when all are there.
+//! bit) and, of a photograph, `NAME_sheet.png` for each target, and `run.json` when all are there.
 //!
 //! A run that was interrupted continues: [`RunWriter::resume`] tells which targets are finished.
 
@@ -41,7 +41,7 @@ pub struct Outputs {
     pub depths: Vec<DepthFormat>,
     /// Write the confidence map, of fields that have one.
     pub confidence: bool,
-    /// Write the contact sheet.
+    /// Write the contact sheets of targets that are photographs: what a picture is compared with there.
     pub sheet: bool,
 }
 
@@ -205,7 +205,7 @@ impl RunWriter {
         self.size = frame.picture.dimensions().into();
         self.background = sources.background;
         self.warnings.clone_from(&sources.warnings);
-        if self.outputs.sheet && self.source_pictures.is_empty() {
+        if self.has_sheet(&frame) && self.source_pictures.is_empty() {
             self.source_pictures = (0..sources.images.len()).map(|source| Arc::new(sources.picture(source))).collect();
         }
         let record = FrameRecord::of(&frame, &self.source_names, &self.coverage, &self.space)
@@ -216,6 +216,10 @@ impl RunWriter {
         self.frames.add(record, files, bytes)?;
         self.videos.add(&self.folder, &frame, self.background());
         Ok(())
+    }
+
+    fn has_sheet(&self, frame: &Frame) -> bool {
+        self.outputs.sheet && frame.truth.is_some()
     }
 
     fn background(&self) -> Background {
@@ -254,7 +258,7 @@ impl RunWriter {
         });
         let is_written = !frame.confidences.is_empty() && self.outputs.confidence;
         add(format!("{target}_confidence.png"), is_written.then_some(confidence))?;
-        let sheet = self.outputs.sheet.then(|| {
+        let sheet = self.has_sheet(frame).then(|| {
             let (shown, title, sources) = (Arc::clone(frame), self.title(frame), self.sheet_sources(frame));
             let write: Writing =
                 Box::new(move |path| write_png(path, &DynamicImage::ImageRgb8(sheet(&shown, title, sources))));

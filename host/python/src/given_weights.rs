@@ -106,12 +106,13 @@ fn weights_of(numbers: &[f64], count: usize) -> Result<SourceWeights, String> {
     if numbers.len() != count {
         return Err(format!("{} numbers for {count} sources", numbers.len()));
     }
-    let is_usable = |number: &f64| (*number as f32).is_finite() && *number >= 0.0;
-    if !numbers.iter().all(is_usable) || !numbers.iter().any(|number| *number as f32 > 0.0) {
+    let largest = numbers.iter().copied().fold(0.0, f64::max);
+    if !numbers.iter().all(|number| number.is_finite() && *number >= 0.0) || largest == 0.0 {
         return Err("weights are finite numbers of at least 0, one of them above 0".to_owned());
     }
+    // Divided first: what is far from 1 would be no f32.
     let mut scores = [0.0; MAX_SOURCES];
-    scores.iter_mut().zip(numbers).for_each(|(score, number)| *score = *number as f32);
+    scores.iter_mut().zip(numbers).for_each(|(score, number)| *score = (number / largest) as f32);
     Ok(SourceWeights::from_scores(&scores, count as u32))
 }
 

@@ -6,7 +6,8 @@
 //! data/cars_train/<object>/                    the path names the data set, as in the code that PixelNeRF was published with
 //! data/cars/cars_train/<object>/               the path is a folder around it
 //! .../chairs_train/chairs_2.0_train/<object>/  one folder more, as in the archive of the chairs
-//! data/cars/<object>/                          a folder of scenes, which is then used for every split
+//! data/cars/<object>/                          a folder of scenes, which is then used for every split; not one whose
+//!                                              name says that it is another split
 //! ```
 //!
 //! An object is a folder in SRN's layout: one that holds `intrinsics.txt`. Nothing else is read here; a scene is
@@ -40,6 +41,10 @@ pub enum DatasetError {
     /// There is more than one data set: the folders found.
     #[error("{}: holds several data sets ({}); name one of them", .0.display(), .1.join(", "))]
     Several(PathBuf, Vec<String>),
+    /// The path is the folder of another split: that split's ending.
+    #[error("{}: is the folder of the {} split by its name; for the {} split name the data set, {}",
+        .0.display(), .2, .1, stem(.0, .2).display())]
+    OtherSplit(PathBuf, Split, Split),
     /// The folder of the split exists, but holds no scene.
     #[error("{}: no scenes: looked for folders with intrinsics.txt inside", .0.display())]
     NoScenes(PathBuf),
@@ -82,6 +87,10 @@ impl Dataset {
             }
         }
         let scenes: Vec<PathBuf> = inside.into_iter().filter(|folder| is_scene(folder)).collect();
+        let is_of = |other: &Split| name_of(path).ends_with(&format!("_{other}"));
+        if let Some(other) = Split::ALL.into_iter().find(|other| *other != split && is_of(other)) {
+            return Err(DatasetError::OtherSplit(path.to_owned(), split, other));
+        }
         if scenes.is_empty() { Err(not_found()) } else { Ok(Dataset { name: name_of(path), scenes }) }
     }
 }
@@ -97,6 +106,12 @@ fn scenes_of_split(folder: &Path, ending: &str) -> Result<Vec<PathBuf>, DatasetE
     let deeper = extra.map_or(Ok(Vec::new()), |extra| folders(&extra))?;
     let scenes: Vec<PathBuf> = deeper.into_iter().filter(|folder| is_scene(folder)).collect();
     if scenes.is_empty() { Err(DatasetError::NoScenes(folder.to_owned())) } else { Ok(scenes) }
+}
+
+/// The data set of a split's folder.
+fn stem(folder: &Path, split: &Split) -> PathBuf {
+    let name = name_of(folder);
+    folder.with_file_name(name.strip_suffix(&format!("_{split}")).unwrap_or(&name))
 }
 
 fn is_scene(folder: &Path) -> bool {

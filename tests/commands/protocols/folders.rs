@@ -140,6 +140,20 @@ fn other_settings_are_refused() {
     change_poses(&folder, |view, matrix| matrix[3] += if view == 3 { 0.1 } else { 0.0 });
     refused(&first, &["cameras of toy: "]);
     fs::write(&pose, text).expect("a file");
+    let intrinsics = folder.join("toy/intrinsics.txt");
+    let text = fs::read_to_string(&intrinsics).expect("intrinsics");
+    let moved: Vec<&str> = text.split_whitespace().collect();
+    fs::write(
+        &intrinsics,
+        text.replacen(
+            &format!("{} {}", moved[0], moved[1]),
+            &format!("{} {}", moved[0], 0.9 * moved[1].parse::<f64>().expect("a number")),
+            1,
+        ),
+    )
+    .expect("a file");
+    refused(&first, &["cameras of toy: "]);
+    fs::write(&intrinsics, text).expect("a file");
     // Another photograph under the same name.
     let photograph = folder.join("toy/rgb/000003.png");
     let before = fs::read(&photograph).expect("a photograph");
@@ -157,6 +171,7 @@ fn other_settings_are_refused() {
     // Lines of another evaluation, put beside these.
     fs::write(&journal, whole.replace("\"settings\":\"", "\"settings\":\"0")).expect("a file");
     refused(&first, &["out: job 0 was done with other settings than run.json states"]);
+    assert_refused(&folder, "report out -o page.html", &["out: job 0 was done with other settings"]);
     fs::write(folder.join("out/run.json"), "{}").expect("a file");
     refused(&first, &["out/run.json: is not of an evaluation"]);
 }

@@ -23,7 +23,7 @@ const NEAREST_COPY: &str = Baseline::NearestCopy.name();
 fn job(number: usize, scene: usize, source_count: usize, values: [[f64; 2]; 3]) -> Finished {
     let score = |(scheme, [psnr, ssim]): (&str, [f64; 2])| Score {
         scheme: scheme.to_owned(),
-        target: "1".to_owned(),
+        target: number.to_string(),
         source_count,
         values: vec![(PSNR.to_owned(), psnr), (SSIM.to_owned(), ssim)],
         time: Duration::from_secs(number as u64),
@@ -105,7 +105,14 @@ fn leading(table: &Table) -> Vec<&str> {
 }
 
 fn views_of_one_scene_take_the_place_of_scenes() {
-    let jobs = [views(&[[10.0, 20.0, 22.0], [12.0, 30.0, 33.0], [14.0, 10.0, 14.0]])];
+    let once = views(&[[10.0, 20.0, 22.0], [12.0, 30.0, 33.0], [14.0, 10.0, 14.0]]);
+    // A view that is drawn again is no other view: it makes no interval narrower.
+    let again = [once.clone(), Finished { job: 1, ..once.clone() }, Finished { job: 2, ..once.clone() }];
+    let (repeated, single) = (&tables(&again, false)[0], &tables(&[once.clone()], false)[0]);
+    assert_eq!((repeated.target_count, repeated.view_count, single.view_count), (9, 3, 3));
+    assert_eq!(repeated.rows[2].cells, single.rows[2].cells);
+    assert!(repeated.interval_words().contains("over 3 views of one scene"), "{}", repeated.interval_words());
+    let jobs = [once];
     let table = &tables(&jobs, false)[0];
     assert_eq!((table.unit, table.scene_count, table.target_count), (Unit::Views, 1, 3));
     let cell = table.rows[2].cells[0].as_ref().expect("a cell");
@@ -118,9 +125,6 @@ fn views_of_one_scene_take_the_place_of_scenes() {
     let two = [jobs[0].clone(), job(1, 1, 3, [[10.0, 0.5]; 3])];
     let table = &tables(&two, false)[0];
     assert_eq!((table.unit, table.rows[2].cells[0].as_ref().map(|cell| cell.value.count)), (Unit::Scenes, Some(2)));
-    // Two jobs of one scene with a target of the same name are two pictures.
-    let again = [jobs[0].clone(), Finished { job: 1, trial: 1, ..jobs[0].clone() }];
-    assert_eq!(tables(&again, false)[0].rows[0].cells[0].as_ref().map(|cell| cell.value.count), Some(6));
 }
 
 fn nothing_leads_within_the_interval() {

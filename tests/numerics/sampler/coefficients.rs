@@ -106,6 +106,11 @@ fn logarithms_of_quotients_agree_with_f64() {
         }
     }
     assert!(worst <= 4.0e-7, "{worst:e}");
+    // The largest numbers' sum is infinite.
+    for (a, b) in [(3.0e38_f32, 2.0e38), (2.5e38, 1.5e38), (1.5e38, 3.4e38), (f32::MAX, 1.0)] {
+        let expected = (f64::from(a) / f64::from(b)).ln();
+        assert!((f64::from(ln_ratio(a, b)) / expected - 1.0).abs() < 4.0e-7, "{a:e} / {b:e}");
+    }
     assert_eq!(ln_ratio(3.0, 3.0), 0.0);
 }
 

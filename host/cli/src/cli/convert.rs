@@ -51,6 +51,24 @@ fn setting(text: &str) -> Result<(String, String), String> {
     Ok((key.to_owned(), value.to_owned()))
 }
 
+/// Refuses what is set and would not be understood, or not be read: keys of another network.
+fn check_settings(checkpoint: &Checkpoint, set: &[(String, String)]) -> anyhow::Result<()> {
+    let Some((key, _)) = set.first() else { return Ok(()) };
+    let keys: &[&str] = match (pixelnerf::Architecture::of(checkpoint), genvs::Architecture::of(checkpoint)) {
+        (Ok(_), _) => &pixelnerf::KEYS,
+        (_, Ok(_)) => &genvs::KEYS,
+        // The value is of a network that it fits, which says what is wrong.
+        (Err(error), _) if pixelnerf::KEYS.contains(&key.as_str()) => return Err(error.into()),
+        (_, Err(error)) => return Err(error.into()),
+    };
+    match set.iter().find(|(key, _)| !keys.contains(&key.as_str())) {
+        Some((key, _)) => {
+            bail!("{}: --set {key}: nothing reads that of such a network", checkpoint.path().display())
+        }
+        None => Ok(()),
+    }
+}
+
 /// Learned attention for firmware: for the C face, or in Rust with 8 bits a weight.
 fn for_firmware(arguments: &Arguments, is_rust: bool) -> anyhow::Result<ExitCode> {
     let Arguments { input, output, .. } = arguments;
@@ -82,6 +100,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let output = &arguments.output;
     let ends_in = |name: &str| output.extension().is_some_and(|extension| extension == name);
     if (ends_in("h") || ends_in("rs")) && !arguments.half {
+        ensure!(arguments.set.is_empty(), "{}: only safetensors say of themselves what --set sets", output.display());
         return for_firmware(arguments, ends_in("rs"));
     }
     ensure!(
@@ -93,6 +112,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     check_writable(output)?;
     let mut checkpoint = Checkpoint::open(&arguments.input)?;
     arguments.set.iter().for_each(|(key, value)| checkpoint.set(key, value));
+    check_settings(&checkpoint, &arguments.set)?;
     let progress = Terminal::new("converting");
     pixelnerf::Architecture::assumption(&checkpoint).iter().for_each(|assumption| progress.warn(assumption));
     let precision = if arguments.half { Precision::Half } else { Precision::Kept };

@@ -2,6 +2,7 @@
 //! pipe that nobody writes), the process is ended here. Outputs are whole or not there in both cases.
 
 use std::process::exit;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 use viewfuse_job::files::remove_all;
@@ -12,6 +13,15 @@ pub(crate) const INTERRUPTED: u8 = 130;
 
 /// CPU time of all threads after the signal that work may take to stop by itself.
 const MAX_CPU: Duration = Duration::from_millis(1500);
+/// Whether work may take as long as it needs.
+static IS_PATIENT: AtomicBool = AtomicBool::new(false);
+
+/// From here on work that is told to end may finish its piece, however long that takes: what it writes then is worth
+/// more than a quick end. A second signal ends the process at once.
+pub fn be_patient() {
+    IS_PATIENT.store(true, Ordering::Relaxed);
+}
+
 /// Time without any CPU time after which the process counts as blocked.
 const BLOCKED: Duration = Duration::from_millis(1000);
 /// CPU time that a blocked process may take: the progress bar and this thread.
@@ -22,6 +32,7 @@ const LOOK: Duration = Duration::from_millis(50);
 /// Waits until the work has had its time to stop, then ends the process.
 pub(crate) fn watch() -> ! {
     let (start, first) = (Instant::now(), cpu_time(Instant::now()));
+    let (is_patient, mut is_told) = (IS_PATIENT.load(Ordering::Relaxed), false);
     let (mut since, mut before) = (start, first);
     loop {
         sleep(LOOK);
@@ -29,7 +40,12 @@ pub(crate) fn watch() -> ! {
         if now.saturating_sub(before) > IDLE_CPU {
             (since, before) = (Instant::now(), now);
         }
-        if now.saturating_sub(first) > MAX_CPU || since.elapsed() > BLOCKED {
+        let is_long = now.saturating_sub(first) > MAX_CPU;
+        if is_long && is_patient && !is_told {
+            super::printing::complain("what was done is kept when this piece of work ends; once more ends it at once");
+            is_told = true;
+        }
+        if (is_long && !is_patient) || since.elapsed() > BLOCKED {
             end();
         }
     }

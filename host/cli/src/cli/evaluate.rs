@@ -25,7 +25,7 @@ use clap::Args;
 use files::{csv_of, json_of};
 use protocol::ProtocolOptions;
 use serde_json::json;
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fs::canonicalize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -33,7 +33,7 @@ use tables::{counted, print_table};
 use viewfuse_device::choice::Chosen;
 use viewfuse_evaluate::baseline::Baseline;
 use viewfuse_evaluate::summary::{Observation, Table, table};
-use viewfuse_evaluate::{Evaluator, Score};
+use viewfuse_evaluate::{Evaluator, Score, check_selection};
 use viewfuse_job::files::{check_writable, write_whole};
 use viewfuse_job::progress::Part;
 use viewfuse_scene::Scene;
@@ -154,6 +154,8 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
     // All are opened before the first is computed: a wrong path shows at once.
     let paths = arguments.paths()?;
     let scenes: Vec<Scene> = paths.iter().map(|path| arguments.picture.masks.open(path)).collect::<Result<_, _>>()?;
+    refuse_same_photographs(&scenes)?;
+    scenes.iter().try_for_each(|scene| check_selection(scene, &selection, about.least_sources))?;
     scenes.iter().for_each(warn_of);
     arguments.output.as_deref().map_or(Ok(()), |path| keep_file_apart(&scenes, path))?;
     let csv = |path: &Path| refuse_extension(path, "a table as CSV", &["csv", "txt"]);
@@ -210,6 +212,21 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Refuses a scene that is given as its folder and as its file, too: it would count as two in means and intervals.
+fn refuse_same_photographs(scenes: &[Scene]) -> anyhow::Result<()> {
+    let mut seen: HashMap<Vec<PathBuf>, &Path> = HashMap::new();
+    for scene in scenes {
+        let files = scene.views.iter().filter_map(|view| view.image.as_deref());
+        let mut files: Vec<PathBuf> = files.map(|file| canonicalize(file).unwrap_or_else(|_| file.into())).collect();
+        files.sort_unstable();
+        if let Some(first) = seen.insert(files, &scene.path) {
+            let (again, first) = (scene.path.display(), first.display());
+            return Err(wrong(format_args!("{again}: the scene is given twice: its photographs are those of {first}")));
+        }
+    }
+    Ok(())
 }
 
 /// Scores of one scene after the other.

@@ -35,8 +35,9 @@ use viewfuse_weighting::{Weighting, WeightingChoice};
     camera_path.json -o - | ffplay -\n      a path from nerfstudio's viewer, played as it comes\n  viewfuse render \
     photos/ --gaussians photos.ply --orbit 24 -o out\n      the Gaussians that `optimise` wrote\n\n\
     Writes NAME.png, NAME_depth.png (16 bit; scale in run.json; none with a GeNVS), NAME_confidence.png (8 bit; where \
-    the field tells), NAME_sheet.png for each target, and run.json. A run that was interrupted continues where it was \
-    when it is started again. With `-o -` the pictures go to standard output as y4m, and nothing is written.\n\n\
+    the field tells) and, where there is a photograph to compare it with, NAME_sheet.png for each target, and \
+    run.json. A run that was interrupted continues where it was when it is started again. With `-o -` the pictures go to \
+    standard output as y4m, and nothing is written.\n\n\
     Real photographs, seconds of two cores for the first picture, of it the choice: seven of 512x341 pixels 18 and 11, \
     with --fast 6; ten of 320x240 in which Gaussians are mixed 40 and 15, with --fast 6. With --cache the choice is \
     kept for the same sources and options: the next picture takes 8 and 21.")]

@@ -48,7 +48,8 @@ pub struct SceneSettings {
     /// Width and height of the pictures at its first view.
     #[serde(default)]
     pub size: [u32; 2],
-    /// SHA-256 of the names, poses and sizes of its views and of the lengths of their files, the first eight bytes.
+    /// SHA-256 of the names, cameras, lenses and bounds of its views, of the lengths of their files and of the points,
+    /// the first eight bytes.
     pub cameras: String,
 }
 
@@ -62,15 +63,24 @@ impl SceneSettings {
         for view in &scene.views {
             digest.update(view.name.as_bytes());
             digest.update([0, u8::from(view.image.is_some())]);
-            let numbers = view.camera.pose.to_opencv().into_iter().flatten().chain(view.camera.pinhole.focal());
+            let pinhole = &view.camera.pinhole;
+            let bounds = view.near_far.into_iter().flatten();
+            let pose = view.camera.pose.to_opencv().into_iter().flatten();
+            let numbers = pose.chain(pinhole.focal()).chain(pinhole.principal()).chain(bounds);
             numbers.for_each(|number| digest.update(number.to_le_bytes()));
             [view.camera.pinhole.width(), view.camera.pinhole.height()]
                 .iter()
                 .for_each(|side| digest.update(side.to_le_bytes()));
+            if let Some(lens) = &view.lens {
+                digest.update(format!("{lens:?}"));
+            }
             // Other photographs under the same names have other lengths; a file's time is that of its copy.
             let length = |file: &PathBuf| std::fs::metadata(file).map_or(0, |file| file.len());
             let files = view.image.iter().chain(&view.mask);
             files.for_each(|file| digest.update(length(file).to_le_bytes()));
+        }
+        for point in &scene.points {
+            point.position_world.to_array().iter().for_each(|number| digest.update(number.to_le_bytes()));
         }
         let cameras = hexadecimal(&digest.finalize()[..8]);
         let masks = scene.views.iter().filter(|view| view.mask.is_some()).count();
@@ -117,8 +127,11 @@ impl Settings {
                 Value::Array(items) if key == "scenes" => {
                     let name = |item: &Value| item["name"].as_str().unwrap_or_default().to_owned();
                     flat.insert(key, items.iter().map(name).collect::<Vec<_>>().join(", "));
-                    let cameras =
-                        items.into_iter().map(|item| (format!("cameras of {}", name(&item)), item.to_string()));
+                    // Scenes may have one name.
+                    let cameras = items.into_iter().enumerate().map(|(index, item)| {
+                        let numbered = if index == 0 { String::new() } else { format!(" (scene {})", index + 1) };
+                        (format!("cameras of {}{numbered}", name(&item)), item.to_string())
+                    });
                     flat.extend(cameras);
                 }
                 value => {

@@ -134,10 +134,10 @@ impl Table {
     pub fn interval_words(&self) -> String {
         match self.unit {
             Unit::Scenes => format!("±: 95 % intervals over {} scenes", self.scene_count),
-            Unit::Views if self.target_count < 2 => "one view of one scene: no intervals".to_owned(),
+            Unit::Views if self.view_count < 2 => "one view of one scene: no intervals".to_owned(),
             Unit::Views => format!(
                 "±: 95 % intervals over {} views of one scene; they say nothing about other scenes",
-                self.target_count
+                self.view_count
             ),
         }
     }

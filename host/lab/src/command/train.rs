@@ -7,7 +7,7 @@ use crate::train::{
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use viewfuse_cli::shared::{Terminal, keep_input, on_threads, say};
+use viewfuse_cli::shared::{Terminal, be_patient, keep_input, on_threads, say};
 use viewfuse_field::pixelnerf;
 use viewfuse_job::files::check_writable;
 use viewfuse_job::progress::Progress;
@@ -126,9 +126,16 @@ fn trained(
     let sets = [Dataset::open(data, Split::Train)?.scenes, Dataset::open(data, Split::Validation)?.scenes];
     sets.iter().flatten().try_for_each(|scene| keep_input(scene, output))?;
     let progress = Terminal::new("reading the scenes");
+    if sets[0] == sets[1] {
+        progress.warn(
+            "validation is on the scenes of training, since these are in no folder *_train beside a *_val: \
+            its score says nothing about other scenes",
+        );
+    }
     let network = network.map(Checkpoint::open).transpose()?;
     let assumption = network.as_ref().and_then(pixelnerf::Architecture::assumption);
     assumption.iter().for_each(|assumption| progress.warn(assumption));
+    be_patient();
     let task = Task { schedule, scenes: [&sets[0], &sets[1]], folder: output, progress: &progress };
     let outcome = on_threads(*threads, || train(network.as_ref(), &task))??;
     drop(progress);

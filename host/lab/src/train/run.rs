@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Instant;
 use viewfuse_job::digest::sha256_of;
-use viewfuse_job::files::{check_writable, write_whole};
+use viewfuse_job::files::{FolderLock, WriteError, check_writable, write_whole};
 use viewfuse_job::progress::{Progress, Silent};
 use viewfuse_nn::checkpoint::{Checkpoint, Precision};
 
@@ -172,7 +172,8 @@ impl<S: Serialize> Plan<'_, S> {
     }
 }
 
-/// Trains, or continues, until all steps are done. On cancellation it writes its state first.
+/// Trains, or continues, until all steps are done. On cancellation it writes its state first. No other process writes to
+/// the folder meanwhile.
 pub(crate) fn run<S: Serialize>(
     learner: &dyn Learner,
     plan: &Plan<'_, S>,
@@ -180,12 +181,20 @@ pub(crate) fn run<S: Serialize>(
 ) -> Result<Outcome, TrainError> {
     let settings = &plan.record(schedule, learner.data())?;
     let run = Run { learner, schedule, settings, score_name: plan.score_name, folder };
+    std::fs::create_dir_all(folder).map_err(|cause| WriteError::Io { path: folder.to_path_buf(), cause })?;
+    let _lock = FolderLock::take(folder)?;
     for file in [run.state(), run.model(), folder.join(CURVE), folder.join(NUMBERS), folder.join(RECORD)] {
         check_writable(&file)?;
     }
     let average = Average::new(learner.parameters(), AVERAGING)?;
     let learned = Learned { parameters: learner.parameters(), adam: Adam::new(learner.parameters())?, average };
-    let mut so_far = state::read(&run.state(), settings, &learned)?.unwrap_or_default();
+    let found = state::read(&run.state(), settings, &learned)?;
+    // An empty one is of a machine that lost its power.
+    if found.is_none() && run.model().exists() && !run.state().exists() {
+        return Err(TrainError::NoState(run.model()));
+    }
+    let is_new = found.is_none();
+    let mut so_far = found.unwrap_or_default();
     if let Some((step, planned)) = so_far.extended.last().filter(|(step, _)| *step == so_far.steps) {
         progress.note(&format!(
             "goes on at step {step} of a run of {planned}: from here the rate is that of {} steps",
@@ -193,6 +202,10 @@ pub(crate) fn run<S: Serialize>(
         ));
     }
     run.tell(&so_far)?;
+    if is_new {
+        // From here on this folder is this run's: another one does not begin in it.
+        state::write(&run.state(), settings, &so_far, &learned)?;
+    }
     progress.stage("training", 1..STAGES, STAGES);
     progress.expect(schedule.steps.saturating_sub(so_far.steps) as usize);
     let mut written = Instant::now();

@@ -19,6 +19,11 @@ pub enum Split {
 #[error("'{0}' is not a split of a data set: train, val or test")]
 pub struct UnknownSplit(String);
 
+impl Split {
+    /// All of them.
+    pub const ALL: [Split; 3] = [Split::Train, Split::Validation, Split::Test];
+}
+
 impl fmt::Display for Split {
     /// As in the folders' suffixes: `train`, `val`, `test`.
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -34,7 +39,6 @@ impl FromStr for Split {
     type Err = UnknownSplit;
 
     fn from_str(name: &str) -> Result<Split, UnknownSplit> {
-        let all = [Split::Train, Split::Validation, Split::Test];
-        all.into_iter().find(|split| split.to_string() == name).ok_or_else(|| UnknownSplit(name.to_owned()))
+        Split::ALL.into_iter().find(|split| split.to_string() == name).ok_or_else(|| UnknownSplit(name.to_owned()))
     }
 }

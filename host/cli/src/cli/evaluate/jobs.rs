@@ -48,7 +48,7 @@ impl Jobs<'_> {
         let mut finished = folder.as_ref().map_or_else(|| Ok(BTreeMap::new()), RunFolder::finished)?;
         let settings = self.settings.digest();
         for (number, done) in &finished {
-            self.check(*number, done, &settings)?;
+            self.check(*number, done)?;
         }
         // What fields may see of the scenes.
         let shown: Vec<Scene> = match self.protocol.hides_masks() {
@@ -105,11 +105,8 @@ impl Jobs<'_> {
     }
 
     /// A finished job must be the one that would be done now.
-    fn check(&self, number: usize, done: &Finished, settings: &str) -> Result<(), FolderError> {
+    fn check(&self, number: usize, done: &Finished) -> Result<(), FolderError> {
         let path = || self.path.unwrap_or(Path::new("")).to_path_buf();
-        if done.settings != settings {
-            return Err(FolderError::OtherSettings { path: path(), job: number });
-        }
         let same =
             |job: &Job| done.scene == job.scene && done.sources == view_names(&self.scenes[job.scene], &job.sources);
         match self.plan.jobs.get(number) {

@@ -1,10 +1,10 @@
 //! `viewfuse evaluate --protocol`.
 
 use super::super::terminal::Terminal;
-use super::Arguments;
 use super::files::{csv_of, json_of};
 use super::jobs::Jobs;
 use super::tables::{counted, print_published, print_table};
+use super::{Arguments, refuse_same_photographs};
 use crate::cli::outputs::keep_folder_apart;
 use crate::cli::printing::{say, warn_of};
 use crate::cli::threads::on_threads;
@@ -30,7 +30,8 @@ use viewfuse_weighting::OpenedChoice;
 
 const PROTOCOLS: &str = "Options of protocols";
 /// Options that change no number, or that the settings hold in another form.
-const NO_SETTINGS: &str = "output shard threads pictures time-limit weights protocol targets json latex verbose";
+const NO_SETTINGS: &str =
+    "output shard threads device cache pictures time-limit weights protocol targets json latex verbose";
 /// Missing jobs and notes that are told; of more, how many there are.
 const NAMED: usize = 8;
 
@@ -75,6 +76,7 @@ pub(super) fn run(
     let render_options = arguments.bound.bounded(render_options, &about, arguments.model.says_omissions());
     let scenes: Vec<Scene> =
         arguments.paths()?.iter().map(|path| arguments.picture.masks.open(path)).collect::<Result<_, _>>()?;
+    refuse_same_photographs(&scenes)?;
     scenes.iter().for_each(warn_of);
     folder.map_or(Ok(()), |folder| keep_folder_apart(&scenes, folder))?;
     let draws = Draws {
