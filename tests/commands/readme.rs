@@ -9,7 +9,8 @@ use viewfuse_tests::places::{links, readmes, repository};
 use viewfuse_tests::source::files;
 
 viewfuse_tests::trials![
-    every_command_runs, links_lead_somewhere, every_package_can_stand_alone, core_depends_on_mathematics_only,
+    every_command_runs, what_a_command_prints_is_shown, links_lead_somewhere, every_package_can_stand_alone,
+    core_depends_on_mathematics_only,
 ];
 
 fn read(path: &Path) -> String {
@@ -135,6 +136,24 @@ fn every_command_runs() {
     for file in files.into_iter().chain(of_others) {
         assert!(out.join(file).exists(), "{file}");
     }
+}
+
+/// A line `$ viewfuse ...` of a README, and the line that it prints first.
+fn what_a_command_prints_is_shown() {
+    let readme = read(&repository().join("README.md"));
+    let lines: Vec<&str> = readme.lines().collect();
+    let (folder, mut count) = (tempfile::tempdir().expect("a folder"), 0);
+    for pair in lines.windows(2) {
+        let Some(command) = pair[0].strip_prefix("$ viewfuse ") else { continue };
+        let data = repository().join("tests/data").display().to_string();
+        let mut run = Command::new(BINARY);
+        run.args(command.replace("tests/data", &data).split_whitespace()).args(["--device", "cpu"]);
+        let output = run.current_dir(folder.path()).output().expect("the command starts");
+        let printed = String::from_utf8_lossy(&output.stdout);
+        assert_eq!(printed.lines().next(), Some(pair[1]), "{command}");
+        count += 1;
+    }
+    assert!(count >= 3, "{count}");
 }
 
 /// What headings are called in links.

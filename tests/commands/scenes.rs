@@ -25,6 +25,8 @@ fn scenes_appear_in_their_folders_and_are_read_again() {
     assert!(done(&folder, "inspect out/cars_train/000001").contains("2"));
     assert_eq!(done(&folder, FEW), "out: 0 new scenes, 4 existing\n");
     assert_eq!(done(&folder, &FEW.replace("--train 2", "--train 3")), "out: 1 new scenes, 4 existing\n");
+    let more = "; 1 more than were asked for stay there, and are part of the data set\n";
+    assert_eq!(done(&folder, FEW), format!("out: 0 new scenes, 4 existing{more}"));
     let other = FEW.replace("--views 2", "--views 4");
     assert_refused(&folder, &other, &["out/cars.json: what is there was made with other settings"]);
 }

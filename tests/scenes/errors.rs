@@ -292,7 +292,7 @@ fn numbers_out_of_range_and_keys_that_stand_twice_are_told() {
 
 #[test]
 fn coordinates_that_overflow_are_told_with_their_place() {
-    for (value, part) in [("1e39", "32-bit number"), ("1e31", "further than 1e30"), ("1e400", "not a finite number")] {
+    for (value, part) in [("1e39", "32-bit number"), ("1e31", "beyond 1e30"), ("1e400", "not a finite number")] {
         let text = words(&POSE).replacen("1 1 0 0 2", &format!("{value} 1 0 0 2"), 1);
         assert!(text.contains(value), "{text}");
         assert_srn_refused("pose/2.txt", &text, "pose/2.txt:", &[part]);

@@ -4,6 +4,7 @@
 //! error          errors as Python exceptions
 //! progress       the course of long work, as a bar or for a function
 //! interrupt      work without Python's lock, which Ctrl-C ends
+//! whole          whole numbers as arguments
 //! arrays         arrays in and out
 //! request        what to render: targets and sources from Python's arguments
 //! weights        weights of the sources for targets
@@ -31,6 +32,7 @@ mod request;
 mod scene;
 mod scores;
 mod weights;
+mod whole;
 
 /// Few-shot novel view synthesis: scenes, weights and pictures as numpy arrays.
 #[pyo3::pymodule(name = "viewfuse")]

@@ -3,6 +3,7 @@
 use crate::error::Failure;
 use crate::interrupt::watched;
 use crate::scene::PyScene;
+use crate::whole::Whole;
 use image::DynamicImage;
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
@@ -35,7 +36,7 @@ struct Order {
 /// Finds the poses of a folder's photographs, and writes them as a scene to a folder that is not there yet, or empty. A
 /// call that was ended goes on behind the attempts that it had finished.
 #[pyfunction]
-#[pyo3(signature = (photographs, output, *, focal=None, solvers=None, every=1, layout="colmap", seed=0, progress=None))]
+#[pyo3(signature = (photographs, output, *, focal=None, solvers=None, every=Whole(1), layout="colmap", seed=Whole(0), progress=None))]
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn pose(
     py: Python<'_>,
@@ -43,14 +44,15 @@ pub(crate) fn pose(
     output: PathBuf,
     focal: Option<f64>,
     solvers: Option<Solvers>,
-    every: usize,
+    every: Whole<usize>,
     layout: &str,
-    seed: u64,
+    seed: Whole<u64>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<PyScene> {
     if let Some(focal) = focal.filter(|focal| !(1.0..=1.0e6).contains(focal)) {
         return Err(Failure::Input(format!("focal: {focal} is not a number of pixels from 1")).into());
     }
+    let (every, seed) = (every.0, seed.0);
     if every == 0 {
         return Err(Failure::Input("every: 0 is not a whole number from 1".to_owned()).into());
     }

@@ -10,6 +10,7 @@ use crate::optimise::{Optimisation, PyGaussians};
 use crate::render::Order;
 use crate::request::{Pictures, Request, held_out};
 use crate::weights::{PyWeights, Schemes, weigh};
+use crate::whole::Whole;
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -120,23 +121,24 @@ impl PyScene {
     /// Renders targets; all frames stay in memory. Ctrl-C ends it. In a notebook a bar shows the progress, where tqdm
     /// is installed.
     #[pyo3(signature = (weights=None, *, size=None, model=None, device="auto", background="auto", leave_out=0.01,
-        seed=0, progress=None, **selection))]
+        seed=Whole(0), progress=None, **selection))]
     #[allow(clippy::too_many_arguments)]
     fn render(
         &self,
         py: Python<'_>,
         weights: Option<GivenWeights>,
-        size: Option<(u32, u32)>,
+        size: Option<(Whole<u32>, Whole<u32>)>,
         model: Option<PathBuf>,
         device: &str,
         background: &str,
         leave_out: f32,
-        seed: u64,
+        seed: Whole<u64>,
         progress: Option<&Bound<'_, PyAny>>,
         selection: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Vec<PyFrame>> {
         let request = Request::of("render", selection)?;
         let (device, background) = (device.to_owned(), background.to_owned());
+        let (size, seed) = (size_of(size), seed.0);
         let pictures = Pictures { size, model, device, background, leave_out, seed };
         let order = Order { request, weights, raised: Raised::default(), pictures };
         let rendered = watched(py, progress, |progress| order.carry_out(&self.scene, progress));
@@ -148,7 +150,7 @@ impl PyScene {
     /// Scores schemes on photographs that are left out: each target from all other views, or, with sources, all other
     /// views from these. The baselines come first. Ctrl-C ends it.
     #[pyo3(signature = (weights=None, *, targets=None, sources=None, views=None, size=None, model=None, device="auto",
-        background="auto", leave_out=0.01, seed=0, progress=None))]
+        background="auto", leave_out=0.01, seed=Whole(0), progress=None))]
     #[allow(clippy::too_many_arguments)]
     fn evaluate(
         &self,
@@ -157,16 +159,17 @@ impl PyScene {
         targets: Option<String>,
         sources: Option<String>,
         views: Option<&Bound<'_, PyAny>>,
-        size: Option<(u32, u32)>,
+        size: Option<(Whole<u32>, Whole<u32>)>,
         model: Option<PathBuf>,
         device: &str,
         background: &str,
         leave_out: f32,
-        seed: u64,
+        seed: Whole<u64>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Vec<PyScore>> {
         let selection = held_out(targets, sources, views)?;
         let (device, background) = (device.to_owned(), background.to_owned());
+        let (size, seed) = (size_of(size), seed.0);
         let pictures = Pictures { size, model, device, background, leave_out, seed };
         let evaluation = Evaluation { selection, weights, raised: Raised::default(), pictures };
         let scores = watched(py, progress, |progress| evaluation.carry_out(&self.scene, progress));
@@ -177,7 +180,7 @@ impl PyScene {
     /// Optimises Gaussians for the photographs, and writes them: as .ply, smaller as .spz or .splat, or as an .html
     /// page. Ctrl-C ends it, and what there is so far is written.
     #[pyo3(signature = (output, *, weights=None, left_out=None, towards=None, quality="fast", sources=None, views=None,
-        count=None, iterations=None, resume=None, antialias=false, size=None, device="auto", background="auto", seed=0,
+        count=None, iterations=None, resume=None, antialias=false, size=None, device="auto", background="auto", seed=Whole(0),
         progress=None))]
     #[allow(clippy::too_many_arguments)]
     fn optimise(
@@ -190,14 +193,14 @@ impl PyScene {
         quality: &str,
         sources: Option<String>,
         views: Option<&Bound<'_, PyAny>>,
-        count: Option<u32>,
-        iterations: Option<u32>,
+        count: Option<Whole<u32>>,
+        iterations: Option<Whole<u32>>,
         resume: Option<PathBuf>,
         antialias: bool,
-        size: Option<(u32, u32)>,
+        size: Option<(Whole<u32>, Whole<u32>)>,
         device: &str,
         background: &str,
-        seed: u64,
+        seed: Whole<u64>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyGaussians> {
         let selection = held_out(None, sources, views)?;
@@ -209,14 +212,14 @@ impl PyScene {
             left_out,
             towards,
             quality,
-            count,
-            iterations,
+            count: count.map(|count| count.0),
+            iterations: iterations.map(|iterations| iterations.0),
             resume,
             antialias,
-            size,
+            size: size_of(size),
             device,
             background,
-            seed,
+            seed: seed.0,
         };
         watched(py, progress, |progress| optimisation.carry_out(&self.scene, progress))
     }
@@ -236,4 +239,8 @@ impl PyScene {
 #[pyo3(signature = (path, masks = "auto"))]
 pub(crate) fn open(py: Python<'_>, path: PathBuf, masks: &str) -> PyResult<PyScene> {
     PyScene::open(py, path, masks)
+}
+
+fn size_of(size: Option<(Whole<u32>, Whole<u32>)>) -> Option<(u32, u32)> {
+    size.map(|(width, height)| (width.0, height.0))
 }

@@ -351,12 +351,18 @@ class OwnWeights(unittest.TestCase):
 
     def test_an_array_is_for_all_targets_or_each(self):
         row = [0, 4, 0, 1, 0, 0]
-        for weights in (row, np.array(row, np.float32), np.array([row, row])):
+        for weights in (row, np.array(row, np.float32), np.array([row, row]), 1e-60 * np.array(row)):
             for frame in self.render(weights, leave_out=0):
                 np.testing.assert_allclose(frame.weights, np.array(row) / 5, atol=1e-6)
                 self.assertEqual(frame.scheme, "array")
         first, second = self.render(np.array([row, row[::-1]]), leave_out=0)
         np.testing.assert_allclose(second.weights, first.weights[::-1], atol=1e-6)
+
+    def test_whole_numbers_that_are_none(self):
+        room = viewfuse.open(ROOM)
+        for wrong in [{"size": (-1, 10)}, {"size": (2**40, 10)}, {"seed": -1}]:
+            with self.assertRaisesRegex(ValueError, "is below 0, or too large"):
+                room.render(**wrong)
 
     def test_what_cannot_be_weights(self):
         def fails(sources, target):

@@ -108,7 +108,7 @@ fn views_of_one_scene_take_the_place_of_scenes() {
     let once = views(&[[10.0, 20.0, 22.0], [12.0, 30.0, 33.0], [14.0, 10.0, 14.0]]);
     // A view that is drawn again is no other view: it makes no interval narrower.
     let again = [once.clone(), Finished { job: 1, ..once.clone() }, Finished { job: 2, ..once.clone() }];
-    let (repeated, single) = (&tables(&again, false)[0], &tables(&[once.clone()], false)[0]);
+    let (repeated, single) = (&tables(&again, false)[0], &tables(std::slice::from_ref(&once), false)[0]);
     assert_eq!((repeated.target_count, repeated.view_count, single.view_count), (9, 3, 3));
     assert_eq!(repeated.rows[2].cells, single.rows[2].cells);
     assert!(repeated.interval_words().contains("over 3 views of one scene"), "{}", repeated.interval_words());

@@ -26,7 +26,10 @@ fn made(out: &Path, settings: &Settings, counts: ObjectCounts) -> Result<Made, M
 fn poses_are_exact_and_pictures_are_those_of_the_object() {
     let place = Folder::new();
     let out = place.join("deep/cars");
-    assert_eq!(made(&out, &settings(), COUNTS).expect("a collection"), Made { new_count: 5, kept_count: 0 });
+    assert_eq!(
+        made(&out, &settings(), COUNTS).expect("a collection"),
+        Made { new_count: 5, kept_count: 0, more_count: 0 }
+    );
     let sphere = sphere(64).expect("a size");
     let spiral = spiral_views(&sphere, 3).expect("cameras");
     for (folder, index, cameras) in [
@@ -59,12 +62,15 @@ fn what_is_there_is_kept_and_what_is_missing_is_made() {
     fs::remove_dir_all(place.join("cars_train/000001")).expect("a scene to delete");
     let mark = place.join("cars_train/000000/rgb/000000.png");
     fs::write(&mark, "kept").expect("a mark");
-    assert_eq!(made(&place, &settings(), COUNTS).expect("the rest"), Made { new_count: 1, kept_count: 4 });
+    assert_eq!(
+        made(&place, &settings(), COUNTS).expect("the rest"),
+        Made { new_count: 1, kept_count: 4, more_count: 0 }
+    );
     assert_eq!(fs::read(&picture).expect("the picture again"), bytes, "bit for bit");
     assert_eq!(fs::read(&mark).expect("the mark"), b"kept");
 
     let more = ObjectCounts { train: 4, ..COUNTS };
-    assert_eq!(made(&place, &settings(), more).expect("one more"), Made { new_count: 1, kept_count: 5 });
+    assert_eq!(made(&place, &settings(), more).expect("one more"), Made { new_count: 1, kept_count: 5, more_count: 0 });
     assert_eq!(fs::read(&mark).expect("the mark"), b"kept");
     let names = |files: Vec<(std::path::PathBuf, u64)>| files.into_iter().map(|(path, _)| path).collect::<Vec<_>>();
     let after = names(files_below(&place));

@@ -126,7 +126,11 @@ fn run_make(arguments: &MakeArguments) -> anyhow::Result<ExitCode> {
     let progress = Terminal::new("making scenes");
     let made = on_threads(*threads, || make(out, &settings, counts, &progress))??;
     drop(progress);
-    say(format_args!("{}: {} new scenes, {} existing", out.display(), made.new_count, made.kept_count))?;
+    let more = match made.more_count {
+        0 => String::new(),
+        count => format!("; {count} more than were asked for stay there, and are part of the data set"),
+    };
+    say(format_args!("{}: {} new scenes, {} existing{more}", out.display(), made.new_count, made.kept_count))?;
     Ok(ExitCode::SUCCESS)
 }
 

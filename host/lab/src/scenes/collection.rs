@@ -72,6 +72,8 @@ pub struct Made {
     pub new_count: usize,
     /// Scenes that were there.
     pub kept_count: usize,
+    /// Scenes that an earlier call made beyond the number that this one asks for: they stay.
+    pub more_count: usize,
 }
 
 /// Why a collection was not made, or not to the end.
@@ -133,6 +135,7 @@ pub fn make(out: &Path, settings: &Settings, counts: ObjectCounts, progress: &dy
     let mut missing = Vec::new();
     let mut made = Made::default();
     for (set, (folder, (_, count, on_spiral))) in folders.iter().zip(sets).enumerate() {
+        made.more_count += (count..).take_while(|object| folder.join(format!("{object:06}")).is_dir()).count();
         for object in 0..count {
             let folder = folder.join(format!("{object:06}"));
             if folder.is_dir() {
