@@ -299,7 +299,7 @@ fn coordinates_that_overflow_are_told_with_their_place() {
     }
     let mut transforms = scenes::transforms();
     transforms["frames"][0]["transform_matrix"][1][3] = json!(1.0e31);
-    let part = "frames[0].transform_matrix: not a camera pose: the camera's centre is further than 1e30";
+    let part = "frames[0].transform_matrix: not a camera pose: a coordinate of the camera's centre is beyond 1e30";
     assert_refused(&scenes::transforms_folder(&transforms), "transforms.json: ", &[part]);
     let folder = scenes::transforms_folder(&Value::Null);
     folder.write("transforms.json", scenes::transforms().to_string().replacen("\"fl_x\":20.0", "\"fl_x\":1e400", 1));
