@@ -109,7 +109,7 @@ impl FineBlock {
 
 /// The random numbers that place fine sample `index` of a pixel's ray: for importance samples where in the distribution
 /// (one in each of as many equal parts as there are samples, in `[0, 1]`: the sum may round up) and where in the part
-/// that it hits, in `[0, 1)`; for depth samples a normal number and 0.
+/// that it hits, in `[0, 1)`; for depth samples a normal number and 0. A ray has fewer than 2^32 samples.
 #[inline]
 pub fn random_draw(pixel: u32, index: u32, block: &FineBlock) -> [f32; 2] {
     let counter = block.coarse_count + index;
@@ -124,7 +124,8 @@ pub fn random_draw(pixel: u32, index: u32, block: &FineBlock) -> [f32; 2] {
 /// Depth of fine sample `index` on a ray, limited to the ray's near and far bounds. Importance samples come first: they
 /// lie in the coarse part in which the distribution of `seen[part]` (weight, transmittance) reaches the first random
 /// number, at the fraction that the second one gives. Then depth samples: normally distributed around `depth`, the mean
-/// depth of the first pass on a ray of this `opacity`. Where that is NaN they lie at `near`.
+/// depth of the first pass on a ray of this `opacity`. Where that is NaN they lie at `near`. There is at least one coarse
+/// part, with its number in `seen`.
 #[inline]
 pub fn fine_depth(
     seen: &(impl Fetch<[f32; 2]> + ?Sized),

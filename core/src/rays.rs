@@ -89,7 +89,8 @@ impl PlaceBlock {
     }
 }
 
-/// The point of sample number `sample` of `depths[ray][sample]`, which increase along each ray of `sample_count`.
+/// The point of sample number `sample` of `depths[ray][sample]`, which increase along each ray of `sample_count`, at least
+/// one.
 #[inline]
 pub fn place_point(
     rays: &(impl Fetch<TargetRay> + ?Sized),

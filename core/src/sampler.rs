@@ -196,7 +196,7 @@ impl Sampler {
     }
 
     /// Calls of the denoiser in a run over this many levels above 0: one a level; where another call corrects each
-    /// step, one more a step but the last, to level 0.
+    /// step, one more a step but the last, to level 0. Fewer than 2^31 levels.
     pub const fn call_count(self, level_count: u32) -> u32 {
         match self.corrected() {
             Corrected::ByAnotherCall => (2 * level_count).saturating_sub(1),

@@ -35,6 +35,9 @@ pub(super) fn verify(path: &Path, json: &Value) -> Result<Report, VerifyError> {
         message,
     };
     let file = File::deserialize(json).map_err(|error| content("top level", error.to_string()))?;
+    if file.cases.is_empty() {
+        return Err(content("cases", "holds no reference values".to_owned()));
+    }
     // Distance from the simplex that passes: the rounding of a sum of as many terms as the file has sources.
     let most_sources = file.cases.iter().chain(&file.extreme).map(|case| case.src.len()).max().unwrap_or(1);
     let simplex_tolerance = most_sources as f64 / 16_777_216.0;

@@ -40,13 +40,15 @@ pub(crate) fn watch() -> ! {
         if now.saturating_sub(before) > IDLE_CPU {
             (since, before) = (Instant::now(), now);
         }
-        let is_long = now.saturating_sub(first) > MAX_CPU;
-        if is_long && is_patient && !is_told {
+        if now.saturating_sub(first) <= MAX_CPU && since.elapsed() <= BLOCKED {
+            continue;
+        }
+        if !is_patient {
+            end();
+        }
+        if !is_told {
             super::printing::complain("what was done is kept when this piece of work ends; once more ends it at once");
             is_told = true;
-        }
-        if (is_long && !is_patient) || since.elapsed() > BLOCKED {
-            end();
         }
     }
 }

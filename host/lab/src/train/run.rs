@@ -218,11 +218,14 @@ pub(crate) fn run<S: Serialize>(
         let step = so_far.steps;
         let loss = learner.loss(&Draw { seed: schedule.seed, step })?;
         let value = f64::from(loss.to_dtype(candle_core::DType::F32)?.to_scalar::<f32>()?);
+        let not_finite = |what: &str| TrainError::NotFinite { step, what: what.to_owned() };
         if !value.is_finite() {
-            return Err(TrainError::NotFinite { step, what: "loss".to_owned() });
+            return Err(not_finite("loss"));
         }
         let rate = schedule.rate_at(step);
-        learned.adam.step(learner.parameters(), &loss.backward()?, step, rate, MAX_GRADIENT)?;
+        if !learned.adam.step(learner.parameters(), &loss.backward()?, step, rate, MAX_GRADIENT)? {
+            return Err(not_finite("gradient"));
+        }
         learned.average.step(learner.parameters(), step)?;
         so_far.steps += 1;
         so_far.pending = (so_far.pending.0 + value, so_far.pending.1 + 1);
