@@ -86,9 +86,9 @@ impl Videos {
             self.give(Picture::File(next.clone()));
         }
         let writers = std::mem::take(&mut self.writers);
-        let of = writers.len();
+        let count = writers.len();
         let finish = |(index, writer): (usize, Result<VideoWriter, VideoError>)| {
-            progress.stage(&format!("writing video.{}", self.formats[index]), index..index + 1, of);
+            progress.stage(&format!("writing video.{}", self.formats[index]), index..index + 1, count);
             writer?.finish(progress)
         };
         writers.into_iter().enumerate().map(finish).collect()
