@@ -153,8 +153,6 @@ impl Table {
 pub struct Observation<'a> {
     /// The scene.
     pub scene: usize,
-    /// The job, which distinguishes targets of the same name.
-    pub job: usize,
     /// The score.
     pub score: &'a Score,
 }
@@ -162,9 +160,9 @@ pub struct Observation<'a> {
 /// The tables of finished jobs: one, or one for each number of sources.
 pub fn tables<'a>(finished: impl IntoIterator<Item = &'a Finished>, by_source_count: bool) -> Vec<Table> {
     let mut groups: BTreeMap<usize, Vec<Observation<'_>>> = BTreeMap::new();
-    for Finished { job, scene, scores, sources, .. } in finished {
+    for Finished { scene, scores, sources, .. } in finished {
         let group = groups.entry(if by_source_count { sources.len() } else { 0 }).or_default();
-        group.extend(scores.iter().map(|score| Observation { scene: *scene, job: *job, score }));
+        group.extend(scores.iter().map(|score| Observation { scene: *scene, score }));
     }
     groups.values().map(|observations| table(observations)).collect()
 }

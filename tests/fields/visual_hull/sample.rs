@@ -43,7 +43,7 @@ fn scores(folder: &Path, schemes: &[&str]) -> Table {
         progress: &Silent,
     };
     let scores = evaluator.score_all(&scene, &selection).expect("scores");
-    table(&scores.iter().map(|score| Observation { scene: 0, job: 0, score }).collect::<Vec<_>>())
+    table(&scores.iter().map(|score| Observation { scene: 0, score }).collect::<Vec<_>>())
 }
 
 fn psnr_of(table: &Table, scheme: &str) -> f64 {

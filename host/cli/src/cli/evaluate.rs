@@ -232,7 +232,7 @@ fn refuse_same_photographs(scenes: &[Scene]) -> anyhow::Result<()> {
 /// Scores of one scene after the other.
 fn observed<'a>(scenes: &[&'a Vec<Score>]) -> Vec<Observation<'a>> {
     let of_scene = |(scene, scores): (usize, &&'a Vec<Score>)| {
-        scores.iter().map(move |score| Observation { scene, job: 0, score }).collect::<Vec<_>>()
+        scores.iter().map(move |score| Observation { scene, score }).collect::<Vec<_>>()
     };
     scenes.iter().enumerate().flat_map(of_scene).collect()
 }
