@@ -97,7 +97,7 @@ impl Pinhole {
     /// scale with their axis.
     ///
     /// # Errors
-    /// [`PinholeError::Size`] for an invalid size, [`PinholeError::Focal`] if a focal length leaves its range.
+    /// As of [`Pinhole::new`], of which the first is told: the size, or what leaves its range with it.
     pub fn resized(&self, width: u32, height: u32) -> Result<Pinhole, PinholeError> {
         // A width of 0 would otherwise be found in the focal length that it scales.
         if width == 0 || height == 0 {

@@ -185,7 +185,7 @@ impl Lens {
     }
 
     /// Distance from the centre of the ideal image, normalised, up to which the radial part of the map grows, at most
-    /// `most`: beyond it an image folds over. Found in 4096 steps.
+    /// `most`, a finite number: beyond it an image folds over. Found in 4096 steps.
     pub fn reach(&self, most: f64) -> f64 {
         let is_fisheye = self.projection == Projection::Fisheye;
         let mut step = 1;
@@ -323,9 +323,9 @@ fn radial_slope(is_fisheye: bool, coefficients: &Coefficients<f64>, radius: f64)
 /// it. It ends if no step helps, after 24 steps at most. Total: if no ideal point maps to the given one, or it is not
 /// finite, the residual is large or not finite.
 ///
-/// Inside [`Lens::reach`] the residual is a few units in the last place of the point (in `f64` below 1e-14 for points
-/// up to 10; in `f32` below 2e-6), but close to a fold, where the inverse has no slope. A small residual does not say that
-/// the point is inside: beyond a fold other ones map to the same.
+/// Inside [`Lens::reach`] the residual is a few units in the last place of the point (below 1e-14 of its length or of 1
+/// in `f64`, below 2e-6 of it in `f32`), but close to a fold, where the inverse has no slope, and to a pole of a rational
+/// factor. A small residual does not say that the point is inside: beyond a fold other ones map to the same.
 #[inline]
 pub fn undistort<T: Real>(is_fisheye: bool, coefficients: &Coefficients<T>, point: [T; 2]) -> Undistorted<T> {
     let guess = if is_fisheye { unbent(coefficients, point) } else { straightened(coefficients, point) };
@@ -403,29 +403,58 @@ fn unbent<T: Real>(coefficients: &Coefficients<T>, point: [T; 2]) -> [T; 2] {
     [point[0] * factor, point[1] * factor]
 }
 
+/// A guess of Newton's method in the plane of a perspective lens.
+#[derive(Clone, Copy)]
+struct Guess<T> {
+    point: [T; 2],
+    /// The lens's factor there, and its slope in the squared radius.
+    factor: [T; 2],
+    /// From the given point to where the lens maps it.
+    off: [T; 2],
+    /// Squared length of that.
+    miss: T,
+    /// Whether the photograph's radius grows with the ideal one there, and the factor has no pole before: it is not
+    /// beyond a fold.
+    is_rising: bool,
+}
+
+impl<T: Real> Guess<T> {
+    #[inline]
+    fn at(coefficients: &Coefficients<T>, guess: [T; 2], point: [T; 2]) -> Guess<T> {
+        let squared = guess[0] * guess[0] + guess[1] * guess[1];
+        let (factor, slope) = factor_and_slope(coefficients, squared);
+        let at = distort(false, coefficients, guess);
+        let off = [at[0] - point[0], at[1] - point[1]];
+        let [_, _, _, k4, k5, k6, ..] = *coefficients;
+        let below = T::of(1.0) + squared * (k4 + squared * (k5 + squared * k6));
+        let is_rising = below > T::of(0.0) && factor + T::of(2.0) * squared * slope > T::of(0.0);
+        Guess { point: guess, factor: [factor, slope], off, miss: off[0] * off[0] + off[1] * off[1], is_rising }
+    }
+}
+
 /// Newton's method in the plane of a perspective lens.
 #[inline]
 fn straightened<T: Real>(coefficients: &Coefficients<T>, point: [T; 2]) -> [T; 2] {
     let p1 = coefficients[6];
     let p2 = coefficients[7];
-    let (two, six) = (T::of(2.0), T::of(6.0));
+    let (zero, two, six) = (T::of(0.0), T::of(2.0), T::of(6.0));
     let radius = (point[0] * point[0] + point[1] * point[1]).root();
     let start = start_of(radius, radius, |at| at * factor_and_slope(coefficients, at * at).0);
-    let mut guess = if start < radius { [point[0] * (start / radius), point[1] * (start / radius)] } else { point };
-    let mut miss = missed(false, coefficients, guess, point);
+    // Seen from the centre, the point is less than a radius beyond the start; a tangential part moves it a little.
+    let (is_wide, end) = (start < radius, (start + radius * T::of(1.0 / STARTS as f32)) * T::of(1.5));
+    let end = if is_wide { end * end } else { zero };
+    let start = if start < radius { [point[0] * (start / radius), point[1] * (start / radius)] } else { point };
+    let mut guess = Guess::at(coefficients, start, point);
     let mut step = 0;
     while step < MAX_STEPS {
-        let [x, y] = guess;
-        let (factor, slope) = factor_and_slope(coefficients, x * x + y * y);
+        let ([x, y], [factor, slope], [a, b]) = (guess.point, guess.factor, guess.off);
         // The Jacobian is symmetric.
         let xx = factor + two * x * x * slope + two * p1 * y + six * p2 * x;
         let xy = two * x * y * slope + two * p1 * x + two * p2 * y;
         let yy = factor + two * y * y * slope + six * p1 * y + two * p2 * x;
         let determinant = xx * yy - xy * xy;
-        let at = distort(false, coefficients, guess);
-        let (a, b) = (at[0] - point[0], at[1] - point[1]);
         // Beyond the fold: back towards the centre, where the map is the identity.
-        let (dx, dy) = if determinant > T::of(1.0e-6) {
+        let (dx, dy) = if guess.is_rising && determinant > T::of(1.0e-6) {
             ((yy * a - xy * b) / determinant, (xx * b - xy * a) / determinant)
         } else {
             (x * T::of(0.5), y * T::of(0.5))
@@ -434,11 +463,12 @@ fn straightened<T: Real>(coefficients: &Coefficients<T>, point: [T; 2]) -> [T; 2
         let mut halving = 0;
         let mut moved = false;
         while halving < MAX_HALVINGS && !moved {
-            let next = [x - share * dx, y - share * dy];
-            let next_miss = missed(false, coefficients, next, point);
-            if next_miss < miss {
+            let next = Guess::at(coefficients, [x - share * dx, y - share * dy], point);
+            // No step leads beyond a fold, and from there any step back will do.
+            let [x, y] = next.point;
+            let is_inside = next.is_rising && !(is_wide && x * x + y * y > end);
+            if !guess.is_rising || (is_inside && next.miss < guess.miss) {
                 guess = next;
-                miss = next_miss;
                 moved = true;
             }
             share = share * T::of(0.5);
@@ -446,5 +476,5 @@ fn straightened<T: Real>(coefficients: &Coefficients<T>, point: [T; 2]) -> [T; 2
         }
         step = if moved { step + 1 } else { MAX_STEPS };
     }
-    guess
+    guess.point
 }

@@ -2,7 +2,8 @@
 //!
 //! Grids are `[row][column]` or `[slice][row][column]`, flat, row-major, one `[f32; C]` a node. Coordinates are
 //! continuous with node centres at halves (the image convention of [`crate::camera`]). Outside the outermost centres
-//! the border node's value is used; a NaN coordinate counts as 0. Grids shorter than the stated size are not allowed.
+//! the border node's value is used; a NaN coordinate counts as 0. An axis has at
+//! most 2^24 nodes. Grids shorter than the stated size are not allowed.
 
 use crate::fetch::Fetch;
 use crate::math::clamp;
@@ -94,7 +95,7 @@ pub fn trilinear<const C: usize>(
     z: f32,
 ) -> [f32; C] {
     let (front, back, share_z) = split(z, size[2]);
-    let slice = (size[0] * size[1]) as usize;
+    let slice = size[0] as usize * size[1] as usize;
     mix(
         &bilinear_from(grid, front * slice, size[0], size[1], x, y),
         &bilinear_from(grid, back * slice, size[0], size[1], x, y),

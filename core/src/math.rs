@@ -219,7 +219,8 @@ pub fn sin_cos(x: f32) -> (f32, f32) {
     }
 }
 
-/// Angle of the point `(x, y)` with `y >= 0` from the positive x axis, in `[0, pi]`: error at most 3 ULP.
+/// Angle of the point `(x, y)` with `y >= 0` from the positive x axis, in `[0, pi]`, for magnitudes up to 1e38 together:
+/// error at most 3 ULP.
 /// `(0, 0)` gives 0. This form is exact at 0 and pi, where `acos` of a dot product loses half of the digits.
 #[inline]
 pub fn angle_from_components(y: f32, x: f32) -> f32 {
@@ -238,7 +239,8 @@ pub fn angle_from_components(y: f32, x: f32) -> f32 {
 }
 
 /// Angle of the point `(sqrt(x), sqrt(y))` from the positive x axis, in `[0, pi / 2]`, for `x` and `y` of at least 0:
-/// the same from squares, with one square root. `(0, 0)` gives 0.
+/// the same from squares, with one square root, where their product neither overflows nor vanishes (both 0, or both
+/// between 1e-19 and 1e19). `(0, 0)` gives 0.
 #[inline]
 pub fn angle_from_squares(y: f32, x: f32) -> f32 {
     let mean = sqrt(y * x);
@@ -289,7 +291,8 @@ pub fn two_product(a: f32, b: f32) -> (f32, f32) {
 }
 
 /// Euclidean norm of three components without overflow or underflow: the components are divided by the largest
-/// magnitude first. Error at most 2 ULP for magnitudes in `[1e-15, 1e15]`, 3 ULP elsewhere; all zero gives 0.
+/// magnitude first. Error at most 2 ULP for magnitudes in `[1e-15, 1e15]`, 3 ULP elsewhere; all zero gives 0, infinity
+/// infinity, and NaN NaN.
 #[inline]
 pub fn norm3(x: f32, y: f32, z: f32) -> f32 {
     let largest = max(max(abs(x), abs(y)), abs(z));
@@ -297,8 +300,8 @@ pub fn norm3(x: f32, y: f32, z: f32) -> f32 {
         // Squares neither overflow nor vanish: no scaling, one rounding less.
         return sqrt(x * x + y * y + z * z);
     }
-    if !(largest > 0.0) {
-        return 0.0;
+    if !(largest > 0.0 && largest <= f32::MAX) {
+        return abs(x) + abs(y) + abs(z);
     }
     let (x, y, z) = (x / largest, y / largest, z / largest);
     largest * sqrt(x * x + y * y + z * z)

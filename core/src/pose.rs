@@ -42,6 +42,9 @@ pub enum PoseError {
     Mirrored,
 }
 
+/// Sine of the least angle between the line of sight and the upward direction of [`Pose::look_at`].
+const MIN_SINE: f32 = 1.0e-6;
+
 impl fmt::Display for PoseError {
     /// As a message, in which rows and columns count from 1.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -210,11 +213,17 @@ impl Pose {
     /// it can be.
     ///
     /// # Errors
-    /// [`PoseError::NotRigid`] if the two points coincide, `up_world` is parallel to the line between them, or a number
-    /// is not finite or so large that a product overflows.
+    /// [`PoseError::NotRigid`] if the two points coincide, `up_world` is parallel to the line between them (to a
+    /// millionth), or a number is not finite or so large that a product overflows; [`PoseError::TooFar`] as of
+    /// [`Pose::from_opencv`].
     pub fn look_at(centre_world: Vec3, point_world: Vec3, up_world: Vec3) -> Result<Pose, PoseError> {
         let degenerate = PoseError::NotRigid { deviation: 1.0 };
         let forward = unit(point_world - centre_world).ok_or(degenerate)?;
+        // Of parallel directions the cross product is noise, and as long as they are.
+        let across = forward.cross(unit(up_world).ok_or(degenerate)?);
+        if !(across.length() > MIN_SINE) {
+            return Err(degenerate);
+        }
         let right = unit(forward.cross(up_world)).ok_or(degenerate)?;
         let down = forward.cross(right);
         let (c, r, d, f) = (centre_world, right, down, forward);
@@ -287,8 +296,8 @@ impl Pose {
 
     /// Angle between the principal axes of two cameras, in `[0, pi]`.
     ///
-    /// `2 atan2(|a - b|, |a + b|)`: exact at 0 and accurate to a few ULP of the result at every angle, where the arc
-    /// cosine of a dot product is quantised to 0.03 degrees near 0.
+    /// `2 atan2(|a - b|, |a + b|)`: exact at 0 and accurate to a few ULP of the result at every angle from 1e-18
+    /// on, where the arc cosine of a dot product is quantised to 0.03 degrees near 0.
     #[inline]
     pub fn axis_angle(&self, other: &Pose) -> f32 {
         let (difference, sum) = self.axis_chords_squared(other);

@@ -32,6 +32,9 @@ fn one_picture_and_folders() {
         folder.write(&format!("made/{name}.png"), bytes);
     }
     folder.write("made/notes.txt", "no picture");
+    // A video of the run may be a picture, too.
+    let bytes = std::fs::read(folder.file("made/000001.png")).expect("a picture");
+    folder.write("made/video.webp", &bytes).write("made/run.json", "{}");
     let printed = done(&folder, "compare made toy/rgb");
     assert!(printed.starts_with("2 pictures\n"), "{printed}");
     assert_eq!(row(&printed, "psnr")[3], "000002.png", "the worst");
@@ -172,6 +175,8 @@ fn what_cannot_be_compared() {
     };
     refused("made toy/rgb", &["made: has no pictures"]);
     refused("toy/rgb made", &["made/000000.png: is missing", "toy/rgb/000000.png"]);
+    folder.image("one/x.png", 8, 8).write("two/x.jpeg", "").write("two/x.jpg", "");
+    refused("one two", &["one/x.png: may be compared with two/x.jpeg or two/x.jpg"]);
     refused("broken.png toy/rgb/000000.png", &["broken.png: not a readable image"]);
     refused("toy/rgb/000000.png toy/rgb", &["toy/rgb: is a folder"]);
     refused("toy/rgb toy/rgb/000000.png", &["toy/rgb: is a folder, toy/rgb/000000.png is not"]);

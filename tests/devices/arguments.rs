@@ -3,6 +3,7 @@
 use crate::candidate::{Candidate, assert_works, tests};
 use bytemuck::bytes_of;
 use libtest_mimic::Failed;
+use std::time::Duration;
 use viewfuse_core::fuse::FuseBlock;
 use viewfuse_kernels::network::linear::LinearBlock;
 use viewfuse_vulkan::kernel::Kernel;
@@ -13,6 +14,9 @@ tests!(
     arrays_of_other_elements_are_refused,
     arrays_of_another_device_are_refused,
     nothing_to_do_is_done,
+    more_elements_than_numbers_count_are_refused,
+    what_is_changed_of_an_adapter_changes_no_device,
+    no_time_limit_is_the_longest,
     a_device_that_lacks_something_is_not_opened,
     devices_are_chosen_by_number_and_name
 );
@@ -108,6 +112,36 @@ fn nothing_to_do_is_done(candidate: &Candidate) -> Result<(), Failed> {
     let limits = Limits { workgroup_count: 0, ..GpuOptions::default().limits };
     assert_works(&candidate.gpu(&GpuOptions { limits, ..GpuOptions::default() })?)?;
     Ok(())
+}
+
+/// Elements whose invocations are more than 32 bits count.
+fn more_elements_than_numbers_count_are_refused(candidate: &Candidate) -> Result<(), Failed> {
+    let gpu = candidate.gpu(&GpuOptions::default())?;
+    let (scores, outputs) = (gpu.upload(&[1.0_f32; 4])?, gpu.zeros::<f32>(4)?);
+    let arrays = [scores.bind(), outputs.bind()];
+    for elements in [0..1 << 26, 1 << 26..(1 << 26) + 2] {
+        let outcome = gpu.dispatch(Kernel::SoftmaxRows, bytes_of(&2_u32), elements, &arrays);
+        assert!(matches!(&outcome, Err(VulkanError::Arguments("softmax_rows", _))), "{outcome:?}");
+    }
+    assert_eq!((gpu.tally(Kernel::SoftmaxRows).elements, gpu.download(&outputs)?), (0, vec![0.0; 4]));
+    Ok(())
+}
+
+/// A device is what its driver says when it is opened.
+fn what_is_changed_of_an_adapter_changes_no_device(candidate: &Candidate) -> Result<(), Failed> {
+    let mut adapter = candidate.adapter.clone();
+    (adapter.subgroup_size, adapter.has_matrices) = (Some(3), true);
+    adapter.limits.workgroup_count = u32::MAX;
+    let gpu = Gpu::open(&candidate.instance, &adapter, &GpuOptions::default())?;
+    assert_eq!(gpu.limits(), candidate.gpu(&GpuOptions::default())?.limits());
+    Ok(assert_works(&gpu)?)
+}
+
+/// The greatest duration is as long as one likes, also while a device is closed.
+fn no_time_limit_is_the_longest(candidate: &Candidate) -> Result<(), Failed> {
+    let longest = Some(Duration::MAX);
+    let gpu = candidate.gpu(&GpuOptions { time_limit: longest, closing: Duration::MAX, ..GpuOptions::default() })?;
+    Ok(assert_works(&gpu)?)
 }
 
 fn named(candidate: &Candidate, index: usize, name: &str) -> Adapter {

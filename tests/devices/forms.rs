@@ -16,6 +16,7 @@ tests!(
     a_form_of_other_subgroups_is_not_used,
     kernels_are_compiled_ahead,
     tiles_stay_in_registers,
+    arrays_that_end_early_are_read_alike,
 );
 
 /// Most registers of an invocation of any device.
@@ -56,6 +57,36 @@ fn linear(gpu: &Gpu) -> Result<Vec<u32>, VulkanError> {
     let elements = 0..tile_elements(row_count, column_count);
     gpu.dispatch(Kernel::Linear, bytes_of(&block), elements, &arrays)?;
     bits(gpu, &outputs)
+}
+
+/// Arrays that are shorter than a kernel's parameters say, or end within a four: every form reads the last number again,
+/// as its body does, and none reads beyond.
+fn arrays_that_end_early_are_read_alike(candidate: &Candidate) -> Result<(), Failed> {
+    let side = 64_u32;
+    let block = LinearBlock {
+        row_count: side,
+        inner_count: side,
+        column_count: side,
+        has_residual: 1,
+        ..LinearBlock::default()
+    };
+    let product = |form: Form, [bias_len, residual_len]: [u32; 2]| -> Result<Vec<u32>, VulkanError> {
+        let gpu = candidate.gpu(&GpuOptions { form: Some(form), ..GpuOptions::default() })?;
+        let [inputs, weights, bias, residual] =
+            [side * side, side * side, bias_len, residual_len].map(|count| gpu.upload(&numbers(count)));
+        let (inputs, weights, bias, residual) = (inputs?, weights?, bias?, residual?);
+        let outputs = gpu.zeros::<f32>((side * side) as usize)?;
+        let arrays = [inputs.bind(), weights.bind(), bias.bind(), residual.bind(), outputs.bind()];
+        gpu.dispatch(Kernel::Linear, bytes_of(&block), 0..tile_elements(side, side), &arrays)?;
+        bits(&gpu, &outputs)
+    };
+    for lengths in [[1, 64 * 64], [3, 64 * 64], [61, 64 * 64], [64, 1], [64, 64 * 64 - 3], [8, 64]] {
+        let expected = product(Form::Single, lengths)?;
+        for form in Form::ALL.into_iter().filter(|form| candidate.adapter.runs(*form)) {
+            assert!(product(form, lengths)? == expected, "{} with arrays of {lengths:?}", form.name());
+        }
+    }
+    Ok(())
 }
 
 /// Channels of a wider image, the first one that a convolution writes, and how many it writes.

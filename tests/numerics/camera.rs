@@ -131,6 +131,16 @@ fn look_at_looks_at() {
     ] {
         assert!(Pose::look_at(centre, target, up).is_err(), "{centre} {target} {up}");
     }
+    // Parallel up to rounding: what is across is noise.
+    for _ in 0..20_000 {
+        let [up, centre] = [0, 1].map(|_| Vec3::from_array(random.vector().map(|c| c as f32)));
+        for (centre, target) in [(Vec3::ZERO, up), (Vec3::ZERO, 2.0 * up), (centre, centre + 8.0 * up)] {
+            let found = Pose::look_at(centre, target, up);
+            // What is far from the line of sight by more than rounding is up.
+            let across = (target - centre).as_dvec3().normalize().cross(up.as_dvec3().normalize()).length();
+            assert!(found.is_err() || across > 0.5e-6, "{centre} {target} {up}: {found:?}");
+        }
+    }
 }
 
 #[test]

@@ -157,3 +157,42 @@ fn points_of_wide_lenses_are_found() {
         }
     }
 }
+
+/// Strong lenses of all coefficients, with folds and poles inside the picture: wherever the map is not flat, the point
+/// is found, and not one beyond a fold that maps to the same or nearly the same.
+#[test]
+fn points_of_strong_lenses_are_found() {
+    let mut random = Random::new(4);
+    const LENSES: usize = 2_000;
+    let mut counts = [0; 2];
+    for index in 0..LENSES {
+        let used: &[usize] = [&[0, 1][..], &[0, 1, 2], &[0, 1, 2, 8], &[0, 1, 2, 6, 7, 8]][index % 4];
+        let mut coefficients = [0.0; 9];
+        for &at in used {
+            let most = [0.6, 0.3, 0.1, 0.0, 0.0, 0.0, 0.01, 0.01, 0.03][at];
+            coefficients[at] = random.range(-most, most);
+        }
+        let lens = Lens::new(Projection::Perspective, coefficients).expect("a lens");
+        let reach = 0.9 * lens.reach(4.0);
+        let slope = |radius: f64| {
+            let [nearer, farther] = [-1.0e-6, 1.0e-6].map(|by| lens.distort([radius + by, 0.0])[0]);
+            (farther - nearer) / 2.0e-6
+        };
+        for step in 1..=40 {
+            let (radius, angle) = (reach * f64::from(step) / 40.0, f64::from(step));
+            if slope(radius) < 0.2 {
+                break;
+            }
+            let point = [radius * angle.cos(), radius * angle.sin()];
+            let bent = lens.distort(point);
+            let length = bent[0].hypot(bent[1]).max(1.0);
+            let found = lens.undistort(bent);
+            assert!(found.residual < 1.0e-14 * length, "{coefficients:?}: {point:?}: {found:?}");
+            assert!(distance(found.point, point) < 1.0e-9 * length, "{coefficients:?}: {point:?}: {found:?}");
+            let single = lens.block().undistort(bent.map(|value| value as f32));
+            assert!(f64::from(single.residual) < 2.0e-6 * length, "{coefficients:?}: {point:?}: {single:?}");
+            counts[usize::from(bent[0].hypot(bent[1]) > 1.0)] += 1;
+        }
+    }
+    assert!(counts.into_iter().all(|count| count > 10 * LENSES), "{counts:?}");
+}

@@ -154,6 +154,15 @@ fn norms_neither_overflow_nor_vanish() {
     }
     assert_eq!(math::norm3(0.0, 0.0, 0.0), 0.0);
     assert_eq!(math::norm3(-3.0, 0.0, 4.0), 5.0);
+    for at in 0..3 {
+        let with = |value: f32, other: f32| {
+            let mut three = [1.0, other, 2.0];
+            three[at] = value;
+            math::norm3(three[0], three[1], three[2])
+        };
+        assert!(with(f32::NAN, 0.0).is_nan() && with(f32::NAN, 1.0e30).is_nan(), "{at}");
+        assert_eq!((with(f32::INFINITY, 0.0), with(f32::NEG_INFINITY, 1.0)), (f32::INFINITY, f32::INFINITY), "{at}");
+    }
     assert_eq!(math::norm3(3.0e30, 4.0e30, 0.0), 5.0e30);
 }
 

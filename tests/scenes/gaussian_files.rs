@@ -9,7 +9,7 @@ use serde_json::json;
 use std::fs;
 use std::io::{Read, Write};
 use std::path::Path;
-use viewfuse::scene::gaussians::{GaussianFile, GaussianScene};
+use viewfuse::scene::gaussians::{Gaussian, GaussianFile, GaussianScene};
 use viewfuse::scene::{Scene, SceneFrame};
 use viewfuse_core::Vec3;
 use viewfuse_core::gaussian::colour_along;
@@ -310,6 +310,33 @@ fn strict_readers_open_what_is_written() {
     // As it was written before: what stumbles.
     let old = ["ply", "format binary_little_endian 1.0", "comment viewfuse", "element vertex 9", "property double x"];
     assert!(sibr(&old).is_err() && inria(&old).is_err() && antimatter(&old).is_err() && gsplat(&old).is_err());
+}
+
+/// What no reader takes is not written, in any format.
+#[test]
+fn what_cannot_be_read_back_is_refused() {
+    let folder = Folder::new();
+    let gaussian = Gaussian {
+        position: [0.1; 3],
+        log_scales: [-3.0; 3],
+        rotation: [1.0, 0.0, 0.0, 0.0],
+        opacity: 0.5,
+        f_dc: [0.2; 3],
+    };
+    let scene = GaussianScene { gaussians: vec![gaussian; 3], degree: 0, f_rest: Vec::new(), is_antialiased: false };
+    let mut wrong = [0, 1, 2, 3].map(|_| scene.clone());
+    wrong[0].gaussians[1].position[2] = f32::NAN;
+    wrong[1].gaussians[1].f_dc[0] = f32::INFINITY;
+    wrong[2].degree = 9;
+    (wrong[3].degree, wrong[3].f_rest) = (1, vec![f32::NAN; 27]);
+    for name in ["a.ply", "a.splat", "a.spz"] {
+        for (scene, part) in wrong.iter().zip(["Gaussian 1 ", "Gaussian 1 ", "degree 9", "coefficient 0 of f_rest"]) {
+            let error = scene.write(&folder.file(name), &SceneFrame::FILE).expect_err(part).to_string();
+            assert!(error.contains(part) && error.contains(name), "{name}: {error}");
+            assert!(!folder.file(name).exists(), "{name}");
+        }
+        scene.write(&folder.file(name), &SceneFrame::FILE).expect(name);
+    }
 }
 
 #[test]

@@ -4,6 +4,7 @@ use super::made::open;
 use image::{Rgba, RgbaImage};
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::photographs::{Album, BackgroundChoice};
+use viewfuse_core::random::uniform;
 use viewfuse_tests::scenes::{self, Folder};
 
 /// The SRN scene with photographs of this many times its size: a disc on a transparent ground.
@@ -44,6 +45,25 @@ fn large_photographs_are_reduced_once() {
     }
     // What is read again when it is needed is reduced the same way.
     assert_eq!(sources(&Album::open_at(&scene, [], 64, &Silent).expect("none")), found);
+}
+
+/// A mean over means of fractions of pixels would be a blurred truth, which blurred pictures are nearer to.
+#[test]
+fn truths_of_large_photographs_are_means_of_their_pixels() {
+    let folder = folder(100);
+    let noise = |x: u32, y: u32| {
+        Rgba([0, 1, 2, 3].map(|channel| (uniform(channel, x, y) * 255.9) as u8 | if channel == 3 { 255 } else { 0 }))
+    };
+    RgbaImage::from_fn(1600, 1200, noise).save(folder.file("rgb/2.png")).expect("a photograph");
+    let scene = open(&folder);
+    let truth = |album: &Album, size: [u32; 2]| album.truth(0, size, None).expect("a truth").picture;
+    let whole = Album::open(&scene, [0, 1], &Silent).expect("photographs");
+    for size in [[64, 48], [96, 72], [192, 144], [250, 188], [300, 225]] {
+        let album = Album::open_for(&scene, [0, 1], |_| size, 2 * size[0] / 3, &Silent).expect("photographs");
+        for (a, b) in truth(&whole, size).pixels().zip(truth(&album, size).pixels()) {
+            assert!((0..3).all(|channel| a[channel].abs_diff(b[channel]) <= 1), "{size:?}: {a:?} and {b:?}");
+        }
+    }
 }
 
 /// What a mask hides is there all the same when a scene is used without its masks.

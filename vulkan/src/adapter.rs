@@ -104,6 +104,13 @@ pub struct Adapter {
     pub(crate) identity: Identity,
 }
 
+impl Adapter {
+    /// The same as the driver describes it now, by the instance that it is of.
+    pub(crate) fn again(&self, instance: &Instance) -> Adapter {
+        Adapter { index: self.index, ..Adapter::new(instance, self.raw) }
+    }
+}
+
 /// What compiled pipelines and measurements depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Identity {

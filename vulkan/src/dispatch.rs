@@ -28,6 +28,16 @@ const _: () = {
     }
 };
 
+/// Whether forms that read fours of numbers can take the place of the others: all that the kernel uses lies in whole
+/// fours. What is beyond an array's end they take from its last four, others from its last number.
+pub(crate) fn lies_in_fours(kernel: Kernel, parameters: &[u8], arrays: &[Bound<'_>]) -> bool {
+    let has = |(bound, used): (&Bound<'_>, u64)| {
+        let fours = bound.0.len * bound.0.stride / size_of::<[f32; 4]>();
+        4 * fours as u64 >= used
+    };
+    kernel.used_in_fours(parameters).is_some_and(|used| arrays.iter().zip(used).all(has))
+}
+
 /// A dispatch whose arguments are right.
 pub(crate) struct DispatchJob<'a> {
     pub(crate) kernel: Kernel,
@@ -88,13 +98,21 @@ impl Gpu {
                 Some(shape) => {
                     let form = match form {
                         Some(form) => form,
-                        None => gpu.form(state, &job, &Class::new(kernel, shape, kernel.is_in_fours(parameters)))?,
+                        None => gpu.form(
+                            state,
+                            &job,
+                            &Class::new(kernel, shape, lies_in_fours(kernel, parameters, arrays)),
+                        )?,
                     };
                     (form, 0..form.elements(shape.row_count, shape.column_count))
                 }
                 None => {
-                    let invocations = kernel.invocations();
-                    (Form::Single, elements.start * invocations..elements.end * invocations)
+                    let of = |elements: u32| elements.checked_mul(kernel.invocations());
+                    let (Some(start), Some(end)) = (of(elements.start), of(elements.end)) else {
+                        let detail = format!("elements {elements:?} of {} invocations each", kernel.invocations());
+                        return Err(VulkanError::Arguments(kernel.name(), detail));
+                    };
+                    (Form::Single, start..end)
                 }
             };
             let count = u64::from(elements.end - elements.start);

@@ -45,7 +45,8 @@ pub struct GpuOptions {
     /// same bits. A form of [`Form::ROUNDED`] or [`Form::FUSED`] is that of the kernels that have it.
     pub form: Option<Form>,
     /// A module whose entry points take the place of those for matrix units, so that tests see the same places,
-    /// barriers and roundings on any device; `None` for the device's own units.
+    /// barriers and roundings on any device; `None` for the device's own units. It goes to the driver as it is.
+    #[doc(hidden)]
     pub stand_ins: Option<&'static [u8]>,
     /// Multiply-adds of a picture from which on forms of rounded factors are worth their trial, which compiles for
     /// seconds in a first process, and gains less than that for less work.
@@ -177,9 +178,12 @@ impl Gpu {
         if adapter.instance_number != instance.number {
             return Err(VulkanError::NoDevice(format!("{} was found by another instance of Vulkan", adapter.name)));
         }
-        if !adapter.missing.is_empty() {
-            return Err(VulkanError::Missing(adapter.name.clone(), adapter.missing.clone()));
+        // What a caller may have changed of it says nothing of the device.
+        let now = adapter.again(instance);
+        if let Some(missing) = [adapter, &now].map(|found| &found.missing).into_iter().find(|found| !found.is_empty()) {
+            return Err(VulkanError::Missing(adapter.name.clone(), missing.clone()));
         }
+        let adapter = &now;
         let (limits, lower) = (adapter.limits, options.limits);
         let limits = Limits {
             buffer_range: limits.buffer_range.min(lower.buffer_range),
@@ -247,12 +251,12 @@ impl Gpu {
     }
 
     /// What the driver says of a kernel in a form as it compiles it, in its own words: registers of an invocation, for
-    /// one. Empty where it says nothing.
+    /// one. Empty where it says nothing, or does not run that form.
     ///
     /// # Errors
     /// If it does not compile.
     pub fn statistics(&self, kernel: Kernel, form: Form) -> Result<Vec<(String, f64)>, VulkanError> {
-        self.pipelines.statistics(kernel, form)
+        if self.runs(form) { self.pipelines.statistics(kernel, form) } else { Ok(Vec::new()) }
     }
 
     /// [`GpuOptions::min_rounded_work`].
@@ -268,7 +272,7 @@ impl Gpu {
     /// Most elements of `bytes` bytes each in an array that is bound as a whole.
     pub fn most_elements(&self, bytes: usize) -> usize {
         let most = self.handle.limits.buffer_range.min(self.handle.limits.allocation);
-        usize::try_from(most).unwrap_or(usize::MAX) / bytes
+        usize::try_from(most).unwrap_or(usize::MAX) / bytes.max(1)
     }
 
     /// Waits until all work is done.

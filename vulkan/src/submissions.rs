@@ -397,7 +397,7 @@ impl Drop for Submissions {
         // One that exceeded the time limit may still run: it gets a little longer, then its resources are not freed.
         let patience =
             if self.is_late { Some(self.closing) } else { self.time_limit.map(|limit| limit.max(self.closing)) };
-        let deadline = patience.map(|patience| Instant::now() + patience);
+        let deadline = patience.and_then(|patience| Instant::now().checked_add(patience));
         while !self.running.is_empty() {
             self.time_limit = deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
             match self.wait_for_oldest(&mut |_| ()) {

@@ -2,6 +2,7 @@
 //! tried first, and of fused ones the time, too.
 
 use crate::buffer::{Bound, Buffer};
+use crate::dispatch::lies_in_fours;
 use crate::error::VulkanError;
 use crate::forms::ENOUGH_TILES;
 use crate::gpu::Gpu;
@@ -21,7 +22,7 @@ const REPEATS: u32 = 4;
 
 impl Gpu {
     /// As [`Gpu::dispatch`], with a form that is not [exact](Form::is_exact) where this device is trusted with it
-    /// ([`Gpu::trusts`]) and the arrays lie in fours ([`Kernel::is_in_fours`]): other numbers, within that form's
+    /// ([`Gpu::trusts`]) and the arrays lie in fours ([`Kernel::used_in_fours`]): other numbers, within that form's
     /// bound; otherwise as `dispatch`. Of the form's [sizes](Form::sizes) that is taken which suits the product, where
     /// the device is trusted with it as well as with the largest one.
     ///
@@ -36,7 +37,9 @@ impl Gpu {
         arrays: &[Bound<'_>],
     ) -> Result<(), VulkanError> {
         let form = match kernel.shape(parameters) {
-            Some(shape) if !form.is_exact() && kernel.is_in_fours(parameters) => Some(self.sized(form, shape)),
+            Some(shape) if !form.is_exact() && lies_in_fours(kernel, parameters, arrays) => {
+                Some(self.sized(form, shape))
+            }
             _ => None,
         };
         let form = match form {

@@ -66,7 +66,8 @@ impl Memory for Cpu {
 
     fn zeros<T: Element>(&self, count: usize) -> Result<Vec<T>, DeviceError> {
         // Zeroed by the allocator, which has zeroed pages for large ones: `vec![T::default()]` writes them.
-        Ok(bytemuck::zeroed_vec(count))
+        let no_memory = |()| DeviceError::Other(format!("no memory for {count} elements of {}", size_of::<T>()).into());
+        bytemuck::try_zeroed_vec(count).map_err(no_memory)
     }
 
     fn most_elements<T: Element>(&self) -> usize {

@@ -41,7 +41,8 @@ macro_rules! device {
         /// Something that runs every kernel: a method for each row of [`viewfuse_kernels::rows`], so that a kernel that
         /// exists on one device only does not compile. A method takes the kernel's parameters, the numbers that say how
         /// many elements there are, and the arrays in the order of the row. Buffers may be longer than the parameters
-        /// say.
+        /// say. Sizes are at least 1, and products of them and of counts below 2^32: a device may panic or write nothing
+        /// of others.
         pub trait Device: Memory {
             /// A layer's weights in the device's own form.
             type Weights: Send + Sync;

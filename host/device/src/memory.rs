@@ -121,7 +121,7 @@ pub trait Memory {
         self.upload(&values)
     }
 
-    /// A buffer of `count` default values.
+    /// A buffer of `count` elements whose bytes are 0.
     ///
     /// # Errors
     /// If the device has no memory left.

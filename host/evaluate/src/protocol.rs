@@ -159,15 +159,16 @@ impl Protocol {
                         close(scene, &draw, *sources, *degrees, draws.target_count, &mut add)
                     }
                     Protocol::Fixed { sources, targets } => {
-                        let (sources, targets) = fixed(scene, sources, targets, least_sources)?;
+                        let (sources, targets, notes) = fixed(scene, sources, targets, least_sources)?;
                         add(sources, targets);
-                        Vec::new()
+                        notes
                     }
                     Protocol::Nearest { sources, targets } => near(scene, *sources, targets.as_deref(), &mut add)?,
                     Protocol::Benchmark { benchmark, sources, .. } => match benchmark.choose(scene, *sources) {
                         Ok((sources, targets)) => {
+                            let notes = of_one_pose(scene, &sources, &targets);
                             add(sources, targets);
-                            Vec::new()
+                            notes
                         }
                         Err(lack) => vec![format!("{} {lack}", scene.name())],
                     },
@@ -227,6 +228,23 @@ impl Protocol {
     }
 }
 
+/// A note of the targets of a published list that have the pose of one of its sources.
+fn of_one_pose(scene: &Scene, sources: &[usize], targets: &[usize]) -> Vec<String> {
+    let poses = scene.same_poses();
+    let of_source = |target: &usize| poses.with_pose_of(sources, *target).map(|source| (*target, source));
+    let same: Vec<(usize, usize)> = targets.iter().filter_map(of_source).collect();
+    let Some((target, source)) = same.first() else { return Vec::new() };
+    let name = |view: &usize| &scene.views[*view].name;
+    vec![format!(
+        "{}: {} of the benchmark's targets have the pose of a source (the first is {}, with {}): their scores are too \
+         high",
+        scene.name(),
+        same.len(),
+        name(target),
+        name(source)
+    )]
+}
+
 /// Each target is a job: its sources are its own.
 fn near(
     scene: &Scene,
@@ -234,7 +252,7 @@ fn near(
     targets: Option<&str>,
     add: &mut impl FnMut(Vec<usize>, Vec<usize>),
 ) -> Result<Vec<String>, ProtocolError> {
-    let count = photographed(scene).count();
+    let count = scene.same_poses().sources(photographed(scene), &[]).len();
     if count <= source_count {
         return Ok(vec![format!(
             "{}: {count} photographs, {} are needed for {source_count} sources",

@@ -47,7 +47,7 @@ pub enum FolderError {
     #[error(transparent)]
     Write(#[from] WriteError),
     /// A file, or a line of it, was not written by this program.
-    #[error("{}{}: is not of an evaluation: {cause}", path.display(), line.map_or(String::new(),
+    #[error("{}{}: is not of an evaluation, or damaged: {cause}", path.display(), line.map_or(String::new(),
         |line| format!(":{line}")))]
     Json {
         /// The file.

@@ -14,9 +14,9 @@ pub struct Size {
 }
 
 impl Size {
-    /// How many pixels it has.
+    /// How many pixels it has; at most `u32::MAX` is told.
     pub fn pixel_count(self) -> u32 {
-        self.height * self.width
+        self.height.saturating_mul(self.width)
     }
 
     /// The same with other channels.

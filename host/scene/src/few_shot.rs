@@ -11,10 +11,8 @@ pub use targets::away_warning;
 
 use crate::path::arc::Arc;
 use crate::path::{CameraPath, NamedCamera, generated, numbered};
-use crate::poses::firsts;
 use crate::rig::{Rig, spread};
 use crate::{Scene, SceneError, Split, View};
-use std::collections::HashSet;
 use std::path::PathBuf;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::pose::PoseError;
@@ -188,6 +186,7 @@ impl Selection {
         let mut targets: Vec<Target> = target_views.iter().map(|&view| target_of(scene, view)).collect();
         let mut frames_per_second = None;
         if let Some(choice) = &self.path {
+            check_count(scene, sources.len(), 1)?;
             let path = along(choice, scene, &sources)?;
             frames_per_second = path.frames_per_second;
             let target = |NamedCamera { name, camera }| Target { name, camera, truth: None };
@@ -222,14 +221,7 @@ impl Selection {
                 }
                 sources
             }
-            None => {
-                let is_source = |view: &usize| scene.views[*view].image.is_some() && !targets.contains(view);
-                let firsts = firsts(&scene.views);
-                // A photograph with a target's own pose would be its truth.
-                let scored = targets.iter().filter(|view| scene.views[**view].image.is_some());
-                let mut poses: HashSet<usize> = scored.map(|view| firsts[*view]).collect();
-                (0..scene.views.len()).filter(is_source).filter(|view| poses.insert(firsts[*view])).collect()
-            }
+            None => scene.same_poses().sources(0..scene.views.len(), targets),
         };
         if let Some(count) = self.view_count {
             let centres: Vec<_> = sources.iter().map(|&view| scene.views[view].camera.pose.centre_world()).collect();

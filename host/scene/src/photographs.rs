@@ -34,6 +34,9 @@ pub enum PhotographsError {
          or photographs with an alpha channel"
     )]
     NoSilhouette(String, String),
+    /// The colour of the background has a channel outside `[0, 1]`, or that is NaN.
+    #[error("the background {0:?} is no colour: a channel is not from 0 to 1")]
+    Background([f32; 3]),
     /// The person stopped the work.
     #[error("interrupted")]
     Interrupted(#[from] Interrupted),
@@ -128,8 +131,8 @@ const MAX_POINT_ERROR: f32 = 2.0;
 pub struct Album<'a> {
     scene: &'a Scene,
     kept: Vec<Option<Photograph>>,
-    /// The longest side that is kept, in pixels.
-    side: Option<u32>,
+    /// The size at which each is kept.
+    sizes: Vec<(u32, u32)>,
 }
 
 impl<'a> Album<'a> {
@@ -145,12 +148,10 @@ impl<'a> Album<'a> {
         views: impl IntoIterator<Item = usize>,
         progress: &dyn Progress,
     ) -> Result<Album<'a>, PhotographsError> {
-        Album { scene, kept: vec![None; scene.views.len()], side: None }.filled(views, progress)
+        Album { scene, kept: vec![None; scene.views.len()], sizes: sizes(scene, own_size) }.filled(views, progress)
     }
 
-    /// As [`Album::open`], for sources and truths of at most `longest_side` pixels on a side: larger photographs are
-    /// reduced as soon as they are decoded, to no less than twice that side. Those below 1280 pixels, or four times
-    /// that side, keep their own size, with bit-identical results.
+    /// As [`Album::open_for`], for sources and truths of at most `longest_side` pixels on a side.
     ///
     /// # Errors
     /// As [`Album::open`].
@@ -160,8 +161,32 @@ impl<'a> Album<'a> {
         longest_side: u32,
         progress: &dyn Progress,
     ) -> Result<Album<'a>, PhotographsError> {
-        let side = Some(longest_side.saturating_mul(2).max(MIN_KEPT_SIDE));
-        Album { scene, kept: vec![None; scene.views.len()], side }.filled(views, progress)
+        Album::open_for(scene, views, |camera| reduced_size(camera, longest_side).into(), longest_side, progress)
+    }
+
+    /// As [`Album::open`], for truths of the size that `picture` gives for a camera, and for sources of at most
+    /// `longest_side` pixels on a side: larger photographs are reduced as soon as they are decoded, to no less than
+    /// twice that side, and to a multiple of the pictures' size, so that a truth is the same mean over the pixels of its
+    /// photograph but for rounding. Those below 1280 pixels, or four times that side, keep their own size, with
+    /// bit-identical results.
+    ///
+    /// # Errors
+    /// As [`Album::open`].
+    pub fn open_for(
+        scene: &'a Scene,
+        views: impl IntoIterator<Item = usize>,
+        picture: impl Fn(&Camera) -> [u32; 2],
+        longest_side: u32,
+        progress: &dyn Progress,
+    ) -> Result<Album<'a>, PhotographsError> {
+        let least = longest_side.saturating_mul(2).max(MIN_KEPT_SIDE);
+        let kept = |camera: &Camera| {
+            let [width, height] = picture(camera).map(|side| side.max(1));
+            let times = least.div_ceil(width.max(height));
+            let is_large = self::longest_side(camera) / 2 >= times.saturating_mul(width.max(height));
+            if is_large { (times * width, times * height) } else { own_size(camera) }
+        };
+        Album { scene, kept: vec![None; scene.views.len()], sizes: sizes(scene, kept) }.filled(views, progress)
     }
 
     fn filled(
@@ -172,8 +197,11 @@ impl<'a> Album<'a> {
         let mut wanted: Vec<usize> = views.into_iter().collect();
         wanted.sort_unstable();
         wanted.dedup();
+        if let Some(&view) = wanted.last().filter(|view| **view >= self.scene.views.len()) {
+            self.scene.photograph(view)?;
+        }
         let pixels = |(width, height): (u32, u32)| u64::from(width) * u64::from(height);
-        if wanted.iter().map(|&view| 4 * pixels(self.kept_size(view))).sum::<u64>() > MAX_KEPT_BYTES {
+        if wanted.iter().map(|&view| 4 * pixels(self.sizes[view])).sum::<u64>() > MAX_KEPT_BYTES {
             return Ok(self);
         }
         progress.expect(wanted.len());
@@ -182,8 +210,7 @@ impl<'a> Album<'a> {
             // As many as fit, and at least one.
             let mut bytes = 0;
             let fits = |&&view: &&usize| {
-                let pinhole = &self.scene.views[view].camera.pinhole;
-                bytes += DECODING_BYTES * pixels((pinhole.width(), pinhole.height()));
+                bytes += DECODING_BYTES * pixels(own_size(&self.scene.views[view].camera));
                 bytes <= MAX_DECODING_BYTES
             };
             let count = rest.iter().take_while(fits).count().max(1);
@@ -203,17 +230,8 @@ impl<'a> Album<'a> {
         Ok(self)
     }
 
-    /// The size at which a photograph is kept.
-    fn kept_size(&self, view: usize) -> (u32, u32) {
-        let camera = &self.scene.views[view].camera;
-        match self.side {
-            Some(side) if longest_side(camera) / 2 >= side => reduced_size(camera, side),
-            _ => (camera.pinhole.width(), camera.pinhole.height()),
-        }
-    }
-
     fn read(&self, view: usize) -> Result<Photograph, SceneError> {
-        let size = self.kept_size(view);
+        let size = self.sizes[view];
         let photograph = self.scene.photograph_after(view, |stored| match stored.pixels.dimensions() == size {
             true => stored,
             false => resample::reduced(&stored, size),
@@ -255,6 +273,11 @@ impl<'a> Album<'a> {
         choice: BackgroundChoice,
         progress: &dyn Progress,
     ) -> Result<SourceImages, PhotographsError> {
+        if let BackgroundChoice::Colour(colour) = choice
+            && !colour.iter().all(|channel| (0.0..=1.0).contains(channel))
+        {
+            return Err(PhotographsError::Background(colour));
+        }
         // Two passes over the photographs, so that at most one for each thread must be in memory.
         let look = |&view: &usize| {
             progress.check()?;
@@ -387,6 +410,16 @@ impl<'a> Album<'a> {
         };
         Ok(SourceImage { camera: Camera { pinhole, ..*camera }, texels })
     }
+}
+
+/// A size for each view of a scene.
+fn sizes(scene: &Scene, size: impl Fn(&Camera) -> (u32, u32)) -> Vec<(u32, u32)> {
+    scene.views.iter().map(|view| size(&view.camera)).collect()
+}
+
+/// Width and height of a camera's image.
+fn own_size(camera: &Camera) -> (u32, u32) {
+    (camera.pinhole.width(), camera.pinhole.height())
 }
 
 /// Longest side of a camera's image in pixels.

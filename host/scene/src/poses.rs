@@ -2,6 +2,7 @@
 
 use crate::rig::Rig;
 use crate::{Scene, View};
+use std::collections::HashSet;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
 
@@ -12,9 +13,39 @@ const MIN_BASELINE: f32 = 1.0e-3;
 /// Least cosine of the angle between the axes of two cameras with the same pose: of 0.6 degrees.
 const MIN_COSINE: f32 = 0.999_95;
 
+/// Which views of a scene have the same pose.
+pub struct SamePoses<'a> {
+    views: &'a [View],
+    firsts: Vec<usize>,
+}
+
+impl SamePoses<'_> {
+    /// Those of some views, in their order, that can be sources of these targets: photographs, one of each pose, and
+    /// none of a target's own pose if that has a photograph, of which they would be another one.
+    pub fn sources(&self, of: impl IntoIterator<Item = usize>, targets: &[usize]) -> Vec<usize> {
+        let has_photograph = |view: &usize| self.views[*view].image.is_some();
+        let scored = targets.iter().filter(|view| has_photograph(view));
+        let mut poses: HashSet<usize> = scored.map(|view| self.firsts[*view]).collect();
+        let is_source = |view: &usize| has_photograph(view) && !targets.contains(view);
+        of.into_iter().filter(is_source).filter(|view| poses.insert(self.firsts[*view])).collect()
+    }
+
+    /// The first of some views that has the pose of another one.
+    pub fn with_pose_of(&self, of: &[usize], other: usize) -> Option<usize> {
+        of.iter().copied().find(|view| *view != other && self.firsts[*view] == self.firsts[other])
+    }
+}
+
+impl Scene {
+    /// Which of its views have the same pose.
+    pub fn same_poses(&self) -> SamePoses<'_> {
+        SamePoses { views: &self.views, firsts: firsts(&self.views) }
+    }
+}
+
 /// The first of these views that has the same pose as each of them, and is of the same split: that view itself, if it
 /// is the only one. A second photograph of a pose shows nothing new, and next to it no depth is found.
-pub(crate) fn firsts(views: &[View]) -> Vec<usize> {
+fn firsts(views: &[View]) -> Vec<usize> {
     let cameras: Vec<Camera> = views.iter().map(|view| view.camera).collect();
     let centres = || cameras.iter().map(|camera| camera.pose.centre_world());
     let middle = Vec3::from_array([0, 1, 2].map(|axis| median(centres().map(|centre| centre[axis]))));

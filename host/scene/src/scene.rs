@@ -358,19 +358,20 @@ impl Scene {
         }
     }
 
-    /// The views that `text` may refer to: the view of exactly this name; `#3` is the index 3; a whole number is an
-    /// index, and the number that a name ends in, leading zeros aside.
+    /// The views that `text` may refer to: the view of exactly this name; `#3` is the index 3, too where a name is `#3`;
+    /// a whole number is an index, and the number that a name ends in, leading zeros aside.
     ///
     /// Both, because some data sets count from 1 and some from 0: in `toy0001, toy0002` the number 1 may mean either,
     /// which the caller says, and 2 can only be `toy0002`. A number with leading zeros is no index, and where names are
     /// nothing but numbers (`000048`), a number is a name. Of a photograph and a target pose of the same number the
     /// photograph is meant.
     pub fn views_meant(&self, text: &str) -> Vec<usize> {
-        if let Some(view) = self.views.iter().position(|view| view.name == text) {
-            return vec![view];
-        }
         let number = text.strip_prefix('#').unwrap_or(text);
         let index = number.parse().ok().filter(|index| is_number(number) && *index < self.views.len());
+        if let Some(view) = self.views.iter().position(|view| view.name == text) {
+            let other = index.filter(|index| number != text && *index != view);
+            return [view].into_iter().chain(other).collect();
+        }
         if number != text || !is_number(number) {
             return index.into_iter().collect();
         }

@@ -15,6 +15,7 @@ viewfuse_tests::trials![
     close_has_exactly_one_near_source,
     fixed_takes_the_views_of_its_lists,
     a_field_may_need_more_sources,
+    a_target_is_no_source_under_another_name,
 ];
 
 const DRAWS: Draws = Draws { seed: 7, trial_count: 5, target_count: 4 };
@@ -206,4 +207,37 @@ fn a_field_may_need_more_sources() {
     let scenes = [scene(&folder.join("toy"))];
     let error = protocol("count:sources=2+8").plan(&scenes, DRAWS, 3).expect_err("2 are too few").to_string();
     assert!(error.contains("count:sources=2+8") && error.contains("at least 3"), "{error}");
+}
+
+/// Two photographs of one pose: the one as the source of the other would be its truth, and both as sources one.
+fn a_target_is_no_source_under_another_name() {
+    let folder = toy();
+    for (view, other) in [("000020", "000024"), ("000003", "000025"), ("000021", "000026")] {
+        for file in ["rgb/NAME.png", "pose/NAME.txt"] {
+            let [from, to] = [view, other].map(|name| folder.join("toy").join(file.replace("NAME", name)));
+            std::fs::copy(from, to).expect("a photograph again");
+        }
+    }
+    let scenes = [scene(&folder.join("toy"))];
+    let pose = |view: &usize| match view {
+        24 => 20,
+        25 => 3,
+        26 => 21,
+        view => *view,
+    };
+    for text in ["random:sources=8", "count:sources=4+16", "nearest:3", "close:degrees=20"] {
+        let jobs = plan(text, &scenes, Draws { trial_count: 40, ..DRAWS }).jobs;
+        assert!(jobs.iter().flat_map(|job| &job.targets).any(|target| *target != pose(target)), "{text}");
+        for job in &jobs {
+            assert_sound(job);
+            let sources: HashSet<usize> = job.sources.iter().map(pose).collect();
+            assert_eq!(sources.len(), job.sources.len(), "{text}: {job:?}");
+            assert!(job.targets.iter().all(|target| !sources.contains(&pose(target))), "{text}: {job:?}");
+        }
+    }
+    // A published list stays, and it is said.
+    let notes = plan("llff:21", &scenes, DRAWS).notes;
+    assert!(notes.iter().any(|note| note.contains("have the pose of a source (the first is 0000")), "{notes:?}");
+    let notes = plan("fixed:0,1:1,2", &scenes, DRAWS).notes;
+    assert_eq!(notes, ["toy: no targets, since they are sources: 000001"]);
 }

@@ -48,7 +48,7 @@ pub struct Push<P> {
 
 for_each_kernel!(entries);
 
-/// The forms of arrays in fours of the kernels that have them ([`Kernel::is_in_fours`]).
+/// The forms of arrays in fours of the kernels that have them ([`Kernel::used_in_fours`]).
 pub mod in_fours {
     entries_in_fours! {
         linear, LinearBlock, block [block.row_count, block.inner_count, block.column_count],

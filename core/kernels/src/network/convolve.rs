@@ -104,6 +104,25 @@ impl ConvolveBlock {
             && self.residual_first.is_multiple_of(4)
     }
 
+    /// Numbers of inputs, weights, bias, residual and outputs up to the last one that it uses.
+    pub fn used(&self) -> [u64; 5] {
+        let (channels, pixels) = (self.out_channels as u64, self.out_height as u64 * self.out_width as u64);
+        let in_pixels = self.in_height as u64 * self.in_width as u64;
+        let inner = self.size as u64 * self.size as u64 * self.in_channels as u64;
+        let up_to = |first: u32, pixels: u64, pitch: u32, channels: u64| {
+            first as u64 + pixels.saturating_sub(1) * pitch as u64 + channels
+        };
+        let residual =
+            if self.has_residual != 0 { up_to(self.residual_first, pixels, self.residual_pitch, channels) } else { 0 };
+        [
+            up_to(self.in_first, in_pixels, self.in_pitch, self.in_channels as u64),
+            inner * channels,
+            channels,
+            residual,
+            up_to(self.out_first, pixels, self.out_pitch, channels),
+        ]
+    }
+
     /// First row and column of the window that output pixel `pixel` sees, in the enlarged image, plus the padding.
     #[inline(always)]
     pub fn window(&self, pixel: u32) -> [u32; 2] {

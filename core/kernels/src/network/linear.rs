@@ -30,6 +30,13 @@ impl LinearBlock {
     pub const fn is_in_fours(&self) -> bool {
         self.inner_count.is_multiple_of(4) && self.column_count.is_multiple_of(4)
     }
+
+    /// Numbers of inputs, weights, bias, residual and outputs that it uses.
+    pub const fn used(&self) -> [u64; 5] {
+        let [rows, inner, columns] = [self.row_count as u64, self.inner_count as u64, self.column_count as u64];
+        let residual = if self.has_residual != 0 { rows * columns } else { 0 };
+        [rows * inner, inner * columns, columns, residual, rows * columns]
+    }
 }
 
 /// The start of the sum for output number `element`: `bias[column]` plus `residual[element]`, if there is a residual.

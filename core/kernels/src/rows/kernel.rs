@@ -168,7 +168,7 @@ impl Form {
     }
 
     /// Whether it loads and stores whole fours: inner indices and columns are multiples of four, and all rows of its
-    /// arrays begin at such ones ([`Kernel::is_in_fours`]).
+    /// arrays begin at such ones ([`Kernel::used_in_fours`]).
     pub const fn needs_fours(self) -> bool {
         !matches!(self, Form::Single | Form::Subgroup)
     }
@@ -467,16 +467,19 @@ impl Kernel {
         !form.is_exact() && matches!(self, Kernel::Linear | Kernel::Convolve)
     }
 
-    /// Whether the arrays of a kernel with these parameters lie in fours, as [some forms](Form::needs_fours) need it.
-    pub fn is_in_fours(self, parameters: &[u8]) -> bool {
+    /// How many numbers of each array a kernel with these parameters uses, if its arrays can lie in fours, as
+    /// [some forms](Form::needs_fours) need it.
+    pub fn used_in_fours(self, parameters: &[u8]) -> Option<[u64; 5]> {
         match self {
             Kernel::Linear => {
-                bytemuck::try_pod_read_unaligned(parameters).is_ok_and(|block: LinearBlock| block.is_in_fours())
+                let block: LinearBlock = bytemuck::try_pod_read_unaligned(parameters).ok()?;
+                block.is_in_fours().then(|| block.used())
             }
             Kernel::Convolve => {
-                bytemuck::try_pod_read_unaligned(parameters).is_ok_and(|block: ConvolveBlock| block.is_in_fours())
+                let block: ConvolveBlock = bytemuck::try_pod_read_unaligned(parameters).ok()?;
+                block.is_in_fours().then(|| block.used())
             }
-            _ => false,
+            _ => None,
         }
     }
 

@@ -26,7 +26,8 @@ use viewfuse_scene::picture_size;
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
-    viewfuse compare out/000020.png car/rgb/000020.png\n      PSNR and SSIM of one picture\n  \
+    viewfuse compare out/000020.png car/rgb/000020.png\n      PSNR and SSIM of one picture; psnr-corrected is that \
+    of the colours after the gain and the offset of each channel that fit the truth best\n  \
     viewfuse compare out/ car/rgb/ --lpips alex=alexnet.pth --dists vgg16.pth --fid pt_inception-2015-12-05.pth\n      \
     of every picture in out/, with the photograph of the same name\n\n\
     Transparent pictures are laid over the background of their run, as `render` does when it compares; the last line \
@@ -165,13 +166,17 @@ fn print_scores(pairs: &[Pair], scores: &[Vec<Scored>]) -> anyhow::Result<()> {
             names.push(score.name);
         }
     }
-    let mut rows = table(["metric", "mean", "worst", "of"].map(str::to_owned));
+    let (mut rows, mut lacks) = (table(["metric", "mean", "worst", "of"].map(str::to_owned)), Vec::new());
     for name in names {
         let scored = pairs
             .iter()
             .zip(scores)
             .filter_map(|(pair, scores)| scores.iter().find(|score| score.name == name).map(|score| (pair, score)));
         let scored: Vec<(&Pair, &Scored)> = scored.collect();
+        if scored.len() < pairs.len() {
+            let (count, all) = (scored.len(), pairs.len());
+            lacks.push(format!("{name}: of {count} of the {all} pictures; the others are too small for it"));
+        }
         let mean = scored.iter().map(|(_, score)| score.value).sum::<f64>() / scored.len() as f64;
         let badness = |score: &Scored| if score.more_is_better { -score.value } else { score.value };
         let worst = scored.iter().max_by(|(_, a), (_, b)| badness(a).total_cmp(&badness(b)));
@@ -182,7 +187,8 @@ fn print_scores(pairs: &[Pair], scores: &[Vec<Scored>]) -> anyhow::Result<()> {
         "{}",
         if pairs.len() == 1 { "1 picture".to_owned() } else { format!("{} pictures", pairs.len()) }
     ))?;
-    Ok(say(rows)?)
+    say(rows)?;
+    Ok(lacks.iter().try_for_each(say)?)
 }
 
 fn print_distances(

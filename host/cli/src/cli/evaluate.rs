@@ -34,6 +34,7 @@ use viewfuse_device::choice::Chosen;
 use viewfuse_evaluate::baseline::Baseline;
 use viewfuse_evaluate::summary::{Observation, Table, table};
 use viewfuse_evaluate::{Evaluator, Score, check_selection};
+use viewfuse_field::render::working_side;
 use viewfuse_job::files::{check_writable, write_whole};
 use viewfuse_job::progress::Part;
 use viewfuse_scene::Scene;
@@ -155,7 +156,10 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
     let paths = arguments.paths()?;
     let scenes: Vec<Scene> = paths.iter().map(|path| arguments.picture.masks.open(path)).collect::<Result<_, _>>()?;
     refuse_same_photographs(&scenes)?;
-    scenes.iter().try_for_each(|scene| check_selection(scene, &selection, about.least_sources))?;
+    for scene in &scenes {
+        check_selection(scene, &selection, about.least_sources)?;
+        working_side(scene, &options, about.longest_side)?;
+    }
     scenes.iter().for_each(warn_of);
     arguments.output.as_deref().map_or(Ok(()), |path| keep_file_apart(&scenes, path))?;
     let csv = |path: &Path| refuse_extension(path, "a table as CSV", &["csv", "txt"]);

@@ -95,7 +95,7 @@ pub(super) fn keep_file_apart<'a>(scenes: impl IntoIterator<Item = &'a Scene>, f
 
 fn inside(scene: &Scene, path: &Path, what: &str) -> anyhow::Error {
     let (path, scene) = (path.display(), scene.path.display());
-    wrong(format_args!("--output {path}: the scene {scene} is read from this {what}; give another {what}"))
+    wrong(format_args!("{path}: the scene {scene} is read from this {what}; give another {what}"))
 }
 
 /// Refuses an output that is the input itself, under any spelling.

@@ -29,6 +29,9 @@ use viewfuse_scene::photographs::Album;
 use viewfuse_vulkan::GpuOptions;
 use viewfuse_weighting::WeightingSpec;
 
+/// How many times as long as reading the photographs a device is taken to need.
+const READINGS: usize = 20;
+
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     viewfuse pareto car/ --targets 5 --sources all/3 --model body:64 --size 64x64 -o out\n      each omission alone, \
@@ -48,7 +51,7 @@ pub(crate) struct Arguments {
     targets: Option<String>,
     #[command(flatten)]
     sources: SourceOptions,
-    /// Weighting scheme, as for render
+    /// Weighting scheme, as for render, but auto, which chooses its own settings
     #[arg(long, value_name = "SCHEME", default_value_t)]
     weights: WeightingSpec,
     #[command(flatten)]
@@ -85,7 +88,8 @@ struct Beside {
 }
 
 fn parse_beside(text: &str) -> Result<Beside, String> {
-    let (name, seconds) = text.rsplit_once('=').ok_or("a name and a time, as PyTorch=5.8")?;
+    let (name, seconds) =
+        text.rsplit_once('=').filter(|(name, _)| !name.trim().is_empty()).ok_or("a name and a time, as PyTorch=5.8")?;
     Ok(Beside { name: name.to_owned(), seconds: parse_seconds(seconds)?.as_secs_f64() })
 }
 
@@ -105,7 +109,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     [&csv, &svg, &json].into_iter().try_for_each(|path| check_writable(path))?;
     let Several { devices, notes, failures } = open_several(&arguments.device, &device_options(GpuOptions::default()))?;
 
-    let progress = Terminal::new("reading the photographs");
+    let (progress, count) = (Terminal::new("measuring"), devices.len());
+    progress.stage("reading the photographs", 0..1, 1 + READINGS * count);
     let truths = job.targets.iter().filter_map(|target| target.truth);
     let album = Album::open(&scene, job.sources.iter().copied().chain(truths), &progress)?;
     let subject = Subject { scene: &scene, album: &album, job: &job, weighting: &weighting };
@@ -126,10 +131,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         failures,
     };
     let mut first: Option<Measured> = None;
-    let count = devices.len();
     for (index, device) in devices.into_iter().enumerate() {
         let name = device.name();
-        let part = Part::begin(&progress, name.clone(), index..index + 1, count);
+        let place = 1 + READINGS * index..1 + READINGS * (index + 1);
+        let part = Part::begin(&progress, name.clone(), place, 1 + READINGS * count);
         let measured = on_threads(arguments.picture.threads, || sweep.on(&device, &field, &part))?;
         let measured = match measured {
             Ok(measured) => measured,
@@ -147,6 +152,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     }
     drop(progress);
 
+    let measured_count = record.devices.len();
     if let Some(exact) = record.devices.first().and_then(|device| device.points.first()).map(|point| point.seconds) {
         let beside = arguments.beside.iter().map(|beside| DeviceRecord::beside(&beside.name, beside.seconds, exact));
         record.devices.extend(beside);
@@ -161,8 +167,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         write_whole(&json, &whole)?;
     }
     say(format_args!("{title}\n"))?;
-    let is_measured = |device: &&DeviceRecord| !arguments.beside.iter().any(|beside| beside.name == device.device);
-    record.devices.iter().filter(is_measured).try_for_each(print_device)?;
+    record.devices.iter().take(measured_count).try_for_each(print_device)?;
     notes.iter().try_for_each(say)?;
     if !record.devices.is_empty() {
         say(format_args!("{}, {}, {}", csv.display(), svg.display(), json.display()))?;

@@ -16,15 +16,16 @@ pub(super) fn counted(
     add: &mut impl FnMut(Vec<usize>, Vec<usize>),
 ) -> Vec<String> {
     let order = draw.order(photographed(scene));
+    let (targets, rest) = order.split_at(target_count.min(order.len()));
+    let sources = scene.same_poses().sources(rest.iter().copied(), targets);
     let mut notes = Vec::new();
     for &count in counts {
-        if order.len() < target_count + count {
-            let (has, wanted) = (order.len(), target_count + count);
+        let (has, wanted) = (targets.len() + sources.len(), target_count + count);
+        if has < wanted {
             notes.push(format!("{}: {has} photographs, {wanted} are needed for {count} sources", scene.name()));
             continue;
         }
-        let (targets, rest) = order.split_at(target_count);
-        add(ascending(&rest[..count]), targets.to_vec());
+        add(ascending(&sources[..count]), targets.to_vec());
     }
     notes
 }
@@ -38,13 +39,13 @@ pub(super) fn close(
     target_count: usize,
     add: &mut impl FnMut(Vec<usize>, Vec<usize>),
 ) -> Vec<String> {
-    let views: Vec<usize> = photographed(scene).collect();
+    let (views, poses): (Vec<usize>, _) = (photographed(scene).collect(), scene.same_poses());
     let cameras: Vec<Camera> = views.iter().map(|&view| scene.views[view].camera).collect();
     let focus = Rig::of(&cameras).focus;
     let from_focus = |view: usize| scene.views[view].camera.pose.centre_world() - focus;
     let is_near = |a: usize, b: usize| angle(from_focus(a), from_focus(b)).to_degrees() < f64::from(degrees);
     let neighbours = |target: usize| -> (Vec<usize>, Vec<usize>) {
-        views.iter().copied().filter(|&view| view != target).partition(|&view| is_near(view, target))
+        poses.sources(views.iter().copied(), &[target]).into_iter().partition(|&view| is_near(view, target))
     };
     let fits = |target: &usize| {
         let (near, far) = neighbours(*target);

@@ -5,15 +5,20 @@ use viewfuse_field::held_out;
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{SelectionError, SelectionFault, check_count, view_list};
 
-/// The views of two lists; a source is never a target.
+/// The views of two lists; a source is never a target: with a note of those that are in both.
 pub(super) fn fixed(
     scene: &Scene,
     sources: &str,
     targets: &str,
     least_sources: usize,
-) -> Result<(Vec<usize>, Vec<usize>), SelectionError> {
-    let (sources, mut targets) = (view_list(scene, sources)?, view_list(scene, targets)?);
-    targets.retain(|target| !sources.contains(target));
+) -> Result<(Vec<usize>, Vec<usize>, Vec<String>), SelectionError> {
+    let (sources, targets) = (view_list(scene, sources)?, view_list(scene, targets)?);
+    let (both, targets): (Vec<usize>, Vec<usize>) = targets.into_iter().partition(|target| sources.contains(target));
+    let names: Vec<&str> = both.iter().map(|view| scene.views[*view].name.as_str()).collect();
+    let notes = match names.is_empty() {
+        true => Vec::new(),
+        false => vec![format!("{}: no targets, since they are sources: {}", scene.name(), names.join(", "))],
+    };
     if let Some(&view) = sources.iter().chain(&targets).find(|&&view| scene.views[view].image.is_none()) {
         return Err(SelectionFault::NoPhotograph(scene.views[view].name.clone()).in_scene(scene));
     }
@@ -21,11 +26,11 @@ pub(super) fn fixed(
     if targets.is_empty() {
         return Err(SelectionFault::NoTargets.in_scene(scene));
     }
-    Ok((sources, targets))
+    Ok((sources, targets, notes))
 }
 
 /// Each target of a list, or each view, with the `count` other views whose cameras are nearest to its own; the first of
-/// equally near ones.
+/// equally near ones, one of each pose.
 pub(super) fn nearest(
     scene: &Scene,
     count: usize,
@@ -39,9 +44,9 @@ pub(super) fn nearest(
     if let Some(&view) = targets.iter().find(|target| !views.contains(target)) {
         return Err(SelectionFault::NoPhotograph(scene.views[view].name.clone()).in_scene(scene));
     }
-    let pose = |view: usize| &scene.views[view].camera.pose;
+    let (pose, poses) = (|view: usize| &scene.views[view].camera.pose, scene.same_poses());
     let of_target = |target: usize| {
-        let others = views.iter().copied().filter(|&view| view != target);
+        let others = poses.sources(views.iter().copied(), &[target]).into_iter();
         let mut others = held_out::nearest(others, |view| pose(view).distance(pose(target)), count);
         others.sort_unstable();
         (others, target)

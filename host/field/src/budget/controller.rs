@@ -279,11 +279,11 @@ impl Controller {
         most: Duration,
         progress: &dyn Progress,
     ) -> Result<(Rendered, usize, Option<Estimate>, bool), FieldError> {
-        let end = search.start + most;
-        let left = || end.saturating_duration_since(Instant::now()).as_secs_f64();
+        let end = search.start.checked_add(most);
+        let left = || end.map_or(f64::INFINITY, |end| end.saturating_duration_since(Instant::now()).as_secs_f64());
         let mut effort = self.expected.best_within(left()).unwrap_or(0);
         let mut best = (self.picture(search, effort, search.view.early_termination, progress)?, effort);
-        let deadline = Deadline { progress, end: Some(end) };
+        let deadline = Deadline { progress, end };
         while let Some(better) = self.expected.best_within(left()).filter(|better| *better > effort) {
             effort = better;
             match self.picture(search, effort, search.view.early_termination, &deadline) {

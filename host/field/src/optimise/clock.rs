@@ -4,10 +4,12 @@
 use crate::FieldError;
 use crate::gaussians::Optimisation;
 use std::time::{Duration, Instant};
-use viewfuse_job::progress::Progress;
+use viewfuse_job::progress::{Progress, Silent};
 
 /// Iterations of the finest level that are measured.
 const MEASURED: u32 = 20;
+/// Iterations before those, in which memory is taken.
+const FIRST: u32 = 3;
 /// How much longer an iteration takes with twice the Gaussians, less 1: the rest of it is a matter of the pixels. On fox,
 /// where the number grows four times, the mean iteration takes 1.9 times the first ones
 /// (`host/results/gaussian_quality.md`).
@@ -32,9 +34,22 @@ impl Clock {
         Clock { begun: Instant::now(), limit, measured: None, is_told: false, wanted: 0 }
     }
 
+    /// Seconds that a mean iteration of an optimisation takes that begins at its finest level, by its first ones.
+    ///
+    /// # Errors
+    /// [`FieldError`] if the device fails.
+    pub(super) fn pace(optimisation: &mut dyn Optimisation) -> Result<f64, FieldError> {
+        optimisation.run_to(FIRST, &Silent)?;
+        optimisation.finish()?;
+        let begun = Instant::now();
+        optimisation.run_to(FIRST + MEASURED, &Silent)?;
+        optimisation.finish()?;
+        Ok(mean_cost(optimisation.growth()) * begun.elapsed().as_secs_f64() / f64::from(MEASURED))
+    }
+
     /// When a trial must end, if there is a limit.
     pub(super) fn end_of_trial(&self) -> Option<Instant> {
-        self.limit.map(|limit| self.begun + limit.mul_f64(TRIAL))
+        self.limit.and_then(|limit| self.begun.checked_add(limit.mul_f64(TRIAL)))
     }
 
     /// The time that is left, if there is a limit.
@@ -107,7 +122,7 @@ fn mean_cost(growth: f64) -> f64 {
 }
 
 /// A time in words.
-fn words(seconds: f64) -> String {
+pub(super) fn words(seconds: f64) -> String {
     match seconds {
         0.0..90.0 => format!("{seconds:.0} s"),
         _ => format!("{:.0} minutes", seconds / 60.0),

@@ -1,11 +1,11 @@
 //! Which recipe, and how many iterations: those that held-out sources prefer, tried at a small size.
 
-use super::clock::Clock;
+use super::clock::{Clock, words};
 use super::{OptimiseError, Photographed, SceneOptimisation};
 use crate::AnyField;
 use crate::gaussians::{Quality, Recipe, RecipeOptions};
 use crate::point_cloud::point_cloud;
-use crate::render::Stage;
+use crate::render::{RenderError, Stage};
 use std::time::Instant;
 use viewfuse_core::camera::Camera;
 use viewfuse_device::choice::AnyDevice;
@@ -92,8 +92,21 @@ impl SceneOptimisation<'_> {
         let points = point_cloud(&mut stage, &self.weighting, Recipe::cloud(sources.len()), &Silent)?;
         let quick = if is_free { vec![fast, long] } else { vec![fast] };
         let recipes: Vec<Recipe> = quick.iter().chain([&recipe]).map(|recipe| small(*recipe)).collect();
-        progress.expect(recipes.iter().map(|recipe| recipe.iterations.iter().sum::<u32>() as usize).sum());
         let trial = SceneOptimisation { sources, held_out, before: None, towards: Vec::new(), ..self.clone() };
+        let longest = stage.images.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
+        if self.max_time.is_none() {
+            let [.., finest] = recipe.iterations;
+            let alone = Recipe { iterations: [0, 0, 0, finest], ..recipe };
+            let mut begun = trial.begin(device, &stage.images, &points, alone)?;
+            let pace = Clock::pace(begun.as_mut()).map_err(RenderError::from)?;
+            let seconds = |of: &Recipe| pace * finest_iterations(of) * pixels(longest, of) / pixels(longest, &recipe);
+            progress.note(&format!(
+                "about {} for a trial of recipes, then at most about {} for {quality}",
+                words(recipes.iter().map(seconds).sum()),
+                words(seconds(&recipe))
+            ));
+        }
+        progress.expect(recipes.iter().map(|recipe| recipe.iterations.iter().sum::<u32>() as usize).sum());
         let photographed = &Photographed::new(device, album, &stage.images);
         let until = clock.end_of_trial();
         let (mut curves, mut begun) = (Vec::new(), Instant::now());
@@ -120,9 +133,8 @@ impl SceneOptimisation<'_> {
         let is_over = until.is_some_and(|until| until <= Instant::now());
         let ahead = sharp.iter().find(|(_, score)| *score > quick_score).map_or(0, |(iteration, _)| *iteration);
         let tried = sharp.last().map_or(1, |(iteration, _)| *iteration);
-        let side = stage.images.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
-        let pixels = (f64::from(side.min(recipe.side)) / f64::from(side.min(small(recipe).side))).powi(2);
-        let least = begun.elapsed().mul_f64(pixels * f64::from(ahead) / f64::from(tried));
+        let larger = pixels(longest, &recipe) / pixels(longest, &small(recipe));
+        let least = begun.elapsed().mul_f64(larger * f64::from(ahead) / f64::from(tried));
         let (chosen, words) = if score <= quick_score {
             (quick, "fast is used".to_owned())
         } else if clock.left().is_some_and(|left| left < least) {
@@ -145,6 +157,17 @@ impl SceneOptimisation<'_> {
         ));
         Ok(chosen)
     }
+}
+
+/// Pixels of the finest level of a recipe, for sources of this longest side, up to a factor.
+fn pixels(longest: u32, recipe: &Recipe) -> f64 {
+    f64::from(longest.min(recipe.side)).powi(2)
+}
+
+/// How many iterations of a recipe's finest level cost as much as all of its iterations: a level has a quarter of the
+/// next one's pixels.
+fn finest_iterations(recipe: &Recipe) -> f64 {
+    recipe.iterations.iter().fold(0.0, |sum, count| sum / 4.0 + f64::from(*count))
 }
 
 /// The iteration of the last score that is [`AS_GOOD`] as the best, and the best.

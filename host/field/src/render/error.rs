@@ -22,10 +22,12 @@ pub enum RenderError {
     Sources(SourcesError),
     /// The size does not fit the scene.
     #[error(
-        "a size of {width}x{height} does not keep the shape of the views ({view_width}x{view_height}); for this width \
+        "{scene}: a size of {width}x{height} does not keep the shape of the views ({view_width}x{view_height}); for this width \
          it would be {width}x{fitting_height}"
     )]
     Shape {
+        /// The scene's path.
+        scene: String,
         /// The requested value.
         width: u32,
         /// The requested value.

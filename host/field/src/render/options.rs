@@ -71,7 +71,8 @@ pub fn working_side(scene: &Scene, options: &RenderOptions, longest: u32) -> Res
         // Of a narrow picture a width of whole pixels says little: the size to which the views are reduced is right.
         let is_reduced = scaled_size(camera, width.max(height)) == (width, height);
         if !is_reduced && fitting_height.abs_diff(height) > 1 {
-            return Err(RenderError::Shape { width, height, view_width, view_height, fitting_height });
+            let scene = scene.path.display().to_string();
+            return Err(RenderError::Shape { scene, width, height, view_width, view_height, fitting_height });
         }
     }
     Ok(width.max(height))
@@ -114,5 +115,7 @@ pub fn open_album<'a>(
 ) -> Result<Album<'a>, RenderError> {
     let about = renderer.about();
     let side = working_side(scene, options, about.longest_side)?;
-    Ok(Album::open_at(scene, views, side.max(about.source_side.of(side)), progress)?)
+    let first = scene.views.first().map(|view| &view.camera);
+    let picture = |camera: &Camera| size_at(camera, options.size, first, side);
+    Ok(Album::open_for(scene, views, picture, side.max(about.source_side.of(side)), progress)?)
 }

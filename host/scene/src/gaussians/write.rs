@@ -8,7 +8,7 @@ use viewfuse_core::gaussian::REST_COUNTS;
 use viewfuse_job::files::{WriteError, write_whole};
 
 use super::harmonics::padded;
-use super::{GaussianScene, MAX_DEGREE, comments, splat, spz};
+use super::{Gaussian, GaussianScene, MAX_DEGREE, comments, splat, spz};
 use crate::SceneFrame;
 use crate::ply::header;
 use crate::scene::files::has_extension;
@@ -20,9 +20,11 @@ impl GaussianScene {
     /// they are about the origin that a comment states, and are read back with it.
     ///
     /// # Errors
-    /// [`WriteError`]; also where a `.splat` or a `.spz` cannot hold the coordinates.
+    /// [`WriteError`]; also where a `.splat` or a `.spz` cannot hold the coordinates, and of Gaussians that no reader
+    /// takes: with a number that is not finite, or harmonics beyond degree 3.
     pub fn write(&self, path: &Path, frame: &SceneFrame) -> Result<(), WriteError> {
         GaussianScene::check_place(path, frame)?;
+        self.check().map_err(|cause| unwritten(path, cause))?;
         let bytes = if has_extension(path, &["splat"]) {
             splat::bytes(self, frame)
         } else if has_extension(path, &["spz"]) {
@@ -31,6 +33,25 @@ impl GaussianScene {
             ply(self, frame)
         };
         write_whole(path, &bytes)
+    }
+
+    /// Whether a reader takes what is written.
+    fn check(&self) -> Result<(), String> {
+        if self.degree > MAX_DEGREE {
+            return Err(format!("harmonics of degree {}; at most {MAX_DEGREE} are possible", self.degree));
+        }
+        let is_finite = |gaussian: &Gaussian| {
+            let Gaussian { position, log_scales, rotation, opacity, f_dc } = gaussian;
+            let shape = position.iter().chain(log_scales).chain(rotation);
+            shape.chain(f_dc).chain([opacity]).all(|value| value.is_finite())
+        };
+        if let Some(index) = self.gaussians.iter().position(|gaussian| !is_finite(gaussian)) {
+            return Err(format!("Gaussian {index} has a number that is not finite"));
+        }
+        match self.f_rest.iter().position(|value| !value.is_finite()) {
+            Some(index) => Err(format!("coefficient {index} of f_rest is not finite")),
+            None => Ok(()),
+        }
     }
 
     /// Whether a file of this name can hold the coordinates of a scene's files: before there are Gaussians to write.

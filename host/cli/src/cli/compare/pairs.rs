@@ -2,7 +2,8 @@
 
 use anyhow::{Context, bail, ensure};
 use std::path::{Path, PathBuf};
-use viewfuse_output::record::SUFFIXES;
+use viewfuse_output::record::{RECORD, SUFFIXES};
+use viewfuse_output::video::VideoFormat;
 
 /// Extensions of pictures, in small letters.
 const EXTENSIONS: [&str; 6] = ["png", "jpg", "jpeg", "webp", "tif", "tiff"];
@@ -28,7 +29,11 @@ pub(super) fn pairs(prediction: &Path, truth: &Path) -> anyhow::Result<Vec<Pair>
         let base = SUFFIXES.iter().filter(|suffix| !suffix.is_empty()).find_map(|suffix| stem.strip_suffix(suffix));
         base.is_some_and(|stem| all.iter().any(|other| self::stem(other) == stem))
     };
-    let predictions: Vec<&PathBuf> = all.iter().filter(|path| !is_beside(path)).collect();
+    // Some videos are pictures, too.
+    let is_run = prediction.join(RECORD).is_file();
+    let is_video = |path: &Path| VideoFormat::ALL.iter().any(|format| path.ends_with(format!("video.{format}")));
+    let is_picture = |path: &&PathBuf| !is_beside(path) && !(is_run && is_video(path));
+    let predictions: Vec<&PathBuf> = all.iter().filter(is_picture).collect();
     if predictions.is_empty() {
         bail!("{}: has no pictures ({})", prediction.display(), EXTENSIONS[..3].join(", "));
     }
@@ -37,8 +42,14 @@ pub(super) fn pairs(prediction: &Path, truth: &Path) -> anyhow::Result<Vec<Pair>
         let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         // The very name, before one that differs in its extension.
         let same = truth.join(&name);
-        let alike = || truths.iter().find(|truth| stem(truth) == stem(path)).cloned();
-        let found = if same.is_file() { Some(same.clone()) } else { alike() };
+        let alike: Vec<&PathBuf> = truths.iter().filter(|truth| stem(truth) == stem(path)).collect();
+        let found = match alike[..] {
+            _ if same.is_file() => Some(same.clone()),
+            [first, second, ..] => {
+                bail!("{}: may be compared with {} or {}", path.display(), first.display(), second.display())
+            }
+            _ => alike.first().copied().cloned(),
+        };
         let truth =
             found.with_context(|| format!("{}: is missing, to compare {} with", same.display(), path.display()))?;
         Ok(Pair { name, prediction: path.to_path_buf(), truth })
