@@ -5,7 +5,7 @@ use image::{DynamicImage, GrayImage, ImageFormat, Luma, Rgb, RgbImage, Rgba, Rgb
 use viewfuse_tests::command::{Outcome, sample};
 use viewfuse_tests::scenes::Folder;
 
-viewfuse_tests::trials![what_masks_hide_takes_no_part, what_is_unclear_is_asked,];
+viewfuse_tests::trials![what_masks_hide_takes_no_part, what_is_unclear_is_asked, what_shows_nothing_is_not_scored,];
 
 /// Rows that show the car that carried the camera: 8 % of the photograph, the same in all.
 const BONNET: u32 = 221;
@@ -101,4 +101,38 @@ fn what_is_unclear_is_asked() {
     assert!(printed.contains("read as    masks: unclear whether"), "{printed}");
     let wrong = "render room --targets 5 -o out --masks person";
     assert_wrong_arguments(folder.path(), wrong, &["unknown meaning of masks 'person'", "auto, object, ignore"]);
+}
+
+/// A failed segmentation: a mask that is black takes part in no score, which would be perfect.
+fn what_shows_nothing_is_not_scored() {
+    let folder = sample("room");
+    for view in 0..11 {
+        let counts = |x: u32, y: u32| Luma([if view != 4 && (x, y) != (9, 9) { 255 } else { 0 }]);
+        put(&folder, &format!("masks/{view:03}.png"), GrayImage::from_fn(320, 240, counts));
+    }
+    let render = "render room --targets 4,5 --size 80x60 --fast --device cpu -o out";
+    let Outcome { code, stdout, stderr } = run(&folder, render);
+    assert_eq!(code, Some(0), "{stderr}");
+    assert!(stderr.contains("'004' is not compared with its photograph, of which nothing counts"), "{stderr}");
+    let lines: Vec<&str> = stdout.lines().collect();
+    assert!(!lines[0].contains("PSNR") && lines[1].contains("005.png  PSNR 2"), "{stdout}");
+    let with = "--sources 0..3 --size 80x60 --weights mean --device cpu";
+    let scored = |targets: &str| {
+        let Outcome { code, stdout, .. } = run(&folder, &format!("evaluate room --targets {targets} {with}"));
+        assert_eq!(code, Some(0), "{stdout}");
+        stdout
+            .lines()
+            .find(|line| line.starts_with(" mean "))
+            .expect("a row")
+            .split_whitespace()
+            .nth(1)
+            .map(str::to_owned)
+    };
+    assert_eq!(scored("4,5"), scored("5"), "the other one counts alone");
+    assert_refused(folder.path(), &format!("evaluate room --targets 4 {with}"), &["004"]);
+    let optimise = "optimise room --size 64x48 --iterations 2 --device cpu";
+    assert_refused(folder.path(), &format!("{optimise} --left-out 4 -o a.ply"), &["held out nothing counts"]);
+    let printed = run(&folder, "inspect room --quality").stdout;
+    let held_out = printed.lines().find(|line| line.starts_with("left out")).expect("scores");
+    assert!(!held_out.contains("(004)"), "{held_out}");
 }

@@ -255,9 +255,14 @@ fn ctrl_c_leaves_nothing() {
 
 fn formats_that_are_not_read() {
     let folder = bare(0..3);
-    folder.write("bare/IMG_7.HEIC", "ftypheic");
-    assert_refused(&folder, "pose bare -o posed", &["bare/IMG_7.HEIC: HEIC is not read", "heif-convert IMG_7.HEIC"]);
-    folder.remove("bare/IMG_7.HEIC").write("bare/DSC_1.NEF", "raw");
+    folder.write("bare/my 7.HEIC", "ftypheic");
+    let advice = "heif-convert 'bare/my 7.HEIC' 'bare/my 7.HEIC.jpg'";
+    assert_refused(&folder, "pose bare -o posed", &["bare/my 7.HEIC: HEIC is not read", advice]);
+    // Done as advised, it stays beside what it became.
+    folder.write("bare/my 7.HEIC.jpg", room(7));
+    let named = with(&folder, "pose bare -o posed", ("VIEWFUSE_OPENMVG", folder.join("nothing")));
+    assert_command_refused(named, &folder, &["nothing: the program is not there"]);
+    folder.remove("bare/my 7.HEIC").write("bare/DSC_1.NEF", "raw");
     assert_refused(&folder, "pose bare -o posed", &["bare/DSC_1.NEF: a camera's raw format is not read"]);
 }
 

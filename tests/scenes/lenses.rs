@@ -177,14 +177,14 @@ fn what_the_lens_did_not_see_is_not_scored() {
             pixel.0 = [255, 0, 255];
         }
         let scores = |prediction: &RgbImage| {
-            let Truth { psnr, ssim, .. } = Truth::compare(prediction, truth.clone());
+            let Truth { psnr, ssim, .. } = Truth::compare(prediction, truth.clone()).expect("seen pixels");
             (psnr, ssim.expect("a window"))
         };
         let (psnr, ssim) = scores(&exact);
         assert!(psnr > 45.0 && ssim > 0.99, "{psnr} {ssim}");
         assert_eq!(scores(&wrong_outside), (psnr, ssim));
         // Over all pixels, the exact picture itself would be wrong where the lens saw nothing.
-        let over_all = Truth::compare(&exact, GroundTruth { seen: None, ..truth.clone() }).psnr;
+        let over_all = Truth::compare(&exact, GroundTruth { seen: None, ..truth.clone() }).expect("seen pixels").psnr;
         assert!(over_all < psnr - 10.0, "{over_all} {psnr}");
         // The metrics of an evaluation agree.
         let metrics = Metrics::plain(&Cpu);

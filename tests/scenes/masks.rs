@@ -185,7 +185,9 @@ fn what_may_be_a_near_object_is_said() {
     // It reaches the border below, and moves.
     let near: fn(u32, u32, u32) -> bool = |view, x, y| y >= 80 && x >= 4 * view;
     let folder = room(|name| format!("masks/{name}.png"), near);
-    let is_said = |scene: &Scene| scene.warnings.iter().any(|line| line.contains("do they show the object instead"));
+    let is_said = |scene: &Scene| {
+        scene.warnings.iter().any(|line| line.contains("if they show the object instead, choose object"))
+    };
     let scene = opened(&folder, MaskChoice::Auto);
     assert!(line(&scene).starts_with("masks: pixels that do not count") && is_said(&scene), "{:?}", scene.warnings);
     assert!([MaskChoice::Ignore, MaskChoice::Object].iter().all(|choice| !is_said(&opened(&folder, *choice))));
@@ -324,4 +326,82 @@ fn what_is_hidden_before_an_objects_background_is_background() {
     for (hidden, all) in hidden.images.iter().zip(&all.images) {
         assert_eq!(hidden.texels, all.texels);
     }
+}
+
+/// A disc around the middle of the room's object, which fills much of the photographs.
+fn object(view: u32, x: u32, y: u32, radius: f64) -> bool {
+    let [left, top] = [160.0 + 4.0 * f64::from(view), 120.0 - 2.0 * f64::from(view)];
+    (f64::from(x) - left).hypot(f64::from(y) - top) < radius
+}
+
+/// Masks of the room's views that follow what all of them look at.
+fn of_object(name: impl Fn(&str) -> String, radius: impl Fn(u32) -> f64) -> Folder {
+    let plain = Scene::open(viewfuse_tests::places::data("room")).expect("the sample");
+    let focus = viewfuse::scene::rig::Rig::of(&plain.views.iter().map(|view| view.camera).collect::<Vec<_>>()).focus;
+    room(name, |view, x, y| {
+        let seen = plain.views[view as usize].camera.project(focus);
+        (x as f32 - seen.x).hypot(y as f32 - seen.y) < radius(view) as f32
+    })
+}
+
+#[test]
+fn some_silhouettes_may_reach_the_border() {
+    let of = |near: u32| {
+        let folder = of_object(
+            |name| format!("masks/{name}.png"),
+            |view| if view < near { 175.0 } else { 60.0 + f64::from(view) },
+        );
+        opened(&folder, MaskChoice::Auto).masks
+    };
+    assert_eq!([0, 5].map(of), [MaskMeaning::Object; 2]);
+    assert_ne!(of(6), MaskMeaning::Object);
+}
+
+#[test]
+fn a_photograph_without_a_silhouette_is_excluded() {
+    let folder = of_object(|name| format!("masks/{name}_mask.png"), |view| 60.0 + f64::from(view));
+    assert_eq!(opened(&folder, MaskChoice::Auto).masks, MaskMeaning::Object, "called so");
+    fs::remove_file(folder.file("room/masks/005_mask.png")).expect("a mask");
+    let scene = opened(&folder, MaskChoice::Auto);
+    assert!(scene.views.iter().all(|view| view.image.is_some() == (view.name != "005")), "as a pose it stays");
+    let said: Vec<&String> = scene.warnings.iter().filter(|warning| warning.contains("005")).collect();
+    assert_eq!(said.len(), 1, "{said:?}");
+    assert!(said[0].contains("1 of 11 photographs are excluded (005.jpg is the first): they have no mask"), "{said:?}");
+    // Of most photographs nothing is known then, and nothing is excluded.
+    (0..5).for_each(|view| fs::remove_file(folder.file(&format!("room/masks/{view:03}_mask.png"))).expect("a mask"));
+    let scene = opened(&folder, MaskChoice::Auto);
+    assert!(scene.views.iter().all(|view| view.image.is_some()));
+    assert!(
+        scene.warnings.iter().any(|warning| warning.contains("6 of 11 photographs have no mask")),
+        "{:?}",
+        scene.warnings
+    );
+    // Ignore masks are a matter of their photographs alone.
+    let folder = room(|name| format!("masks/{name}.png"), |view, x, y| !thing(view, x, y));
+    fs::remove_file(folder.file("room/masks/005.png")).expect("a mask");
+    assert!(opened(&folder, MaskChoice::Auto).views.iter().all(|view| view.image.is_some()));
+}
+
+#[test]
+fn masks_that_fit_no_photograph_are_told() {
+    let folder = room(|name| format!("masks/of_{name}.png"), |view, x, y| object(view, x, y, 60.0));
+    let scene = opened(&folder, MaskChoice::Auto);
+    assert!(scene.views.iter().all(|view| view.mask.is_none()));
+    let expected = "masks: 11 pictures are no masks of any photograph: of_000.png would be the mask of 000.jpg";
+    assert!(scene.warnings.iter().any(|warning| warning.contains(expected)), "{:?}", scene.warnings);
+}
+
+#[test]
+fn photographs_of_which_nothing_counts_are_told() {
+    let folder = room(|name| format!("masks/{name}.png"), |view, x, y| view != 3 && view != 7 && !thing(view, x, y));
+    let scene = opened(&folder, MaskChoice::Auto);
+    let album = Album::open(&scene, 0..11, &Silent).expect("photographs");
+    let sources = |views: &[usize]| album.sources(views, 64, BackgroundChoice::Auto, &Silent);
+    let warnings = sources(&[1, 3, 5, 7]).expect("sources").warnings;
+    assert!(
+        warnings.iter().any(|warning| warning.contains("of the photograph '003', and of 1 more nothing counts")),
+        "{warnings:?}"
+    );
+    let error = sources(&[3, 7]).expect_err("nothing").to_string();
+    assert!(error.contains("of the photographs nothing counts ('003' is the first)"), "{error}");
 }

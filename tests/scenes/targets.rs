@@ -77,6 +77,17 @@ fn a_pose_is_one_source() {
     assert_eq!(open(&called(&["a", "b"])).pose_warnings(), Vec::<String>::new());
 }
 
+#[test]
+fn intrinsics_that_are_no_pixels_are_told() {
+    let folder = called(&["a", "b", "c"]);
+    let told = || open(&folder).pose_warnings().into_iter().find(|warning| warning.contains("150 degrees"));
+    assert_eq!(told(), None);
+    // Shares of the width.
+    folder.write("intrinsics.txt", "1.25 0.5 0.5 0.\n0. 0. 0.\n1.\n12 16\n");
+    let told = told().expect("a warning");
+    assert!(told.contains("3 of 3 photographs") && told.contains("'a' has a focal length of 1.25 pixels"), "{told}");
+}
+
 fn job(scene: &Scene, target: Camera) -> FewShot {
     let target = Target { name: "away".to_owned(), camera: target, truth: None };
     FewShot { sources: (0..8).collect(), targets: vec![target_of(scene, 20), target], frames_per_second: None }

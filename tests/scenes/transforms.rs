@@ -124,7 +124,7 @@ fn masks_are_named_or_stand_beside() {
     let named = |name: &'static str| Some(Some(std::ffi::OsStr::new(name)));
     assert_eq!(found, [named("m.png"), named("2.png.png"), named("3.jpg"), None]);
     assert_eq!(scene.warnings.len(), 1);
-    assert!(scene.warnings[0].contains("1 of 4 photographs have no mask"), "{:?}", scene.warnings);
+    assert!(scene.warnings[0].contains("1 of 4 photographs are excluded (4.png is the first)"), "{:?}", scene.warnings);
     for (view, alpha) in [(0, 0), (1, 51), (2, 255)] {
         let photograph = scene.photograph(view).expect("a photograph");
         assert!(
@@ -132,7 +132,7 @@ fn masks_are_named_or_stand_beside() {
             "{view}"
         );
     }
-    assert!(!scene.photograph(3).expect("a photograph").has_alpha);
+    assert!(scene.views[3].image.is_none());
     mask("masks/3.jpg", 255, 16, 13);
     let error = open(&folder).photograph(2).expect_err("another shape").to_string();
     assert!(error.contains("masks/3.jpg: the image is 16 x 13, but the photograph that it is for"), "{error}");

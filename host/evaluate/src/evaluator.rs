@@ -16,6 +16,7 @@ use viewfuse_field::auto::choose;
 use viewfuse_field::budget::Kept;
 use viewfuse_field::held_out::nearest;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, open_album};
+use viewfuse_field::scores::shows_anything;
 use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_job::progress::{Part, Progress};
 use viewfuse_scene::few_shot::{Selection, SelectionError, SelectionFault, target_of, view_list};
@@ -160,6 +161,10 @@ impl Evaluator<'_> {
         let mut stage = Stage::prepare(scene, album, sources, renderer, options, progress)?;
         let (mut scores, masks) = self.baseline_scores(&subject, &stage, sources, targets, score)?;
         // Views that a field encodes when a target first needs them: all schemes and targets share that.
+        if scores.is_empty() && !targets.is_empty() {
+            let (scene, view) = (scene.path.display().to_string(), scene.views[targets[0]].name.clone());
+            return Err(EvaluateError::NoTruth { scene, view });
+        }
         let (first, mut shared) = (scores.len(), Duration::ZERO);
         for (index, row) in weightings.iter().enumerate() {
             let name = row.to_string();
@@ -214,6 +219,9 @@ impl Evaluator<'_> {
         for &target in targets {
             self.progress.check().map_err(PhotographsError::from).map_err(RenderError::from)?;
             let ((camera, truth), mask) = (shown_at(*subject, stage, target)?, self.mask(*subject, stage, target)?);
+            if !shows_anything(truth.seen.as_ref()) {
+                continue;
+            }
             let pose = &scene.views[target].camera.pose;
             let distance = |source: usize| scene.views[source].camera.pose.distance(pose);
             let nearest = nearest(sources.iter().copied(), distance, BLENDED);

@@ -37,7 +37,7 @@ use image::{GrayImage, RgbImage};
 use lpips::Lpips;
 use viewfuse_device::{Device, DeviceError};
 use viewfuse_field::finite::NotFinite;
-use viewfuse_field::scores::{corrected_psnr_of_seen, psnr_of_seen, ssim_of_seen, with_truth_unseen};
+use viewfuse_field::scores::{corrected_psnr_of_seen, psnr_of_seen, shows_anything, ssim_of_seen, with_truth_unseen};
 use viewfuse_nn::checkpoint::CheckpointError;
 use viewfuse_nn::image::HostImage;
 
@@ -102,7 +102,8 @@ pub trait Scorer {
     /// Scores a prediction: PSNR, SSIM if the pictures are at least 7x7, PSNR of corrected colours, and the metrics of
     /// the loaded networks, in the order of [`Scored::name`]'s list.
     ///
-    /// `seen` is 0 where the photograph shows nothing; without it all pixels are scored. PSNR and SSIM leave unseen
+    /// `seen` is 0 where the photograph shows nothing; without it all pixels are scored, and of no pixels there are no
+    /// scores. PSNR and SSIM leave unseen
     /// pixels out ([`viewfuse_field::scores`]); networks see the truth's pixels there in both pictures.
     ///
     /// # Errors
@@ -126,7 +127,11 @@ impl<D: Device> Scorer for Metrics<'_, D> {
         seen.map_or(Ok(()), |seen| equal(seen.dimensions(), truth.dimensions()))?;
         let (shown, shown_truth) = (self.convention.shown(prediction), self.convention.shown(truth));
         let psnr = psnr_of_seen(&shown, &shown_truth, seen);
-        let mut scores = vec![Scored { name: "psnr", value: psnr, more_is_better: true }];
+        let mut scores = Vec::new();
+        if !shows_anything(seen) {
+            return Ok(scores);
+        }
+        scores.push(Scored { name: "psnr", value: psnr, more_is_better: true });
         if let Some(value) = ssim_of_seen(&shown, &shown_truth, seen) {
             scores.push(Scored { name: "ssim", value, more_is_better: true });
         }

@@ -39,6 +39,9 @@ const SCORED: u32 = 40;
 const MAX_SCORES: u32 = 20;
 /// Sources that are scored where no view is held out.
 const FIT_SOURCES: usize = 3;
+/// What is said where nothing can be scored.
+const NOTHING_COUNTS: &str =
+    "of the photographs that are held out nothing counts: their masks or alpha channels hide all";
 /// Iterations with the weights of [`SceneOptimisation::towards`].
 pub const TOWARDS: u32 = 60;
 
@@ -307,7 +310,7 @@ impl<'a> SceneOptimisation<'a> {
         Ok(sums)
     }
 
-    /// Mean PSNR of these views.
+    /// Mean PSNR of these views, but of those whose photographs show nothing that counts.
     fn score(
         &self,
         gaussians: &GaussianScene,
@@ -315,7 +318,7 @@ impl<'a> SceneOptimisation<'a> {
         views: &[usize],
     ) -> Result<f64, RenderError> {
         self.given(gaussians, &[], photographed, &Silent, |stage| {
-            let (mut truths, mut sum) = (photographed.truths.borrow_mut(), 0.0);
+            let (mut truths, mut sum, mut count) = (photographed.truths.borrow_mut(), 0.0, 0.0);
             for view in views {
                 let target = Target { truth: None, ..target_of(self.scene, *view) };
                 let picture = stage.frame(&self.weighting, &target, &Silent)?.picture;
@@ -326,9 +329,19 @@ impl<'a> SceneOptimisation<'a> {
                         place.insert(photographed.album.truth(*view, size, stage.background())?)
                     }
                 };
-                sum += psnr_of_seen(&picture, &truth.picture, truth.seen.as_ref());
+                let psnr = psnr_of_seen(&picture, &truth.picture, truth.seen.as_ref());
+                // Of some photographs nothing counts.
+                if !psnr.is_nan() {
+                    (sum, count) = (sum + psnr, count + 1.0);
+                }
             }
-            Ok(sum / views.len() as f64)
+            if count == 0.0 {
+                return Err(RenderError::Unsuitable {
+                    scene: self.scene.path.display().to_string(),
+                    reason: NOTHING_COUNTS.into(),
+                });
+            }
+            Ok(sum / count)
         })
     }
 

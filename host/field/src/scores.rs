@@ -9,10 +9,18 @@ use image::{GrayImage, Rgb, RgbImage};
 use std::borrow::Cow;
 use viewfuse_core::metrics::{SSIM_WINDOW, psnr, ssim};
 
-/// [`psnr`] over the seen pixels, in decibels; infinite where these are equal or none is seen. All pictures must have
-/// one size.
+/// Whether a photograph shows anything that counts.
+pub fn shows_anything(seen: Option<&GrayImage>) -> bool {
+    seen.is_none_or(|seen| seen.as_raw().iter().any(|seen| *seen > 0))
+}
+
+/// [`psnr`] over the seen pixels, in decibels; infinite where these are equal, NaN where none is seen. All pictures must
+/// have one size.
 pub fn psnr_of_seen(prediction: &RgbImage, truth: &RgbImage, seen: Option<&GrayImage>) -> f64 {
     let Some(seen) = seen else { return psnr(prediction, truth) };
+    if !shows_anything(Some(seen)) {
+        return f64::NAN;
+    }
     let levels = |picture: &RgbImage| -> Vec<u8> {
         let pixels = picture.pixels().zip(seen.as_raw()).filter(|(_, seen)| **seen > 0);
         pixels.flat_map(|(pixel, _)| pixel.0).collect()
@@ -21,7 +29,7 @@ pub fn psnr_of_seen(prediction: &RgbImage, truth: &RgbImage, seen: Option<&GrayI
 }
 
 /// [`psnr_of_seen`] after each of the prediction's channels was corrected by the gain and offset that fit it best, by
-/// least squares over the seen pixels, to the truth's; corrected levels are clamped to 0..=255 and not rounded. What it
+/// least squares over the seen pixels, to the truth's (NaN where none is seen); corrected levels are clamped to 0..=255 and not rounded. What it
 /// is above PSNR is the price of the camera's exposure and white balance, which no other view tells. Never below PSNR,
 /// rounding aside. A channel of one level, in either picture, gets an offset alone: a gain of 0 would hide
 /// all of a picture.
@@ -31,6 +39,9 @@ pub fn psnr_of_seen(prediction: &RgbImage, truth: &RgbImage, seen: Option<&GrayI
 pub fn corrected_psnr_of_seen(prediction: &RgbImage, truth: &RgbImage, seen: Option<&GrayImage>) -> f64 {
     let is_seen = |at: usize| seen.is_none_or(|seen| seen.as_raw()[at] > 0);
     let pairs: Vec<_> = prediction.pixels().zip(truth.pixels()).enumerate().filter(|(at, _)| is_seen(*at)).collect();
+    if pairs.is_empty() {
+        return f64::NAN;
+    }
     let count = pairs.len() as f64;
     let mut error = 0.0;
     for channel in 0..3 {

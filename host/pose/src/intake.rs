@@ -16,6 +16,7 @@ use std::path::{Path, PathBuf};
 use viewfuse_job::files::Scratch;
 use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_job::progress::{Interrupted, Progress};
+use viewfuse_job::shell::quoted;
 use viewfuse_job::text::listed;
 use viewfuse_scene::reader::{ImageFile, folders, list};
 use viewfuse_scene::write::{Layout, check_name};
@@ -161,10 +162,12 @@ impl Intake {
         for (path, photo) in files.iter().zip(read) {
             match photo {
                 Ok(photo) => match photos.iter_mut().find(|other| is_same(&photo, other)) {
-                    // Of copies the largest is the photograph.
+                    // Of copies the largest is the photograph, and of equally large ones that of the most bytes.
                     Some(other) => {
-                        let is_larger = |a: &Photo, b: &Photo| a.size[0] * a.size[1] > b.size[0] * b.size[1];
-                        let copy = if is_larger(&photo, other) { std::mem::replace(other, photo) } else { photo };
+                        let bytes = |photo: &Photo| fs::metadata(&photo.path).map_or(0, |about| about.len());
+                        let worth = |photo: &Photo| (photo.size[0] * photo.size[1], bytes(photo));
+                        let is_better = worth(&photo) > worth(other);
+                        let copy = if is_better { std::mem::replace(other, photo) } else { photo };
                         let reason = format!("the same picture as {}", other.file);
                         unusable.push(Unusable { name: copy.file, reason });
                     }
@@ -212,6 +215,9 @@ fn lengths(root: &Path, files: &[PathBuf]) -> Result<Vec<(String, u64)>, IntakeE
     files.iter().map(length).collect()
 }
 
+/// How many times less detail is blur; beyond, there is none.
+const MAX_BLUR: f64 = 1.0e5;
+
 /// Takes the blurred ones out.
 fn blurred(photos: &mut Vec<Photo>) -> Vec<Unusable> {
     let mut all: Vec<f64> = photos.iter().map(|photo| photo.sharpness).collect();
@@ -220,11 +226,27 @@ fn blurred(photos: &mut Vec<Photo>) -> Vec<Unusable> {
     let is_sharp = |photo: &Photo| photo.sharpness >= MIN_SHARPNESS * median;
     let refused = |photo: &Photo| Unusable {
         name: photo.file.clone(),
-        reason: format!("blurred: {:.0} times less detail than the others", median / photo.sharpness.max(1.0e-9)),
+        reason: match median / photo.sharpness.max(1.0e-9) {
+            times if times < MAX_BLUR => format!("blurred: {times:.0} times less detail than the others"),
+            _ => "nothing is to be seen in it: it has no detail".to_owned(),
+        },
     };
     let found = photos.iter().filter(|photo| !is_sharp(photo)).map(refused).collect();
     photos.retain(is_sharp);
     found
+}
+
+/// `my 4.HEIC.jpg` for `my 4.HEIC`.
+fn appended(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".jpg");
+    name.into()
+}
+
+/// Whether a JPEG or PNG of a photograph's name lies beside it.
+fn is_converted(path: &Path, all: &HashSet<PathBuf>) -> bool {
+    let replaced = ["jpg", "jpeg", "png", "JPG", "JPEG", "PNG"].map(|extension| path.with_extension(extension));
+    all.contains(&appended(path)) || replaced.iter().any(|other| all.contains(other))
 }
 
 /// The photographs of a folder, and what else is there.
@@ -251,9 +273,12 @@ fn files(folder: &Path, every: usize) -> Result<Listed, IntakeError> {
         return Err(IntakeError::None(folder.to_path_buf()));
     }
     let root = root.to_path_buf();
+    // What was converted, as it is advised, lies beside it.
+    let converted: HashSet<PathBuf> = all.iter().cloned().collect();
+    all.retain(|path| unread(&extension(path)).is_none() || !is_converted(path, &converted));
     for path in &all {
         if let Some((format, way)) = unread(&extension(path)) {
-            let way = way.replace("FILE", &place_in(&root, path));
+            let way = way.replace("FILE.jpg", &quoted(&appended(path))).replace("FILE", &quoted(path));
             return Err(IntakeError::Format(path.clone(), format, way));
         }
     }

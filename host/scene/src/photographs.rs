@@ -2,7 +2,7 @@
 
 mod exposure;
 mod ground_truth;
-mod ignored;
+pub(crate) mod ignored;
 mod matte;
 pub mod object_box;
 mod resample;
@@ -34,6 +34,11 @@ pub enum PhotographsError {
          or photographs with an alpha channel"
     )]
     NoSilhouette(String, String),
+    /// Of no photograph anything counts.
+    #[error(
+        "{0}: of the photographs nothing counts ('{1}' is the first): their alpha channels or masks hide all of them"
+    )]
+    NothingCounts(String, String),
     /// The colour of the background has a channel outside `[0, 1]`, or that is NaN.
     #[error("the background {0:?} is no colour: a channel is not from 0 to 1")]
     Background([f32; 3]),
@@ -46,6 +51,7 @@ impl Hinted for PhotographsError {
     fn hint(&self) -> Option<Hint> {
         match self {
             PhotographsError::NoSilhouette { .. } => Some(Hint::Background),
+            PhotographsError::NothingCounts { .. } => Some(Hint::Masks),
             PhotographsError::Scene(error) => error.hint(),
             _ => None,
         }
@@ -321,7 +327,9 @@ impl<'a> Album<'a> {
         };
         if is_asked && !backdrop.can_be_told() {
             // The same text for any choice of sources, so that it is shown once.
-            let outcome = if whole_pictures {
+            let outcome = if whole_pictures && transparent_count > 0 {
+                "nothing is cut out, and what is transparent does not count"
+            } else if whole_pictures {
                 "nothing is cut out, whole pictures are used"
             } else {
                 "what is cut out may be more or less than the object"
@@ -352,8 +360,22 @@ impl<'a> Album<'a> {
             }
             images => images?,
         };
-        let names = views.iter().map(|&view| self.scene.views[view].name.as_str());
-        warnings.extend(exposure::warning(&images, names));
+        let name = |view: usize| self.scene.views[view].name.as_str();
+        let shows_nothing = |image: &SourceImage| image.texels.iter().all(|texel| texel[3] == 0.0);
+        let empty: Vec<usize> =
+            views.iter().zip(&images).filter(|(_, image)| shows_nothing(image)).map(|(&view, _)| view).collect();
+        if let [first, ..] = empty[..] {
+            if empty.len() == views.len() {
+                let scene = self.scene.path.display().to_string();
+                return Err(PhotographsError::NothingCounts(scene, name(first).to_owned()));
+            }
+            let more = if empty.len() > 1 { format!(", and of {} more", empty.len() - 1) } else { String::new() };
+            warnings.push(format!(
+                "of the photograph '{}'{more} nothing counts: its mask or its alpha channel hides all of it",
+                name(first)
+            ));
+        }
+        warnings.extend(exposure::warning(&images, views.iter().map(|&view| name(view))));
         let (points, near_far) = self.space(views);
         Ok(SourceImages { images, background, has_silhouettes, points, near_far, warnings })
     }

@@ -13,6 +13,10 @@ const MIN_BASELINE: f32 = 1.0e-3;
 /// Least cosine of the angle between the axes of two cameras with the same pose: of 0.6 degrees.
 const MIN_COSINE: f32 = 0.999_95;
 
+/// Tangent of half of the greatest angle of a photograph's width that is no fault: 75 degrees. What lenses see beyond, a
+/// pinhole's picture does not show.
+const MAX_HALF_ANGLE_TANGENT: f32 = 3.732;
+
 /// Which views of a scene have the same pose.
 pub struct SamePoses<'a> {
     views: &'a [View],
@@ -91,6 +95,19 @@ fn warnings(views: &[View]) -> Vec<String> {
         warnings.push(format!(
             "{away} of {count} cameras look away from the point that their axes come nearest to: the axes look flipped \
              (OpenGL poses read as OpenCV, or the other way round), or the poses inverted"
+        ));
+    }
+    let is_odd = |view: &&View| {
+        let pinhole = &view.camera.pinhole;
+        view.image.is_some() && pinhole.width() as f32 > 2.0 * MAX_HALF_ANGLE_TANGENT * pinhole.focal()[0]
+    };
+    if let Some(view) = views.iter().find(is_odd) {
+        let (pinhole, odd) = (&view.camera.pinhole, views.iter().filter(is_odd).count());
+        let [width, focal] = [pinhole.width() as f32, pinhole.focal()[0]];
+        warnings.push(format!(
+            "{odd} of {count} photographs would show more than 150 degrees: '{}' has a focal length of {focal} pixels at a \
+             width of {width}; the intrinsics may be shares of the width, or millimetres, in place of pixels",
+            view.name
         ));
     }
     let firsts = firsts(views);

@@ -229,10 +229,11 @@ impl Scene {
             let Some(found) = reader.recognise(path)? else { continue };
             let mut checked = check::scene(&found, reader.form(), reader.read(&found)?)?;
             distinguish(&mut checked.views);
+            let mut unmasked = None;
             if mask_choice == MaskChoice::None {
                 checked.views.iter_mut().for_each(|view| view.mask = None);
             } else {
-                checked.warnings.extend(masks::find(path, &mut checked.views));
+                unmasked = masks::find(path, &mut checked.views);
             }
             let Decision { meaning: masks, line, warning } =
                 masks::meaning::decide(&checked.views, mask_choice, reader.masks());
@@ -243,10 +244,13 @@ impl Scene {
                 let place = FilePlace::file(twin.image.clone().unwrap_or(found));
                 return Err(place.fault(SceneFault::DuplicateName(twin.name.clone())));
             }
-            let Checked { views, points, mut warnings, conventions, mut unused, lists, frame } = checked;
+            let Checked { mut views, points, mut warnings, conventions, mut unused, lists, frame } = checked;
             warnings.extend(unlisted::photographs(&views));
             warnings.extend(found_poses::warnings(path, &views));
             unused.extend(unlisted::files(&found, &views, &lists));
+            let is_of_object = masks == MaskMeaning::Object && mask_choice != MaskChoice::None;
+            let excluded = is_of_object.then(|| masks::exclude_unmasked(path, &mut views)).flatten();
+            warnings.extend(excluded.or(unmasked));
             let (path, layout) = (path.to_path_buf(), reader.name());
             return Ok(Scene { path, layout, views, points, warnings, conventions, unused, masks, mask_choice, frame });
         }

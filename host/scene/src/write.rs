@@ -266,7 +266,9 @@ fn lost(scene: &Scene, layout: Layout) -> Vec<String> {
     if scene.mask_choice == MaskChoice::Object && scene.views.iter().any(is_said) {
         lines.push("that alpha channels say where the object is, which must be said of this folder, too".to_owned());
     }
-    let has_object = scene.views.iter().any(|view| scene.has_object_mask(view));
+    // What cannot be read is said when it is written.
+    let is_cut_out = || layout == Layout::Neus && neus::is_cut_out(scene, 0).unwrap_or(false);
+    let has_object = scene.views.iter().any(|view| scene.has_object_mask(view)) || is_cut_out();
     if layout == Layout::Neus && !has_object {
         lines.push(
             "masks, of which there are none: NeuS's own program needs mask/, in which white pictures will do"

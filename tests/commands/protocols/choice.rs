@@ -236,7 +236,7 @@ fn a_target_is_no_source_under_another_name() {
         }
     }
     // A published list stays, and it is said.
-    let notes = plan("llff:21", &scenes, DRAWS).notes;
+    let notes = plan("llff:23", &scenes, DRAWS).notes;
     assert!(notes.iter().any(|note| note.contains("have the pose of a source (the first is 0000")), "{notes:?}");
     let notes = plan("fixed:0,1:1,2", &scenes, DRAWS).notes;
     assert_eq!(notes, ["toy: no targets, since they are sources: 000001"]);

@@ -107,7 +107,12 @@ impl<'a> HeldOutSources<'a> {
         let quiet = &Quiet(progress);
         for source in chosen {
             progress.check().map_err(stopped)?;
-            let mut others = hold_out.neighbours(&poses, source);
+            if !photographs.shows_anything(source) {
+                progress.step();
+                continue;
+            }
+            let copies = photographs.copies(source);
+            let mut others = hold_out.neighbours_among(&poses, source, |other| !copies.contains(&other));
             others.sort_unstable();
             let standing = measure.standing(&poses[source], others.iter().map(|&other| &poses[other]));
             let prepared = photographs.hold_out(source, others, renderer, options, quiet).and_then(|mut held_out| {

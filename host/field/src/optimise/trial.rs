@@ -81,7 +81,8 @@ impl SceneOptimisation<'_> {
             ));
             return Ok(chosen);
         }
-        let places = held_out(count);
+        let shows = |place: &usize| images.images[*place].texels.iter().any(|texel| texel[3] > 0.0);
+        let places: Vec<usize> = held_out(count).into_iter().filter(shows).collect();
         let (held_out, sources): (Vec<_>, Vec<_>) = (0..count).partition(|place| places.contains(place));
         let views =
             |places: Vec<usize>| -> Vec<usize> { places.into_iter().map(|place| self.sources[place]).collect() };

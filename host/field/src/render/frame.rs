@@ -2,7 +2,7 @@
 
 use super::Seen;
 use crate::budget::Kept;
-use crate::scores::{corrected_psnr_of_seen, psnr_of_seen, ssim_of_seen};
+use crate::scores::{corrected_psnr_of_seen, psnr_of_seen, shows_anything, ssim_of_seen};
 use image::{GrayImage, RgbImage};
 use std::time::Duration;
 use viewfuse_core::weights::Omission;
@@ -60,12 +60,15 @@ pub struct Truth {
 }
 
 impl Truth {
-    /// Compares a prediction with the truth.
-    pub fn compare(prediction: &RgbImage, truth: GroundTruth) -> Truth {
+    /// Compares a prediction with the truth; `None` where the photograph shows nothing that counts.
+    pub fn compare(prediction: &RgbImage, truth: GroundTruth) -> Option<Truth> {
         let GroundTruth { picture, seen } = truth;
+        if !shows_anything(seen.as_ref()) {
+            return None;
+        }
         let psnr = psnr_of_seen(prediction, &picture, seen.as_ref());
         let ssim = ssim_of_seen(prediction, &picture, seen.as_ref());
         let corrected_psnr = corrected_psnr_of_seen(prediction, &picture, seen.as_ref());
-        Truth { picture, seen, psnr, corrected_psnr, ssim }
+        Some(Truth { picture, seen, psnr, corrected_psnr, ssim })
     }
 }

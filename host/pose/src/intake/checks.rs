@@ -1,16 +1,11 @@
 //! What can be wrong with a photograph.
 
 use super::{Photo, scaled};
-use image::{GrayImage, RgbImage, imageops};
+use image::{GrayImage, imageops};
+use viewfuse_field::held_out::{COPY_SIDE, difference, is_copy};
 
 /// Pictures whose small copies differ by less than this, root mean square in levels of 255, are the same picture.
 const MAX_SAME_LEVELS: f64 = 1.0;
-/// Longest side at which what compression and resampling do is averaged out, in pixels.
-const SMALL_SIDE: u32 = 32;
-/// At that size copies differ by less than this, as a share of what a pixel's step changes. JPEGs of quality 60 and 70 at
-/// the same and at a smaller size have 0.037 to 0.041; of the photographs of fourteen scenes the nearest two are a car
-/// on white from two sides, 0.12, then a cup on a table, 0.17.
-const MAX_COPY_SHARE: f64 = 0.07;
 
 /// A format that is not read, and a command that converts `FILE`.
 pub(super) fn unread(extension: &str) -> Option<(&'static str, &'static str)> {
@@ -45,26 +40,10 @@ pub(super) fn sharpness(grey: &GrayImage) -> f64 {
 /// Whether two photographs are one picture, if only as a smaller or a more compressed copy.
 pub(super) fn is_same(a: &Photo, b: &Photo) -> bool {
     let [small_a, small_b] = [a, b].map(|photo| {
-        let [width, height] = scaled(photo.copy.dimensions().into(), SMALL_SIDE, 1.0);
+        let [width, height] = scaled(photo.copy.dimensions().into(), COPY_SIDE, 1.0);
         imageops::thumbnail(&photo.copy, width, height)
     });
-    let is_near = difference(&small_a, &small_b).is_some_and(|levels| levels < MAX_COPY_SHARE * step(&small_a));
-    is_near || difference(&a.copy, &b.copy).is_some_and(|levels| levels < MAX_SAME_LEVELS)
-}
-
-/// Root mean square difference of two pictures of one size, in levels.
-fn difference(a: &RgbImage, b: &RgbImage) -> Option<f64> {
-    (a.dimensions() == b.dimensions()).then(|| {
-        let sum: f64 = a.iter().zip(b.iter()).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2)).sum();
-        (sum / a.len().max(1) as f64).sqrt()
-    })
-}
-
-/// Root mean square difference of a picture from itself a pixel beside, in levels.
-fn step(picture: &RgbImage) -> f64 {
-    let (width, height) = picture.dimensions();
-    let part = |x, y| imageops::crop_imm(picture, x, y, width.saturating_sub(1), height.saturating_sub(1)).to_image();
-    difference(&part(0, 0), &part(1, 1)).unwrap_or(0.0)
+    is_copy(&small_a, &small_b) || difference(&a.copy, &b.copy).is_some_and(|levels| levels < MAX_SAME_LEVELS)
 }
 
 #[cfg(test)]

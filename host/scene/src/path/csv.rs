@@ -54,7 +54,8 @@ impl PoseColumns {
             let name = name.trim();
             let groups: [&[&str]; 6] = [&[NAME], &CENTRE, &ROTATION, &LOOK, &MATRIX, &INTRINSICS];
             if !groups.iter().any(|group| group.contains(&name)) {
-                return Err(format!("there is no column {name:?}"));
+                let separated = if name.contains(';') { ": columns are separated by commas" } else { "" };
+                return Err(format!("there is no column {name:?}{separated}"));
             }
             if places.insert(name.to_owned(), place).is_some() {
                 return Err(format!("column {name:?} is there twice"));

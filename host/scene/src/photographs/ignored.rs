@@ -25,6 +25,11 @@ pub(super) fn is_of_ignored(mut shares: Vec<f32>) -> bool {
     shares.get(shares.len() / 2).is_some_and(|share| *share > MAX_OBJECT_BORDER)
 }
 
+/// Whether the alpha channel of a photograph says where the object is.
+pub(crate) fn shows_object(photograph: &Photograph) -> bool {
+    photograph.has_alpha && !is_of_ignored(vec![border_share(photograph)])
+}
+
 /// The whole photograph, of which what is transparent does not count.
 pub(super) fn by_alpha(photograph: Photograph) -> Photograph {
     let counts = |x: u32, y: u32| {

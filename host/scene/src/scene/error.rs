@@ -63,6 +63,12 @@ pub enum SceneFault {
     /// A pose whose photograph is missing (if its name has no extension: with any supported one).
     #[error("this pose has no photograph: there is no {}", in_line(.0.display()))]
     PoseWithoutImage(PathBuf),
+    /// The same, where a file of its name lies beside the list.
+    #[error(
+        "this pose has no photograph: there is no {}, but {} is there: make the path relative to the list",
+        in_line(.0.display()), in_line(.1.display())
+    )]
+    PoseWithImageElsewhere(PathBuf, PathBuf),
     /// A mask that is named and missing.
     #[error("there is no mask {}", in_line(.0.display()))]
     NoMask(PathBuf),

@@ -91,6 +91,12 @@ pub enum ImageFault {
     /// It cannot be decoded.
     #[error("not a readable image: {}", in_one_line(.0))]
     Unreadable(Box<ImageError>),
+    /// It is empty.
+    #[error("the file is empty")]
+    Empty,
+    /// It is of a format that is not read, whatever its name says.
+    #[error("it is a picture of the format {0}, which is not read: convert it to JPEG or PNG first")]
+    Kind(&'static str),
     /// A decoder panics on it.
     #[error("not a readable image: {0}")]
     Decoder(Panicked),

@@ -61,6 +61,8 @@ pub(super) struct Header {
     pub(super) size: [u32; 2],
     /// How the pixels must be turned to be upright.
     pub(super) orientation: Orientation,
+    /// Whether its pixels have an alpha channel.
+    pub(super) has_alpha: bool,
     /// Bytes of the decoded pixels.
     bytes: u64,
 }
@@ -125,7 +127,8 @@ fn described(path: &Path, reader: ImageReader<Box<dyn Source>>) -> Result<Header
         let (width, height) = decoder.dimensions();
         // An unreadable tag is ignored.
         let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
-        Ok(Header { size: [width, height], orientation, bytes: decoder.total_bytes() })
+        let has_alpha = decoder.color_type().has_alpha();
+        Ok(Header { size: [width, height], orientation, has_alpha, bytes: decoder.total_bytes() })
     })
 }
 
@@ -166,7 +169,15 @@ impl Turn {
 pub(super) fn decode(path: &Path, size: [u32; 2]) -> Result<(Photograph, Turn), SceneError> {
     let (mut decoded, orientation) = pixels(path)?;
     let bytes = decoded.as_bytes().len() as u64;
-    let turn = Turn::of(&Header { size: [decoded.width(), decoded.height()], orientation, bytes }, size);
+    let turn = Turn::of(
+        &Header {
+            size: [decoded.width(), decoded.height()],
+            orientation,
+            has_alpha: decoded.color().has_alpha(),
+            bytes,
+        },
+        size,
+    );
     if turn.is_applied {
         decoded.apply_orientation(orientation);
     }
@@ -209,7 +220,7 @@ pub(super) fn turned(size: [u32; 2], orientation: Orientation) -> [u32; 2] {
 ///
 /// The header is checked first, and the decoder may allocate no more than an image of that size needs.
 pub(super) fn pixels(path: &Path) -> Result<(DynamicImage, Orientation), SceneError> {
-    let Header { size: [width, height], orientation, bytes } = header(path)?;
+    let Header { size: [width, height], orientation, bytes, .. } = header(path)?;
     let length = path.metadata().map_err(|cause| unreadable(path, cause))?.len();
     if bytes > SMALL_IMAGE && bytes / MAX_RATIO > length {
         return Err(FilePlace::file(path).fault(ImageFault::Hollow([width, height], length)));
@@ -236,10 +247,28 @@ pub(super) fn pixels(path: &Path) -> Result<(DynamicImage, Orientation), SceneEr
 fn decoding<T>(path: &Path, decode: impl FnOnce() -> image::ImageResult<T>) -> Result<T, SceneError> {
     let fault = match caught(decode) {
         Ok(Ok(decoded)) => return Ok(decoded),
-        Ok(Err(cause)) => ImageFault::Unreadable(Box::new(cause)),
+        Ok(Err(cause)) => match kind_of(path) {
+            Some("") => ImageFault::Empty,
+            Some(kind) => ImageFault::Kind(kind),
+            None => ImageFault::Unreadable(Box::new(cause)),
+        },
         Err(panic) => ImageFault::Decoder(panic),
     };
     Err(FilePlace::file(path).fault(fault))
+}
+
+/// The format of a file of pictures that is not read, by its first bytes; an empty one of an empty file.
+fn kind_of(path: &Path) -> Option<&'static str> {
+    let mut first = Vec::new();
+    File::open(path).ok()?.take(12).read_to_end(&mut first).ok()?;
+    Some(match &first[..] {
+        [] => "",
+        [_, _, _, _, b'f', b't', b'y', b'p', b'a', b'v', b'i', ..] => "AVIF",
+        [_, _, _, _, b'f', b't', b'y', b'p', b'h' | b'm', ..] => "HEIC",
+        [b'B', b'M', ..] => "BMP",
+        [b'G', b'I', b'F', b'8', ..] => "GIF",
+        _ => return None,
+    })
 }
 
 /// The pixels of any picture, upright as its orientation tag (EXIF) says: PNG, JPEG, WebP or TIFF of at most

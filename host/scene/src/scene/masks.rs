@@ -9,7 +9,7 @@
 //!
 //! A layout may name masks itself. Otherwise they are searched in a folder `mask` or `masks` in the scene, beside the
 //! photograph's folder or one above it: `images/left/1.jpg` has `masks/left/1.jpg.png` (COLMAP) or `masks/left/1.png`
-//! (nerfstudio), or one of another extension.
+//! (nerfstudio), or one of another extension, or with `_mask` behind the name.
 
 pub(crate) mod meaning;
 
@@ -37,7 +37,8 @@ const INVERTED: &str = "dynamic_mask_";
 const HALF: u8 = 128;
 
 /// Gives views without a mask the one in a folder of masks or beside the photograph; `root` is the scene's folder or a
-/// file in it. The warning counts photographs without a mask if others have one.
+/// file in it. The warning counts photographs without a mask if others have one, or tells of pictures that seem to be
+/// masks and fit none.
 pub(super) fn find(root: &Path, views: &mut [View]) -> Option<String> {
     let root = if root.is_dir() { root } else { root.parent()? };
     // Two photographs of one name in two folders may not share a mask.
@@ -51,8 +52,58 @@ pub(super) fn find(root: &Path, views: &mut [View]) -> Option<String> {
     let first = without.next()?.image.as_deref()?;
     let (without, all) = (1 + without.count(), photographs().count());
     let first = files::exact(first.file_name().unwrap_or_default());
-    let some = without < all;
-    some.then(|| format!("{}: {without} of {all} photographs have no mask, {first} the first", root.display()))
+    if without == all {
+        return unmatched(root, views);
+    }
+    Some(format!("{}: {without} of {all} photographs have no mask, {first} the first", root.display()))
+}
+
+/// Where the masks of most photographs say where the object is, those of the others are wanting: they are no photographs
+/// of it, neither as sources nor to compare with, but those that say it in their alpha channel. The warning counts them.
+pub(super) fn exclude_unmasked(root: &Path, views: &mut [View]) -> Option<String> {
+    let photographs = || views.iter().filter(|view| view.image.is_some());
+    let (masked, all) = (photographs().filter(|view| view.mask.is_some()).count(), photographs().count());
+    if 2 * masked < all {
+        return None;
+    }
+    let says_nothing = |view: &&mut View| {
+        let has_alpha = |file: &Path| images::header(file).is_ok_and(|header| header.has_alpha);
+        view.mask.is_none() && view.image.as_deref().is_some_and(|file| !has_alpha(file))
+    };
+    let excluded: Vec<PathBuf> = views.iter_mut().filter(says_nothing).filter_map(|view| view.image.take()).collect();
+    let first = files::exact(excluded.first()?.file_name().unwrap_or_default());
+    Some(format!(
+        "{}: {} of {all} photographs are excluded ({first} is the first): they have no mask, and those of the others say \
+         where the object is",
+        root.display(),
+        excluded.len()
+    ))
+}
+
+/// A warning where a folder of masks has pictures, and none of them is named as a photograph.
+fn unmatched(root: &Path, views: &[View]) -> Option<String> {
+    let files = || views.iter().filter_map(|view| view.image.as_deref());
+    let mut folders: Vec<&Path> = files().filter_map(Path::parent).collect();
+    folders.push(root);
+    folders.sort_unstable();
+    folders.dedup();
+    let of_masks = folders.iter().flat_map(|folder| FOLDERS.map(|masks| folder.join(masks)));
+    let is_of_photographs = |folder: &PathBuf| files().any(|file| file.starts_with(folder));
+    for folder in of_masks.filter(|folder| !is_of_photographs(folder)) {
+        let entries = folder.read_dir().into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path()));
+        let mut pictures: Vec<PathBuf> = entries.filter(|path| files::has_extension(path, &IMAGE_EXTENSIONS)).collect();
+        pictures.sort_unstable();
+        if let Some(first) = pictures.first() {
+            let (count, first) = (pictures.len(), files::exact(first.file_name().unwrap_or_default()));
+            let photograph = files::exact(files().next()?.file_name().unwrap_or_default());
+            return Some(format!(
+                "{}: {count} pictures are no masks of any photograph: {first} would be the mask of {photograph} if it \
+                 were called so, or with _mask behind the name",
+                folder.display()
+            ));
+        }
+    }
+    None
 }
 
 /// instant-ngp's mask of a photograph, if there is one.
@@ -78,7 +129,12 @@ fn beside(root: &Path, image: &Path) -> Option<PathBuf> {
             for masks in FOLDERS.map(|masks| folder.join(masks)).into_iter().filter(|masks| masks.is_dir()) {
                 let appended = |extension: &&str| files::appended(&masks.join(name), extension);
                 let replaced = |extension: &&str| masks.join(name).with_extension(extension);
-                let mut candidates = IMAGE_EXTENSIONS.iter().map(appended).chain(IMAGE_EXTENSIONS.iter().map(replaced));
+                let marked = |extension: &&str| {
+                    let stem = name.file_stem().unwrap_or_default().to_string_lossy();
+                    masks.join(name).with_file_name(format!("{stem}_mask.{extension}"))
+                };
+                let all = || IMAGE_EXTENSIONS.iter();
+                let mut candidates = all().map(appended).chain(all().map(replaced)).chain(all().map(marked));
                 if let Some(mask) = candidates.find(|mask| mask.is_file()) {
                     return Some(mask);
                 }

@@ -4,6 +4,14 @@ use std::path::{Path, PathBuf};
 
 use super::error::{SceneError, SceneFault};
 use super::fault::FilePlace;
+use super::files::IMAGE_FOLDERS;
+
+/// The file of a photograph's name beside the list that names another place for it, perhaps on another machine.
+fn beside(list: &Path, image: &Path) -> Option<PathBuf> {
+    let (folder, name) = (list.parent()?, image.file_name()?);
+    let places = [""].iter().chain(IMAGE_FOLDERS.iter()).map(|place| folder.join(place).join(name));
+    places.into_iter().find(|found| found.is_file())
+}
 
 /// The photographs of a list that are missing.
 #[derive(Debug, Default)]
@@ -33,7 +41,10 @@ impl Missing {
     pub(super) fn warning(self, list: &Path) -> Result<Option<String>, SceneError> {
         let Missing { listed, count, first } = self;
         match first {
-            Some((place, image)) if count == listed => Err(place.fault(SceneFault::PoseWithoutImage(image))),
+            Some((place, image)) if count == listed => Err(place.fault(match beside(list, &image) {
+                Some(found) => SceneFault::PoseWithImageElsewhere(image, found),
+                None => SceneFault::PoseWithoutImage(image),
+            })),
             Some((_, image)) => Ok(Some(format!(
                 "{}: {count} of {listed} photographs are not there and left out (the first is {})",
                 list.display(),

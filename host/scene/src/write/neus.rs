@@ -7,7 +7,8 @@
 //!
 //! `N` is the photograph's place in the order of the files' names, byte by byte, from 0, where NeuS's own program looks
 //! for it; it reads PNGs alone. Where our reader would take a name's number for another one, photographs are numbered.
-//! PNGs of a pinhole and their masks are copied; others are written undistorted, with the mask as a picture of its own.
+//! PNGs of a pinhole and their masks are copied; others are written undistorted, with the mask as a picture of its own,
+//! which an alpha channel that says where the object is becomes, too.
 
 use std::io::{Cursor, Write};
 
@@ -18,10 +19,11 @@ use zip::{CompressionMethod, ZipWriter};
 
 use super::{Draft, Layout, WriteSceneError, camera_from_world};
 use crate::numpy::npy;
+use crate::photographs::ignored::shows_object;
 use crate::rig::Rig;
-use crate::scene::files::natural_order;
+use crate::scene::files::{has_extension, natural_order};
 use crate::scene::neus::matrices_of;
-use crate::{Scene, View};
+use crate::{MaskChoice, Scene, SceneError, View};
 
 /// Whether the scene is in the coordinates of a unit sphere that this layout gave it.
 pub(super) fn has_unit_sphere(scene: &Scene) -> bool {
@@ -69,10 +71,21 @@ pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
 /// The only format that NeuS's own program reads.
 const PNG: [&str; 1] = ["png"];
 
+/// Whether the alpha channel of a view's photograph says where its object is: it becomes a mask.
+pub(super) fn is_cut_out(scene: &Scene, index: usize) -> Result<bool, SceneError> {
+    let View { image, mask, .. } = &scene.views[index];
+    let is_used = matches!(scene.mask_choice, MaskChoice::Auto | MaskChoice::Object);
+    // JPEGs have no alpha channel.
+    let may_be = is_used && mask.is_none() && image.as_ref().is_some_and(|file| !has_extension(file, &["jpg", "jpeg"]));
+    Ok(may_be && shows_object(&scene.photograph(index)?))
+}
+
 /// Writes the photograph of a view and its mask.
 fn photograph(out: &Draft, index: usize) -> Result<(), WriteSceneError> {
     let view = &out.scene.views[index];
+    let is_cut_out = is_cut_out(out.scene, index)?;
     match (&view.lens, &view.mask) {
+        _ if is_cut_out => drop(out.pinhole_photograph_and_mask(index, "image", "mask")?),
         (None, _) => {
             out.stored_photograph(index, "image", &PNG)?;
             out.mask(index, "mask", &out.names[index], &PNG)?;

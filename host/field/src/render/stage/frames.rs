@@ -135,7 +135,15 @@ impl Stage<'_> {
         let (width, height) = picture.dimensions();
         let truth = match (target.truth, &self.scene) {
             (Some(view), Some(SceneSources { album, .. })) => {
-                Some(Truth::compare(&picture, album.truth(view, [width, height], self.background())?))
+                let truth = Truth::compare(&picture, album.truth(view, [width, height], self.background())?);
+                if truth.is_none() {
+                    progress.warn(&format!(
+                        "'{}' is not compared with its photograph, of which nothing counts: its mask or its alpha \
+                         channel hides all",
+                        target.name
+                    ));
+                }
+                truth
             }
             _ => None,
         };

@@ -2,8 +2,9 @@
 //! object is (an object mask: its silhouette).
 //!
 //! A person says it ([`MaskChoice`]), or the layout does ([`Reader::masks`](super::super::reader::Reader::masks)).
-//! Otherwise the masks themselves do. In every photograph a silhouette is one region away from the border; silhouettes
-//! are not alike, as masks that are fixed to the camera are; and the rays through their middles meet in the object.
+//! Otherwise the masks themselves do. A silhouette is one region, in at least half of the photographs away from the
+//! border; silhouettes are not alike, as masks that are fixed to the camera are; and the rays through their middles meet
+//! in the object.
 //! All other masks say which pixels do not count. Where these leave little of the photographs, they may be inverted, or
 //! of an object that reaches the border: then it is unclear, and asked.
 
@@ -131,8 +132,8 @@ pub(in super::super) fn decide(views: &[View], choice: MaskChoice, layout: Optio
     let is_doubtful = is_guessed && !looks.is_empty() && left < MAX_DOUBTFUL;
     let warning = (meaning == MaskMeaning::Ignore && is_doubtful).then(|| {
         format!(
-            "masks that leave {:.0} % of the pixels are taken to say which pixels do not count: do they show the \
-             object instead, it must be said",
+            "masks that leave {:.0} % of the pixels are taken to say which pixels do not count (ignore): if they show \
+             the object instead, choose object",
             100.0 * left
         )
     });
@@ -146,8 +147,9 @@ struct Look {
     /// Whether a cell of a coarse grid holds a pixel that counts, row by row, and the cells of a row.
     cells: Vec<bool>,
     columns: usize,
-    /// Whether it is one region away from the border.
+    /// Whether it is one region, and whether it is away from the border.
     is_region: bool,
+    is_inside: bool,
     /// Least and greatest place of what counts, x and y, as shares of the sides.
     bounds: [[f64; 2]; 2],
     /// The camera's centre, and the direction of the middle of what counts.
@@ -178,6 +180,7 @@ impl Look {
         Some(Look {
             share: count / (sides[0] * sides[1]),
             is_region: is_region(&cells, columns),
+            is_inside: is_inside(&cells, columns),
             cells,
             columns,
             bounds: [low, high],
@@ -206,7 +209,10 @@ fn are_silhouettes(looks: &[Look]) -> bool {
     let Some((first, others)) = looks.split_first() else { return false };
     let are_fixed = !others.is_empty() && others.iter().all(|look| first.is_like(look));
     let rays: Vec<(DVec3, DVec3)> = looks.iter().map(|look| look.ray).collect();
+    // Where the object is near, some of its silhouettes reach the border.
+    let inside = looks.iter().filter(|look| look.is_inside).count();
     looks.iter().all(|look| look.is_region)
+        && 2 * inside >= looks.len()
         && !are_fixed
         && nearest_point_to_lines(&rays).is_none_or(|point| looks.iter().all(|look| look.surrounds(point.as_vec3())))
 }
@@ -223,18 +229,21 @@ fn grid(mask: &GrayImage) -> (Vec<bool>, usize) {
     (cells, columns)
 }
 
-/// Whether what counts is one region away from the border.
+/// Whether what counts is one region.
 fn is_region(cells: &[bool], columns: usize) -> bool {
+    let counting = cells.iter().filter(|cell| **cell).count();
+    counting > 0 && largest_region(cells, columns) as f64 >= MIN_REGION * counting as f64
+}
+
+/// Whether what counts is away from the border.
+fn is_inside(cells: &[bool], columns: usize) -> bool {
     let rows = cells.len() / columns.max(1);
     let at_border = |cell: usize| {
         let (column, row) = (cell % columns, cell / columns);
         column == 0 || row == 0 || column + 1 == columns || row + 1 == rows
     };
     let border: Vec<bool> = (0..cells.len()).filter(|cell| at_border(*cell)).map(|cell| cells[cell]).collect();
-    let counting = cells.iter().filter(|cell| **cell).count();
-    let at_border = border.iter().filter(|counts| **counts).count() as f64;
-    let largest = largest_region(cells, columns) as f64;
-    counting > 0 && at_border <= MAX_BORDER * border.len() as f64 && largest >= MIN_REGION * counting as f64
+    border.iter().filter(|counts| **counts).count() as f64 <= MAX_BORDER * border.len() as f64
 }
 
 /// The cells of the largest region of connected ones that count.
