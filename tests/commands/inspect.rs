@@ -2,7 +2,7 @@
 
 use super::{done, list_of, number_of, numbers, read_json, run, texts};
 use serde_json::Value;
-use viewfuse_tests::command::{change_poses, names_in, toy};
+use viewfuse_tests::command::{change_poses, names_in, sample, toy};
 use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![
@@ -13,6 +13,7 @@ viewfuse_tests::trials![
     a_background_of_many_colours_is_a_fault_only_of_an_object,
     what_the_cameras_cover,
     the_quality_is_that_of_held_out_photographs,
+    a_copy_tells_nothing_of_new_views,
     views_are_listed_with_their_neighbours,
     what_is_excluded_is_said_and_recorded,
     conventions_are_said_and_recorded,
@@ -213,7 +214,7 @@ fn the_quality_is_that_of_held_out_photographs() {
     // A view between neighbours has nearer sources than a held-out view.
     assert!(20.0 < mean && mean < expected && expected < 45.0, "{judged}");
     let printed = done(&scene, "inspect toy --quality");
-    let said = format!("\nleft out   6 photographs, rendered from the others: PSNR {mean:.1} dB, from ");
+    let said = format!("\nheld out   6 photographs, rendered from the others: PSNR {mean:.1} dB, from ");
     assert!(
         printed.contains(&said) && printed.contains(&format!("\nexpected   PSNR {expected:.1} dB half-way")),
         "{printed}"
@@ -232,6 +233,39 @@ fn the_quality_is_that_of_held_out_photographs() {
     assert!(done(&scene, "inspect toy --quality").contains("\nexpected   not measured: toy: the silhouettes"));
 }
 
+/// A photograph that was saved again, with a pose of its own, is no new view of anything: what is held out beside it would
+/// be met by its copy.
+fn a_copy_tells_nothing_of_new_views() {
+    let folder = sample("room");
+    let judged = || -> Value {
+        let printed = done(&folder, "inspect room --json --quality");
+        serde_json::from_str::<Value>(&printed).expect("JSON")["quality"].clone()
+    };
+    let best = |judged: &Value| {
+        let views = list_of(&judged["left_out"]);
+        views.iter().map(|view| number_of(&view["psnr"])).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let before = judged();
+    let mut transforms = read_json(folder.join("room/transforms.json"));
+    let frames = transforms["frames"].as_array_mut().expect("frames");
+    for frame in frames.clone() {
+        let name = frame["file_path"].as_str().expect("a name").to_owned();
+        let picture = image::open(folder.join("room").join(&name)).expect("a photograph").into_rgb8();
+        let again = name.replace(".jpg", "_again.jpg");
+        let file = std::fs::File::create(folder.file(&format!("room/{again}"))).expect("a file");
+        let encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(file, 70);
+        picture.write_with_encoder(encoder).expect("written");
+        let mut frame = frame;
+        frame["file_path"] = again.into();
+        let x = number_of(&frame["transform_matrix"][0][3]);
+        frame["transform_matrix"][0][3] = (x + 5.0e-3).into();
+        frames.push(frame);
+    }
+    folder.write("room/transforms.json", transforms.to_string());
+    let after = judged();
+    assert!(best(&after) < best(&before) + 3.0, "{before}: {after}");
+}
+
 fn what_is_excluded_is_said_and_recorded() {
     let (folder, room) = (Folder::new(), viewfuse_tests::places::data("room"));
     for name in names_in(&room.join("images")) {
@@ -244,7 +278,7 @@ fn what_is_excluded_is_said_and_recorded() {
     transforms["aabb_scale"] = 4.into();
     folder.write("room/transforms.json", transforms.to_string());
     let warnings = [
-        format!("transforms.json: 1 of {count} photographs are not there and left out"),
+        format!("transforms.json: 1 of {count} photographs are not there and excluded"),
         format!("images: 1 photograph has no pose and is not used, {} have one (without is 002.jpg)", count - 1),
     ];
     let (printed, verbose) = (done(&folder, "inspect room"), done(&folder, "inspect room --verbose"));

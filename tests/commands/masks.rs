@@ -133,6 +133,6 @@ fn what_shows_nothing_is_not_scored() {
     let optimise = "optimise room --size 64x48 --iterations 2 --device cpu";
     assert_refused(folder.path(), &format!("{optimise} --left-out 4 -o a.ply"), &["held out nothing counts"]);
     let printed = run(&folder, "inspect room --quality").stdout;
-    let held_out = printed.lines().find(|line| line.starts_with("left out")).expect("scores");
+    let held_out = printed.lines().find(|line| line.starts_with("held out")).expect("scores");
     assert!(!held_out.contains("(004)"), "{held_out}");
 }

@@ -50,7 +50,7 @@ fn scene(path: &Path) {
 fn scores(text: &str) -> Vec<(u32, f64)> {
     let score = |line: &str| {
         let (iteration, rest) = line.strip_prefix("iteration ")?.split_once(" of ")?;
-        let (_, psnr) = rest.split_once(": views left out have a PSNR of ")?;
+        let (_, psnr) = rest.split_once(": held-out views have a PSNR of ")?;
         Some((iteration.parse().ok()?, psnr.strip_suffix(" dB")?.parse().ok()?))
     };
     text.lines().filter_map(score).collect()
@@ -250,7 +250,7 @@ fn more_quality_is_tried_on_sources_and_has_more_gaussians_or_iterations() {
         (text, last)
     };
     let trial = |text: &str| {
-        let line = text.lines().find(|line| line.contains("left out of a trial")).expect("a trial");
+        let line = text.lines().find(|line| line.contains("held out of a trial")).expect("a trial");
         assert!(line.starts_with("2 of 22 photographs"), "{line}");
         line.to_owned()
     };

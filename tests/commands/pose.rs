@@ -176,7 +176,7 @@ fn what_does_not_belong_is_excluded_by_name() {
         ("blurred.jpg", "blurred"),
         ("other.jpg", ""),
     ] {
-        assert!(said.contains(&format!("left out   {name}: {reason}")), "{name}: {said}");
+        assert!(said.contains(&format!("excluded   {name}: {reason}")), "{name}: {said}");
     }
     let scene = Scene::open(folder.join("posed")).expect("a scene");
     assert_eq!(scene.views.len(), 5);

@@ -142,7 +142,7 @@ fn what_is_dear_is_tried_on_few_pixels_before_its_picture() {
     let kept = pictures[0].kept.as_ref().expect("a bound");
     let last = kept.tried.last().expect("what was tried");
     let pixels = last.error.map(|error| error.pixels);
-    assert_eq!((last.effort.as_str(), pixels), ("both passes, empty space left out", Some(32)), "{kept:?}");
+    assert_eq!((last.effort.as_str(), pixels), ("both passes, empty space omitted", Some(32)), "{kept:?}");
     assert_eq!(kept.effort, "exact", "{kept:?}");
 }
 

@@ -101,7 +101,7 @@ fn one_wrong_pose_is_excluded_by_name() {
     let verdict = found.verdict.as_ref().expect("the others are true");
     assert!(!verdict.photos.contains(&2) && verdict.photos.len() >= 3, "{:?}", verdict.photos);
     let excluded = found.excluded(Some(verdict));
-    let is_it = |(name, why): &(_, String)| name == "002.jpg" && why.contains("left out and rendered");
+    let is_it = |(name, why): &(_, String)| name == "002.jpg" && why.contains("held out and rendered");
     assert!(excluded.iter().any(is_it), "{excluded:?}");
 }
 

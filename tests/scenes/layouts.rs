@@ -171,6 +171,12 @@ fn a_view_is_found_by_name_or_by_its_number() {
         view.name = name.to_owned();
     }
     assert_eq!(["0", "2", "5", "9"].map(|number| scene.view_named(number)), [Some(0), Some(2), None, None]);
+    // A name that looks like an index is one, too: where they differ it may be either.
+    (scene.views[0].name, scene.views[3].name) = ("#2".to_owned(), "#3".to_owned());
+    assert_eq!(
+        (scene.views_meant("#2"), scene.view_named("#3"), scene.view_named("#0")),
+        (vec![0, 2], Some(3), Some(0))
+    );
 }
 
 #[test]

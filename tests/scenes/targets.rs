@@ -5,7 +5,7 @@ use super::made::open;
 use image::{Rgba, RgbaImage};
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
-use viewfuse::scene::few_shot::{FewShot, Selection, Target, away_warning, target_of};
+use viewfuse::scene::few_shot::{FewShot, PathChoice, Selection, Target, away_warning, target_of};
 use viewfuse::scene::photographs::{Album, BackgroundChoice};
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
@@ -75,6 +75,21 @@ fn a_pose_is_one_source() {
     near.write("pose/b.txt", moved(1.0e-5));
     assert!(open(&near).pose_warnings().iter().any(|warning| warning.contains("have the same pose")));
     assert_eq!(open(&called(&["a", "b"])).pose_warnings(), Vec::<String>::new());
+}
+
+#[test]
+fn what_no_scene_has_is_an_error() {
+    let scene = Scene::open(data("toy")).expect("a scene");
+    let along = Selection { path: Some(PathChoice::Orbit(2)), targets: Some("all".to_owned()), ..Selection::default() };
+    assert!(along.resolve(&scene, 0).is_err_and(|error| error.to_string().contains("source")), "a path of no sources");
+    let error = Album::open(&scene, [0, 999], &Silent).map(|_| ()).expect_err("no such view").to_string();
+    assert!(error.contains("999"), "{error}");
+    let album = Album::open(&scene, [0, 1], &Silent).expect("photographs");
+    for colour in [[f32::NAN, 0.0, 0.0], [0.0, 1.5, 0.0], [0.0, 0.0, -0.1]] {
+        let choice = BackgroundChoice::Colour(colour);
+        let error = album.sources(&[0, 1], 64, choice, &Silent).expect_err("no colour").to_string();
+        assert!(error.contains("is no colour"), "{error}");
+    }
 }
 
 #[test]

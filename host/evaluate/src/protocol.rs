@@ -25,7 +25,7 @@ pub use published::{Figure, Published};
 
 use draw::Draw;
 use drawn::{close, counted};
-use listed::{fixed, nearest};
+use listed::{Listed, fixed, nearest};
 use viewfuse_core::Vec3;
 use viewfuse_scene::Scene;
 use viewfuse_scene::photographs::reduced_size;
@@ -159,7 +159,7 @@ impl Protocol {
                         close(scene, &draw, *sources, *degrees, draws.target_count, &mut add)
                     }
                     Protocol::Fixed { sources, targets } => {
-                        let (sources, targets, notes) = fixed(scene, sources, targets, least_sources)?;
+                        let Listed { sources, targets, notes } = fixed(scene, sources, targets, least_sources)?;
                         add(sources, targets);
                         notes
                     }

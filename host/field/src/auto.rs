@@ -146,7 +146,7 @@ impl Chosen {
         let (psnr, copy) = (mean(|source| source.psnr), mean(|source| source.copy_psnr));
         (psnr < copy).then(|| {
             format!(
-                "sources that were left out and rendered from the others have a PSNR of {psnr:.1} dB, copies of the \
+                "sources that were held out and rendered from the others have a PSNR of {psnr:.1} dB, copies of the \
                  nearest photographs {copy:.1} dB: pictures may be worse than a copy; take photographs nearer to one \
                  another, and check the camera poses"
             )

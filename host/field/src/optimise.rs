@@ -193,8 +193,8 @@ impl<'a> SceneOptimisation<'a> {
         let mut recipe = self.recipe.recipe(stage.images.has_silhouettes);
         recipe.is_antialiased |= self.before.as_ref().is_some_and(|before| before.scene.is_antialiased);
         if is_sharp && self.before.is_none() {
-            progress.stage("trying recipes on sources left out", trial, 30);
-            recipe = self.tried(device, &album, &stage.images, &clock, progress)?;
+            progress.stage("trying recipes on held-out sources", trial, 30);
+            recipe = self.tried(device, &album, &stage.images, &mut clock, progress)?;
         }
         let photographed = &Photographed::new(device, &album, &stage.images);
         let mut optimisation = self.begin(device, &stage.images, &points, recipe)?;
@@ -286,7 +286,7 @@ impl<'a> SceneOptimisation<'a> {
             if !self.held_out.is_empty() {
                 let psnr = self.score(&gaussians, photographed, &self.held_out)?;
                 progress.note(&format!(
-                    "iteration {done} of {iteration_count}: views left out have a PSNR of {psnr:.2} dB"
+                    "iteration {done} of {iteration_count}: held-out views have a PSNR of {psnr:.2} dB"
                 ));
                 scores.push((done, psnr));
             }

@@ -79,7 +79,7 @@ impl Sheet {
             canvas.text(
                 MARGIN as i32,
                 (results_top - LINE_HEIGHT - GAP) as i32,
-                &format!("and {} more of smaller weight, {hidden_left_out} of them left out", hidden.len()),
+                &format!("and {} more of smaller weight, {hidden_left_out} of them dropped", hidden.len()),
                 GREY,
             );
         }
@@ -105,7 +105,7 @@ impl Sheet {
             let below = y + grid.picture_height as i32 + 2;
             let length = (picture.width() as f32 * source.weight / heaviest).round() as u32;
             canvas.fill(x, below, length, BAR, BLUE);
-            let weight = if source.weight > 0.0 { format!("{:.4}", source.weight) } else { "left out".to_owned() };
+            let weight = if source.weight > 0.0 { format!("{:.4}", source.weight) } else { "dropped".to_owned() };
             let text_top = below + BAR as i32 + 2;
             canvas.text(x, text_top, &weight, if source.weight > 0.0 { INK } else { GREY });
             let name = end_of(&source.name, ((grid.cell_width - GAP) / CHARACTER_WIDTH) as usize);

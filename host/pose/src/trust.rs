@@ -96,7 +96,7 @@ pub(crate) fn doubt(all: &[&Verified], cameras: &Cameras, is_confirmed: impl FnO
     let gain = median(gains);
     (has_told && gain < MIN_MEDIAN_GAIN).then(|| {
         format!(
-            "photographs that were left out are met {gain:.1} dB better than by copies of their neighbours, \
+            "photographs that were held out are met {gain:.1} dB better than by copies of their neighbours, \
              {MIN_MEDIAN_GAIN} are needed"
         )
     })
@@ -106,14 +106,14 @@ pub(crate) fn doubt(all: &[&Verified], cameras: &Cameras, is_confirmed: impl FnO
 fn failure(scores: &HeldOutScores) -> Option<String> {
     if scores.sharpness() < MIN_SHARPNESS {
         return Some(format!(
-            "left out and rendered from the others, it is met no better at its pose ({:.1} dB) than two degrees beside \
+            "held out and rendered from the others, it is met no better at its pose ({:.1} dB) than two degrees beside \
              it ({:.1} dB)",
             scores.score, scores.disturbed
         ));
     }
     if scores.gain() < MIN_GAIN {
         return Some(format!(
-            "left out and rendered from the others, it is met no better or hardly better ({:.1} dB) than by a copy of \
+            "held out and rendered from the others, it is met no better or hardly better ({:.1} dB) than by a copy of \
              its neighbour ({:.1} dB)",
             scores.score,
             scores.copy.max(scores.warp)

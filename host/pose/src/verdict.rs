@@ -79,7 +79,7 @@ impl Refusal {
     pub fn main(&self) -> &str {
         let all = || self.reasons.iter().map(String::as_str);
         let stage = |reason: &&str| {
-            let later = ["left out", "held-out", "no other attempt", "lie in a plane", "hardly moved", "focal length"];
+            let later = ["held out", "held-out", "no other attempt", "lie in a plane", "hardly moved", "focal length"];
             later.iter().position(|words| reason.contains(words)).map_or(0, |place| later.len() - place)
         };
         all().max_by_key(stage).unwrap_or("no attempt was made")

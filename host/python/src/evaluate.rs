@@ -1,4 +1,4 @@
-//! Schemes on views that are left out of the sources, with the defaults of the command.
+//! Schemes on held-out views, with the defaults of the command.
 
 use crate::error::Failure;
 use crate::given_weights::{GivenWeights, Raised};

@@ -11,7 +11,7 @@
 //! given_weights  weights of the caller's own: an array, or a function
 //! frame          a rendered view
 //! render         the render loop
-//! evaluate       schemes on views that are left out
+//! evaluate       schemes on held-out views
 //! optimise       photographs to a file of Gaussians
 //! scene          a scene, with the methods that use the modules above
 //! pose           bare photographs to a scene

@@ -24,9 +24,9 @@ pub(crate) struct PyGaussians {
     count: usize,
     /// The iterations that were made.
     iterations: u32,
-    /// Iteration and mean PSNR in decibels of the views that were left out, on the way. Empty without such views.
+    /// Iteration and mean PSNR in decibels of the held-out views, on the way. Empty without such views.
     scores: Vec<(u32, f64)>,
-    /// Mean PSNR of some of the sources themselves, which says nothing of new views. None where views were left out.
+    /// Mean PSNR of some of the sources themselves, which says nothing of new views. None where views were held out.
     fit: Option<f64>,
 }
 

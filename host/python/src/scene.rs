@@ -147,7 +147,7 @@ impl PyScene {
         frames.into_iter().map(|frame| to_python(py, &self.scene, &sources, frame)).collect()
     }
 
-    /// Scores schemes on photographs that are left out: each target from all other views, or, with sources, all other
+    /// Scores schemes on held-out photographs: each target from all other views, or, with sources, all other
     /// views from these. The baselines come first. Ctrl-C ends it.
     #[pyo3(signature = (weights=None, *, targets=None, sources=None, views=None, size=None, model=None, device="auto",
         background="auto", leave_out=0.01, seed=Whole(0), progress=None))]

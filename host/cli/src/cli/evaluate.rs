@@ -63,7 +63,7 @@ pub(crate) struct Arguments {
     /// Take the scenes of a data set: those for train, val or test
     #[arg(long, value_name = "SPLIT")]
     split: Option<Split>,
-    /// Views to render and compare, as for --sources [default: all views, each left out in turn; with --sources all
+    /// Views to render and compare, as for --sources [default: all views, each held out in turn; with --sources all
     /// others]
     #[arg(long, value_name = "VIEWS")]
     targets: Option<String>,

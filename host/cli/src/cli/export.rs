@@ -42,6 +42,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         arguments.layout,
         written.photograph_count
     ))?;
-    written.lost.iter().try_for_each(|line| say(format_args!("left out   {line}")))?;
+    written.lost.iter().try_for_each(|line| say(format_args!("omitted    {line}")))?;
     Ok(ExitCode::SUCCESS)
 }

@@ -19,7 +19,7 @@ use viewfuse_scene::{MaskChoice, Scene, SceneError};
 use viewfuse_vulkan::{GpuOptions, VulkanError};
 
 /// Heading of the options that say what is omitted.
-pub(crate) const EFFORTS: &str = "Efforts: what is left out, for which time and error";
+pub(crate) const EFFORTS: &str = "Efforts: what is omitted, for which time and error";
 
 /// How a scene is opened, for every command that reads its photographs.
 #[derive(Args)]

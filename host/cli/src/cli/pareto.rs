@@ -46,7 +46,7 @@ const READINGS: usize = 20;
 pub(crate) struct Arguments {
     /// The scene's folder, or its transforms.json or *_par.txt
     scene: PathBuf,
-    /// Views to render, as for --sources; left out of the sources [default: the scene's target poses]
+    /// Views to render, as for --sources; they are no sources [default: the scene's target poses]
     #[arg(long, value_name = "VIEWS")]
     targets: Option<String>,
     #[command(flatten)]
@@ -244,7 +244,7 @@ fn print_device(device: &DeviceRecord) -> std::io::Result<()> {
     device.points.iter().for_each(|point| rows.add_row(row(point, has_truth, has_calls)));
     say(rows)?;
     if !left_out.is_empty() {
-        say("the last columns: how much of it was left out, %")?;
+        say("the last columns: how much of it was omitted, %")?;
     }
     let named = |setting: &Option<String>| setting.clone().unwrap_or_else(|| "none".to_owned());
     if has_truth {

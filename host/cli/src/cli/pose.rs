@@ -36,7 +36,7 @@ const MAX_ROWS: usize = 24;
     that do not state their focal length\n  viewfuse pose photos/ --from openmvg,colmap -o posed\n      with your own \
     COLMAP as a second opinion\n\n\
     Poses are found several times, with other features and, where the focal length is unknown, other guesses of it. \
-    What is written is what two attempts agree on, and what passes this: each photograph, left out and rendered from \
+    What is written is what two attempts agree on, and what passes this: each photograph, held out and rendered from \
     the others, is met at its pose, better than by copies of its neighbours, and not two degrees beside it. Where \
     neighbours are too far away for that, attempts must agree more closely and over many points, and the pose is \
     doubtful: pose.json and every command that opens\n\
@@ -270,7 +270,7 @@ fn picture_of_matches(found: &Found) -> RgbImage {
 fn print(found: &Found, verdict: &Verdict, record: &Record<'_>) -> std::io::Result<()> {
     let all = found.intake.photos.len() + found.intake.unusable.len();
     say(format_args!("registered {} of {all} photographs", verdict.photos.len()))?;
-    record.excluded.iter().try_for_each(|(name, reason)| say(format_args!("left out   {name}: {reason}")))?;
+    record.excluded.iter().try_for_each(|(name, reason)| say(format_args!("excluded   {name}: {reason}")))?;
     let doubtful = verdict.doubtful();
     if !doubtful.is_empty() {
         say(format_args!(
@@ -305,7 +305,7 @@ fn print(found: &Found, verdict: &Verdict, record: &Record<'_>) -> std::io::Resu
     for image in record.accepted {
         let scores = &image.held_out;
         say(format_args!(
-            "left-out   {} rendered from the others {:.1} dB; copies {:.1} dB, two degrees beside {:.1} dB; attempts \
+            "held out   {} rendered from the others {:.1} dB; copies {:.1} dB, two degrees beside {:.1} dB; attempts \
                 differ by {:.2} degrees",
             scores.photograph,
             scores.score,

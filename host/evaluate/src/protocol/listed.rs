@@ -5,13 +5,22 @@ use viewfuse_field::held_out;
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{SelectionError, SelectionFault, check_count, view_list};
 
-/// The views of two lists; a source is never a target: with a note of those that are in both.
+/// Views of two lists.
+pub(super) struct Listed {
+    pub(super) sources: Vec<usize>,
+    /// None of them is a source.
+    pub(super) targets: Vec<usize>,
+    /// What is said of views that are in both.
+    pub(super) notes: Vec<String>,
+}
+
+/// The views of two lists; a source is never a target.
 pub(super) fn fixed(
     scene: &Scene,
     sources: &str,
     targets: &str,
     least_sources: usize,
-) -> Result<(Vec<usize>, Vec<usize>, Vec<String>), SelectionError> {
+) -> Result<Listed, SelectionError> {
     let (sources, targets) = (view_list(scene, sources)?, view_list(scene, targets)?);
     let (both, targets): (Vec<usize>, Vec<usize>) = targets.into_iter().partition(|target| sources.contains(target));
     let names: Vec<&str> = both.iter().map(|view| scene.views[*view].name.as_str()).collect();
@@ -26,7 +35,7 @@ pub(super) fn fixed(
     if targets.is_empty() {
         return Err(SelectionFault::NoTargets.in_scene(scene));
     }
-    Ok((sources, targets, notes))
+    Ok(Listed { sources, targets, notes })
 }
 
 /// Each target of a list, or each view, with the `count` other views whose cameras are nearest to its own; the first of

@@ -50,7 +50,7 @@ flags! {
         "Largest and smallest noise level [default: 80,0.002]",
         |options, schedule| options.plan.schedule = schedule;
     "sampler", "NAME", parse_sampler, Effort, BOUNDS,
-        "Sampler: heun, unipc, ipndm [default: ipndm; heun where nothing is left out]",
+        "Sampler: heun, unipc, ipndm [default: ipndm; heun where nothing is omitted]",
         |options, given| if let Steps::Fixed { sampler, .. } = &mut options.plan.steps {
             *sampler = given;
         };

@@ -10,8 +10,8 @@ use viewfuse_job::progress::{Progress, Silent};
 const MEASURED: u32 = 20;
 /// Iterations before those, in which memory is taken.
 const FIRST: u32 = 3;
-/// How much longer an iteration takes with twice the Gaussians, less 1: the rest of it is a matter of the pixels. On fox,
-/// where the number grows four times, the mean iteration takes 1.9 times the first ones
+/// How much longer an iteration takes with twice the Gaussians, less 1, where that is not measured: the rest of it is a
+/// matter of the pixels. On fox, where the number grows four times, the mean iteration takes 1.9 times the first ones
 /// (`host/results/gaussian_quality.md`).
 const OF_GAUSSIANS: f64 = 0.44;
 /// Share of a limit after which a trial ends.
@@ -26,25 +26,55 @@ pub(super) struct Clock {
     is_told: bool,
     /// Iterations of the finest level that there are without a limit.
     wanted: u32,
+    /// As [`OF_GAUSSIANS`], of this scene.
+    of_gaussians: f64,
 }
 
-impl Clock {
-    /// Starts, with a limit or without.
-    pub(super) fn start(limit: Option<Duration>) -> Clock {
-        Clock { begun: Instant::now(), limit, measured: None, is_told: false, wanted: 0 }
-    }
+/// What an iteration of an optimisation takes that begins at its finest level.
+#[derive(Clone, Copy)]
+pub(super) struct Pace {
+    /// Seconds of one of the first iterations.
+    pub(super) first: f64,
+    /// Gaussians at first.
+    count: usize,
+    /// How many times as many there are at last.
+    growth: f64,
+}
 
-    /// Seconds that a mean iteration of an optimisation takes that begins at its finest level, by its first ones.
+impl Pace {
+    /// Of an optimisation's first iterations.
     ///
     /// # Errors
     /// [`FieldError`] if the device fails.
-    pub(super) fn pace(optimisation: &mut dyn Optimisation) -> Result<f64, FieldError> {
+    pub(super) fn of(optimisation: &mut dyn Optimisation) -> Result<Pace, FieldError> {
+        let (count, growth) = (optimisation.optimised()?.gaussians.len(), optimisation.growth());
         optimisation.run_to(FIRST, &Silent)?;
         optimisation.finish()?;
         let begun = Instant::now();
         optimisation.run_to(FIRST + MEASURED, &Silent)?;
         optimisation.finish()?;
-        Ok(mean_cost(optimisation.growth()) * begun.elapsed().as_secs_f64() / f64::from(MEASURED))
+        Ok(Pace { first: begun.elapsed().as_secs_f64() / f64::from(MEASURED), count, growth })
+    }
+
+    /// How much longer an iteration takes with twice the Gaussians, less 1, by another one of the same pictures.
+    fn of_gaussians(&self, other: &Pace) -> f64 {
+        let more = other.count as f64 / self.count.max(1) as f64 - 1.0;
+        let longer = other.first / self.first.max(1.0e-9) - 1.0;
+        if more > 0.5 { (longer / more).clamp(0.0, 1.0) } else { OF_GAUSSIANS }
+    }
+}
+
+impl Clock {
+    /// Starts, with a limit or without.
+    pub(super) fn start(limit: Option<Duration>) -> Clock {
+        Clock { begun: Instant::now(), limit, measured: None, is_told: false, wanted: 0, of_gaussians: OF_GAUSSIANS }
+    }
+
+    /// Seconds that a mean iteration takes, by the first ones and by those of an optimisation of the same pictures with
+    /// more Gaussians, of which it learns what these cost.
+    pub(super) fn mean(&mut self, pace: Pace, of_more: Pace) -> f64 {
+        self.of_gaussians = pace.of_gaussians(&of_more);
+        mean_cost(pace.growth, self.of_gaussians) * pace.first
     }
 
     /// When a trial must end, if there is a limit.
@@ -82,7 +112,8 @@ impl Clock {
         }
         optimisation.finish()?;
         self.is_told = true;
-        let one = mean_cost(optimisation.growth()) * begun.elapsed().as_secs_f64() / f64::from(done - first);
+        let one = mean_cost(optimisation.growth(), self.of_gaussians) * begun.elapsed().as_secs_f64()
+            / f64::from(done - first);
         self.measured = Some((Instant::now(), done));
         self.fit(optimisation, one);
         let left = optimisation.iteration_count() - optimisation.done();
@@ -116,9 +147,9 @@ impl Clock {
 
 /// What the mean iteration costs, relative to one now, if the number of Gaussians grows so many times: by equal factors
 /// in three fifths of the iterations.
-fn mean_cost(growth: f64) -> f64 {
+fn mean_cost(growth: f64, of_gaussians: f64) -> f64 {
     let mean = if growth > 1.0 + 1.0e-6 { 0.6 * (growth - 1.0) / growth.ln() + 0.4 * growth } else { 1.0 };
-    1.0 + OF_GAUSSIANS * (mean - 1.0)
+    1.0 + of_gaussians * (mean - 1.0)
 }
 
 /// A time in words.
@@ -135,6 +166,7 @@ mod tests {
 
     #[test]
     fn growth_makes_iterations_dearer() {
+        let mean_cost = |growth: f64| mean_cost(growth, OF_GAUSSIANS);
         assert_eq!(mean_cost(1.0), 1.0);
         assert!((mean_cost(4.25) - 1.9).abs() < 0.01, "fox: {}", mean_cost(4.25));
         assert!(mean_cost(20.0) > mean_cost(4.25));

@@ -1,6 +1,6 @@
 //! Which recipe, and how many iterations: those that held-out sources prefer, tried at a small size.
 
-use super::clock::{Clock, words};
+use super::clock::{Clock, Pace, words};
 use super::{OptimiseError, Photographed, SceneOptimisation};
 use crate::AnyField;
 use crate::gaussians::{Quality, Recipe, RecipeOptions};
@@ -58,7 +58,7 @@ impl SceneOptimisation<'_> {
         device: &AnyDevice,
         album: &Album<'_>,
         images: &SourceImages,
-        clock: &Clock,
+        clock: &mut Clock,
         progress: &dyn Progress,
     ) -> Result<Recipe, OptimiseError> {
         let (quality, count) = (self.recipe.quality, self.sources.len());
@@ -95,30 +95,35 @@ impl SceneOptimisation<'_> {
         let recipes: Vec<Recipe> = quick.iter().chain([&recipe]).map(|recipe| small(*recipe)).collect();
         let trial = SceneOptimisation { sources, held_out, before: None, towards: Vec::new(), ..self.clone() };
         let longest = stage.images.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
-        if self.max_time.is_none() {
-            let [.., finest] = recipe.iterations;
-            let alone = Recipe { iterations: [0, 0, 0, finest], ..recipe };
-            let mut begun = trial.begin(device, &stage.images, &points, alone)?;
-            let pace = Clock::pace(begun.as_mut()).map_err(RenderError::from)?;
-            let seconds = |of: &Recipe| pace * finest_iterations(of) * pixels(longest, of) / pixels(longest, &recipe);
-            progress.note(&format!(
-                "about {} for a trial of recipes, then at most about {} for {quality}",
-                words(recipes.iter().map(seconds).sum()),
-                words(seconds(&recipe))
-            ));
-        }
         progress.expect(recipes.iter().map(|recipe| recipe.iterations.iter().sum::<u32>() as usize).sum());
         let photographed = &Photographed::new(device, album, &stage.images);
         let until = clock.end_of_trial();
         let (mut curves, mut begun) = (Vec::new(), Instant::now());
-        for &recipe in &recipes {
+        for (index, &tried) in recipes.iter().enumerate() {
             begun = Instant::now();
-            let mut optimisation = trial.begin(device, &stage.images, &points, recipe)?;
+            let mut optimisation = trial.begin(device, &stage.images, &points, tried)?;
             let mut scores = Vec::new();
             let counted = Counted { progress, until };
             trial.advance(optimisation.as_mut(), photographed, &counted, None, &mut |_| Ok(()), &mut scores)?;
             progress.check().map_err(|error| OptimiseError::Render(crate::FieldError::from(error).into()))?;
             curves.push(scores);
+            if index == 0 && self.max_time.is_none() {
+                // What a finest iteration of the fast recipe takes, its scores included.
+                let quick = begun.elapsed().as_secs_f64() / finest_iterations(&tried).max(1.0);
+                let pace = |recipe: Recipe| -> Result<Pace, OptimiseError> {
+                    let alone = Recipe { iterations: [0, 0, 0, MAX_ITERATIONS], ..small(recipe) };
+                    let mut begun = trial.begin(device, &stage.images, &points, alone)?;
+                    Ok(Pace::of(begun.as_mut()).map_err(RenderError::from)?)
+                };
+                let more = Recipe { cell: 0.5 * recipe.cell, least_points: 1, ..recipe };
+                let sharp = clock.mean(pace(recipe)?, pace(more)?);
+                let seconds = |recipe: &Recipe| finest_iterations(recipe) * if recipe.grows { sharp } else { quick };
+                progress.note(&format!(
+                    "about {} more for a trial of recipes, then at most about {} for {quality}",
+                    words(recipes[1..].iter().map(seconds).sum()),
+                    words(seconds(&recipe) * pixels(longest, &recipe) / pixels(longest, &small(recipe)))
+                ));
+            }
         }
         let sharp = curves.pop().unwrap_or_default();
         // The fast recipe ends where it ends.
@@ -152,7 +157,7 @@ impl SceneOptimisation<'_> {
         };
         let held_out_count = trial.held_out.len();
         progress.note(&format!(
-            "{held_out_count} of {count} photographs left out of a trial have {quick_score:.2} dB with {} iterations \
+            "{held_out_count} of {count} photographs held out of a trial have {quick_score:.2} dB with {} iterations \
                 of fast and {score:.2} dB with {quality}: {words}",
             quick.all_iterations()
         ));

@@ -38,12 +38,12 @@ const ROUNDINGS: [Rounding; 3] = [
 /// Both passes, without nodes.
 const TWO_PASSES: [(&str, Omissions, f32, f32); 2] = [
     (
-        "both passes, empty space left out",
+        "both passes, empty space omitted",
         Omissions { interpolation: 0.05, probe_error: 1.0 / 512.0, ..Omissions::ALL },
         0.0021,
         0.32,
     ),
-    ("both passes, empty parts left out", Omissions { interpolation: 0.02, ..PARTS }, 0.0014, 0.42),
+    ("both passes, empty parts omitted", Omissions { interpolation: 0.02, ..PARTS }, 0.0014, 0.42),
 ];
 /// Second-pass samples in empty parts of rays are left out; rays stay independent of one another.
 const PARTS: Omissions = Omissions { empty_space: 0, ..Omissions::ALL };

@@ -46,7 +46,7 @@ impl Missing {
                 None => SceneFault::PoseWithoutImage(image),
             })),
             Some((_, image)) => Ok(Some(format!(
-                "{}: {count} of {listed} photographs are not there and left out (the first is {})",
+                "{}: {count} of {listed} photographs are not there and excluded (the first is {})",
                 list.display(),
                 image.display()
             ))),

@@ -62,7 +62,7 @@ impl Quality {
         let count = self.left_out.len() as f64;
         let mean = |value: &dyn Fn(&HeldOutSource) -> f64| self.left_out.iter().map(value).sum::<f64>() / count;
         say(format_args!(
-            "left out   {count} photographs, rendered from the others: PSNR {:.1} dB, from {:.1} ({}) to {:.1} ({}); a \
+            "held out   {count} photographs, rendered from the others: PSNR {:.1} dB, from {:.1} ({}) to {:.1} ({}); a \
              copy of the nearest photograph {:.1} dB",
             mean(&|source| source.psnr),
             least.psnr,

@@ -79,7 +79,7 @@ fn choice(chosen: &ChosenRecord, weighting: &str) -> String {
     let more = if gain > 0.0 { format!(", {gain:.2} dB more than by default") } else { String::new() };
     let count = left_out.len();
     format!(
-        "chosen: {weighting}{with}: {count} photographs that were left out have {psnr:.1} dB{more} (what was tried: \
+        "chosen: {weighting}{with}: {count} photographs that were held out have {psnr:.1} dB{more} (what was tried: \
             {RECORD})"
     )
 }
@@ -110,8 +110,8 @@ fn summary(frame: &FrameRecord, sources: &[String], is_of_sources: bool, folder:
     let left_out = match frame.left_out.len() {
         _ if !is_of_sources => String::new(),
         0 => String::new(),
-        1 => format!("  1 source left out (weight {:.4})", frame.left_out_weight),
-        count => format!("  {count} sources left out (weight {:.4})", frame.left_out_weight),
+        1 => format!("  1 source dropped (weight {:.4})", frame.left_out_weight),
+        count => format!("  {count} sources dropped (weight {:.4})", frame.left_out_weight),
     };
     let kept = frame.kept.as_ref().map_or_else(String::new, kept);
     let few = few_photographs(frame, sources).unwrap_or_default();
