@@ -278,7 +278,12 @@ fn files(folder: &Path, every: usize) -> Result<Listed, IntakeError> {
     all.retain(|path| unread(&extension(path)).is_none() || !is_converted(path, &converted));
     for path in &all {
         if let Some((format, way)) = unread(&extension(path)) {
-            let way = way.replace("FILE.jpg", &quoted(&appended(path))).replace("FILE", &quoted(path));
+            let word = |word: &str| match word {
+                "FILE" => quoted(path),
+                "FILE.jpg" => quoted(appended(path)),
+                word => word.to_owned(),
+            };
+            let way = way.split(' ').map(word).collect::<Vec<_>>().join(" ");
             return Err(IntakeError::Format(path.clone(), format, way));
         }
     }

@@ -32,8 +32,8 @@ pub(super) fn pairs(prediction: &Path, truth: &Path) -> anyhow::Result<Vec<Pair>
     // Some videos are pictures, too.
     let is_run = prediction.join(RECORD).is_file();
     let is_video = |path: &Path| VideoFormat::ALL.iter().any(|format| path.ends_with(format!("video.{format}")));
-    let is_picture = |path: &&PathBuf| !is_beside(path) && !(is_run && is_video(path));
-    let predictions: Vec<&PathBuf> = all.iter().filter(is_picture).collect();
+    let is_other = |path: &Path| is_beside(path) || is_run && is_video(path);
+    let predictions: Vec<&PathBuf> = all.iter().filter(|path| !is_other(path)).collect();
     if predictions.is_empty() {
         bail!("{}: has no pictures ({})", prediction.display(), EXTENSIONS[..3].join(", "));
     }
