@@ -146,7 +146,7 @@ fn bad_input_is_refused() {
     wrong("pareto toy --targets 20 --repeat 0 -o out", &["--repeat", "1..=1000"]);
     wrong("pareto toy --targets 20 --samples 8,8,8 -o out", &["--samples", "PixelNeRF", "--model FILE"]);
     wrong("pareto toy --targets 20 --device cpu --only sampler -o out", &["--only sampler", "exact; leave out 0.01"]);
-    wrong("pareto toy --targets 20 --beside =3 -o out", &["--beside", "PyTorch=5.8"]);
+    wrong("pareto toy --targets 20 --device cpu --beside =3 -o out", &["--beside", "PyTorch=5.8"]);
     wrong("pareto toy --targets 20", &["required"]);
 }
 
