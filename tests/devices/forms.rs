@@ -60,7 +60,7 @@ fn linear(gpu: &Gpu) -> Result<Vec<u32>, VulkanError> {
 }
 
 /// Arrays that are shorter than a kernel's parameters say, or end within a four: every form reads the last number again,
-/// as its body does, and none reads beyond.
+/// as its body does, and none reads beyond. Forms that read fours do not take them, and take all others.
 fn arrays_that_end_early_are_read_alike(candidate: &Candidate) -> Result<(), Failed> {
     let side = 64_u32;
     let block = LinearBlock {
@@ -70,8 +70,9 @@ fn arrays_that_end_early_are_read_alike(candidate: &Candidate) -> Result<(), Fai
         has_residual: 1,
         ..LinearBlock::default()
     };
-    let product = |form: Form, [bias_len, residual_len]: [u32; 2]| -> Result<Vec<u32>, VulkanError> {
-        let gpu = candidate.gpu(&GpuOptions { form: Some(form), ..GpuOptions::default() })?;
+    let whole = [side, side * side];
+    let faulty = |form: Form, faults: Faults, [bias_len, residual_len]: [u32; 2]| -> Result<Vec<u32>, VulkanError> {
+        let gpu = candidate.gpu(&GpuOptions { form: Some(form), faults, ..GpuOptions::default() })?;
         let [inputs, weights, bias, residual] =
             [side * side, side * side, bias_len, residual_len].map(|count| gpu.upload(&numbers(count)));
         let (inputs, weights, bias, residual) = (inputs?, weights?, bias?, residual?);
@@ -80,11 +81,18 @@ fn arrays_that_end_early_are_read_alike(candidate: &Candidate) -> Result<(), Fai
         gpu.dispatch(Kernel::Linear, bytes_of(&block), 0..tile_elements(side, side), &arrays)?;
         bits(&gpu, &outputs)
     };
+    let product = |form: Form, lengths: [u32; 2]| faulty(form, Faults::default(), lengths);
     for lengths in [[1, 64 * 64], [3, 64 * 64], [61, 64 * 64], [64, 1], [64, 64 * 64 - 3], [8, 64]] {
         let expected = product(Form::Single, lengths)?;
         for form in Form::ALL.into_iter().filter(|form| candidate.adapter.runs(*form)) {
             assert!(product(form, lengths)? == expected, "{} with arrays of {lengths:?}", form.name());
         }
+    }
+    let expected = product(Form::Single, whole)?;
+    for form in Form::ALL.into_iter().filter(|form| form.needs_fours() && candidate.adapter.runs(*form)) {
+        let faults = Faults { half_done: Some(form), ..Faults::default() };
+        assert!(faulty(form, faults, whole)? != expected, "{} is not taken for whole arrays", form.name());
+        assert!(faulty(form, faults, [side - 1, side * side])? == product(form, [side - 1, side * side])?);
     }
     Ok(())
 }
