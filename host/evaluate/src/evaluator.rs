@@ -160,11 +160,11 @@ impl Evaluator<'_> {
         progress.stage("reading the sources", 0..1, stage_count);
         let mut stage = Stage::prepare(scene, album, sources, renderer, options, progress)?;
         let (mut scores, masks) = self.baseline_scores(&subject, &stage, sources, targets, score)?;
-        // Views that a field encodes when a target first needs them: all schemes and targets share that.
         if scores.is_empty() && !targets.is_empty() {
             let (scene, view) = (scene.path.display().to_string(), scene.views[targets[0]].name.clone());
             return Err(EvaluateError::NoTruth { scene, view });
         }
+        // Views that a field encodes when a target first needs them: all schemes and targets share that.
         let (first, mut shared) = (scores.len(), Duration::ZERO);
         for (index, row) in weightings.iter().enumerate() {
             let name = row.to_string();

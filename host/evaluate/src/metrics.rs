@@ -103,8 +103,8 @@ pub trait Scorer {
     /// the loaded networks, in the order of [`Scored::name`]'s list.
     ///
     /// `seen` is 0 where the photograph shows nothing; without it all pixels are scored, and of no pixels there are no
-    /// scores. PSNR and SSIM leave unseen
-    /// pixels out ([`viewfuse_field::scores`]); networks see the truth's pixels there in both pictures.
+    /// scores. PSNR and SSIM leave unseen pixels out ([`viewfuse_field::scores`]); networks see the truth's pixels there
+    /// in both pictures.
     ///
     /// # Errors
     /// [`MetricError`].
