@@ -129,7 +129,21 @@ fn what_shows_nothing_is_not_scored() {
             .map(str::to_owned)
     };
     assert_eq!(scored("4,5"), scored("5"), "the other one counts alone");
-    assert_refused(folder.path(), &format!("evaluate room --targets 4 {with}"), &["004"]);
+    let nothing = "of the photographs of the targets nothing counts";
+    assert_refused(folder.path(), &format!("evaluate room --targets 4 {with}"), &["room", nothing]);
+    // Each target from sources of its own, and as a job of its own.
+    let with = "--size 64x48 --weights mean --device cpu";
+    for each in [format!("evaluate room {with}"), format!("evaluate room --protocol nearest:3 {with} -o jobs")] {
+        let Outcome { code, stdout, stderr } = run(&folder, &format!("{each} --targets 4,5"));
+        assert_eq!(code, Some(0), "{stderr}");
+        assert!(stderr.contains("'004' is not scored: of its photograph nothing counts"), "{stderr}");
+        assert!(stdout.contains(": 1 target") || stdout.contains(", 1 picture of each scheme"), "{stdout}");
+    }
+    assert_refused(
+        folder.path(),
+        &format!("evaluate room --protocol nearest:3 {with} --targets 4"),
+        &["room", nothing],
+    );
     let optimise = "optimise room --size 64x48 --iterations 2 --device cpu";
     assert_refused(folder.path(), &format!("{optimise} --left-out 4 -o a.ply"), &["held out nothing counts"]);
     let printed = run(&folder, "inspect room --quality").stdout;

@@ -100,6 +100,23 @@ fn webp_and_tiff_are_read_whatever_they_are_called() {
 }
 
 #[test]
+fn a_file_that_is_not_read_is_named_by_its_kind() {
+    for (bytes, kind) in [
+        (&b""[..], "the file is empty"),
+        (b"\0\0\0\x18ftypheic", "a picture of the format HEIC"),
+        (b"\0\0\0\x18ftypmif1", "a picture of the format HEIC"),
+        (b"\0\0\0\x1cftypavif", "a picture of the format AVIF"),
+        (b"\0\0\0\x18ftypmp42", "a video"),
+        (b"\0\0\0\x14ftypqt  ", "a video"),
+        (b"BM\x36\0", "a picture of the format BMP"),
+        (b"GIF89a", "a picture of the format GIF"),
+        (b"a letter", "not a readable image"),
+    ] {
+        assert_refused(&folder(None, bytes), "images/1.jpg: ", &[kind]);
+    }
+}
+
+#[test]
 fn a_jpeg_that_ends_before_its_picture_is_refused() {
     let whole = tagged(32, 24, 1);
     open(&folder(None, &whole)).photograph(0).expect("a photograph");

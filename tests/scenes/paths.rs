@@ -180,6 +180,7 @@ fn tables_of_poses() {
         ("x,y,z,up\n1,2,3,4\n", ":1: there is no column \"up\""),
         ("x,x,y,z\n", ":1: column \"x\" is there twice"),
         ("x,y,z,look_x,look_y,look_z\n1,2,3,4,5,6\n1,2,3,4,five,6\n", ":3: \"five\" is not a number"),
+        ("x;y;z;look_x\n1;2;3;4\n", ":1: there is no column \"x;y;z;look_x\": columns are separated by commas"),
         ("x,y,z,look_x,look_y,look_z\n1,2,3,4,5\n", "not a table of comma-separated values"),
         ("x,y,z,qw,qx,qy,qz\n1,2,3,0,0,0,0\n", ":2: qw qx qy qz are no rotation"),
         ("x,y,z,look_x,look_y,look_z\n1,2,3,1,2,3\n", ":2: the camera stands at the point that it is to look at"),

@@ -96,6 +96,14 @@ fn missing_photographs_and_depth_images_are_one_warning_each() {
 }
 
 #[test]
+fn a_photograph_beside_a_list_from_another_machine_is_named() {
+    let moved = with_frames(json!([frame("/home/anna/desk/1.png")]), &["images/1.png"]);
+    let found = format!("but {} is there: make the path relative", moved.file("images/1.png").display());
+    let begins = "transforms.json: frames[0].file_path: this pose has no photograph";
+    assert_refused(&moved, begins, &["/home/anna/desk/1.png", &found]);
+}
+
+#[test]
 fn photographs_may_be_smaller_and_paths_those_of_another_system() {
     let mut frames: Vec<Value> = ["images/1.png", "images/2.png"].map(frame).into();
     frames[1]["file_path"] = json!("images\\2.png");

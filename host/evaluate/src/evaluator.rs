@@ -38,6 +38,12 @@ pub enum EvaluateError {
         /// The view.
         view: String,
     },
+    /// Of no target's photograph anything counts.
+    #[error(
+        "{0}: nothing can be scored: of the photographs of the targets nothing counts, as their masks or alpha \
+        channels say"
+    )]
+    NothingCounts(String),
     /// A render failed.
     #[error(transparent)]
     Render(#[from] RenderError),
@@ -134,8 +140,9 @@ const READINGS_A_GROUP: usize = 20;
 type Masks = HashMap<usize, Option<MaskedTruth>>;
 
 impl Evaluator<'_> {
-    /// Scores the baselines and then every scheme on targets that share their sources. `seen` gets each rendered frame
-    /// with its scheme's name, its values and the sources at working size.
+    /// Scores the baselines and then every scheme on targets that share their sources, but for targets of whose
+    /// photographs nothing counts, which are named in a warning. `seen` gets each rendered frame with its scheme's
+    /// name, its values and the sources at working size.
     ///
     /// # Errors
     /// [`EvaluateError`].
@@ -160,9 +167,9 @@ impl Evaluator<'_> {
         progress.stage("reading the sources", 0..1, stage_count);
         let mut stage = Stage::prepare(scene, album, sources, renderer, options, progress)?;
         let (mut scores, masks) = self.baseline_scores(&subject, &stage, sources, targets, score)?;
-        if scores.is_empty() && !targets.is_empty() {
-            let (scene, view) = (scene.path.display().to_string(), scene.views[targets[0]].name.clone());
-            return Err(EvaluateError::NoTruth { scene, view });
+        let targets: Vec<usize> = targets.iter().copied().filter(|target| masks.contains_key(target)).collect();
+        if targets.is_empty() {
+            return Ok(scores);
         }
         // Views that a field encodes when a target first needs them: all schemes and targets share that.
         let (first, mut shared) = (scores.len(), Duration::ZERO);
@@ -205,7 +212,7 @@ impl Evaluator<'_> {
         Ok(scores)
     }
 
-    /// Scores the baselines, and reads the masks of the targets.
+    /// Scores the baselines, and reads the masks of the targets: there is an entry of each that can be scored.
     fn baseline_scores(
         &self,
         subject: &Subject<'_>,
@@ -220,6 +227,10 @@ impl Evaluator<'_> {
             self.progress.check().map_err(PhotographsError::from).map_err(RenderError::from)?;
             let ((camera, truth), mask) = (shown_at(*subject, stage, target)?, self.mask(*subject, stage, target)?);
             if !shows_anything(truth.seen.as_ref()) {
+                self.progress.warn(&format!(
+                    "'{}' is not scored: of its photograph nothing counts, as its mask or its alpha channel says",
+                    scene.views[target].name
+                ));
                 continue;
             }
             let pose = &scene.views[target].camera.pose;
@@ -293,6 +304,9 @@ impl Evaluator<'_> {
             let progress = &Part::begin(self.progress, "", place..place + READINGS_A_GROUP, parts);
             let part = Evaluator { progress, ..*self };
             scores.extend(part.score(subject, sources, targets, |_, _, _, _| {})?);
+        }
+        if scores.is_empty() {
+            return Err(EvaluateError::NothingCounts(scene.path.display().to_string()));
         }
         Ok(scores)
     }

@@ -126,12 +126,12 @@ impl<D: Device> Scorer for Metrics<'_, D> {
         same_size(prediction, truth)?;
         seen.map_or(Ok(()), |seen| equal(seen.dimensions(), truth.dimensions()))?;
         let (shown, shown_truth) = (self.convention.shown(prediction), self.convention.shown(truth));
-        let psnr = psnr_of_seen(&shown, &shown_truth, seen);
         let mut scores = Vec::new();
         if !shows_anything(seen) {
             return Ok(scores);
         }
-        scores.push(Scored { name: "psnr", value: psnr, more_is_better: true });
+        let value = psnr_of_seen(&shown, &shown_truth, seen);
+        scores.push(Scored { name: "psnr", value, more_is_better: true });
         if let Some(value) = ssim_of_seen(&shown, &shown_truth, seen) {
             scores.push(Scored { name: "ssim", value, more_is_better: true });
         }

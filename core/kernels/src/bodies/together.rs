@@ -15,13 +15,14 @@ pub use paths::*;
 pub use shares::*;
 
 use crate::gaussians::blend_gradient::{GradientLanes, GradientSums, NUMBERS, SplatGradient};
-use crate::gaussians::lanes::sum;
+use crate::gaussians::lanes::{SplatLanes, sum};
 use crate::gaussians::{MIN_TRANSMITTANCE, SPLAT_TILE, TileBlock};
 use crate::rows::{SHARED_BYTES, WORKGROUP};
 use crate::store::Store;
 use crate::workgroup::Workgroup;
 use viewfuse_core::fetch::Fetch;
 use viewfuse_core::gaussian::ProjectedGaussian;
+use viewfuse_core::math::abs;
 
 /// Splats of which the pixels' numbers are in the workgroup's memory at a time.
 const BATCH: u32 = 5;
@@ -29,7 +30,7 @@ const BATCH: u32 = 5;
 const SUMMED: u32 = BATCH * NUMBERS as u32;
 /// From a number of all pixels to the next: odd, so that invocations that sum neighbouring ones read different banks.
 const STRIDE: usize = WORKGROUP as usize + 1;
-/// Where the sums begin: behind the numbers of the pixels, the last of which is what is seen behind the splats.
+/// Where the sums begin: behind the numbers of the pixels, the last of which is 1 where something behind is seen.
 const SUMS: usize = (SUMMED as usize + 1) * STRIDE;
 /// Splats that are fetched at a time, each by one invocation.
 const FETCHED: u32 = WORKGROUP / BATCH * BATCH;
@@ -83,17 +84,15 @@ pub fn blend_gradient(
             let count = if fetched - first < BATCH { fetched - first } else { BATCH };
             put_numbers(&mut group, thread, &mut pixel, centre, first, count);
             group.wait();
+            // All by the same instructions: invocations of a subgroup that differ would wait for one another.
             if thread <= SUMMED {
-                let of_pixels = thread as usize * STRIDE;
-                let total =
-                    if thread < SUMMED { sum_of_tile(&group, of_pixels) } else { most_of_tile(&group, of_pixels) };
-                group.put(SUMS + thread as usize, total);
+                group.put(SUMS + thread as usize, sum_of_tile(&group, thread as usize * STRIDE));
             }
             group.wait();
             if thread < count {
                 sums.store((entry + first + thread) as usize, sum_of_splat(&group, thread));
             }
-            is_over = group.get(SUMS + SUMMED as usize) < MIN_TRANSMITTANCE;
+            is_over = group.get(SUMS + SUMMED as usize) == 0.0;
             first += count;
         }
         entry += first;
@@ -134,28 +133,44 @@ fn splat_at(group: &impl Workgroup, place: u32) -> ProjectedGaussian {
     }
 }
 
-/// Puts what a pixel says of `count` splats from `first` on, and what is seen behind them.
+/// Puts what a pixel says of `count` splats from `first` on, and whether something behind them is seen. How a pixel sees
+/// a splat depends on no other one, so that a device computes that of all side by side; one after the other is only
+/// what they hide of one another.
 #[inline(always)]
-fn put_numbers(
-    group: &mut impl Workgroup,
+fn put_numbers<W: Workgroup>(
+    group: &mut W,
     thread: u32,
     pixel: &mut GradientLanes<1>,
     [x, y]: [f32; 2],
     first: u32,
     count: u32,
 ) {
-    let mut place = 0;
-    while place < count {
+    let seen = |group: &W, place: u32| {
+        let splat = splat_at(group, first + if place < count { place } else { 0 });
+        let mut seen = SplatLanes::<1>::of(&splat, x, y);
+        if place >= count || abs(y - splat.mean[1]) > splat.extent[1] {
+            (seen.alpha, seen.slope) = ([0.0], [0.0]);
+        }
+        (seen, splat.colour)
+    };
+    const { assert!(BATCH == 5) };
+    let (a, b, c, d, e) = (seen(group, 0), seen(group, 1), seen(group, 2), seen(group, 3), seen(group, 4));
+    let mut put = |place: usize, (seen, colour): (SplatLanes<1>, [f32; 3])| {
         let mut said = GradientSums::<1>::ZERO;
-        pixel.add(x, y, &splat_at(group, first + place), &mut said);
+        pixel.add_seen(&seen, colour, &mut said);
         let mut number = 0;
         while number < NUMBERS {
-            group.put((place as usize * NUMBERS + number) * STRIDE + thread as usize, said.0[number][0]);
+            group.put((place * NUMBERS + number) * STRIDE + thread as usize, said.0[number][0]);
             number += 1;
         }
-        place += 1;
-    }
-    group.put(SUMMED as usize * STRIDE + thread as usize, pixel.most_seen());
+    };
+    put(0, a);
+    put(1, b);
+    put(2, c);
+    put(3, d);
+    put(4, e);
+    let sees_on = if pixel.most_seen() >= MIN_TRANSMITTANCE { 1.0 } else { 0.0 };
+    group.put(SUMMED as usize * STRIDE + thread as usize, sees_on);
 }
 
 /// The sums of a splat of a batch.
@@ -184,17 +199,4 @@ fn sum_of_tile(group: &impl Workgroup, first: usize) -> f32 {
         row += 1;
     }
     sum(&columns)
-}
-
-/// The most of a tile's pixels.
-#[inline(always)]
-fn most_of_tile(group: &impl Workgroup, first: usize) -> f32 {
-    let mut most = 0.0;
-    let mut pixel = 0;
-    while pixel < WORKGROUP as usize {
-        let seen = group.get(first + pixel);
-        most = if seen > most { seen } else { most };
-        pixel += 1;
-    }
-    most
 }

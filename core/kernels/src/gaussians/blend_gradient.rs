@@ -83,12 +83,13 @@ pub struct GradientLanes<const N: usize> {
 }
 
 impl<const N: usize> GradientLanes<N> {
-    /// Pixels outside of the picture: no derivatives.
-    pub const OUTSIDE: GradientLanes<N> = GradientLanes { by: [[0.0; N]; 4], transmittance: [1.0; N], rest: [0.0; N] };
+    /// Pixels outside of the picture: no derivatives, and nothing that is seen.
+    pub const OUTSIDE: GradientLanes<N> = GradientLanes { by: [[0.0; N]; 4], transmittance: [0.0; N], rest: [0.0; N] };
 
     /// Makes a pixel that of this colour (red, green, blue, opacity), with the derivatives by these.
     #[inline(always)]
     pub fn set(&mut self, lane: usize, colour: [f32; 4], by: [f32; 4]) {
+        self.transmittance[lane] = 1.0;
         let mut channel = 0;
         while channel < 4 {
             self.by[channel][lane] = by[channel];
@@ -107,7 +108,13 @@ impl<const N: usize> GradientLanes<N> {
         if greatest(&seen.alpha) <= 0.0 {
             return;
         }
-        let (by, [red, green, blue]) = (&self.by, splat.colour);
+        self.add_seen(&seen, splat.colour, sums);
+    }
+
+    /// Adds what the pixels say of the next splat, of this colour, which they see so.
+    #[inline(always)]
+    pub fn add_seen(&mut self, seen: &SplatLanes<N>, [red, green, blue]: [f32; 3], sums: &mut GradientSums<N>) {
+        let by = &self.by;
         let (transmittance, rest) = (&mut self.transmittance, &mut self.rest);
         let mut lane = 0;
         while lane < N {

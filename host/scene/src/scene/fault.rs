@@ -95,7 +95,7 @@ pub enum ImageFault {
     #[error("the file is empty")]
     Empty,
     /// It is of a format that is not read, whatever its name says.
-    #[error("it is a picture of the format {0}, which is not read: convert it to JPEG or PNG first")]
+    #[error("it is {0}, which is not read: JPEG and PNG are")]
     Kind(&'static str),
     /// A decoder panics on it.
     #[error("not a readable image: {0}")]

@@ -257,16 +257,19 @@ fn decoding<T>(path: &Path, decode: impl FnOnce() -> image::ImageResult<T>) -> R
     Err(FilePlace::file(path).fault(fault))
 }
 
-/// The format of a file of pictures that is not read, by its first bytes; an empty one of an empty file.
+/// What a file that is not read is, by its first bytes; nothing of an empty file.
 fn kind_of(path: &Path) -> Option<&'static str> {
     let mut first = Vec::new();
     File::open(path).ok()?.take(12).read_to_end(&mut first).ok()?;
     Some(match &first[..] {
         [] => "",
-        [_, _, _, _, b'f', b't', b'y', b'p', b'a', b'v', b'i', ..] => "AVIF",
-        [_, _, _, _, b'f', b't', b'y', b'p', b'h' | b'm', ..] => "HEIC",
-        [b'B', b'M', ..] => "BMP",
-        [b'G', b'I', b'F', b'8', ..] => "GIF",
+        [_, _, _, _, b'f', b't', b'y', b'p', brand @ ..] => match brand {
+            b"avif" | b"avis" => "a picture of the format AVIF",
+            [b'h', b'e', ..] | b"mif1" | b"msf1" => "a picture of the format HEIC",
+            _ => "a video",
+        },
+        [b'B', b'M', ..] => "a picture of the format BMP",
+        [b'G', b'I', b'F', b'8', ..] => "a picture of the format GIF",
         _ => return None,
     })
 }

@@ -16,6 +16,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::ExitCode;
 use viewfuse_device::choice::Chosen;
+use viewfuse_evaluate::EvaluateError;
 use viewfuse_evaluate::metrics::masked::PSNR_MASKED;
 use viewfuse_evaluate::protocol::{Draws, Job, Plan, Protocol, Published};
 use viewfuse_evaluate::run_folder::{Finished, SETTINGS, SceneSettings, Settings, Shard, missing};
@@ -120,6 +121,10 @@ pub(super) fn run(
     let (finished, done) = on_threads(arguments.picture.threads, || work.run(&device, &field))??;
     drop(progress);
     let missing = missing(plan.jobs.len(), &finished);
+    if missing.is_empty() && finished.values().all(|job| job.scores.is_empty()) {
+        let scenes: Vec<String> = scenes.iter().map(Scene::name).collect();
+        return Err(EvaluateError::NothingCounts(scenes.join(", ")).into());
+    }
     let results = match missing.is_empty() {
         true => tables(finished.values(), protocol.has_table_a_count()),
         false => Vec::new(),
