@@ -93,6 +93,25 @@ fn the_published_network() {
     assert_eq!((published.tensors().len(), published.parameter_count()), (950, 102_783_749));
 }
 
+/// A file that lost its metadata, as some programs write it again.
+#[test]
+fn what_is_assumed_of_a_network_is_told() {
+    let assumed = |architecture: &Architecture, metadata: &[(&str, &str)]| {
+        let mut tensors = Tensors::of(architecture);
+        tensors.metadata = metadata.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+        let checkpoint = tensors.checkpoint();
+        Architecture::of(&checkpoint).expect("a network").assumption(&checkpoint)
+    };
+    let said = assumed(&Architecture::small(), &[]).expect("what its denoiser begins with");
+    assert!(said.starts_with("it: ") && said.contains("write viewfuse.estimate = published"), "{said}");
+    assert_eq!(assumed(&Architecture::published(), &[]), None);
+    for estimate in ["published", "colours"] {
+        assert_eq!(assumed(&Architecture::small(), &[("viewfuse.estimate", estimate)]), None, "{estimate}");
+    }
+    let made = Tensors::small().metadata;
+    assert_eq!(made.get("viewfuse.estimate").map(String::as_str), Some("published"), "it says so itself");
+}
+
 #[test]
 fn the_small_network() {
     let small = Architecture::small();

@@ -1,7 +1,7 @@
 //! PixelNeRF's family of networks: what its metadata say.
 
 use std::path::Path;
-use viewfuse::field::pixelnerf::Architecture;
+use viewfuse::field::pixelnerf::{Architecture, PixelNerf};
 use viewfuse::job::progress::Silent;
 use viewfuse::nn::checkpoint::{Checkpoint, Precision};
 use viewfuse::nn::initialisation;
@@ -57,7 +57,16 @@ fn the_folder_of_the_authors_archive_says_what_tensors_do_not() {
         assert!(!opened(place, &[("viewfuse.first_pool", "0")]).0, "{place}");
     }
     let said = saying("viewfuse.first_pool", "2").expect_err("neither");
-    assert!(said.contains("viewfuse.first_pool = 2, which is neither 0 nor 1"), "{said}");
+    assert!(said.contains("viewfuse.first_pool = '2', which is not 0 or 1"), "{said}");
+    for (key, value, allowed) in [
+        ("frequency", "0", "above 0 and at most 1000"),
+        ("frequency", "1e30", "above 0 and at most 1000"),
+        ("pixel_centre", "64.5", "from 0 to 1"),
+        ("pixel_centre", "-1", "from 0 to 1"),
+    ] {
+        let said = saying(&format!("viewfuse.{key}"), value).expect_err(value);
+        assert!(said.contains(&format!("viewfuse.{key} = '{value}', which is not {allowed}")), "{said}");
+    }
 }
 
 #[test]
@@ -81,6 +90,31 @@ fn what_is_assumed_of_a_network_that_nothing_is_known_of_is_told() {
     for name in ["pixelnerf_cars.safetensors", "genvs_cars.safetensors"] {
         assert_eq!(Architecture::assumption(&included(name)), None, "{name}");
     }
+}
+
+/// The included network with a tensor of integers in the place of f16, and with a variance below 0.
+#[test]
+fn numbers_that_are_no_weights_are_refused() {
+    let bytes = std::fs::read(repository().join("host/models/pixelnerf_cars.safetensors")).expect("a network");
+    let length = u64::from_le_bytes(bytes[..8].try_into().expect("eight bytes")) as usize;
+    let header = std::str::from_utf8(&bytes[8..8 + length]).expect("a header");
+    let tensors: serde_json::Value = serde_json::from_str(header).expect("JSON");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("network.safetensors");
+    let refused = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).expect("a file");
+        let opened = Checkpoint::open(&path).and_then(|checkpoint| PixelNerf::new(&checkpoint, Default::default()));
+        opened.err().expect("must be refused").to_string()
+    };
+    let integers = header.replacen("F16", "I16", 1);
+    let said = refused(&[&bytes[..8], integers.as_bytes(), &bytes[8 + length..]].concat());
+    assert!(said.contains("holds numbers of type int16, where weights are floating point"), "{said}");
+    let name = "encoder.model.bn1.running_var";
+    let first = tensors[name]["data_offsets"][0].as_u64().expect("an offset") as usize + 8 + length;
+    let mut negative = bytes.clone();
+    negative[first + 1] = 0xbc;
+    let said = refused(&negative);
+    assert!(said.contains(&format!("tensor '{name}': the variance of channel 0 is -1")), "{said}");
 }
 
 #[test]

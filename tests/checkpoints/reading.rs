@@ -1,6 +1,6 @@
 //! Files that PyTorch wrote, and everything that a good file may have.
 
-use super::{data, pair, read};
+use super::{assert_refused, data, pair, read};
 use std::collections::BTreeMap;
 use viewfuse::nn::checkpoint::{Checkpoint, Element};
 use viewfuse_tests::checkpoints::{Claim, Pickle, archive, file, legacy, safetensors, state_dict};
@@ -97,6 +97,47 @@ fn prefix_of_data_parallel() {
     let claims = [Claim::new("module.a", &[1], &[1.0]), Claim::new("b", &[1], &[2.0])];
     let names = read(&archive(&state_dict(&claims), &claims)).expect("a file");
     assert_eq!(names[1].0, "module.a");
+}
+
+/// A tensor's call in its parts: the function, and the arguments as a tuple.
+fn call(claim: &Claim) -> (Vec<u8>, Vec<u8>) {
+    let function = Pickle::default().global("torch._utils", "_rebuild_tensor_v2").0;
+    let tensor = Pickle::default().tensor(claim).0;
+    (function.clone(), tensor[function.len()..tensor.len() - 1].to_vec())
+}
+
+#[test]
+fn buffers_and_tensors_with_attributes() {
+    let claim = Claim::new("a", &[2], &[1.0, 2.0]);
+    let (function, arguments) = call(&claim);
+    let class = Pickle::new().raw(b"}").text("a").global("torch._tensor", "_rebuild_from_type_v2").raw(b"(");
+    let class = class.raw(&function).global("torch.nn.parameter", "Buffer").raw(&arguments).raw(b"}tRs");
+    assert_eq!(read(&archive(&class.end(), &[claim])).expect("a file"), [("a".to_owned(), vec![1.0, 2.0])]);
+}
+
+#[test]
+fn what_would_be_lost_or_turned_is_refused() {
+    let claims = pair();
+    // A network beside the last loss, at the top and in the `state_dict`.
+    let table =
+        |table: Pickle| table.text("network").state_dict(&claims[..1]).text("loss").tensor(&claims[1]).raw(b"u");
+    let top = table(Pickle::new().raw(b"}("));
+    let inner = table(Pickle::new().raw(b"}").text("state_dict").raw(b"}(")).raw(b"s");
+    for pickle in [top, inner] {
+        assert_refused(&archive(&pickle.end(), &claims), &["beside them 'network'", "save model.state_dict()"]);
+    }
+    let array = Pickle::new().raw(b"}(").text("loss").tensor(&claims[1]).text("b");
+    let array = array.global("numpy.core.multiarray", "_reconstruct").raw(b")Ru").end();
+    assert_refused(&archive(&array, &claims), &["beside them 'b'", "an array of numpy"]);
+    for turned in ["neg", "conj"] {
+        let (function, arguments) = call(&claims[1]);
+        let tensor = Pickle::new().raw(b"}").text("a").raw(&function).raw(&arguments[..arguments.len() - 1]);
+        let tensor = tensor.raw(b"}").text(turned).raw(b"\x88stRs").end();
+        assert_refused(&archive(&tensor, &claims), &["tensor 'a': is to be negated or conjugated", "resolve_neg()"]);
+    }
+    let whole =
+        Pickle::new().raw(b"(").text("module").global("nets", "Net").text("net.py").text("class Net").raw(b"tQ");
+    assert_refused(&legacy(&whole.end(), &[]), &["a whole network as PyTorch wrote it before 1.6"]);
 }
 
 #[test]

@@ -76,9 +76,21 @@ fn nerfstudios_world_is_undone() {
             (0..3).for_each(|channel| assert!((seen[channel] - expected[channel]).abs() < 1.0e-4));
         }
     }
-    // What viewfuse wrote is in the scene's coordinates, whatever lies beside it.
+    // What viewfuse wrote is in the scene's coordinates, whatever lies beside it; a .splat cannot say so.
     gaussians.write(&path, &SceneFrame::FILE).expect("a file");
     assert_eq!(GaussianFile::open(&path, &scene).expect("a file").scene, gaussians);
+    let packed = folder.join("splat.spz");
+    GaussianScene::check_place(&packed, &scene).expect("it says so");
+    gaussians.write(&packed, &SceneFrame::FILE).expect("a file");
+    let near = |file: GaussianFile| {
+        let pairs = file.scene.gaussians.iter().zip(&gaussians.gaussians).collect::<Vec<_>>();
+        pairs.iter().all(|(new, old)| Vec3::from(new.position).distance(Vec3::from(old.position)) < 1.0e-3)
+    };
+    assert!(near(GaussianFile::open(&packed, &scene).expect("a file")));
+    let bare = folder.join("splat.splat");
+    let refused = GaussianScene::check_place(&bare, &scene).expect_err("another world");
+    assert!(refused.to_string().contains("dataparser_transforms.json"), "{refused}");
+    GaussianScene::check_place(Path::new("splat.splat"), &scene).expect("no other world");
 }
 
 #[test]
@@ -168,6 +180,13 @@ fn smaller_formats_are_written_and_read() {
             assert!((new[0] - old[0]).length() < 0.3, "{name}");
         }
         let far = SceneFrame { origin: DVec3::new(4.0e6, 1.0, 2.0), scale: 1.0 };
+        // Other numbers are none.
+        std::fs::write(
+            &renamed,
+            [[0.5_f32; 8]; 40].as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<_>>(),
+        )
+        .expect("a file");
+        read(&renamed).expect_err("no Gaussians");
         assert!(scene.write(&path, &far).expect_err(name).to_string().contains("state no origin"));
     }
     // Niantic's axes: y and z point the other way.
@@ -184,6 +203,27 @@ fn smaller_formats_are_written_and_read() {
     let path = folder.join("extended.spz");
     std::fs::write(&path, stream.finish().expect("gzip")).expect("a file");
     assert!(read(&path).expect_err("extensions").contains("with extensions (flags 0x2)"));
+    // The checksum is that of the arrays.
+    let whole = fs::read(folder.join("a.spz")).expect("a file");
+    for (name, end) in [("damaged.spz", 1), ("short.spz", 9)] {
+        let mut bytes = whole.clone();
+        let last = bytes.len() - end;
+        match name {
+            "short.spz" => bytes.truncate(last),
+            _ => bytes[last - 4] ^= 1,
+        }
+        let path = folder.join(name);
+        fs::write(&path, bytes).expect("a file");
+        assert!(read(&path).expect_err(name).contains("damaged or ends too early"));
+    }
+    bytes[14] = 0;
+    bytes.extend([7; 50]);
+    let mut stream = GzEncoder::new(Vec::new(), Compression::fast());
+    stream.write_all(&bytes).expect("gzip");
+    let path = folder.join("longer.spz");
+    fs::write(&path, stream.finish().expect("gzip")).expect("a file");
+    let notes = read(&path).expect("a file").notes;
+    assert!(notes.iter().any(|note| note.contains("50 bytes behind the arrays are not read")), "{notes:?}");
     for (name, bytes, word) in [
         ("a.sog", &b"PK\x03\x04"[..], ".sog of PlayCanvas"),
         ("a.ksplat", &b"\x00\x01\x00\x00"[..], ".ksplat"),

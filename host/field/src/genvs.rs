@@ -154,6 +154,7 @@ impl Field for Genvs {
         sources: &SourceImages,
         progress: &dyn Progress,
     ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
+        self.architecture.assumption(&self.checkpoint).iter().for_each(|assumption| progress.warn(assumption));
         if sources.background != [1.0; 3] {
             progress.warn("this network renders over white; a ground truth over another background differs by that");
         }

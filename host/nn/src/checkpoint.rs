@@ -42,7 +42,7 @@ use bytemuck::allocation::try_zeroed_vec;
 use error::{Problem, shortened};
 use location::{TensorLocation, TensorLocations, element_count};
 use std::collections::BTreeMap;
-use std::fs::File;
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use values::{Fault, PIECE_BYTES};
 
@@ -95,11 +95,12 @@ impl Checkpoint {
     /// too large or lie outside the file.
     pub fn open(path: &Path) -> Result<Checkpoint, CheckpointError> {
         let opened = || -> Result<Checkpoint, Problem> {
-            let file = File::open(path)?;
-            let facts = file.metadata()?;
+            // A pipe would be waited for when it is opened.
+            let facts = fs::metadata(path)?;
             if !facts.is_file() {
                 return Err(Problem::NoCheckpoint("not a file".to_owned()));
             }
+            let file = File::open(path)?;
             let kind = Kind::of(&file)?;
             let mut origin = kind.name().to_owned();
             let (places, mut metadata) = match kind {
@@ -216,9 +217,19 @@ impl Checkpoint {
     /// Checks that it has exactly these tensors; others are allowed if `optional` accepts them.
     ///
     /// # Errors
-    /// [`CheckpointError::Tensors`] with those that are missing, unexpected, or of another shape.
+    /// [`CheckpointError::Tensors`] with those that are missing, unexpected, of another shape, or no floating point
+    /// numbers, as quantised ones are.
     pub fn check(&self, expected: &[TensorShape], optional: impl Fn(&str) -> bool) -> Result<(), CheckpointError> {
-        match check::compare(&self.shapes, expected, optional) {
+        let of_integers = || {
+            let found = expected.iter().find_map(|tensor| {
+                let element = self.element(&tensor.name).filter(|element| !element.is_float());
+                element.map(|element| (&tensor.name, element.name()))
+            });
+            found.map(|(name, element)| {
+                format!("tensor '{name}' holds numbers of type {element}, where weights are floating point")
+            })
+        };
+        match check::compare(&self.shapes, expected, optional).or_else(of_integers) {
             None => Ok(()),
             Some(detail) => Err(CheckpointError::Tensors(self.path.clone(), detail)),
         }

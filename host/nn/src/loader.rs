@@ -71,11 +71,17 @@ impl Tensors<'_> {
     /// A batch norm that adds `epsilon` to variances.
     ///
     /// # Errors
-    /// [`CheckpointError`] if a tensor cannot be read.
+    /// [`CheckpointError`] if a tensor cannot be read, or a variance is negative.
     pub fn batch_norm(&self, name: &str, epsilon: f64) -> Result<BatchNorm, CheckpointError> {
         let [weight, bias, mean, variance] =
             ["weight", "bias", "running_mean", "running_var"].map(|leaf| self.values(&format!("{name}.{leaf}")));
-        Ok(BatchNorm::new(&weight?, bias?, mean?, &variance?, epsilon))
+        let variance = variance?;
+        if let Some(channel) = variance.iter().position(|variance| *variance < 0.0) {
+            let (prefix, value) = (self.prefix, variance[channel]);
+            let detail = format!("tensor '{prefix}{name}.running_var': the variance of channel {channel} is {value}");
+            return Err(CheckpointError::Tensors(self.checkpoint.path().to_path_buf(), detail));
+        }
+        Ok(BatchNorm::new(&weight?, bias?, mean?, &variance, epsilon))
     }
 
     /// A linear layer, from `weight[out][in]` and, where there is one, `bias[out]`.

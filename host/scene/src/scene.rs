@@ -331,6 +331,16 @@ impl Scene {
         masks::read(mask, &turn, self.masks).map(Some)
     }
 
+    /// The ignore mask of a view for the photograph of [`Scene::stored_photograph`], at a size: 0 for what does not
+    /// count, 255 elsewhere and without a mask.
+    pub(crate) fn stored_ignore_mask(&self, view: usize, [width, height]: [u32; 2]) -> Result<GrayImage, SceneError> {
+        let Some(mask) = &self.view(view)?.mask else {
+            return Ok(GrayImage::from_pixel(width, height, image::Luma([u8::MAX])));
+        };
+        let turn = Turn::of(&images::header(self.photograph_file(view)?)?, self.size(view)?);
+        masks::ignoring(mask, &turn, [width, height])
+    }
+
     /// The file of a view's photograph if its pixels are upright as they are stored.
     pub(crate) fn upright_file(&self, view: usize) -> Result<Option<&Path>, SceneError> {
         let file = self.photograph_file(view)?;

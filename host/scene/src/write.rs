@@ -28,9 +28,8 @@ use std::str::FromStr;
 use viewfuse_job::files::WholeFolder;
 use viewfuse_job::progress::{Interrupted, Progress};
 
-use crate::scene::camera_models::KeyedLens;
 use crate::scene::files::has_extension;
-use crate::{MaskChoice, Scene, SceneError, View};
+use crate::{MaskChoice, MaskMeaning, Scene, SceneError, View};
 pub use names::check_name;
 
 /// A layout in which scenes can be written.
@@ -192,10 +191,10 @@ pub fn write_with(
         Layout::Llff => llff::write(&mut out)?,
         Layout::Neus => neus::write(&mut out)?,
     };
-    readback::check(scene, layout, &draft, &names).map_err(unfit)?;
+    let read = readback::check(scene, layout, &draft, &names).map_err(unfit)?;
     beside.iter().try_for_each(|(name, bytes)| out.put(name, bytes))?;
     unfinished.finish().map_err(failed)?;
-    Ok(Written { folder: folder.to_path_buf(), photograph_count, lost: lost(scene, layout) })
+    Ok(Written { folder: folder.to_path_buf(), photograph_count, lost: lost(scene, layout, &read) })
 }
 
 /// A folder that is being filled.
@@ -238,14 +237,20 @@ fn all_photographed(scene: &Scene) -> Result<(), String> {
     }
 }
 
-/// The content that a layout does not hold.
-fn lost(scene: &Scene, layout: Layout) -> Vec<String> {
-    let views = |has: fn(&View) -> bool| scene.views.iter().filter(|view| has(view)).count();
+/// The content that a layout does not hold, of a scene that is `read` from it.
+fn lost(scene: &Scene, layout: Layout, read: &Scene) -> Vec<String> {
+    let views = |has: &dyn Fn(&View) -> bool| scene.views.iter().filter(|view| has(view)).count();
     let mut lines = Vec::new();
     if !layout.is_colmap() && !scene.points.is_empty() {
         lines.push(format!("{} reconstructed points", scene.points.len()));
     }
-    let depths = views(|view| view.near_far.is_some());
+    if let Some([least, greatest]) = llff::differing_focals(scene).filter(|_| layout == Layout::Llff) {
+        lines.push(format!(
+            "for NeRF's own program, the focal lengths: it takes the first photograph's for all, which are {least:.1} to \
+             {greatest:.1} pixels here"
+        ));
+    }
+    let depths = views(&|view| view.near_far.is_some());
     if layout != Layout::Llff && !(layout == Layout::Neus && neus::has_unit_sphere(scene)) && depths > 0 {
         lines.push(format!("near and far depths of {depths} views"));
     }
@@ -266,6 +271,11 @@ fn lost(scene: &Scene, layout: Layout) -> Vec<String> {
     if scene.mask_choice == MaskChoice::Object && scene.views.iter().any(is_said) {
         lines.push("that alpha channels say where the object is, which must be said of this folder, too".to_owned());
     }
+    let are_masks =
+        |scene: &Scene| scene.masks == MaskMeaning::Ignore && scene.views.iter().any(|view| view.mask.is_some());
+    if are_masks(scene) && !are_masks(read) && read.views.iter().any(|view| view.mask.is_some()) {
+        lines.push("that masks say which pixels do not count, which must be said of this folder, too".to_owned());
+    }
     // What cannot be read is said when it is written.
     let is_cut_out = || layout == Layout::Neus && neus::is_cut_out(scene, 0).unwrap_or(false);
     let has_object = scene.views.iter().any(|view| scene.has_object_mask(view)) || is_cut_out();
@@ -282,7 +292,7 @@ fn lost(scene: &Scene, layout: Layout) -> Vec<String> {
              that read this layout look for surfaces within that sphere"
         ));
     }
-    let parts = views(|view| view.split.is_some());
+    let parts = views(&|view| view.split.is_some());
     if layout != Layout::Transforms && parts > 0 {
         lines.push(format!("the part of the scene that {parts} views belong to"));
     }
@@ -291,9 +301,9 @@ fn lost(scene: &Scene, layout: Layout) -> Vec<String> {
         lines.push(format!("the ignore masks of {masks} photographs: what does not count is transparent"));
     }
     let lenses = match layout {
-        Layout::Transforms => views(|view| view.lens.is_some_and(|lens| KeyedLens::of(&lens).is_none())),
-        Layout::Colmap | Layout::ColmapBinary => views(|view| view.lens.is_some_and(|lens| !colmap::holds(&lens))),
-        _ => views(|view| view.lens.is_some()),
+        Layout::Transforms => views(&|view| view.lens.is_some_and(|lens| !transforms::holds(scene, &lens))),
+        Layout::Colmap | Layout::ColmapBinary => views(&|view| view.lens.is_some_and(|lens| !colmap::holds(&lens))),
+        _ => views(&|view| view.lens.is_some()),
     };
     if lenses > 0 {
         lines.push(format!(

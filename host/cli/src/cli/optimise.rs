@@ -136,7 +136,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let options = arguments.picture.to_render_options();
     check_writable(output)?;
     keep_file_apart([&scene], output)?;
-    GaussianScene::check_place(output, &scene.frame)?;
+    GaussianScene::check_place(output, &scene)?;
     let before = arguments.resume.as_ref().map(|path| GaussianFile::open(path, &scene)).transpose()?;
     let quality = arguments.quality.unwrap_or_else(|| quality_for(output, of_scene.sources.len()));
     let Arguments { iterations, count, seed, max_time, .. } = *arguments;

@@ -85,6 +85,21 @@ impl Architecture {
         }
     }
 
+    /// What is assumed of a network whose tensors and metadata leave open what its denoiser starts from, as a warning.
+    /// `None` for the published sizes, and for a network that says it or has no denoiser.
+    pub fn assumption(&self, checkpoint: &Checkpoint) -> Option<String> {
+        let says = checkpoint.metadata().contains_key(denoiser::ESTIMATE);
+        (self.denoiser.is_some() && !says && *self != Architecture::published()).then(|| {
+            format!(
+                "{}: what its tensors do not tell is assumed to be as in the published GeNVS, whose denoiser does not \
+                 begin with the features' colours; have `viewfuse convert` write {} = published into it, or colours, \
+                 as the laboratory's networks have it",
+                checkpoint.path().display(),
+                denoiser::ESTIMATE
+            )
+        })
+    }
+
     /// Reads the sizes from a checkpoint's tensors, and checks that it has every tensor of the architecture and no
     /// other.
     ///

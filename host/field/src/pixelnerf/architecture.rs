@@ -46,6 +46,8 @@ pub struct Architecture {
 const SOURCE_SIDE: u32 = 128;
 /// The largest side that a checkpoint may tell.
 const MAX_SIDE: f32 = 65536.0;
+/// The largest frequency.
+const MAX_FREQUENCY: f32 = 1000.0;
 
 const FIRST_POOL: &str = "viewfuse.first_pool";
 const FREQUENCY: &str = "viewfuse.frequency";
@@ -195,7 +197,12 @@ impl Architecture {
             frequency: frequency(&sizes, (embedded_len - 6) / 6)?,
             has_fine: checkpoint.shapes().keys().any(|name| name.starts_with("mlp_fine.")),
             has_pool: has_pool(&sizes)?,
-            pixel_centre: sizes.number(PIXEL_CENTRE, 0.0)?,
+            pixel_centre: sizes.number_that(
+                PIXEL_CENTRE,
+                0.0,
+                |centre| (0.0..=1.0).contains(&centre),
+                "from 0 to 1",
+            )?,
             source_side: source_side(&sizes)?,
         };
         checkpoint.check(&architecture.tensors(), |name| architecture.is_optional(name))?;
@@ -214,7 +221,7 @@ impl Architecture {
                 "{}: what its tensors do not tell is assumed to be as in the authors' srn_car: a max pool in the \
                  trunk, sources of {side} pixels (their sn64 has no pool, and 64 pixels); keep the file as \
                  EXPERIMENT/pixel_nerf_latest, as their archive has it, or have `viewfuse convert` write {FIRST_POOL} \
-                 and {SIDE} into it",
+                 and {SIDE} into it, and {PIXEL_CENTRE} if it is not 0 (0.5 in the laboratory's networks)",
                 checkpoint.path().display()
             )
         })
@@ -279,29 +286,23 @@ fn linear(tensors: &mut Vec<TensorShape>, name: &str, out_count: usize, in_count
 
 /// The longest side of source photographs, from the metadata.
 fn source_side(sizes: &Sizes<'_>) -> Result<u32, CheckpointError> {
-    let side = sizes.number(SIDE, SOURCE_SIDE as f32)?;
-    if !(1.0..=MAX_SIDE).contains(&side) || side.fract() != 0.0 {
-        return Err(
-            sizes.refuse(format!("its metadata says {SIDE} = {side}, which is not a whole number from 1 to 65536"))
-        );
-    }
-    Ok(side as u32)
+    let fits = |side: f32| (1.0..=MAX_SIDE).contains(&side) && side.fract() == 0.0;
+    Ok(sizes.number_that(SIDE, SOURCE_SIDE as f32, fits, "a whole number from 1 to 65536")? as u32)
 }
 
 /// Whether there is a max pool, from the metadata.
 fn has_pool(sizes: &Sizes<'_>) -> Result<bool, CheckpointError> {
-    match sizes.number(FIRST_POOL, 1.0)? {
-        0.0 => Ok(false),
-        1.0 => Ok(true),
-        other => Err(sizes.refuse(format!("its metadata says {FIRST_POOL} = {other}, which is neither 0 nor 1"))),
-    }
+    Ok(sizes.number_that(FIRST_POOL, 1.0, |pool| pool == 0.0 || pool == 1.0, "0 or 1")? == 1.0)
 }
 
 /// The lowest frequency: from the checkpoint's table if it has one, otherwise the published one.
 fn frequency(sizes: &Sizes<'_>, octaves: usize) -> Result<f32, CheckpointError> {
     const TABLE: &str = "code._freqs";
     let published = Architecture::published().frequency;
-    let Some(shape) = sizes.shape(TABLE) else { return sizes.number(FREQUENCY, published) };
+    let Some(shape) = sizes.shape(TABLE) else {
+        let fits = |frequency: f32| frequency > 0.0 && frequency <= MAX_FREQUENCY;
+        return sizes.number_that(FREQUENCY, published, fits, "above 0 and at most 1000");
+    };
     // Each frequency stands twice, for sine and cosine.
     if shape.iter().try_fold(1_usize, |count, side| count.checked_mul(*side)) != Some(2 * octaves) {
         return Err(sizes.refuse(format!("{TABLE} has the shape {shape:?} instead of 2 x {octaves} numbers")));

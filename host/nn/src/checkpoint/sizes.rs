@@ -63,10 +63,24 @@ impl<'a> Sizes<'a> {
     /// # Errors
     /// [`CheckpointError`] if it is not a finite number.
     pub fn number(&self, key: &str, otherwise: f32) -> Result<f32, CheckpointError> {
+        self.number_that(key, otherwise, |_| true, "a number")
+    }
+
+    /// An optional number of the metadata that `fits`: `what` says which do.
+    ///
+    /// # Errors
+    /// [`CheckpointError`] if it is another.
+    pub fn number_that(
+        &self,
+        key: &str,
+        otherwise: f32,
+        fits: impl FnOnce(f32) -> bool,
+        what: &str,
+    ) -> Result<f32, CheckpointError> {
         let Some(text) = self.checkpoint.metadata().get(key) else { return Ok(otherwise) };
         match text.parse::<f32>() {
-            Ok(number) if number.is_finite() => Ok(number),
-            _ => Err(self.refuse(format!("its metadata says {key} = '{text}', which is not a number"))),
+            Ok(number) if number.is_finite() && fits(number) => Ok(number),
+            _ => Err(self.refuse(format!("its metadata says {key} = '{text}', which is not {what}"))),
         }
     }
 }

@@ -8,7 +8,7 @@
 use super::element::Element;
 use super::error::shortened;
 use super::modules;
-use super::pickle::{Id, Object, Pickle, Value};
+use super::pickle::{Id, Pickle, Value};
 use std::collections::{BTreeMap, HashSet};
 
 /// Keys under which training scripts put the `state_dict`, in the order in which they are tried.
@@ -119,8 +119,11 @@ pub(super) fn find(pickle: &Pickle, storage_of: &StorageOf<'_>) -> Result<StateD
     } else {
         for (key, value) in entries(pickle, found).unwrap_or_default() {
             let name = pickle.text(key);
-            let Some(claim) = claim(pickle, value, name.unwrap_or("?"), storage_of)? else { continue };
-            keep(name.ok_or("holds a tensor under a key that is not a text")?, claim)?;
+            match claim(pickle, value, name.unwrap_or("?"), storage_of)? {
+                Some(claim) => keep(name.ok_or("holds a tensor under a key that is not a text")?, claim)?,
+                None if holds_tensors(value) || is_numpys(pickle, value) => return Err(beside(name.unwrap_or("?"))),
+                None => {}
+            }
         }
     }
     let mut prefix = "";
@@ -129,6 +132,17 @@ pub(super) fn find(pickle: &Pickle, storage_of: &StorageOf<'_>) -> Result<StateD
         claims = claims.into_iter().map(|(name, claim)| (name[prefix.len()..].to_owned(), claim)).collect();
     }
     Ok(StateDict { place, prefix, claims, settings: settings(pickle, &table) })
+}
+
+/// The message for what would be lost beside the tensors of a table.
+fn beside(name: &str) -> String {
+    format!("holds tensors and beside them '{}', which are others or an array of numpy; {RESAVE}", shortened(name))
+}
+
+/// Whether a value is an array of numpy.
+fn is_numpys(pickle: &Pickle, id: Id) -> bool {
+    let callable = pickle.object(id).and_then(|object| pickle.global(object.callable));
+    callable.is_some_and(|(module, name)| module.starts_with("numpy.") && name == "_reconstruct")
 }
 
 const RESAVE: &str = "in PyTorch, save model.state_dict() and use that file";
@@ -163,6 +177,10 @@ pub(super) const NO_STORAGE: &str = "has no storage; the file is damaged, or it 
 fn identified(pickle: &Pickle, identity: Id) -> Result<Storage<'_>, String> {
     let unknown = || "refers to something stored outside its description that is no storage of tensors".to_owned();
     let fields = pickle.sequence(identity).ok_or_else(unknown)?;
+    // A network as an object names the source text of its classes.
+    if fields.first().is_some_and(|tag| pickle.text(*tag) == Some("module")) {
+        return Err(format!("holds a whole network as PyTorch wrote it before 1.6; {RESAVE}"));
+    }
     let [tag, class, key, _device, count, view @ ..] = fields else { return Err(unknown()) };
     if pickle.text(*tag) != Some("storage") {
         return Err(unknown());
@@ -200,31 +218,52 @@ fn entries(pickle: &Pickle, id: Id) -> Option<Vec<(Id, Id)>> {
     Some(pairs.chain(object.items.iter().copied()).collect())
 }
 
-/// The call that builds a tensor, without the call that makes it a parameter.
-fn tensor_call(pickle: &Pickle, id: Id) -> Option<(&Object, &str)> {
+/// The call that builds a tensor, its arguments and the function's name, without the calls that make it a parameter or
+/// one of another class, as buffers are and tensors with attributes.
+fn tensor_call(pickle: &Pickle, id: Id) -> Option<(Id, &str)> {
     let call = |id: Id| {
         let object = pickle.object(id)?;
-        let (module, name) = pickle.global(object.callable)?;
-        (module == "torch._utils" && name.starts_with("_rebuild_")).then_some((object, name))
+        let (arguments, (module, name)) = match pickle.global(object.callable)? {
+            ("torch._tensor", "_rebuild_from_type_v2") => match pickle.sequence(object.arguments)? {
+                [function, _class, arguments, ..] => (*arguments, pickle.global(*function)?),
+                _ => return None,
+            },
+            function => (object.arguments, function),
+        };
+        (module == "torch._utils" && name.starts_with("_rebuild_")).then_some((arguments, name))
     };
     match call(id)? {
-        (parameter, "_rebuild_parameter" | "_rebuild_parameter_with_state") => {
-            call(*pickle.sequence(parameter.arguments)?.first()?)
+        (arguments, "_rebuild_parameter" | "_rebuild_parameter_with_state") => {
+            call(*pickle.sequence(arguments)?.first()?)
         }
         tensor => Some(tensor),
     }
 }
 
+/// Whether values are to be negated or conjugated when they are read (the last argument of PyTorch's functions).
+fn is_turned(pickle: &Pickle, metadata: Option<&Id>) -> bool {
+    let table = metadata.and_then(|metadata| entries(pickle, *metadata)).unwrap_or_default();
+    table.iter().any(|(key, value)| {
+        matches!(pickle.text(*key), Some("neg" | "conj")) && !matches!(pickle.value(*value), Value::Bool(false))
+    })
+}
+
 fn claim(pickle: &Pickle, id: Id, name: &str, storage_of: &StorageOf<'_>) -> Result<Option<Claim>, String> {
-    let Some((object, function)) = tensor_call(pickle, id) else { return Ok(None) };
+    let Some((arguments, function)) = tensor_call(pickle, id) else { return Ok(None) };
     let wrong = |what: &str| format!("tensor '{}': {what}", shortened(name));
     if !matches!(function, "_rebuild_tensor" | "_rebuild_tensor_v2" | "_rebuild_tensor_v3") {
         return Err(wrong(&format!("is of a kind that is not read (torch._utils.{})", shortened(function))));
     }
     let malformed = || wrong("is not described as PyTorch does; the file is damaged");
-    let [from, first, shape, strides, more @ ..] = pickle.sequence(object.arguments).ok_or_else(malformed)? else {
+    let [from, first, shape, strides, more @ ..] = pickle.sequence(arguments).ok_or_else(malformed)? else {
         return Err(malformed());
     };
+    let metadata = if function == "_rebuild_tensor_v3" { more.get(3) } else { more.get(2) };
+    if is_turned(pickle, metadata) {
+        return Err(wrong(
+            "is to be negated or conjugated when it is read: save what its resolve_neg() and resolve_conj() give",
+        ));
+    }
     let stored = storage_of(*from).map_err(|what| wrong(&what))?;
     let element = match (function, more) {
         ("_rebuild_tensor_v3", [_, _, element, ..]) => {

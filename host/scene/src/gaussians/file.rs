@@ -41,12 +41,10 @@ impl GaussianFile {
     /// # Errors
     /// As [`GaussianScene::read`]; a file without Gaussians.
     pub fn open(path: &Path, scene: &Scene) -> Result<GaussianFile, SceneError> {
-        let folder = if scene.path.is_dir() { Some(scene.path.as_path()) } else { scene.path.parent() };
-        let places = [Some(path.to_path_buf()), folder.map(|folder| folder.join(PARSER))];
         let mut world = None;
-        for place in places.into_iter().flatten() {
+        for place in parser_files(path, scene) {
             if world.is_none() {
-                world = ParserWorld::beside(&place, scene)?.map(|world| (world, place.with_file_name(PARSER)));
+                world = ParserWorld::beside(&place, scene)?.map(|world| (world, place));
             }
         }
         let file = read(path, &scene.frame, world.as_ref())?;
@@ -65,18 +63,30 @@ impl GaussianFile {
     }
 }
 
+/// Where the world may be stated that a file of Gaussians is in: beside the file, and in the scene's folder.
+pub(super) fn parser_files(path: &Path, scene: &Scene) -> Vec<PathBuf> {
+    let folder = if scene.path.is_dir() { Some(scene.path.as_path()) } else { scene.path.parent() };
+    [Some(path.with_file_name(PARSER)), folder.map(|folder| folder.join(PARSER))].into_iter().flatten().collect()
+}
+
 fn read(path: &Path, frame: &SceneFrame, world: Option<&(ParserWorld, PathBuf)>) -> Result<GaussianFile, SceneError> {
     let bytes = read_at_most(path, MAX_BYTES).map_err(|cause| unreadable(path, cause))?;
+    if bytes.is_empty() {
+        return Err(refused(path, "the file is empty"));
+    }
     let mut notes = Vec::new();
     let mut place = GaussianPlace::new(path, frame, world.map(|(world, _)| world));
-    let is_splat = has_extension(path, &["splat"]) || !bytes.is_empty() && splat::is_plausible(&bytes);
+    let is_splat = has_extension(path, &["splat"]) || splat::is_likely(&bytes);
     let known = |(magic, extension, _): &&(&[u8], &str, &str)| match *extension {
         // Two bytes are no proof.
         "ksplat" => bytes.starts_with(magic) && has_extension(path, &["ksplat"]),
         _ => bytes.starts_with(magic),
     };
     let mut scene = if bytes.starts_with(&[0x1f, 0x8b]) {
-        spz::read(path, &bytes, &place)?
+        if spz::is_by_viewfuse(&bytes) {
+            place = GaussianPlace::new(path, frame, None);
+        }
+        spz::read(path, &bytes, &place, &mut notes)?
     } else if bytes.trim_ascii_start().starts_with(b"<") {
         return Err(refused(path, "a page or another text: Gaussians are not read from it; write them as .ply, too"));
     } else if let Some((_, _, what)) = OTHERS.iter().find(known) {

@@ -25,6 +25,15 @@ pub(super) fn is_plausible(bytes: &[u8]) -> bool {
         })
 }
 
+/// Whether bytes are such a file, whatever it is called: its quaternions have length 1, which other numbers have not.
+pub(super) fn is_likely(bytes: &[u8]) -> bool {
+    let is_unit = |row: &[u8]| {
+        let square: f32 = rotation(row).iter().map(|value| value * value).sum();
+        (0.8..1.2).contains(&square)
+    };
+    !bytes.is_empty() && is_plausible(bytes) && bytes.chunks_exact(SIZE).take(1024).all(is_unit)
+}
+
 pub(super) fn read(path: &Path, bytes: &[u8], place: &GaussianPlace<'_>) -> Result<GaussianScene, SceneError> {
     if !is_plausible(bytes) {
         return Err(refused(path, "not a .splat: it is no sequence of 32 bytes with finite numbers a Gaussian"));
@@ -35,7 +44,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], place: &GaussianPlace<'_>) -> Resu
         let raw = RawGaussian {
             position: DVec3::new(values[0], values[1], values[2]),
             log_scales: [values[3], values[4], values[5]].map(f64::ln),
-            rotation: [28, 29, 30, 31].map(|at| (f32::from(row[at]) - 128.0) / 128.0),
+            rotation: rotation(row),
             opacity: logit(byte(27)),
             f_dc: [24, 25, 26].map(|at| (byte(at) as f32 - 0.5) / SH_0),
         };
@@ -58,6 +67,11 @@ pub(super) fn bytes(scene: &GaussianScene, frame: &SceneFrame) -> Vec<u8> {
         bytes.extend(unit(gaussian.rotation).map(|value| (value * 128.0 + 128.0).round() as u8));
     }
     bytes
+}
+
+/// The quaternion of a row.
+fn rotation(row: &[u8]) -> [f32; 4] {
+    [28, 29, 30, 31].map(|at| (f32::from(row[at]) - 128.0) / 128.0)
 }
 
 /// The first six numbers of a row.

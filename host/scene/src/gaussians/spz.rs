@@ -6,9 +6,8 @@
 use std::io::{Read, Write};
 use std::path::Path;
 
-use flate2::Compression;
 use flate2::read::GzDecoder;
-use flate2::write::GzEncoder;
+use flate2::{Compression, GzBuilder};
 use glam::DVec3;
 use viewfuse_core::gaussian::{REST_COUNTS, opacity};
 
@@ -29,20 +28,33 @@ const MAX_COUNT: u32 = 10_000_000;
 const COLOUR: f32 = 0.15;
 /// The flag of a scene whose splats keep their integral when they are dilated.
 const ANTIALIASED: u8 = 1;
+/// The comment in the header of what viewfuse writes.
+const COMMENT: &str = "viewfuse";
+/// Bytes behind the arrays from which on a file is no such file.
+const MAX_SURPLUS: u64 = 1 << 20;
 /// Levels of a magnitude in the quaternions of version 3.
 const MAGNITUDE: u32 = (1 << 9) - 1;
 
-pub(super) fn read(path: &Path, bytes: &[u8], place: &GaussianPlace<'_>) -> Result<GaussianScene, SceneError> {
+/// Whether viewfuse wrote a file, which its header says: in the coordinates of a scene's files.
+pub(super) fn is_by_viewfuse(bytes: &[u8]) -> bool {
+    let mut stream = GzDecoder::new(bytes);
+    let begun = stream.read(&mut [0]);
+    begun.is_ok() && stream.header().and_then(|header| header.comment()) == Some(COMMENT.as_bytes())
+}
+
+pub(super) fn read(
+    path: &Path,
+    bytes: &[u8],
+    place: &GaussianPlace<'_>,
+    notes: &mut Vec<String>,
+) -> Result<GaussianScene, SceneError> {
+    let damaged = || refused(path, "not a readable .spz file: it is damaged or ends too early");
     let mut stream = GzDecoder::new(bytes);
     let mut take = |size: usize| {
         let mut part = Vec::new();
         let outcome = stream.by_ref().take(size as u64).read_to_end(&mut part);
         let is_whole = outcome.is_ok() && part.len() == size;
-        if is_whole {
-            Ok(part)
-        } else {
-            Err(refused(path, "not a readable .spz file: it is damaged or ends too early"))
-        }
+        if is_whole { Ok(part) } else { Err(damaged()) }
     };
     let header = take(HEADER)?;
     let word = |at: usize| u32::from_le_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]]);
@@ -72,6 +84,12 @@ pub(super) fn read(path: &Path, bytes: &[u8], place: &GaussianPlace<'_>) -> Resu
     let (positions, alphas, colours) = (take(9 * count)?, take(count)?, take(3 * count)?);
     let (scales, rotations, harmonics) =
         (take(3 * count)?, take(rotation_size * count)?, take(3 * rest_count * count)?);
+    // The checksum stands at the end.
+    match std::io::copy(&mut stream.take(MAX_SURPLUS), &mut std::io::sink()) {
+        Ok(0) => {}
+        Ok(surplus) if surplus < MAX_SURPLUS => notes.push(format!("{surplus} bytes behind the arrays are not read")),
+        _ => return Err(damaged()),
+    }
     let mut gaussians = Vec::with_capacity(count);
     for index in 0..count {
         let fixed = |axis: usize| {
@@ -171,7 +189,7 @@ pub(super) fn bytes(scene: &GaussianScene, frame: &SceneFrame) -> Result<Vec<u8>
         }
     }
     let flags = if scene.is_antialiased { ANTIALIASED } else { 0 };
-    let mut stream = GzEncoder::new(Vec::new(), Compression::default());
+    let mut stream = GzBuilder::new().comment(COMMENT).write(Vec::new(), Compression::default());
     let mut write = || {
         stream.write_all(&MAGIC)?;
         stream.write_all(&WRITTEN.to_le_bytes())?;

@@ -7,11 +7,12 @@ use viewfuse_core::Vec3;
 use viewfuse_core::gaussian::REST_COUNTS;
 use viewfuse_job::files::{WriteError, write_whole};
 
+use super::file::parser_files;
 use super::harmonics::padded;
 use super::{Gaussian, GaussianScene, MAX_DEGREE, comments, splat, spz};
-use crate::SceneFrame;
 use crate::ply::header;
 use crate::scene::files::has_extension;
+use crate::{Scene, SceneFrame};
 
 impl GaussianScene {
     /// Writes a file in the coordinates of the scene's files, completely or not at all: a `.splat` or a `.spz` if it is
@@ -23,7 +24,7 @@ impl GaussianScene {
     /// [`WriteError`]; also where a `.splat` or a `.spz` cannot hold the coordinates, and of Gaussians that no reader
     /// takes: with a number that is not finite, or harmonics beyond degree 3.
     pub fn write(&self, path: &Path, frame: &SceneFrame) -> Result<(), WriteError> {
-        GaussianScene::check_place(path, frame)?;
+        check_frame(path, frame)?;
         self.check().map_err(|cause| unwritten(path, cause))?;
         let bytes = if has_extension(path, &["splat"]) {
             splat::bytes(self, frame)
@@ -54,22 +55,39 @@ impl GaussianScene {
         }
     }
 
-    /// Whether a file of this name can hold the coordinates of a scene's files: before there are Gaussians to write.
+    /// Whether a file of this name can hold the coordinates of a scene's files, and is read back in them
+    /// ([`GaussianFile::open`](super::GaussianFile::open)): before there are Gaussians to write.
     ///
     /// # Errors
-    /// [`WriteError`] for a `.splat` or a `.spz` where the scene was moved when it was opened.
-    pub fn check_place(path: &Path, frame: &SceneFrame) -> Result<(), WriteError> {
-        if frame.origin == DVec3::ZERO || !has_extension(path, &["splat", "spz"]) {
-            return Ok(());
+    /// [`WriteError`] for a `.splat` or a `.spz` where the scene was moved when it was opened, and for a `.splat` where
+    /// nerfstudio's `dataparser_transforms.json` says that such files are in another world.
+    pub fn check_place(path: &Path, scene: &Scene) -> Result<(), WriteError> {
+        check_frame(path, &scene.frame)?;
+        let states_world = parser_files(path, scene).into_iter().find(|file| file.is_file());
+        match states_world.filter(|_| has_extension(path, &["splat"])) {
+            Some(file) => Err(unwritten(
+                path,
+                format!(
+                    "a .splat does not say who wrote it, and would be read in the world that {} states; write a .ply",
+                    file.display()
+                ),
+            )),
+            None => Ok(()),
         }
-        // `float` and fixed point lose such coordinates, and no header states an origin.
-        let [x, y, z] = frame.origin.to_array();
-        let cause = format!(
-            "the scene is around ({x}, {y}, {z}): .splat and .spz hold no such coordinates and state no origin; write \
-                a .ply"
-        );
-        Err(unwritten(path, cause))
     }
+}
+
+/// Whether a file of this name can hold the coordinates of a scene's files.
+fn check_frame(path: &Path, frame: &SceneFrame) -> Result<(), WriteError> {
+    if frame.origin == DVec3::ZERO || !has_extension(path, &["splat", "spz"]) {
+        return Ok(());
+    }
+    // `float` and fixed point lose such coordinates, and no header states an origin.
+    let [x, y, z] = frame.origin.to_array();
+    let cause = format!(
+        "the scene is around ({x}, {y}, {z}): .splat and .spz hold no such coordinates and state no origin; write a .ply"
+    );
+    Err(unwritten(path, cause))
 }
 
 fn unwritten(path: &Path, cause: String) -> WriteError {

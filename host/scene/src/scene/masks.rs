@@ -219,6 +219,28 @@ pub(super) fn is_as_stored(path: &Path, photograph: &Turn) -> Result<bool, Scene
     Ok(!is_inverted(path) && photograph.orientation == none && images::header(path)?.orientation == none)
 }
 
+/// A mask at a size.
+fn at_size(
+    path: &Path,
+    photograph: &Turn,
+    meaning: MaskMeaning,
+    [width, height]: [u32; 2],
+) -> Result<GrayImage, SceneError> {
+    let mask = read(path, photograph, meaning)?;
+    let is_so = mask.dimensions() == (width, height);
+    Ok(if is_so { mask } else { resize(&mask, width, height, FilterType::Triangle) })
+}
+
+/// An ignore mask at a size: 0 for what does not count, 255 elsewhere.
+///
+/// # Errors
+/// As [`read`].
+pub(super) fn ignoring(path: &Path, photograph: &Turn, size: [u32; 2]) -> Result<GrayImage, SceneError> {
+    let mut mask = at_size(path, photograph, MaskMeaning::Ignore, size)?;
+    mask.iter_mut().for_each(|share| *share = if *share >= HALF { u8::MAX } else { 0 });
+    Ok(mask)
+}
+
 /// Multiplies the photograph's alpha channel by an object's mask, or marks what an ignore mask takes away as not seen.
 ///
 /// # Errors
@@ -232,16 +254,13 @@ pub(super) fn apply(
     if let MaskMeaning::Unclear { percent } = meaning {
         return Err(FilePlace::file(path).fault(SceneFault::UnclearMasks(percent)));
     }
-    let mut mask = read(path, turn, meaning)?;
-    let (width, height) = photograph.pixels.dimensions();
-    if mask.dimensions() != (width, height) {
-        mask = resize(&mask, width, height, FilterType::Triangle);
-    }
+    let size = photograph.pixels.dimensions().into();
     if meaning == MaskMeaning::Ignore {
-        mask.iter_mut().for_each(|share| *share = if *share >= HALF { u8::MAX } else { 0 });
+        let mask = ignoring(path, turn, size)?;
         photograph.seen = mask.as_raw().contains(&0).then_some(mask);
         return Ok(());
     }
+    let mask = at_size(path, turn, meaning, size)?;
     for (pixel, share) in photograph.pixels.pixels_mut().zip(mask.pixels()) {
         let product = u32::from(pixel[3]) * u32::from(share[0]);
         pixel[3] = ((product + 127) / 255) as u8;

@@ -9,7 +9,7 @@ use glam::{DMat3, DQuat, DVec3};
 use viewfuse_core::lens::{Lens, Projection};
 
 use super::{Draft, WriteSceneError, camera_from_world};
-use crate::{Scene, View};
+use crate::{Scene, ScenePoint, View};
 
 /// The two forms of a model's files.
 #[derive(Clone, Copy, Debug)]
@@ -93,8 +93,8 @@ pub(super) fn write(out: &mut Draft, form: Form) -> Result<usize, WriteSceneErro
 /// The scene's points in the coordinates of its files.
 fn points(scene: &Scene) -> Vec<WrittenPoint> {
     let mut next = vec![0; scene.views.len()];
-    let point = |(index, point): (usize, &crate::ScenePoint)| {
-        let place = |&view: &u32| {
+    let point = |(index, point): (usize, &ScenePoint)| {
+        let place = |view: u32| {
             let place = next[view as usize];
             next[view as usize] += 1;
             [view + 1, place]
@@ -104,17 +104,23 @@ fn points(scene: &Scene) -> Vec<WrittenPoint> {
             position: scene.frame.file(point.position_world.as_dvec3()).to_array(),
             colour: point.colour,
             error: point.error.map_or(-1.0, f64::from),
-            track: point.views.iter().map(place).collect(),
+            track: seen_by(scene, point).map(place).collect(),
         }
     };
     scene.points.iter().enumerate().map(point).collect()
+}
+
+/// The views that saw a point, but for those that it lies behind: it has no place in their photographs.
+fn seen_by<'a>(scene: &'a Scene, point: &'a ScenePoint) -> impl Iterator<Item = u32> + 'a {
+    let is_before = |view: &u32| scene.views[*view as usize].camera.project(point.position_world).depth > 0.0;
+    point.views.iter().copied().filter(is_before)
 }
 
 /// For each view the points that it saw, in their order, with their image coordinates in the stored photograph.
 fn observations(scene: &Scene) -> Vec<Vec<([f64; 2], u64)>> {
     let mut seen = vec![Vec::new(); scene.views.len()];
     for (index, point) in scene.points.iter().enumerate() {
-        for &view in &point.views {
+        for view in seen_by(scene, point) {
             let View { camera, lens, .. } = &scene.views[view as usize];
             let projected = camera.project(point.position_world);
             let (focal, principal) = (camera.pinhole.focal().map(f64::from), camera.pinhole.principal().map(f64::from));

@@ -8,8 +8,8 @@ use crate::numpy::npy;
 const CENTRED: f32 = 1.0e-3;
 
 pub(super) fn fits(scene: &Scene) -> Result<(), String> {
-    let names: Vec<&str> = scene.views.iter().map(|view| view.name.as_str()).collect();
-    if !names.is_sorted() {
+    // The layout is read in the order of the files' names: a dot is behind each.
+    if !scene.views.is_sorted_by_key(|view| format!("{}.", view.name)) {
         return Err("its views are not in the order of their names, which the layout is read in".to_owned());
     }
     for view in &scene.views {
@@ -29,6 +29,14 @@ pub(super) fn fits(scene: &Scene) -> Result<(), String> {
         return Err(format!("view {:?} has {reason}", view.name));
     }
     Ok(())
+}
+
+/// The focal lengths of the photographs, the least and the greatest, if they differ: programs that take the first
+/// one's for all, as NeRF's own does, see others.
+pub(super) fn differing_focals(scene: &Scene) -> Option<[f32; 2]> {
+    let focals = || scene.views.iter().map(|view| view.camera.pinhole.focal()[0]);
+    let (least, greatest) = (focals().fold(f32::INFINITY, f32::min), focals().fold(0.0, f32::max));
+    (greatest > 1.0001 * least).then_some([least, greatest])
 }
 
 pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {

@@ -85,13 +85,13 @@ fn photograph(out: &Draft, index: usize) -> Result<(), WriteSceneError> {
     let view = &out.scene.views[index];
     let is_cut_out = is_cut_out(out.scene, index)?;
     match (&view.lens, &view.mask) {
-        _ if is_cut_out => drop(out.pinhole_photograph_and_mask(index, "image", "mask")?),
+        _ if is_cut_out => drop(out.pinhole_photograph_and_mask(index, "image", ["mask", &out.names[index]])?),
         (None, _) => {
             out.stored_photograph(index, "image", &PNG)?;
             out.mask(index, "mask", &out.names[index], &PNG)?;
         }
         (Some(_), None) => drop(out.pinhole_photograph(index, "image")?),
-        (Some(_), Some(_)) => drop(out.pinhole_photograph_and_mask(index, "image", "mask")?),
+        (Some(_), Some(_)) => drop(out.pinhole_photograph_and_mask(index, "image", ["mask", &out.names[index]])?),
     }
     Ok(())
 }

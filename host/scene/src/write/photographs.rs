@@ -1,13 +1,13 @@
 //! Writing the photographs of a scene and their masks.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use image::{DynamicImage, GrayImage};
 
 use super::{Draft, WriteSceneError};
 use crate::scene::files::has_extension;
-use crate::{Photograph, encode_png, read_picture};
+use crate::{Photograph, encode_png, picture_size, read_picture};
 
 /// Extensions of files that have no alpha channel.
 const JPEG: [&str; 2] = ["jpg", "jpeg"];
@@ -59,14 +59,32 @@ impl Draft<'_> {
         }))
     }
 
+    /// Writes the ignore mask of a view into `masks`, as COLMAP and nerfstudio read it: a PNG of the photograph's size
+    /// that is called as that is with `.png` behind it, of each photograph if one has a mask. A file that is one
+    /// already is copied. Returns its name.
+    fn ignore_mask(&self, view: usize, photograph: &str) -> Result<Option<String>, WriteSceneError> {
+        let scene = self.scene;
+        if scene.views.iter().all(|view| view.mask.is_none() || scene.has_object_mask(view)) {
+            return Ok(None);
+        }
+        let size = picture_size(&self.folder.join("images").join(photograph))?;
+        let is_ready = |mask: &PathBuf| -> Result<bool, WriteSceneError> {
+            Ok(is_of(mask, &["png"]) && picture_size(mask)? == size && scene.stored_mask(view)?.is_none())
+        };
+        Ok(Some(match &scene.views[view].mask {
+            Some(mask) if is_ready(mask)? => self.copied(mask, "masks", photograph)?,
+            _ => self.png("masks", photograph, scene.stored_ignore_mask(view, size)?.into())?,
+        }))
+    }
+
     /// Writes the stored photograph of a view into `images`, as [`Draft::stored_photograph`], and its ignore mask into
-    /// `masks`, as [`Draft::mask`]; an object's mask becomes the alpha channel, which says in these layouts where an
-    /// object is. Returns both names.
+    /// `masks`, as [`Draft::ignore_mask`]; an object's mask becomes the alpha channel, which says in these layouts where
+    /// an object is. Returns both names.
     pub(super) fn stored_photograph_and_mask(&self, index: usize) -> Result<(String, Option<String>), WriteSceneError> {
         let view = &self.scene.views[index];
         if !self.scene.has_object_mask(view) {
             let name = self.stored_photograph(index, "images", &[])?;
-            let mask = self.mask(index, "masks", &name, &[])?;
+            let mask = self.ignore_mask(index, &name)?;
             return Ok((name, mask));
         }
         self.progress.check()?;
@@ -99,19 +117,26 @@ impl Draft<'_> {
         view: usize,
     ) -> Result<(String, Option<String>), WriteSceneError> {
         let changed = &self.scene.views[view];
-        if changed.mask.is_none() || self.scene.has_object_mask(changed) {
+        if self.scene.has_object_mask(changed) {
             return Ok((self.pinhole_photograph(view, "images")?, None));
         }
-        let name = self.pinhole_photograph_and_mask(view, "images", "masks")?;
-        Ok((name.clone(), Some(name)))
+        if changed.mask.is_none() {
+            let name = self.pinhole_photograph(view, "images")?;
+            let mask = self.ignore_mask(view, &name)?;
+            return Ok((name, mask));
+        }
+        let mask = format!("{}.png", self.names[view]);
+        let name = self.pinhole_photograph_and_mask(view, "images", ["masks", &mask])?;
+        Ok((name, Some(format!("{mask}.png"))))
     }
 
-    /// Writes the undistorted picture of a view and its undistorted mask as two PNGs; returns the first one's name.
+    /// Writes the undistorted picture of a view and its undistorted mask as two PNGs, the mask in a folder and with a
+    /// name (without extension); returns the first one's name.
     pub(super) fn pinhole_photograph_and_mask(
         &self,
         view: usize,
         folder: &str,
-        mask_folder: &str,
+        [mask_folder, mask_name]: [&str; 2],
     ) -> Result<String, WriteSceneError> {
         self.progress.check()?;
         let Photograph { pixels, seen, .. } = self.scene.photograph(view)?;
@@ -121,7 +146,7 @@ impl Draft<'_> {
             Some(seen) if !self.scene.has_object_mask(&self.scene.views[view]) => seen,
             _ => GrayImage::from_fn(width, height, |x, y| image::Luma([pixels.get_pixel(x, y)[3]])),
         };
-        self.png(mask_folder, name, mask.into())?;
+        self.png(mask_folder, mask_name, mask.into())?;
         let written = self.png(folder, name, DynamicImage::ImageRgba8(pixels).into_rgb8().into())?;
         self.progress.step();
         Ok(written)

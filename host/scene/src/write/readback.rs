@@ -12,8 +12,8 @@ const MAX_SHARES: [f64; 2] = [1.0e-3, 1.0e-5];
 /// Most radians that a principal axis may turn.
 const MAX_TURN: f32 = 1.0e-2;
 
-/// Checks that the files in `draft` are the scene, whose views have these names there.
-pub(super) fn check(scene: &Scene, layout: Layout, draft: &Path, names: &[String]) -> Result<(), String> {
+/// Checks that the files in `draft` are the scene, whose views have these names there; the scene that was read.
+pub(super) fn check(scene: &Scene, layout: Layout, draft: &Path, names: &[String]) -> Result<Scene, String> {
     let read = Scene::open(draft).map_err(|error| {
         let place = format!("{}{}", draft.display(), std::path::MAIN_SEPARATOR);
         format!("read back, {}", error.to_string().replace(&place, ""))
@@ -37,5 +37,5 @@ pub(super) fn check(scene: &Scene, layout: Layout, draft: &Path, names: &[String
             return Err(format!("view {:?} is read back with the pose of another", view.name));
         }
     }
-    Ok(())
+    Ok(read)
 }

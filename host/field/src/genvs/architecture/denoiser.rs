@@ -128,15 +128,16 @@ pub enum DenoiserStep {
 /// The metadata key of [`Estimate`]: the name of one that is not the published one.
 pub(super) const ESTIMATE: &str = "viewfuse.estimate";
 const FROM_COLOURS: &str = "colours";
+const AS_PUBLISHED: &str = "published";
 
 impl Estimate {
     fn of(sizes: &Sizes<'_>) -> Result<Estimate, CheckpointError> {
         match sizes.checkpoint().metadata().get(ESTIMATE).map(String::as_str) {
-            None => Ok(Estimate::Published),
+            None | Some(AS_PUBLISHED) => Ok(Estimate::Published),
             Some(FROM_COLOURS) => Ok(Estimate::FromColours),
-            Some(other) => {
-                Err(sizes.refuse(format!("its metadata says {ESTIMATE} = '{other}'; only '{FROM_COLOURS}' is known")))
-            }
+            Some(other) => Err(sizes.refuse(format!(
+                "its metadata says {ESTIMATE} = '{other}'; '{AS_PUBLISHED}' and '{FROM_COLOURS}' are known"
+            ))),
         }
     }
 }
@@ -144,10 +145,11 @@ impl Estimate {
 impl Denoiser {
     /// Sizes in a checkpoint's metadata that its tensors do not determine.
     pub(super) fn metadata(&self) -> BTreeMap<String, String> {
-        match self.estimate {
-            Estimate::Published => BTreeMap::new(),
-            Estimate::FromColours => BTreeMap::from([(ESTIMATE.to_owned(), FROM_COLOURS.to_owned())]),
-        }
+        let name = match self.estimate {
+            Estimate::Published => AS_PUBLISHED,
+            Estimate::FromColours => FROM_COLOURS,
+        };
+        BTreeMap::from([(ESTIMATE.to_owned(), name.to_owned())])
     }
 
     /// Those of the published network.
