@@ -106,15 +106,23 @@ fn a_depth_map_says_where_the_surfaces_are() {
     let camera = camera(10.0, 20.0);
     let size = [40, 30];
     let map = |depth: f32| vec![depth; 40 * 30];
-    assert!(coverage.seen_surfaces(&camera, size, &map(4.0)).expect("surfaces") > 0.95);
+    assert!(coverage.seen_surfaces(&camera, size, &map(4.0), false).expect("surfaces") > 0.95);
     // Just in front of this camera nothing is in another one's picture.
-    assert_eq!(coverage.seen_surfaces(&camera, size, &map(0.2)), Some(0.0));
+    assert_eq!(coverage.seen_surfaces(&camera, size, &map(0.2), false), Some(0.0));
     // The left half has no surface: only the right one counts.
     let half: Vec<f32> = (0..40 * 30).map(|pixel| if pixel % 40 < 20 { 0.0 } else { 4.0 }).collect();
-    assert!(coverage.seen_surfaces(&camera, size, &half).expect("surfaces") > 0.95);
-    assert_eq!(coverage.seen_surfaces(&camera, size, &map(0.0)), None);
-    assert_eq!(coverage.seen_surfaces(&camera, size, &map(4.0)[1..]), None);
-    assert_eq!(coverage.seen_in(&camera, size, &[]), coverage.seen(&camera));
+    assert!(coverage.seen_surfaces(&camera, size, &half, false).expect("surfaces") > 0.95);
+    assert_eq!(coverage.seen_surfaces(&camera, size, &map(0.0), false), None);
+    // What has no surface counts as without a depth map, where that is no known background.
+    assert_eq!(coverage.seen_surfaces(&camera, size, &map(0.0), true), Some(coverage.seen(&camera)));
+    let away = Pose::look_at(4.0 * camera.pose.centre_world(), Vec3::ZERO, Vec3::Z).expect("a pose");
+    let away = Camera { pose: away, ..camera };
+    let middle = |pixel: usize| (15..25).contains(&(pixel % 40)) && (10..20).contains(&(pixel / 40));
+    let object: Vec<f32> = (0..40 * 30).map(|pixel| if middle(pixel) { 16.0 } else { 0.0 }).collect();
+    assert_eq!(coverage.seen_surfaces(&away, size, &object, false), Some(1.0));
+    assert!(coverage.seen_surfaces(&away, size, &object, true).expect("gaps") < 0.3);
+    assert_eq!(coverage.seen_surfaces(&camera, size, &map(4.0)[1..], false), None);
+    assert_eq!(coverage.seen_in(&camera, size, &[], false), coverage.seen(&camera));
 }
 
 #[test]

@@ -5,7 +5,7 @@ use super::made::open;
 use image::{Rgba, RgbaImage};
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
-use viewfuse::scene::few_shot::{FewShot, PathChoice, Selection, Target, away_warning, target_of};
+use viewfuse::scene::few_shot::{FewShot, PathChoice, Selection, Target, away_warning, item_of, target_of, view_list};
 use viewfuse::scene::photographs::{Album, BackgroundChoice};
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
@@ -125,6 +125,19 @@ fn a_target_that_faces_away_is_told() {
     // One source alone, and away from it.
     let alone = FewShot { sources: vec![20], ..job(&scene, Camera { pose: turned, ..camera }) };
     assert!(away_warning(&scene, &alone).is_some());
+}
+
+/// Names that a list takes for something else are given by their index.
+#[test]
+fn every_view_is_an_item_of_a_list() {
+    let folder = called(&["0", "x,y", "all", "0..2", "train", "5"]);
+    let scene = open(&folder);
+    for view in 0..scene.views.len() {
+        let item = item_of(&scene, view);
+        assert_eq!(view_list(&scene, &item).expect(&item), [view], "{item}");
+        let name = &scene.views[view].name;
+        assert_eq!(item == *name, !name.contains(','), "{item}");
+    }
 }
 
 fn warnings(scene: &Scene, views: &[usize]) -> Vec<String> {

@@ -218,6 +218,84 @@ fn a_lens_that_a_layout_has_not_is_undone() {
     assert_eq!((read.views[0].lens, given.lost.len()), (None, 1));
 }
 
+/// Other programs look for the model at the top of the file, and know one for all frames.
+#[test]
+fn a_lens_of_all_frames_is_said_once() {
+    let top = |folder: &Folder| -> serde_json::Value {
+        serde_json::from_slice(&std::fs::read(folder.join("out/transforms.json")).expect("a file")).expect("JSON")
+    };
+    for (model, name, fisheye) in [("OPENCV", "OPENCV", None), ("OPENCV_FISHEYE", "OPENCV_FISHEYE", Some(true))] {
+        let (folder, ..) = written(&open(&through_a_lens(model, 0.05)), Layout::Transforms);
+        let top = top(&folder);
+        assert_eq!(top["camera_model"], name);
+        assert_eq!(
+            (top["is_fisheye"].as_bool(), &top["frames"][0]["camera_model"]),
+            (fisheye, &serde_json::Value::Null)
+        );
+    }
+    // OpenCV's rational lens is none of theirs, and neither is a fisheye beside a pinhole.
+    let mut rational = open(&through_a_lens("FULL_OPENCV", 0.05));
+    rational.views[0].lens = Lens::new(Projection::Perspective, [0.05, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0]).ok();
+    let mut mixed = open(&through_a_lens("OPENCV_FISHEYE", 0.05));
+    let mut beside = mixed.views[0].clone();
+    (beside.lens, beside.name) = (None, "2".to_owned());
+    mixed.views.push(beside);
+    for scene in [rational, mixed] {
+        let (folder, read, given) = written(&scene, Layout::Transforms);
+        assert!(read.views.iter().all(|view| view.lens.is_none()));
+        assert!(given.lost.iter().any(|line| line.contains("the lens of 1 photographs")), "{:?}", given.lost);
+        assert_eq!(top(&folder)["camera_model"], serde_json::Value::Null);
+    }
+}
+
+/// COLMAP and nerfstudio want a PNG of the photograph's size for each photograph, if there is one for any.
+#[test]
+fn ignore_masks_are_those_that_other_programs_read() {
+    let folder = Folder::new();
+    let mut frames = Vec::new();
+    for (view, mask) in [("1", Some([16, 12])), ("2", Some([8, 6])), ("3", None), ("4", Some([16, 12]))] {
+        let pixels = image::RgbImage::from_fn(16, 12, |x, y| image::Rgb([15 * x as u8, 20 * y as u8, 77]));
+        pixels.save(folder.file(&format!("images/{view}.png"))).expect("a photograph");
+        let mut frame =
+            json!({ "file_path": format!("images/{view}.png"), "transform_matrix": scenes::opengl_matrix() });
+        frame["transform_matrix"][0][3] = json!(view.parse::<f64>().expect("a number"));
+        if let Some([width, height]) = mask {
+            let ending = if view == "4" { "jpg" } else { "png" };
+            let mask =
+                image::GrayImage::from_fn(width, height, |x, _| image::Luma([if 8 * x < width { 0 } else { 255 }]));
+            mask.save(folder.file(&format!("masks/{view}.{ending}"))).expect("a mask");
+            frame["mask_path"] = json!(format!("masks/{view}.{ending}"));
+        }
+        frames.push(frame);
+    }
+    folder.write("transforms.json", json!({ "fl_x": 20, "frames": frames }).to_string());
+    let scene = Scene::open_masked(&folder, MaskChoice::Ignore).expect("a scene");
+    for layout in [Layout::Transforms, Layout::Colmap, Layout::ColmapBinary] {
+        let (folder, read, _) = written(&scene, layout);
+        let read = Scene::open_masked(&read.path, MaskChoice::Ignore).expect("a scene");
+        for (view, name) in ["1", "2", "3", "4"].iter().enumerate() {
+            let mask = image::open(folder.join(format!("out/masks/{name}.png.png"))).expect("a mask").into_luma8();
+            assert_eq!(mask.dimensions(), (16, 12), "{name}");
+            assert_eq!(scene.photograph(view).expect("one").seen, read.photograph(view).expect("one").seen, "{name}");
+            assert_eq!(mask.as_raw().contains(&0), *name != "3");
+        }
+    }
+}
+
+/// Masks that look like an object's, of which a person says that they are not.
+#[test]
+fn a_meaning_that_a_person_gives_must_be_given_again() {
+    let folder = through_a_lens("OPENCV", 0.05);
+    let mask = image::GrayImage::from_fn(16, 12, |x, y| {
+        image::Luma([if (5..11).contains(&x) && (3..9).contains(&y) { 255 } else { 0 }])
+    });
+    mask.save(folder.file("masks/1.png")).expect("a mask");
+    let scene = Scene::open_masked(&folder, MaskChoice::Ignore).expect("a scene");
+    let said =
+        |layout| written(&scene, layout).2.lost.iter().any(|line| line.contains("which must be said of this folder"));
+    assert!(said(Layout::Colmap) && said(Layout::Transforms) && !said(Layout::Srn));
+}
+
 #[test]
 fn what_a_layout_cannot_hold_is_refused_and_leaves_nothing() {
     let folder = Folder::new();

@@ -282,6 +282,9 @@ pub struct About {
     /// Whether a picture takes milliseconds once the sources are prepared, because the scene is there and is only
     /// drawn: a moving camera then gets larger pictures, and more of them.
     pub is_live: bool,
+    /// Whether it draws all that there is: where its pictures have no surface, they show nothing of a scene whose
+    /// photographs have no silhouettes.
+    pub draws_all: bool,
 }
 
 impl About {
@@ -296,6 +299,7 @@ impl About {
             has_previews: false,
             kernels: &[],
             is_live: false,
+            draws_all: false,
         }
     }
 }

@@ -5,6 +5,9 @@ import { clamp } from './vectors.js';
 
 const TURN = Math.PI * 0.75; // radians for the width of the picture
 const STEP = Math.PI / 60;   // radians for a key
+// What takes these keys itself: check boxes take none of them, radio buttons the arrows.
+const TAKES_KEYS = 'input:not([type="checkbox"], [type="radio"]), select, textarea';
+const TAKES_ARROWS = 'input:not([type="checkbox"]), select, textarea';
 
 export function listenToHands(canvas, actions) {
   const hands = new Map();   // pointers that are down
@@ -66,7 +69,8 @@ export function listenToKeys(actions, back) {
     0: back,
   };
   document.addEventListener('keydown', (event) => {
-    const isTyping = event.target instanceof Element && event.target.matches('input, select, textarea');
+    const takes = event.key.startsWith('Arrow') ? TAKES_ARROWS : TAKES_KEYS;
+    const isTyping = event.target instanceof Element && event.target.matches(takes);
     const action = keys[event.key];
     if (!actions.isReady() || isTyping || !action || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();

@@ -284,7 +284,12 @@ impl FrameRecord {
                 .filter(|(_, (used, before))| **used == 0.0 && **before > 0.0)
                 .map(|(name, _)| name.clone())
                 .collect(),
-            seen: coverage.seen_in(&frame.target.camera, frame.picture.dimensions().into(), &frame.depths),
+            seen: coverage.seen_in(
+                &frame.target.camera,
+                frame.picture.dimensions().into(),
+                &frame.depths,
+                frame.counts_gaps,
+            ),
             seen_by: frame.seen,
             shares: frame.shares.clone(),
             left_out_weight: frame.omission.omitted_weight,

@@ -35,31 +35,43 @@ impl Coverage {
     /// The share of a camera's picture that was seen, in `[0, 1]`. Its points are taken where its rays come nearest to
     /// what the photographs look at; where they lead away from that, as far away as that is from the photographs.
     pub fn seen(&self, camera: &Camera) -> f32 {
-        let point = |x: f32, y: f32| {
-            let ray = camera.ray(x, y);
-            let along = (self.rig.focus - ray.origin_world).dot(ray.direction_world);
-            Some(ray.at(if along > 0.0 { along } else { self.rig.distance }))
-        };
-        self.share(camera, point).unwrap_or(0.0)
+        self.share(camera, |x, y| Some(self.looked_at(camera, x, y))).unwrap_or(0.0)
+    }
+
+    /// The point of a ray that is nearest to what the photographs look at.
+    fn looked_at(&self, camera: &Camera, x: f32, y: f32) -> Vec3 {
+        let ray = camera.ray(x, y);
+        let along = (self.rig.focus - ray.origin_world).dot(ray.direction_world);
+        ray.at(if along > 0.0 { along } else { self.rig.distance })
     }
 
     /// As [`Coverage::seen`], with the points of a depth map of this width and height (row-major, along the principal
-    /// axis; 0: no surface, which does not count). `None` if it has no surface, or another length.
-    pub fn seen_surfaces(&self, camera: &Camera, [width, height]: [u32; 2], depths: &[f32]) -> Option<f32> {
+    /// axis; 0: no surface, which does not count, or with `counts_gaps` counts as in [`Coverage::seen`]). `None` if
+    /// nothing counts, or if it has another length.
+    pub fn seen_surfaces(
+        &self,
+        camera: &Camera,
+        [width, height]: [u32; 2],
+        depths: &[f32],
+        counts_gaps: bool,
+    ) -> Option<f32> {
         let pinhole = camera.pinhole.resized(width, height).ok()?;
         let camera = Camera { pinhole, ..*camera };
         let point = |x: f32, y: f32| {
             let depth = *depths.get(y as usize * width as usize + x as usize)?;
             let ray = camera.ray(x, y);
             let slope = ray.direction_world.dot(camera.pose.forward_world());
-            (depth > 0.0 && slope > 0.0).then(|| ray.at(depth / slope))
+            match depth > 0.0 && slope > 0.0 {
+                true => Some(ray.at(depth / slope)),
+                false => counts_gaps.then(|| self.looked_at(&camera, x, y)),
+            }
         };
         self.share(&camera, point).filter(|_| depths.len() == width as usize * height as usize)
     }
 
     /// [`Coverage::seen_surfaces`] where a depth map has surfaces, otherwise [`Coverage::seen`].
-    pub fn seen_in(&self, camera: &Camera, size: [u32; 2], depths: &[f32]) -> f32 {
-        self.seen_surfaces(camera, size, depths).unwrap_or_else(|| self.seen(camera))
+    pub fn seen_in(&self, camera: &Camera, size: [u32; 2], depths: &[f32], counts_gaps: bool) -> f32 {
+        self.seen_surfaces(camera, size, depths, counts_gaps).unwrap_or_else(|| self.seen(camera))
     }
 
     /// A line about pictures that leave what the photographs show, if there are any: how many of all, and their names.

@@ -324,6 +324,13 @@ pub fn view_list(scene: &Scene, list: &str) -> Result<Vec<usize>, SelectionError
     Ok(chosen)
 }
 
+/// A view as an item of a list ([`view_list`]): its name, or its index where a list takes the name for something else.
+pub fn item_of(scene: &Scene, view: usize) -> String {
+    let name = &scene.views[view].name;
+    let is_clear = view_list(scene, name).is_ok_and(|views| views == [view]);
+    if is_clear { name.clone() } else { format!("#{view}") }
+}
+
 /// The photographs of a split of the scene, if a text names a split that it has.
 fn part_named(scene: &Scene, text: &str) -> Option<Vec<usize>> {
     let part: Split = text.parse().ok()?;

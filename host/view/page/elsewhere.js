@@ -7,17 +7,17 @@ import { element, state } from './state.js';
 const FILE = 'view.json';
 
 // A command line that renders a target. Words for a shell come from the program; a scheme of the menu has none that needs
-// quotes.
-export function commandOf(target) {
+// quotes. `isFirst`: with the scheme that the command line began with, or with what was chosen for the scene.
+export function commandOf(target, isFirst = state.scheme === state.first) {
   const { render, options, first_weights: first } = state.scene.commands;
   if (render === '') return '';
-  return `${render} ${target}${options} --weights ${state.scheme === state.first ? first : state.scheme} -o out`;
+  return `${render} ${target}${options} --weights ${isFirst ? first : state.scheme} -o out`;
 }
 
-function command() {
+function command(isFirst) {
   const matrix = JSON.stringify(matrixOf(state.pose));
   const own = state.scene.others.find((other) => JSON.stringify(matrixOf(other.pose)) === matrix);
-  return commandOf(own ? `--targets ${own.word}` : `--camera-path ${FILE}`);
+  return commandOf(own ? `--targets ${own.word}` : `--camera-path ${FILE}`, isFirst);
 }
 
 export function tellCommand() {
@@ -43,7 +43,9 @@ export function saveWantedPicture() {
   if (!isPictureWanted || !own || !own.full || own.pose !== state.pose || own.scheme !== state.scheme) return;
   isPictureWanted = false;
   saveFile('view.png', own.file, 'image/png');
-  saveJson('run.json', { command: command(), ...own.record });
+  // A picture of before the choice has its scheme, perhaps, but not what was chosen along with it.
+  const isFirst = state.scene.chooses ? own.record.chosen !== null : undefined;
+  saveJson('run.json', { command: command(isFirst), ...own.record });
   said('Saved as view.png, with its record run.json.');
 }
 

@@ -34,7 +34,8 @@ async function make() {
     const response = await fetch('video', {
       method: 'POST',
       headers: { 'Content-Type': 'application/json' },
-      body: JSON.stringify({ poses, scheme: state.scheme }),
+      // None while it is to be chosen for the scene: the program waits for that.
+      body: JSON.stringify({ poses, scheme: state.first === null && !state.isSchemeGiven ? null : state.scheme }),
       signal: making.signal,
     });
     if (!response.ok) throw new Error(await response.text());

@@ -84,13 +84,14 @@ async function begin() {
   }
   document.title = `${state.scene.name} · viewfuse`;
   element('name').textContent = state.scene.name;
-  element('about').textContent = `${state.scene.sources.length} source views, ${state.scene.field} field on ${state.scene.device}`;
+  const { length: count } = state.scene.sources;
+  element('about').textContent = `${count} source view${count === 1 ? '' : 's'}, ${state.scene.field} field on ${state.scene.device}`;
   element('picture').style.aspectRatio = state.scene.size.join(' / ');
   element('picture').style.maxWidth = `calc(68vh * ${state.scene.size[0] / state.scene.size[1]})`;
   state.pose = state.scene.start;
   state.focus = state.scene.focus;
   state.observer = firstObserver();
-  showSources((own) => { stop(); goTo(own); });
+  showSources((own) => { stop(); goTo(own, state.scene.focus); });
   showSchemes(state.scene.scheme);
   state.first = state.scene.chooses ? null : state.scene.scheme;
   listenToSettings();

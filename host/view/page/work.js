@@ -35,8 +35,7 @@ function tellWork({ stage, done, pieces, warnings, chosen, video }) {
 function tellChoice(chosen) {
   state.first = chosen;
   element('choosing').textContent = `${chosen} is what render chooses for this scene`;
-  if (state.scheme === state.scene.scheme && !state.isSchemeGiven) {
-    showSchemes(chosen);
-    changed();
-  }
+  if (state.scheme === state.scene.scheme && !state.isSchemeGiven) showSchemes(chosen);
+  // Other pictures are made under it, of the same scheme too.
+  if (state.scheme === chosen) changed();
 }

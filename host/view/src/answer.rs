@@ -54,7 +54,7 @@ struct Part {
 struct LayerPart {
     kind: Layer,
     bytes: usize,
-    /// What the least and the greatest level mean: world units for depths, `[0, 1]` for confidences.
+    /// What the least and the greatest level mean: units of the scene's files for depths, `[0, 1]` for confidences.
     range: [f32; 2],
     /// Level 0 is "nothing there".
     has_gaps: bool,
@@ -71,11 +71,13 @@ pub(crate) enum AnswerError {
     Jpeg(#[from] EncodingError),
 }
 
-/// The bytes of an answer: of a full picture if there is a record of it.
+/// The bytes of an answer: of a full picture if there is a record of it. A length of the world is `unit` of the scene's
+/// files.
 pub(crate) fn bytes(
     frame: &Frame,
     coverage: &Coverage,
     layer: Layer,
+    unit: f64,
     record: Option<PictureRecord>,
 ) -> Result<Vec<u8>, AnswerError> {
     let is_full = record.is_some();
@@ -94,14 +96,19 @@ pub(crate) fn bytes(
         full: is_full,
         seconds: frame.time.as_secs_f64(),
         weights: &frame.weights.values()[..frame.weights.count() as usize],
-        seen: coverage.seen_in(&frame.target.camera, frame.picture.dimensions().into(), &frame.depths),
+        seen: coverage.seen_in(
+            &frame.target.camera,
+            frame.picture.dimensions().into(),
+            &frame.depths,
+            frame.counts_gaps,
+        ),
         left_out: frame.omission.omitted_count,
         picture: Part { media_type, bytes: picture.len() },
         layers: has.into_iter().filter(|(_, is_there)| *is_there).map(|(layer, _)| layer).collect(),
         layer: levels.as_ref().map(|(levels, range)| LayerPart {
             kind: layer,
             bytes: levels.len(),
-            range: *range,
+            range: if layer == Layer::Depth { range.map(|depth| (f64::from(depth) * unit) as f32) } else { *range },
             has_gaps: layer == Layer::Depth,
         }),
         record,

@@ -2,6 +2,7 @@
 
 use crate::Viewed;
 use viewfuse_field::auto::Chosen;
+use viewfuse_weighting::Weighting;
 
 /// What is known of the choice.
 #[derive(Debug)]
@@ -17,6 +18,14 @@ pub(crate) enum Choice {
 impl Choice {
     pub(crate) fn of(viewed: &Viewed<'_>) -> Choice {
         if viewed.chooses { Choice::Due } else { Choice::None }
+    }
+
+    /// The weighting that was chosen, once it is.
+    pub(crate) fn weighting(&self) -> Option<&Weighting> {
+        match self {
+            Choice::Made(chosen) => Some(&chosen.weighting),
+            _ => None,
+        }
     }
 
     /// What was chosen, if it is the choice of this scheme.

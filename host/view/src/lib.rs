@@ -56,7 +56,7 @@ use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::sources::SourcesError;
 use viewfuse_device::choice::AnyDevice;
 use viewfuse_field::AnyField;
-use viewfuse_field::render::{RenderError, RenderOptions};
+use viewfuse_field::render::{RenderError, RenderOptions, picture_size};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
 use viewfuse_scene::unit::RigUnit;
@@ -128,7 +128,7 @@ impl<'a> Viewer<'a> {
         let poses: Vec<_> = sources.iter().map(|&view| unit.pose(&scene.views[view].camera.pose)).collect();
         let source_poses = SourcePoses::new(&poses).map_err(RenderError::Sources)?;
         let about = field.about();
-        let size = render_loop::full_size(scene, &camera, options, about.longest_side)?;
+        let size = picture_size(scene, options, about.longest_side, &camera)?;
         let [width, height] = size;
         let pinhole = camera.pinhole.resized(width, height);
         let pinhole = pinhole.map_err(|error| RenderError::Size { width, height, error })?;

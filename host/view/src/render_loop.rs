@@ -22,13 +22,12 @@ use std::sync::mpsc::Sender;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::Camera;
-use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, open_album, working_side};
+use viewfuse_field::render::{Frame, RenderError, Stage, open_album, working_side};
 use viewfuse_field::{AnyOptions, FieldError, Mixture, Renderer, auto};
 use viewfuse_job::progress::Progress;
-use viewfuse_scene::Scene;
 use viewfuse_scene::coverage::Coverage;
 use viewfuse_scene::few_shot::Target;
-use viewfuse_scene::photographs::{Album, PhotographsError, SourceImages, reduced_size, scaled_size};
+use viewfuse_scene::photographs::{Album, PhotographsError, SourceImages, scaled_size};
 use viewfuse_weighting::Weighting;
 
 /// So long the loop waits for a request before it looks whether it should end.
@@ -168,17 +167,6 @@ struct RenderLoop<'a> {
     film: Option<(Order, usize)>,
 }
 
-/// Width and height of full pictures at a camera of a view.
-pub(crate) fn full_size(
-    scene: &Scene,
-    camera: &Camera,
-    options: &RenderOptions,
-    longest: u32,
-) -> Result<[u32; 2], RenderError> {
-    let side = working_side(scene, options, longest)?;
-    Ok(options.size.unwrap_or_else(|| reduced_size(camera, side).into()))
-}
-
 /// Renders until the progress says that it is cancelled.
 pub(crate) fn run(viewer: &Viewer<'_>, shared: &Shared, outer: &dyn Progress) -> Result<(), RenderError> {
     let Viewed { scene, sources, field, device, options, weighting, .. } = viewer.viewed;
@@ -195,6 +183,8 @@ pub(crate) fn run(viewer: &Viewer<'_>, shared: &Shared, outer: &dyn Progress) ->
         shared.status.begin("reading photographs");
         let album = open_album(scene, sources.iter().copied(), renderer.as_ref(), options, &watch)?;
         let images = Arc::new(album.sources(sources, source_side, options.background, &watch)?);
+        // They were printed when the scene was opened.
+        scene.warnings.iter().for_each(|warning| shared.status.warn(warning));
         for warning in &images.warnings {
             watch.warn(&format!("{}: {warning}", scene.path.display()));
         }
@@ -292,7 +282,8 @@ impl<'a> RenderLoop<'a> {
             let chosen = self.choice.made(&scheme);
             PictureRecord::of(frame, viewed, &self.coverage, device_name, scheme, chosen, self.images.background)
         });
-        match answer::bytes(frame, &self.coverage, request.layer, record) {
+        let unit = self.viewer.viewed.scene.frame.scale;
+        match answer::bytes(frame, &self.coverage, request.layer, unit, record) {
             Ok(bytes) => Answer::of("application/octet-stream", bytes),
             Err(error) => Answer::error(503, &format!("the picture cannot be encoded: {error}")),
         }
@@ -327,10 +318,11 @@ impl<'a> RenderLoop<'a> {
             return Ok(());
         };
         let watch = Watch { shared: self.shared, outer: self.outer, makes_way: MakesWay::ToAll };
+        let chosen = self.choice.weighting().unwrap_or(self.viewer.viewed.weighting);
         let request = Request {
             tab: String::new(),
             pose: order.poses[done],
-            weighting: order.weighting.clone(),
+            weighting: order.weighting.as_ref().unwrap_or(chosen).clone(),
             layer: Layer::None,
             is_moving: false,
             most_side: COARSE_SIDE,

@@ -122,7 +122,8 @@ fn weighting_of(scheme: String, first: &Weighting) -> Result<Weighting, RequestE
 struct WrittenPath {
     /// World from camera, row-major, OpenCV axes: one a frame.
     poses: Vec<[[f32; 4]; 4]>,
-    scheme: String,
+    /// Null for the one that is chosen for the scene.
+    scheme: Option<String>,
 }
 
 /// A checked request for a video.
@@ -130,8 +131,8 @@ struct WrittenPath {
 pub(crate) struct VideoRequest {
     /// The cameras, one a frame.
     pub(crate) poses: Vec<Pose>,
-    /// The weighting.
-    pub(crate) weighting: Weighting,
+    /// The weighting; `None` for the one that is chosen for the scene.
+    pub(crate) weighting: Option<Weighting>,
 }
 
 impl VideoRequest {
@@ -142,7 +143,8 @@ impl VideoRequest {
             return Err(RequestError::Frames(poses.len()));
         }
         let poses = poses.iter().map(|pose| Pose::from_opencv(pose).map_err(RequestError::Pose));
-        Ok(VideoRequest { poses: poses.collect::<Result<_, _>>()?, weighting: weighting_of(scheme, first)? })
+        let weighting = scheme.map(|scheme| weighting_of(scheme, first)).transpose()?;
+        Ok(VideoRequest { poses: poses.collect::<Result<_, _>>()?, weighting })
     }
 }
 

@@ -226,6 +226,13 @@ fn check<'a>(
     [host, origin, site]: [Option<&str>; 3],
 ) -> Result<Route<'a>, Answer> {
     let forbidden = || Answer::error(403, "this address is for the page of this program alone");
+    let other_host = || {
+        let text = format!(
+            "this address is for the page of this program alone, at port {port} of this machine: a tunnel must have \
+             that port at both ends"
+        );
+        Answer::error(403, &text)
+    };
     let is_own = |host: &str| {
         ["127.0.0.1", "localhost"].into_iter().any(|local| match host.strip_prefix(local) {
             Some("") => port == USUAL_PORT,
@@ -234,7 +241,7 @@ fn check<'a>(
         })
     };
     if !host.is_some_and(is_own) {
-        return Err(forbidden());
+        return Err(other_host());
     }
     if origin.is_some_and(|origin| !origin.strip_prefix("http://").is_some_and(is_own)) {
         return Err(forbidden());
@@ -244,10 +251,12 @@ fn check<'a>(
         return Err(forbidden());
     }
     let path = url.strip_prefix('/').unwrap_or_default();
-    let (given, rest) = path.split_once('/').unwrap_or((path, ""));
+    let (given, rest) = path.split_once('/').map_or((path, None), |(given, rest)| (given, Some(rest)));
     if !is_same(given, token) {
         return Err(forbidden());
     }
+    // Without the slash the page would look for its parts beside itself.
+    let rest = rest.ok_or_else(|| Answer::error(404, "the address ends with a slash"))?;
     let route = match rest {
         "scene" => Route::Scene,
         "status" => Route::Status,

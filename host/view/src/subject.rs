@@ -11,7 +11,8 @@ use viewfuse_core::weighting::ROWS;
 use viewfuse_field::About;
 use viewfuse_job::shell::quoted;
 use viewfuse_output::ring::{RingPlace, ring};
-use viewfuse_scene::View;
+use viewfuse_scene::Scene;
+use viewfuse_scene::few_shot::item_of;
 use viewfuse_scene::rig::Rig;
 use viewfuse_weighting::scheme_names;
 
@@ -129,8 +130,8 @@ impl Subject {
             origin: scene.frame.origin.to_array(),
             scale: scene.frame.scale,
             ring: ring(&cameras),
-            sources: sources.iter().map(|&view| CameraRow::of(&scene.views[view])).collect(),
-            others: others.map(|view| CameraRow::of(&scene.views[view])).collect(),
+            sources: sources.iter().map(|&view| CameraRow::of(scene, view)).collect(),
+            others: others.map(|view| CameraRow::of(scene, view)).collect(),
             schemes: scheme_rows(),
             scheme: weighting.to_string(),
             chooses,
@@ -141,10 +142,11 @@ impl Subject {
 }
 
 impl CameraRow {
-    fn of(view: &View) -> CameraRow {
+    fn of(scene: &Scene, index: usize) -> CameraRow {
+        let view = &scene.views[index];
         CameraRow {
             name: view.name.clone(),
-            word: quoted(&view.name),
+            word: quoted(item_of(scene, index)),
             pose: view.camera.pose.to_opencv(),
             lens: Intrinsics::of(&view.camera),
         }

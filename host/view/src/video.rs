@@ -47,7 +47,8 @@ impl Videos {
 /// A path whose frames are to be rendered.
 pub(crate) struct Order {
     pub(crate) poses: Vec<Pose>,
-    pub(crate) weighting: Weighting,
+    /// `None` for the one that is chosen for the scene.
+    pub(crate) weighting: Option<Weighting>,
     /// To the connection that waits: the frames in their order, or why there are none. Closed once nobody waits.
     pub(crate) frames: SyncSender<Result<RgbImage, Answer>>,
 }

@@ -175,7 +175,18 @@ fn schemes_and_layers(tab: &Tab<'_>) {
         assert!(difference(&canvas(tab), &plain) > 5.0, "{layer}");
         keep(tab, &format!("{layer}.png"));
     }
+    // Keys go to the view from what takes none, as a check box, and the numbers from radio buttons, too.
+    let matrix = "JSON.stringify(matrixOf(shows.pose))";
+    for (element, key) in [("#overlay", "ArrowLeft"), ("#overlay", "+"), ("input[value=depth]", "-")] {
+        let before = tab.text(matrix);
+        tab.evaluate(&format!("document.querySelector('{element}').focus()"));
+        tab.key(key);
+        assert_ne!(tab.text(matrix), before, "{key} at {element}");
+    }
+    // To a source, and around what the photographs look at, wherever the view was moved to.
+    tab.evaluate("goTo(shows.pose, [9, 9, 9])");
     tab.evaluate("document.querySelector('#sources button').click()");
+    assert_eq!(tab.evaluate("shows.focus"), tab.evaluate("shows.scene.focus"));
     // From its own place it is the most relevant one.
     tab.wait_for(&format!("{FULL} && {WEIGHTS}[0] === Math.max(...{WEIGHTS})"));
 }
@@ -433,6 +444,19 @@ fn the_scheme_becomes_that_of_render() {
     assert!(chosen.starts_with(&tab.text("document.getElementById('scheme').value")));
     let line = text_in(&tab, "command");
     assert!(line.ends_with(" --weights auto -o out"), "{line}");
+    // A picture of the same scheme that was made before has not what was chosen along with it.
+    let files = keep_downloads(&chromium);
+    let command = || {
+        click(&tab, "save-picture");
+        wait_until("nothing is saved", || files.join("run.json").exists());
+        let command = read_json(files.join("run.json"))["command"].to_string();
+        fs::remove_file(files.join("run.json")).expect("a record");
+        command
+    };
+    assert!(command().contains("--weights auto"));
+    tab.evaluate("shows.shown.record.chosen = null");
+    let said = command();
+    assert!(said.contains(&format!("--weights {chosen}")), "{said}");
     done_with_warnings(&folder, &format!("render toy --targets 000020 {options} --device cpu -o out"));
     let record = read_json(folder.join("out/run.json"));
     assert_eq!(record["weighting"], chosen.as_str());

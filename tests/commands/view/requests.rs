@@ -3,7 +3,7 @@
 use super::super::{BINARY, assert_near, assert_refused, command, done_with_warnings, list_of, number_of, numbers};
 use super::{room, start};
 use image::codecs::webp::WebPDecoder;
-use image::{AnimationDecoder, DynamicImage};
+use image::{AnimationDecoder, DynamicImage, Rgb, RgbImage};
 use serde_json::{Value, json};
 use std::io::Cursor;
 use std::path::Path;
@@ -20,6 +20,7 @@ viewfuse_tests::trials![
     other_hosts_and_addresses_get_nothing,
     how_much_was_photographed_is_told,
     full_pictures_are_those_of_render,
+    pictures_have_the_size_and_the_units_that_are_told,
     no_view_is_an_error_of_the_server,
     the_scheme_can_be_chosen_for_the_scene,
     the_newest_request_wins,
@@ -61,6 +62,10 @@ fn other_hosts_and_addresses_get_nothing() {
     for path in ["/", "/scene", "/0123456789abcdef0123456789abcdef/", &program.path[..20]] {
         assert_eq!(status("GET", path, &[header], b""), 403, "{path}");
     }
+    // A page there would look for its parts elsewhere.
+    assert_eq!(status("GET", program.path.trim_end_matches('/'), &[header], b""), 404);
+    let tunnel = program.connect().ask("GET", &program.path, &[("Host", "127.0.0.1:9")], b"").body;
+    assert!(String::from_utf8_lossy(&tunnel).contains("a tunnel must have that port at both ends"));
     for (rest, expected) in [("scene", 405), ("picture", 400), ("nothing", 404), ("../Cargo.toml", 404)] {
         assert_eq!(status("POST", &format!("{}{rest}", program.path), &[header], b"{}"), expected, "{rest}");
     }
@@ -251,6 +256,40 @@ fn full_pictures_are_those_of_render() {
     assert!(pictures[0] != pictures[1] && pictures[0] != rendered);
 }
 
+/// Photographs of two shapes, far apart, of which one is missing: the page is of the first source's shape, as `render`
+/// takes it, and hears of the scene's warnings.
+fn pictures_have_the_size_and_the_units_that_are_told() {
+    let folder = Folder::new();
+    let mut frames = Vec::new();
+    for (view, [width, height]) in [[64, 48], [48, 64], [48, 64], [48, 64]].into_iter().enumerate() {
+        let picture = RgbImage::from_fn(width, height, |x, y| Rgb([(x * 5) as u8, (y * 5) as u8, (x * y % 251) as u8]));
+        picture.save(folder.file(&format!("images/{view}.png"))).expect("a photograph");
+        let across = 1.0e6 * view as f64;
+        frames.push(json!({
+            "file_path": format!("images/{view}.png"), "w": width, "h": height, "fl_x": 60, "fl_y": 60,
+            "cx": width / 2, "cy": height / 2,
+            "transform_matrix": [[1, 0, 0, across], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]],
+        }));
+    }
+    frames
+        .push(json!({ "file_path": "images/gone.png", "fl_x": 60, "transform_matrix": frames[0]["transform_matrix"] }));
+    folder.write("transforms.json", json!({ "frames": frames }).to_string());
+    let program = start(&folder, ". --sources 1,2,3 --size 32x24 --weights mean");
+    let found = program.scene();
+    let mut request = request("a", &found["start"], false);
+    (request["scheme"], request["layer"]) = ("mean".into(), "depth".into());
+    let (answer, picture) = program.connect().picture(&request).unpacked();
+    assert_eq!(picture.dimensions(), (24, 32), "upright, as the first source");
+    assert_eq!(
+        (&found["size"], &answer["record"]["size"], &answer["size"]),
+        (&json!([24, 32]), &json!([24, 32]), &json!([24, 32]))
+    );
+    let far = number_of(&answer["layer"]["range"][1]);
+    assert!(far > 1.0e5, "in units of the files: {far}");
+    let warnings = program.get("status").json()["warnings"].to_string();
+    assert!(warnings.contains("1 of 5 photographs are not there"), "{warnings}");
+}
+
 /// Whatever a person does with the camera, there is a picture or a sentence that says why not.
 fn no_view_is_an_error_of_the_server() {
     let folder = toy();
@@ -282,7 +321,12 @@ fn the_scheme_can_be_chosen_for_the_scene() {
     let found = program.scene();
     let pose = &found["others"][8]["pose"];
     assert_eq!((&found["scheme"], &found["chooses"]), (&json!("error:alpha=1"), &json!(true)));
-    // It is chosen beside the pictures, from the first full one on.
+    // A video that asks for what is chosen waits for the choice, which is made beside the pictures.
+    let mut film = path(pose, 2);
+    film["scheme"] = Value::Null;
+    let film = video(&program, &film);
+    let decoder = WebPDecoder::new(Cursor::new(film.body)).expect("a WebP");
+    let filmed = decoder.into_frames().collect_frames().expect("frames").remove(0).into_buffer();
     program.connect().picture(&request("a", pose, false)).unpacked();
     let chosen = || program.get("status").json()["chosen"].clone();
     wait_until("no scheme is chosen", || !chosen().is_null());
@@ -302,6 +346,7 @@ fn the_scheme_can_be_chosen_for_the_scene() {
         assert!(image::open(path).expect("a picture").to_rgb8() == *row, "{scheme}: another picture");
     }
     assert!(shown[0] != shown[1] && shown[0] == shown[2]);
+    assert!(DynamicImage::from(filmed).into_rgb8() == shown[0], "the video has another scheme");
 }
 
 /// The kernels are the same functions on every device.

@@ -23,6 +23,11 @@ pub fn say(text: impl Display) -> io::Result<()> {
     }
 }
 
+/// `1 target`, `2 targets`.
+pub(crate) fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
 /// Standard output for what is no message: a script, a video.
 pub(crate) fn data_out() -> StdoutLock<'static> {
     io::stdout().lock()

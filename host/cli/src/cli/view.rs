@@ -3,7 +3,7 @@
 use super::model::{ModelOptions, chosen_scheme, of_fields, scene_help};
 use super::options::{BoundOptions, DeviceOptions, OmissionOptions, PictureOptions, SourceOptions};
 use super::posed::PoseOption;
-use super::printing::{say, warn_of};
+use super::printing::{counted, say, warn_of};
 use super::terminal::Terminal;
 use super::threads::on_threads;
 use super::weighting::choice_help;
@@ -14,6 +14,7 @@ use viewfuse_device::choice::Chosen;
 use viewfuse_field::gaussians::GivenGaussians;
 use viewfuse_field::render::RenderOptions;
 use viewfuse_job::shell::quoted;
+use viewfuse_scene::few_shot::item_of;
 use viewfuse_view::{Commands, ViewError, Viewed, Viewer};
 use viewfuse_weighting::{Weighting, WeightingChoice};
 
@@ -89,8 +90,8 @@ pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> 
         };
         let commands = commands(&folder, given, &viewed);
         let viewer = Viewer::listen(viewed, commands, arguments.port).map_err(plain)?;
-        let (count, path) = (sources.len(), folder.display());
-        say(format_args!("{path}: {count} sources, {} on {}, {reason}", about.name, viewer.device_name))?;
+        let (count, path) = (counted(sources.len(), "source"), folder.display());
+        say(format_args!("{path}: {count}, {} on {}, {reason}", about.name, viewer.device_name))?;
         say(format_args!("{}", viewer.address()))?;
         if !arguments.no_browser && !start_browser(&viewer.address().to_string()) {
             say("no browser could be started: open this address")?;
@@ -125,8 +126,8 @@ fn commands(folder: &Path, given: &[(String, Option<String>)], viewed: &Viewed<'
     let Viewed { scene, sources, weighting: first, .. } = viewed;
     let mut options = String::new();
     if given.iter().any(|(name, _)| name == "sources" || name == "views") {
-        let names: Vec<&str> = sources.iter().map(|&view| scene.views[view].name.as_str()).collect();
-        options = format!(" --sources {}", quoted(names.join(",")));
+        let items: Vec<String> = sources.iter().map(|&view| item_of(scene, view)).collect();
+        options = format!(" --sources {}", quoted(items.join(",")));
     }
     for (name, value) in given.iter().filter(|(name, _)| !NOT_OF_RENDER.contains(&name.as_str())) {
         options += &format!(" --{name}");

@@ -78,7 +78,7 @@ impl From<GivenGaussians> for AnyField {
 impl Field for GivenGaussians {
     /// The Gaussians are only drawn.
     fn about(&self) -> About {
-        About { is_live: true, kernels: &KERNELS, ..About::new(GIVEN) }
+        About { is_live: true, draws_all: true, kernels: &KERNELS, ..About::new(GIVEN) }
     }
 
     fn prepare<'a, D: Device>(

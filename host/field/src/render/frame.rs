@@ -42,6 +42,9 @@ pub struct Frame {
     pub encode: Duration,
     /// How the frame keeps the run's bound, if there is one.
     pub kept: Option<Kept>,
+    /// Whether a pixel without depth may show nothing of the scene ([`About::draws_all`](crate::About::draws_all)), and
+    /// not the known background of an object.
+    pub counts_gaps: bool,
 }
 
 /// A photograph at the target, and the scores of the prediction.

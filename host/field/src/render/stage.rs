@@ -45,6 +45,8 @@ pub struct Stage<'a> {
     /// The sources at working size.
     pub images: Arc<SourceImages>,
     pub(crate) session: Session<'a>,
+    /// [`Frame::counts_gaps`](super::Frame::counts_gaps) of its frames.
+    counts_gaps: bool,
     /// Keeps the options' bound.
     controller: Option<Controller>,
     /// Times of the stages so far.
@@ -144,7 +146,9 @@ impl<'a> Stage<'a> {
             Ok::<_, FieldError>((session, controller))
         })?;
         let first = images.images.first().map(|image| image.camera);
-        let mut stage = Stage { scene: None, options, side, first, unit, sources, images, session, controller, costs };
+        let counts_gaps = renderer.about().draws_all && !images.has_silhouettes;
+        let mut stage =
+            Stage { counts_gaps, scene: None, options, side, first, unit, sources, images, session, controller, costs };
         stage.session.vary(options.field.as_ref(), options.mixture.as_ref(), progress)?;
         Ok(stage)
     }

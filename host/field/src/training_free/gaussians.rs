@@ -112,7 +112,7 @@ fn open(given: &Given) -> Result<AnyField, OpenError> {
 impl Field for Gaussians {
     /// Sources at the size of the pictures.
     fn about(&self) -> About {
-        About { least_sources: 2, ..About::new(ROW.name) }
+        About { least_sources: 2, draws_all: true, ..About::new(ROW.name) }
     }
 
     fn options(&self) -> AnyOptions {

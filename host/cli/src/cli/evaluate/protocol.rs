@@ -3,10 +3,10 @@
 use super::super::terminal::Terminal;
 use super::files::{csv_of, json_of};
 use super::jobs::Jobs;
-use super::tables::{counted, print_published, print_table};
+use super::tables::{print_published, print_table};
 use super::{Arguments, refuse_same_photographs};
 use crate::cli::outputs::keep_folder_apart;
-use crate::cli::printing::{say, warn_of};
+use crate::cli::printing::{counted, say, warn_of};
 use crate::cli::threads::on_threads;
 use crate::cli::wrong::wrong;
 use anyhow::Context;

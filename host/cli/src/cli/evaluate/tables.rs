@@ -9,11 +9,6 @@ use viewfuse_evaluate::summary::{Cell, Column, Row, Table};
 /// Verdicts that are printed; of more, how many there are.
 const VERDICTS: usize = 16;
 
-/// `1 target`, `2 targets`.
-pub(super) fn counted(count: usize, what: &str) -> String {
-    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
-}
-
 /// A table with intervals under a title, and what it says in words, on request with the differences. The best row of
 /// each column is marked, and those that are not shown to differ from it.
 pub(super) fn print_table(title: &str, results: &Table, is_verbose: bool) -> io::Result<()> {

@@ -162,6 +162,7 @@ impl Stage<'_> {
             time,
             encode,
             kept,
+            counts_gaps: self.counts_gaps,
         })
     }
 
