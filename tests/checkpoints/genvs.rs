@@ -227,7 +227,7 @@ fn estimates_are_read_and_unknown_ones_refused() {
     assert_eq!(estimate(Tensors::small().saying("viewfuse.estimate", "colours")), Estimate::FromColours);
     Tensors::small()
         .saying("viewfuse.estimate", "color")
-        .refused("its metadata says viewfuse.estimate = 'color'; only 'colours' is known");
+        .refused("its metadata says viewfuse.estimate = 'color'; 'published' and 'colours' are known");
 }
 
 #[test]

@@ -123,9 +123,9 @@ fn the_side_of_sources_is_read_and_one_without_sense_refused() {
     assert_eq!(saying("who", "me").map(|architecture| architecture.source_side), Ok(128));
     assert_eq!([side("64"), side("1"), side("65536")], [Ok(64), Ok(1), Ok(65536)]);
     for (value, part) in [
-        ("0", "not a whole number from 1 to 65536"),
+        ("0", "= '0', which is not a whole number from 1 to 65536"),
         ("65537", "not a whole number from 1 to 65536"),
-        ("63.5", "viewfuse.source_side = 63.5"),
+        ("63.5", "viewfuse.source_side = '63.5', which is not a whole number from 1 to 65536"),
         ("NaN", "viewfuse.source_side"),
         ("wide", "viewfuse.source_side"),
     ] {

@@ -195,7 +195,7 @@ fn what_is_no_file_of_gaussians_is_refused() {
     };
     let cases = [
         (b"solid\n".to_vec(), ":1: not a readable PLY file: the first line is not ply"),
-        (Vec::new(), ":1: not a readable PLY file: the first line is not ply"),
+        (Vec::new(), ": the file is empty"),
         (
             text("binary_little_endian", "ascii"),
             ":2: not a readable PLY file: the format is \"ascii 1.0\"; binary_little_endian 1.0 is read",

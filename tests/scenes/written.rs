@@ -225,7 +225,8 @@ fn a_lens_of_all_frames_is_said_once() {
         serde_json::from_slice(&std::fs::read(folder.join("out/transforms.json")).expect("a file")).expect("JSON")
     };
     for (model, name, fisheye) in [("OPENCV", "OPENCV", None), ("OPENCV_FISHEYE", "OPENCV_FISHEYE", Some(true))] {
-        let (folder, ..) = written(&open(&through_a_lens(model, 0.05)), Layout::Transforms);
+        let of_all = through_a_lens(model, 0.05);
+        let (folder, ..) = written(&open(&of_all), Layout::Transforms);
         let top = top(&folder);
         assert_eq!(top["camera_model"], name);
         assert_eq!(
@@ -234,9 +235,9 @@ fn a_lens_of_all_frames_is_said_once() {
         );
     }
     // OpenCV's rational lens is none of theirs, and neither is a fisheye beside a pinhole.
-    let mut rational = open(&through_a_lens("FULL_OPENCV", 0.05));
+    let folders = ["FULL_OPENCV", "OPENCV_FISHEYE"].map(|model| through_a_lens(model, 0.05));
+    let [mut rational, mut mixed] = folders.each_ref().map(open);
     rational.views[0].lens = Lens::new(Projection::Perspective, [0.05, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0]).ok();
-    let mut mixed = open(&through_a_lens("OPENCV_FISHEYE", 0.05));
     let mut beside = mixed.views[0].clone();
     (beside.lens, beside.name) = (None, "2".to_owned());
     mixed.views.push(beside);
@@ -529,8 +530,11 @@ fn hostile_names_are_given_back_or_refused() {
 fn poses_of_other_photographs_are_not_written() {
     let folder = llff_of_two_places();
     let mut scene = open(&folder);
-    // `a-b.png` comes before `a.png`, `a` before `a-b`.
-    scene.views.iter_mut().zip(["a", "a-b"]).for_each(|(view, name)| view.name = name.to_owned());
+    // In the order of their files, `a-b.png` comes before `a.png`: these can be written.
+    scene.views.iter_mut().zip(["a-b", "a"]).for_each(|(view, name)| view.name = name.to_owned());
+    assert_same(Layout::Llff, &scene, &written(&scene, Layout::Llff).1);
+    // `a.b.png` comes before `a.png`, too.
+    scene.views.iter_mut().zip(["a", "a.b"]).for_each(|(view, name)| view.name = name.to_owned());
     let out = Folder::new();
     let error = write(&scene, Layout::Llff, &out.join("out"), &Silent).expect_err("another order");
     assert!(error.to_string().contains("is read back with the pose of another"), "{error}");

@@ -275,7 +275,7 @@ fn has_words(name: &str, text: &str) -> bool {
     let is_word = |character: Option<char>| character.is_some_and(char::is_alphanumeric);
     let begins_within = |at: usize| is_word(name[..at].chars().next_back()) && is_word(text.chars().next());
     let ends_within = |end: usize| is_word(name[end..].chars().next()) && is_word(text.chars().next_back());
-    text.contains(char::is_alphanumeric)
+    (text.is_empty() || text.contains(char::is_alphanumeric))
         && name.match_indices(text).any(|(at, _)| !begins_within(at) && !ends_within(at + text.len()))
 }
 

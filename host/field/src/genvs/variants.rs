@@ -38,6 +38,10 @@ enum Relative {
     ToLastChange(f32),
 }
 
+/// Pictures of less than half the side of the network's training have so many times the error: of 56 of a quarter of
+/// it, one had more than 1.5 times that (`host/results/bounds.md`).
+const OF_SMALL: f32 = 1.75;
+
 /// What rounded products are typically worth. Errors: emulated on the network of the published size, with an encoder
 /// and feature images that are rounded too, 61.5 and 89 dB from the exact picture; times: what convolutions take of a
 /// picture, at the rates of prototypes on a GPU (`host/results/efforts.md`).
@@ -64,8 +68,9 @@ fn exact_plan(plan: &Plan) -> Plan {
 }
 
 /// The root mean square difference of an effort's picture from the exact one, colours from 0 to 1, without what
-/// rounding changes: an estimate. Infinite for other runs.
-pub(super) fn error_of(plan: &Plan, accuracy: Accuracy) -> f32 {
+/// rounding changes: an estimate. Infinite for other runs. `share` is the picture's longer side over that of the
+/// network's training.
+pub(super) fn error_of(plan: &Plan, accuracy: Accuracy, share: f32) -> f32 {
     if *plan == exact_plan(plan) {
         return 0.0;
     }
@@ -73,11 +78,13 @@ pub(super) fn error_of(plan: &Plan, accuracy: Accuracy) -> f32 {
         plan.compares_orders && plan.steps == Steps::Fixed { sampler: Sampler::Ipndm, level_count: *calls }
     };
     // Pictures are from -1 to 1.
-    0.5 * match CALLS.iter().find(is_own) {
-        Some((.., Relative::ToSteps(share))) => share * accuracy.steps,
-        Some((.., Relative::ToLastChange(share))) => share * accuracy.last_change,
-        None => f32::INFINITY,
-    }
+    let of_size = if share < 0.5 { OF_SMALL } else { 1.0 };
+    0.5 * of_size
+        * match CALLS.iter().find(is_own) {
+            Some((.., Relative::ToSteps(share))) => share * accuracy.steps,
+            Some((.., Relative::ToLastChange(share))) => share * accuracy.last_change,
+            None => f32::INFINITY,
+        }
 }
 
 /// So few calls have other levels than the published ones, of which a good part is spent where the picture hardly

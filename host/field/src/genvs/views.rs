@@ -225,7 +225,9 @@ impl<D: Device> Prepared for Views<'_, D> {
             }
         }
         let sampled = sampled?;
-        self.error = variants::error_of(&plan, sampled.accuracy) + self.rounding(precision, &mut scratch, &features)?;
+        let share = size.width.max(size.height) as f32 / self.field.architecture.image_side as f32;
+        let of_steps = variants::error_of(&plan, sampled.accuracy, share);
+        self.error = of_steps + self.rounding(precision, &mut scratch, &features)?;
         self.features = Some((key, features));
         self.counts.calls += u64::from(sampled.call_count());
         self.counts.planned_calls += u64::from(sampled.call_count() + sampled.left_out);
