@@ -44,9 +44,10 @@ export function drawPicture() {
 
 const recent = [];           // when the last coarse pictures were drawn
 
-export function tellStatus({ full, size, seconds }) {
+export function tellStatus({ full, size, seconds, left_out: leftOut }) {
   const time = seconds < 1 ? `${Math.round(1000 * seconds)} ms` : `${seconds.toFixed(1)} s`;
-  element('status').textContent = `${full ? 'full' : 'coarse'}, ${size.join(' × ')}, ${time}`;
+  const dropped = leftOut > 0 ? `; without ${leftOut} source${leftOut === 1 ? '' : 's'} of least weight` : '';
+  element('status').textContent = `${full ? 'full' : 'coarse'}, ${size.join(' × ')}, ${time}${dropped}`;
   const now = performance.now();
   if (!full) recent.push(now);
   while (recent.length > 0 && recent[0] < now - 2000) recent.shift();

@@ -94,6 +94,7 @@ async function begin() {
   showSources((own) => { stop(); goTo(own, state.scene.focus); });
   showSchemes(state.scene.scheme);
   state.first = state.scene.chooses ? null : state.scene.scheme;
+  if (!state.scene.is_weighted) element('choosing').textContent = 'Weights only colour the cameras: these Gaussians are drawn without them.';
   listenToSettings();
   listenToKeyframes(goTo);
   listenToVideo();

@@ -24,6 +24,8 @@ const MAX_LIMIT: f32 = 1.0e9;
 pub(crate) struct Subject {
     name: String,
     field: &'static str,
+    /// Whether pictures depend on the weights.
+    is_weighted: bool,
     device: String,
     /// Width and height of full pictures.
     size: [u32; 2],
@@ -119,6 +121,7 @@ impl Subject {
         Subject {
             name: scene.name(),
             field: about.name,
+            is_weighted: !about.is_live,
             device,
             size,
             moving_side: Pace::of(about.is_live, size[0].max(size[1])).largest,

@@ -290,9 +290,11 @@ fn where_nothing_was_photographed_it_is_said() {
 /// A pose is saved as a file that viewfuse reads, and the command line says how this view is rendered.
 fn a_view_is_taken_elsewhere() {
     let browser = &Browser::needed();
-    let program = room(SMALL);
+    let program = room(&format!("{SMALL} --leave-out 0.5"));
     let chromium = Chromium::start(browser);
     let tab = opened(&chromium, &program);
+    let status = text_in(&tab, "status");
+    assert!(status.contains("; without ") && status.ends_with(" of least weight"), "{status}");
     let files = keep_downloads(&chromium);
     let permissions = json!({"permissions": ["clipboardReadWrite", "clipboardSanitizedWrite"]});
     chromium.call(None, "Browser.grantPermissions", permissions);

@@ -446,7 +446,7 @@ fn gaussians_are_shown() {
     let pose = &others.iter().find(|view| view["name"] == "000020").expect("view 20")["pose"];
     let mut connection = program.connect();
     let (full, picture) = connection.picture(&request("a", pose, false)).unpacked();
-    assert_eq!(full["full"], true);
+    assert_eq!((&full["full"], &found["is_weighted"]), (&json!(true), &json!(false)));
     assert!(picture == expected, "it is not the picture of render");
     let mut moving = request("a", pose, true);
     moving["side"] = found["moving_side"].clone();
