@@ -139,4 +139,8 @@ fn learned_attention_becomes_a_header() {
     let refused = |arguments: &str, parts: &[&str]| assert_refused(&folder, arguments, parts);
     refused("convert flat.safetensors flat.h", &["flat.safetensors", "Fourier"]);
     refused("convert learned.safetensors half.h --half", &["half.h", "--half"]);
+    refused(
+        "convert learned.safetensors half.safetensors --half",
+        &["learned.safetensors: learned attention is read in f32"],
+    );
 }

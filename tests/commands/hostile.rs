@@ -187,6 +187,9 @@ fn devices_without_an_end() {
         symlink("/dev/zero", path).expect("a link");
     };
     zero("zero");
+    // Nor has a pipe that nobody writes to.
+    let made = std::process::Command::new("mkfifo").arg(folder.join("pipe")).status().expect("mkfifo runs");
+    assert!(made.success());
     zero("run/run.json");
     zero("json/transforms.json");
     zero("srn/intrinsics.txt");
@@ -205,6 +208,8 @@ fn devices_without_an_end() {
         "inspect srn",
         "inspect llff",
         "render toy --targets 20 --size 16x16 --model zero --device cpu -o out",
+        "render toy --targets 20 --size 16x16 --model pipe --device cpu -o out",
+        "convert pipe out.safetensors",
     ] {
         let mut limited = std::process::Command::new("sh");
         // Four GiB of addresses: more would be taken by a reader without a limit.

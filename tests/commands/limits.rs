@@ -14,6 +14,8 @@ viewfuse_tests::trials![
     narrow_photographs_have_narrow_pictures,
     #[cfg(unix)]
     a_file_that_may_not_grow_is_an_error,
+    #[cfg(target_os = "linux")]
+    threads_that_cannot_be_started_are_an_error,
 ];
 
 /// What the process may take, in KiB of addresses: less than one such file took.
@@ -156,6 +158,33 @@ fn narrow_photographs_have_narrow_pictures() {
     assert_eq!((picture.width(), picture.height()), (7, 512));
     let other = "render thin --targets 3 --size 9x500 --device cpu -o other";
     assert_refused(&folder, other, &["9x500 does not keep the shape"]);
+}
+
+/// `ulimit -u`, as containers have it: the limit holds for people but not for root, who becomes nobody.
+#[cfg(target_os = "linux")]
+fn threads_that_cannot_be_started_are_an_error() {
+    use std::os::unix::fs::PermissionsExt;
+    use std::process::Command;
+    let user = Command::new("id").arg("-u").output().expect("id runs").stdout;
+    // Who runs this has other processes, too; of nobody's the first thread beside this one listens to Ctrl-C.
+    let (first, limits): (&[&str], &[u32]) = match user.trim_ascii() == b"0" {
+        true => (&["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"], &[1, 2]),
+        false => (&[], &[1]),
+    };
+    let folder = Folder::new();
+    fs::set_permissions(&*folder, fs::Permissions::from_mode(0o755)).expect("a folder for all");
+    fs::copy(BINARY, folder.join("viewfuse")).expect("the command");
+    for limit in limits {
+        let script = format!("ulimit -u {limit}; exec ./viewfuse inspect nowhere");
+        let words = [first, &["sh", "-c", &script]].concat();
+        let mut limited = Command::new(words[0]);
+        limited.args(&words[1..]).current_dir(&*folder);
+        let Outcome { code, stderr, .. } = Outcome::of(limited);
+        let is_told = ["Ctrl-C cannot be listened to", "the threads of the cores cannot be started"]
+            .iter()
+            .any(|told| stderr.starts_with(&format!("viewfuse: {told}")));
+        assert!(code == Some(1) && is_told && stderr.lines().count() == 1, "{limit}: {stderr}");
+    }
 }
 
 /// `ulimit -f`: a write beyond it is an error like that of a full disk, and nothing is left.

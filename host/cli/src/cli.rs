@@ -58,6 +58,7 @@ mod weighting;
 mod weights;
 mod wrong;
 
+use anyhow::Context;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::env::args_os;
 use std::process::ExitCode;
@@ -175,13 +176,14 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
     }
 }
 
-/// Makes Ctrl-C set a flag that the work looks at and the limit of files' sizes an error, and keeps panics silent that
-/// become errors.
+/// Makes Ctrl-C set a flag that the work looks at and the limit of files' sizes an error, keeps panics silent that become
+/// errors, and starts the threads.
 ///
 /// # Errors
-/// If another handler is already installed.
+/// If another handler is already installed, or the system allows no more threads.
 pub fn listen() -> anyhow::Result<()> {
     viewfuse_job::panics::silence_caught();
     terminal::survive_full_files();
-    Ok(terminal::listen()?)
+    terminal::listen().context("Ctrl-C cannot be listened to")?;
+    threads::start_threads()
 }

@@ -109,12 +109,20 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
          .safetensors, or in .h or .rs without --half",
         output.display()
     );
+    let is_attention = arguments.half && AttentionModel::open(&arguments.input).is_ok();
+    ensure!(
+        !is_attention,
+        "{}: learned attention is read in f32: convert it without --half",
+        arguments.input.display()
+    );
     check_writable(output)?;
     let mut checkpoint = Checkpoint::open(&arguments.input)?;
     arguments.set.iter().for_each(|(key, value)| checkpoint.set(key, value));
     check_settings(&checkpoint, &arguments.set)?;
     let progress = Terminal::new("converting");
     pixelnerf::Architecture::assumption(&checkpoint).iter().for_each(|assumption| progress.warn(assumption));
+    let of_genvs = genvs::Architecture::of(&checkpoint).ok();
+    of_genvs.and_then(|genvs| genvs.assumption(&checkpoint)).iter().for_each(|assumption| progress.warn(assumption));
     let precision = if arguments.half { Precision::Half } else { Precision::Kept };
     let written = checkpoint.write_safetensors(output, precision, &progress)?;
     drop(progress);
