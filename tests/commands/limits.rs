@@ -176,7 +176,7 @@ fn threads_that_cannot_be_started_are_an_error() {
     fs::copy(BINARY, folder.join("viewfuse")).expect("the command");
     for limit in limits {
         let script = format!("ulimit -u {limit}; exec ./viewfuse inspect nowhere");
-        let words = [first, &["sh", "-c", &script]].concat();
+        let words = [first, &["bash", "-c", &script]].concat();
         let mut limited = Command::new(words[0]);
         limited.args(&words[1..]).current_dir(&*folder);
         let Outcome { code, stderr, .. } = Outcome::of(limited);

@@ -113,6 +113,17 @@ fn every_layout_that_can_hold_a_scene_gives_it_back() {
         let is_cut = written.lost.iter().any(|line| line.contains("within that sphere"));
         assert_eq!(is_cut, layout == Layout::Neus, "{layout}: {:?}", written.lost);
     }
+    // NeRF's own program takes one focal length for all.
+    let mut second = llff_row();
+    (second[3], second[8], second[14]) = (1.25, 2.5, 176.0);
+    folder.write("poses_bounds.npy", npy(&[2, 17], &[llff_row(), second].concat()));
+    let scene = open(&folder);
+    for layout in [Layout::Llff, Layout::Transforms] {
+        let (_folder, read, written) = written(&scene, layout);
+        assert_same(layout, &scene, &read);
+        let is_told = written.lost.iter().any(|line| line.contains("takes the first photograph's for all"));
+        assert_eq!(is_told, layout == Layout::Llff, "{:?}", written.lost);
+    }
 }
 
 #[test]
@@ -131,6 +142,16 @@ fn points_and_poses_without_photographs() {
         assert!(lost.starts_with("where features were found") && written.lost.len() == 1, "{lost}");
         let is_binary = folder.join("out/sparse/0/cameras.bin").exists();
         assert_eq!(is_binary, layout == Layout::ColmapBinary);
+        // A point behind a camera has no place in its photograph.
+        let seen_by = scene.points[0].views.clone();
+        let camera = &scene.views[seen_by[0] as usize].camera.pose;
+        scene.points[0].position_world = camera.centre_world() - camera.forward_world();
+        let (_folder, read, _) = self::written(&scene, layout);
+        let is_before =
+            |view: &u32| scene.views[*view as usize].camera.project(scene.points[0].position_world).depth > 0.0;
+        let before: Vec<u32> = seen_by.iter().copied().filter(is_before).collect();
+        assert_eq!(read.points[0].views, before);
+        assert!(before.len() < seen_by.len());
     }
     let (_folder, read, written) = self::written(&scene, Layout::Transforms);
     assert_same(Layout::Transforms, &scene, &read);

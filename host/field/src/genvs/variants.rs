@@ -241,6 +241,15 @@ mod tests {
     }
 
     #[test]
+    fn small_pictures_have_more_error_than_their_steps_tell() {
+        let plan = in_calls(&Plan::fast(3), Estimate::FromColours, 6);
+        let accuracy = Accuracy { steps: 0.02, last_change: 0.01 };
+        let of = |share: f32| error_of(&Plan { compares_orders: true, ..plan }, accuracy, share);
+        assert!(of(1.0) > 0.0 && of(1.0) == of(0.5));
+        assert_eq!(of(0.49), OF_SMALL * of(1.0));
+    }
+
+    #[test]
     fn given_levels_are_kept() {
         let given = |smallest, largest| {
             let schedule = NoiseSchedule::new(smallest, largest).expect("levels");
