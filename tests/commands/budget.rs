@@ -5,12 +5,14 @@ use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use viewfuse::field::scores::psnr_of_seen;
-use viewfuse_tests::command::toy;
+use viewfuse_tests::command::{sample, toy};
 
 viewfuse_tests::trials![
     a_bound_on_the_error_is_kept_and_recorded,
     a_network_keeps_45_decibels_unless_options_say_what_is_omitted,
     a_time_that_is_too_short_is_said,
+    weights_are_those_of_the_picture,
+    a_mixture_under_a_bound_is_that_of_all_views,
     an_evaluation_says_how_its_bound_is_kept,
     wrong_bounds_are_refused,
 ];
@@ -48,6 +50,36 @@ fn a_bound_on_the_error_is_kept_and_recorded() {
     assert!(frames(&folder).iter().all(|frame| frame["kept"]["effort"] == "exact"));
 }
 
+/// A picture that has all views says so, whatever the options leave out of others.
+fn weights_are_those_of_the_picture() {
+    let folder = toy();
+    for (options, effort) in [("--max-time 100", "exact"), ("--exact", "")] {
+        let _ = fs::remove_dir_all(folder.join("out"));
+        let leave_out = if effort.is_empty() { "" } else { "--leave-out 0.5" };
+        done(&folder, &format!("render toy {NETWORK} {options} {leave_out} -o out"));
+        for frame in frames(&folder) {
+            assert!(effort.is_empty() || frame["kept"]["effort"] == effort, "{frame}");
+            assert_eq!((list_of(&frame["left_out"]).len(), &frame["weights"]), (0, &frame["weights_before"]));
+            assert_eq!((&frame["size"], list_of(&frame["files"]).len() > 1), (&serde_json::json!([32, 32]), true));
+        }
+    }
+}
+
+fn a_mixture_under_a_bound_is_that_of_all_views() {
+    let folder = sample("room");
+    let picture = |options: &str| {
+        done_with_warnings(
+            &folder,
+            &format!("render room --targets 5 --size 48x36 --device cpu {options} -o out --replace"),
+        );
+        fs::read(folder.join("out/005.png")).expect("a picture")
+    };
+    let exact = picture("--exact");
+    let bounded = picture("--max-error 100dB");
+    assert_eq!(frames(&folder)[0]["kept"]["effort"], "exact");
+    assert!(exact == bounded, "another picture is called exact");
+}
+
 /// With what was omitted by these test networks before there was a default bound they are 24, 52 and 35 dB from their
 /// exact pictures.
 fn a_network_keeps_45_decibels_unless_options_say_what_is_omitted() {
@@ -57,7 +89,7 @@ fn a_network_keeps_45_decibels_unless_options_say_what_is_omitted() {
             fs::remove_dir_all(folder.join("out")).expect("removed");
         }
         let printed =
-            done(&folder, &format!("render toy --targets 20 --views 3 --size 24x24 --device cpu {options} -o out"));
+            done(&folder, &format!("render toy --targets 20 --views 3 --size 32x32 --device cpu {options} -o out"));
         let picture = image::open(folder.join("out/000020.png")).expect("a picture").to_rgb8();
         (picture, frames(&folder)[0]["kept"].clone(), printed)
     };

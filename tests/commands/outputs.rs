@@ -14,6 +14,7 @@ viewfuse_tests::trials![
     inputs_are_not_replaced,
     no_option_names_both_an_input_and_an_output,
     files_of_a_person_are_no_pictures_of_a_run,
+    a_record_lists_what_its_run_wrote,
     #[cfg(unix)]
     links_to_nothing_are_noticed_first,
     what_a_kill_left_is_removed,
@@ -179,6 +180,29 @@ fn files_of_a_person_are_no_pictures_of_a_run() {
     for _ in 0..2 {
         done(&folder, &format!("{RENDER} --video gif -o again"));
     }
+}
+
+/// Beside the pictures of a run a person's own video, and depths of another program.
+fn a_record_lists_what_its_run_wrote() {
+    let folder = toy();
+    let run_in =
+        |more: &str| format!("render toy --targets 20,21 --size 16x16 --device cpu --pictures-only -o out {more}");
+    super::done_with_warnings(&folder, &run_in("--weights mean"));
+    for own in ["out/video.webp", "out/000020_depth.npy"] {
+        folder.write(own, "mine");
+        assert_refused(&folder, &run_in("--weights mean --video webp"), &[own]);
+        assert_refused(&folder, &run_in("--weights mean --video webp --replace"), &[own]);
+        assert_eq!(fs::read(folder.join(own)).expect("a file"), b"mine");
+        folder.remove(own);
+    }
+    folder.write("out/video.mp4", "mine");
+    super::done_with_warnings(&folder, &run_in("--weights distance --video webp --replace"));
+    assert_eq!(fs::read(folder.join("out/video.mp4")).expect("a file"), b"mine");
+    // Its own video goes with it.
+    let record = super::read_json(folder.join("out/run.json"));
+    assert_eq!(record["videos"], serde_json::json!(["video.webp"]));
+    super::done_with_warnings(&folder, &run_in("--weights error --replace"));
+    assert!(!folder.join("out/video.webp").exists() && folder.join("out/video.mp4").exists());
 }
 
 #[cfg(unix)]

@@ -7,6 +7,7 @@ use super::options::{Flag, Given, OpenError};
 use super::record::{Omission, VIEWS};
 use super::render::{DEFAULT_EARLY_TERMINATION, DEFAULT_LEAVE_OUT, RenderOptions};
 use super::variant::Variant;
+use crate::budget::Bound;
 use viewfuse_device::Precision;
 use viewfuse_nn::checkpoint::Checkpoint;
 
@@ -86,11 +87,14 @@ impl Row {
     }
 
     /// The options of a render, with [`DEFAULT_BOUND`] for a learned field where they have no bound and do not say to
-    /// omit more than by default.
+    /// omit more than by default. Of a field without a network a bound on the error omits no view: its pictures are
+    /// mixed by what is found of held-out sources under the same omissions, and would not be those of all views.
     pub fn bounded(&self, options: RenderOptions) -> RenderOptions {
         let is_more = options.leave_out > DEFAULT_LEAVE_OUT || options.early_termination > DEFAULT_EARLY_TERMINATION;
         let usual = (self.prefix().is_some() && !is_more).then_some(DEFAULT_BOUND);
-        RenderOptions { bound: options.bound.or(usual), ..options }
+        let is_mixed = self.prefix().is_none() && matches!(options.bound, Some(Bound::Error(_)));
+        let leave_out = if is_mixed { 0.0 } else { options.leave_out };
+        RenderOptions { bound: options.bound.or(usual), leave_out, ..options }
     }
 
     /// Its test networks.

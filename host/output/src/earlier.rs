@@ -19,6 +19,8 @@ struct WrittenRecord {
     _program: String,
     frames: Vec<WrittenFrame>,
     background: Option<WrittenBackground>,
+    /// None in records of before 2026-11-30.
+    videos: Option<Vec<String>>,
 }
 
 /// A run that another one of the same settings may add frames to.
@@ -45,17 +47,31 @@ struct WrittenBackground {
 #[derive(Deserialize)]
 struct WrittenFrame {
     target: String,
+    /// None in records of before 2026-11-30.
+    files: Option<Vec<String>>,
 }
 
 /// Names of the targets of the record in a folder; `None` if the file is no record of a render. An empty one is: of a
 /// machine that lost its power.
 pub(crate) fn recorded_targets(folder: &Path) -> Option<Vec<String>> {
-    let bytes = bytes_of_record(folder)?;
-    if bytes.is_empty() {
+    if bytes_of_record(folder)?.is_empty() {
         return Some(Vec::new());
     }
-    let record: WrittenRecord = serde_json::from_slice(&bytes).ok()?;
-    Some(record.frames.into_iter().map(|frame| frame.target).collect())
+    Some(recorded(folder)?.frames.into_iter().map(|frame| frame.target).collect())
+}
+
+fn recorded(folder: &Path) -> Option<WrittenRecord> {
+    serde_json::from_slice(&bytes_of_record(folder)?).ok()
+}
+
+/// The files that the record in a folder lists; of an older one, which lists none, all that its run may have written.
+fn recorded_files(folder: &Path) -> Vec<String> {
+    let Some(record) = recorded(folder) else { return Vec::new() };
+    let any_video = || VideoFormat::ALL.iter().map(|format| format!("video.{format}")).collect();
+    let of_frame = |frame: WrittenFrame| frame.files.unwrap_or_else(|| files_of(&frame.target));
+    let mut files = record.videos.unwrap_or_else(any_video);
+    files.extend(record.frames.into_iter().flat_map(of_frame));
+    files
 }
 
 /// The background that the run of a folder used, red green blue in `[0, 1]`; `Some(None)` if it had none, `None` if the
@@ -82,13 +98,10 @@ pub(crate) fn was_interrupted(folder: &Path) -> bool {
 /// The files that earlier runs wrote to a folder and that are there; the record and the journal themselves are not
 /// among them. Nothing outside the folder, and no link.
 pub(crate) fn earlier_files(folder: &Path) -> BTreeSet<String> {
-    let recorded = recorded_targets(folder);
-    let videos = recorded.iter().flat_map(|_| VideoFormat::ALL).map(|format| format!("video.{format}"));
     let finished = FrameJournal::files_of_any_run(folder);
-    let of_targets = recorded.iter().flatten().flat_map(|target| files_of(target));
     let is_there = |name: &String| {
         let is_inside = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
         is_inside && folder.join(name).symlink_metadata().is_ok_and(|about| about.is_file())
     };
-    videos.chain(of_targets).chain(finished).filter(is_there).collect()
+    recorded_files(folder).into_iter().chain(finished).filter(is_there).collect()
 }

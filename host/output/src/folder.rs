@@ -128,7 +128,7 @@ fn frames_that_stay(folder: &Path, planned: &Planned<'_>, others: &[String]) -> 
     if before != settings {
         return Err("their settings were others");
     }
-    let has_video = VideoFormat::ALL.iter().any(|format| folder.join(format!("video.{format}")).exists());
+    let has_video = others.iter().any(|file| file.starts_with("video."));
     if has_video || !videos.is_empty() {
         return Err("a video is of all pictures of one run");
     }

@@ -43,8 +43,10 @@ pub struct RunRecord {
     pub chosen: Option<ChosenRecord>,
     /// Seed of every random draw. The training-free field makes none.
     pub seed: u64,
-    /// Width and height of the pictures.
+    /// Width and height of the last picture.
     pub size: [u32; 2],
+    /// Names of the videos.
+    pub videos: Vec<String>,
     /// Requested and used background, red green blue in 0..=255.
     pub background: BackgroundRecord,
     /// The largest total weight of views that are left out.
@@ -210,6 +212,12 @@ pub struct FrameRecord {
     pub target: String,
     /// Its camera-to-world matrix in the coordinates of the scene's files, OpenCV axes, row-major.
     pub world_from_camera: [[f64; 4]; 4],
+    /// Width and height of its picture.
+    #[serde(default)]
+    pub size: [u32; 2],
+    /// Names of its files; none of a picture that a page shows.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub files: Vec<String>,
     /// Weight of each source as used, in the order of `sources`; 0 where it was left out.
     pub weights: Vec<f32>,
     /// Weights before views were left out.
@@ -276,6 +284,8 @@ impl FrameRecord {
         FrameRecord {
             target: frame.target.name.clone(),
             world_from_camera: space.file_from_camera(&frame.target.camera.pose),
+            size: frame.picture.dimensions().into(),
+            files: Vec::new(),
             weights: used.to_vec(),
             weights_before: before.to_vec(),
             left_out: source_names

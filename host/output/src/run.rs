@@ -208,11 +208,12 @@ impl RunWriter {
         if self.has_sheet(&frame) && self.source_pictures.is_empty() {
             self.source_pictures = (0..sources.images.len()).map(|source| Arc::new(sources.picture(source))).collect();
         }
-        let record = FrameRecord::of(&frame, &self.source_names, &self.coverage, &self.space)
+        let mut record = FrameRecord::of(&frame, &self.source_names, &self.coverage, &self.space)
             .expecting(self.chosen.as_ref(), &frame);
         let bytes = bytes_of(&frame);
         let frame = Arc::new(frame);
         let files = self.files(&frame)?;
+        record.files = files.iter().map(|file| file.name.clone()).collect();
         self.frames.add(record, files, bytes)?;
         self.videos.add(&self.folder, &frame, self.background());
         Ok(())
@@ -329,6 +330,7 @@ impl RunWriter {
             chosen: self.chosen.map(ChosenRecord::from),
             seed,
             size: self.size,
+            videos: self.videos.names(),
             background: background_record(options, self.background),
             leave_out: options.leave_out,
             early_termination: options.early_termination,

@@ -42,6 +42,11 @@ pub(crate) struct Videos {
 }
 
 impl Videos {
+    /// Names of their files.
+    pub(crate) fn names(&self) -> Vec<String> {
+        self.formats.iter().map(|format| format!("video.{format}")).collect()
+    }
+
     /// In these formats, of pictures that are written to these files.
     pub(crate) fn new(formats: &[VideoFormat], rate: FrameRate, files: Vec<PathBuf>) -> Videos {
         Videos { formats: formats.to_vec(), rate, files, next: 0, writers: Vec::new() }

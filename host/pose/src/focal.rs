@@ -1,6 +1,7 @@
 //! The cameras of photographs before the work: which photographs share one, and its focal length with where it comes
 //! from.
 
+use crate::exif::Exif;
 use crate::intake::Photo;
 use crate::solution::CameraGuess;
 
@@ -54,10 +55,7 @@ impl Cameras {
                     let focal = given * longest(photo.size) / longest(photos[0].size);
                     (Some(focal), FocalSource::Given, String::new())
                 }
-                (None, Some(focal)) => {
-                    let camera = format!("{:?} {:?}", photo.exif.camera, photo.exif.millimetres);
-                    (Some(focal), FocalSource::Exif, camera)
-                }
+                (None, Some(focal)) => (Some(focal), FocalSource::Exif, camera_of(&photo.exif, focal)),
                 (None, None) => (None, FocalSource::Unknown, "unknown".to_owned()),
             };
             let key = format!("{:?} {key}", photo.size);
@@ -94,9 +92,22 @@ impl Cameras {
     }
 }
 
+/// The camera that photographs state, with a focal length in pixels: a digital zoom changes this, but not the lens.
+fn camera_of(Exif { camera, millimetres, .. }: &Exif, focal: f64) -> String {
+    format!("{camera:?} {millimetres:?} {focal:.0}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_digital_zoom_is_another_camera() {
+        let phone = |focal| Exif { focal: Some(focal), camera: Some("phone".to_owned()), millimetres: Some(6.8) };
+        let camera = |focal| camera_of(&phone(focal), focal);
+        assert_eq!(camera(427.0), camera(427.2));
+        assert_ne!(camera(427.0), camera(480.0));
+    }
 
     #[test]
     fn what_is_known_may_change_a_little() {

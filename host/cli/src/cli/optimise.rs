@@ -186,6 +186,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let count = gaussians.gaussians.len();
     let gaussians = if count == 1 { "Gaussian" } else { "Gaussians" };
     say(format_args!("{}: {count} {gaussians} after {done} of {of} iterations", written.display()))?;
+    let is_moved = scene.frame.origin.to_array() != [0.0; 3];
+    if is_moved && written.extension().is_some_and(|extension| extension == "ply") {
+        let [x, y, z] = scene.frame.origin.to_array();
+        say(format_args!(
+            "positions are about ({x}, {y}, {z}), where the scene is: a comment of the file says so, which other programs \
+             do not read"
+        ))?;
+    }
     if written != output {
         say(format_args!("{}: as it was before", output.display()))?;
     }

@@ -63,8 +63,8 @@ pub(crate) struct Controller {
     pictures: u64,
 }
 
-/// A picture that keeps a bound, or does not, and the time of encoding in it.
-pub(crate) type Bounded = (Rendered, Kept, Duration);
+/// A picture that keeps a bound, or does not, the time of encoding in it, and whether it has the weights of all views.
+pub(crate) type Bounded = (Rendered, Kept, Duration, bool);
 
 /// The state of one picture's search.
 struct Search<'s, 'a> {
@@ -131,8 +131,10 @@ impl Controller {
             Bound::Time(most) => (None, Some(most.as_secs_f64())),
         };
         let seconds = search.start.elapsed().as_secs_f64();
+        let has_all = self.expected.is_exact(effort) || std::ptr::eq(search.view.used, search.view.all);
         let (effort, tried) = (self.expected.efforts[effort].label.clone(), search.tried);
-        Ok((rendered, Kept { most_error, most_seconds, effort, error, seconds, is_kept, tried }, search.encode))
+        let kept = Kept { most_error, most_seconds, effort, error, seconds, is_kept, tried };
+        Ok((rendered, kept, search.encode, has_all))
     }
 
     fn within_error(

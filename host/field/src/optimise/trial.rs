@@ -133,7 +133,8 @@ impl SceneOptimisation<'_> {
             quick.reduce(|best, next| if next.1 > best.1 { next } else { best }).unwrap_or((fast, f64::NEG_INFINITY));
         let (end, score) = last_good(&sharp);
         if score == f64::NEG_INFINITY {
-            progress.note(&format!("the time is too short for a trial of {quality}: fast is used"));
+            progress
+                .note(&format!("the time is too short for a trial of {quality}: however long it takes, fast is used"));
             return Ok(fast);
         }
         let is_over = until.is_some_and(|until| until <= Instant::now());

@@ -54,7 +54,7 @@ impl Stage<'_> {
             let Frame { colours, depths, confidences, .. } = frame;
             return Ok(Box::new(move || Ok(Rendered { colours, depths, confidences, width, height })));
         }
-        let (_, omission, _) = self.weighed(weighting, target);
+        let (_, [omission, _]) = self.weighed(weighting, target);
         let early_termination = self.options.early_termination;
         // An error of the scene is told with its name.
         let scene = self.scene.as_ref().map(|of| of.scene);
@@ -65,9 +65,8 @@ impl Stage<'_> {
         })
     }
 
-    /// The weights of the sources for a target, without those that are omitted by the options, and without any that
-    /// need not be.
-    fn weighed(&self, weighting: &Weighting, target: &Target) -> (SourceWeights, Omission<MAX_SOURCES>, SourceWeights) {
+    /// The weights of the sources for a target, what the options omit of them, and what may be omitted by any.
+    fn weighed(&self, weighting: &Weighting, target: &Target) -> (SourceWeights, [Omission<MAX_SOURCES>; 2]) {
         let pose = self.unit.pose(&target.camera.pose);
         let weights = weighting.weigh(&self.sources, &pose);
         let compares = matches!(self.session.prepared.encoding(), Encoding::Greatest(_));
@@ -75,8 +74,8 @@ impl Stage<'_> {
             omission if compares => comparable(&weights, omission, &self.sources, &pose),
             omission => omission,
         };
-        let (omission, all) = (omitting(self.left_out_total(&weights)), omitting(0.0).weights);
-        (weights, omission, all)
+        let omissions = [omitting(self.left_out_total(&weights)), omitting(0.0)];
+        (weights, omissions)
     }
 
     /// As [`Stage::frame`] without a truth, with a picture of another size than the options': for coarse pictures.
@@ -105,14 +104,19 @@ impl Stage<'_> {
         progress: &dyn Progress,
     ) -> Result<Frame, RenderError> {
         let start = Instant::now();
-        let (weights, omission, all) = self.weighed(weighting, target);
+        let (weights, [mut omission, least]) = self.weighed(weighting, target);
         let early_termination = self.options.early_termination;
         let is_rounded = self.options.is_rounded;
         let (pixels, kept, encode) = match &mut self.controller {
             Some(controller) => {
-                let view = View { camera, all: &all, used: &omission.weights, early_termination };
+                let view = View { camera, all: &least.weights, used: &omission.weights, early_termination };
                 let bounded = controller.render(&mut self.session, view, progress);
-                bounded.map(|(rendered, kept, encode)| (rendered.into(), Some(kept), encode))
+                bounded.map(|(rendered, kept, encode, has_all)| {
+                    if has_all {
+                        omission = least;
+                    }
+                    (rendered.into(), Some(kept), encode)
+                })
             }
             None => {
                 let (session, used) = (&mut self.session, &omission.weights);
