@@ -56,10 +56,8 @@ fn a_signal_ends_what_waits_for_a_pipe() {
     assert!(made.success());
     let waits = [
         "compare pipe toy/rgb/000000.png --device cpu",
-        "convert pipe out.safetensors",
         "verify pipe --device cpu",
         "weights toy --target 20 --weights attention:pipe",
-        "render toy --targets 20 --model pipe -o out",
         "report --pareto pipe -o page.html",
     ];
     for (index, arguments) in waits.into_iter().enumerate() {
