@@ -78,7 +78,7 @@ impl Optimisation {
             SceneOptimisation::new(scene, &self.selection, self.left_out.as_deref(), self.towards.as_deref())?;
         check_writable(output)?;
         self.keep_inputs(scene)?;
-        GaussianScene::check_place(output, &scene)?;
+        GaussianScene::check_place(output, scene)?;
         let before = self.resume.as_ref().map(|path| GaussianFile::open(path, scene)).transpose()?;
         let is_antialiased = self.antialias || before.as_ref().is_some_and(|before| before.scene.is_antialiased);
         if is_antialiased && is_of_one_colour {
