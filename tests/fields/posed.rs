@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use std::path::Path;
 use viewfuse::job::progress::{Progress, Silent};
 use viewfuse::pose::{
-    Features, Found, Options, PoseJob, Solution, SolvedCamera, SolvedPhotograph, SolvedPoint, Solver, SolverError, find,
+    Features, Found, Options, PoseJob, Solution, SolvedApart, SolvedCamera, SolvedPhotograph, SolvedPoint, Solver, SolverError, find,
 };
 use viewfuse::scene::Scene;
 use viewfuse::scene::rig::Rig;
@@ -21,6 +21,8 @@ struct Oracle<F> {
     turn: F,
     /// What all distances between cameras are multiplied with.
     baseline: f64,
+    /// Whether it says of one camera that its photographs are of two focal lengths.
+    is_zoomed: bool,
 }
 
 impl<F: Fn(Features, usize) -> f64 + Sync> Solver for Oracle<F> {
@@ -66,6 +68,10 @@ impl<F: Fn(Features, usize) -> f64 + Sync> Solver for Oracle<F> {
             photographs: (0..COUNT).map(photograph).collect(),
             points: (0..40).map(point).collect(),
             pairs: Vec::new(),
+            apart: (self.is_zoomed && job.cameras.len() == 1).then(|| SolvedApart {
+                loss: 0.5,
+                focal: (0..COUNT).map(|photo| Some([300.0, 420.0][photo % 2])).collect(),
+            }),
         })
     }
 }
@@ -81,7 +87,8 @@ fn found(baseline: f64, turn: impl Fn(Features, usize) -> f64 + Sync) -> Found {
     let folder = tempfile::tempdir().expect("a folder");
     bare(folder.path());
     let options = Options { focal: Some(294.4), ..Options::default() };
-    find(folder.path(), &[&Oracle { turn, baseline }], &options, &Silent).expect("a verdict")
+    let oracle = Oracle { turn, baseline, is_zoomed: false };
+    find(folder.path(), &[&oracle], &options, &Silent).expect("a verdict")
 }
 
 #[test]
@@ -93,6 +100,19 @@ fn true_poses_pass() {
         assert!(image.rotation_difference < 1.0e-6, "{image:?}");
         assert!(image.held_out.gain() > 1.0 && image.held_out.sharpness() > 1.0, "{image:?}");
     }
+}
+
+/// Photographs that state nothing are looked for again with two cameras where a solver tells two zooms apart.
+#[test]
+fn zooms_are_cameras() {
+    let folder = tempfile::tempdir().expect("a folder");
+    bare(folder.path());
+    let oracle = Oracle { turn: |_, _| 0.0, baseline: 1.0, is_zoomed: true };
+    let found = find(folder.path(), &[&oracle], &Options::default(), &Silent).expect("a verdict");
+    let photos: Vec<_> = found.cameras.groups.iter().map(|group| group.photos.clone()).collect();
+    assert_eq!(photos, [vec![0, 2, 4], vec![1, 3]]);
+    assert!(found.attempts.iter().all(|attempt| attempt.tried.focal.len() == 2), "{:?}", found.attempts[0].tried);
+    assert_eq!(found.verdict.as_ref().expect("true poses").photos.len(), COUNT);
 }
 
 #[test]

@@ -282,9 +282,11 @@ pub struct About {
     /// Whether a picture takes milliseconds once the sources are prepared, because the scene is there and is only
     /// drawn: a moving camera then gets larger pictures, and more of them.
     pub is_live: bool,
-    /// Whether it draws all that there is: where its pictures have no surface, they show nothing of a scene whose
-    /// photographs have no silhouettes.
+    /// Whether it draws all that there is: a pixel without a surface may show nothing of a scene whose photographs have
+    /// no silhouettes, and counts among what no photograph shows where the camera looks past all of them.
     pub draws_all: bool,
+    /// Whether its pictures come with depths and an opacity; otherwise they are pictures alone, and opaque.
+    pub has_surfaces: bool,
 }
 
 impl About {
@@ -300,6 +302,7 @@ impl About {
             kernels: &[],
             is_live: false,
             draws_all: false,
+            has_surfaces: true,
         }
     }
 }

@@ -141,7 +141,13 @@ const KERNELS: [Kernel; 16] = [
 impl Field for Genvs {
     fn about(&self) -> About {
         let side = self.architecture.image_side as u32;
-        About { source_side: SourceSide::Pixels(side), longest_side: side, kernels: &KERNELS, ..About::new(ROW.name) }
+        About {
+            source_side: SourceSide::Pixels(side),
+            longest_side: side,
+            kernels: &KERNELS,
+            has_surfaces: false,
+            ..About::new(ROW.name)
+        }
     }
 
     fn options(&self) -> AnyOptions {

@@ -119,7 +119,7 @@ fn solution_of(job: &PoseJob, model: &RawScene, solver: String) -> Option<Soluti
         SolvedPoint { position: point.position, error: point.error.max(0.0), seen: seen.collect() }
     });
     let points = points.collect();
-    Some(Solution { solver, cameras, photographs, points, pairs: Vec::new() })
+    Some(Solution { solver, cameras, photographs, points, pairs: Vec::new(), apart: None })
 }
 
 /// A camera none of whose photographs has a pose: as it was before.

@@ -87,11 +87,18 @@ pub fn find(
         let unusable = intake.unusable.iter().map(|photo| format!("; {}: {}", photo.name, photo.reason)).collect();
         return Err(PoseError::Few(folder.display().to_string(), intake.photos.len(), unusable));
     }
-    let cameras = Cameras::of(&intake.photos, options.focal);
+    let mut cameras = Cameras::of(&intake.photos, options.focal);
     let photos = &intake.photos;
     let part = Part::begin(progress, "", 1..4, 10);
     let mut made = attempts(solvers, (photos, photos), &cameras, options.seed, &part)?;
-    let part = Part::begin(progress, "", 4..5, 10);
+    let mut after = 4;
+    let apart = made.iter().filter_map(|attempt| attempt.solution.as_ref()?.apart.as_ref());
+    if let Some(by_zoom) = cameras.by_zoom(apart) {
+        let part = Part::begin(progress, "several focal lengths", 4..8, 10);
+        made = attempts(solvers, (photos, photos), &by_zoom, options.seed, &part)?;
+        (cameras, after) = (by_zoom, 8);
+    }
+    let part = Part::begin(progress, "", after..after + 1, 10);
     let mut found = verdict(folder, photos, &cameras, &mut made, &part)?;
     let accepted = |found: &Result<Verdict, Refusal>| found.as_ref().map_or(Vec::new(), |found| found.photos.clone());
     // With unknown focal lengths more attempts were not seen to be as safe.

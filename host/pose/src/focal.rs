@@ -3,10 +3,16 @@
 
 use crate::exif::Exif;
 use crate::intake::Photo;
-use crate::solution::CameraGuess;
+use crate::solution::{CameraGuess, SolvedApart};
 
 /// Most that a known focal length may change, as a share of it.
 const MAX_KNOWN_CHANGE: f64 = 0.15;
+
+/// With a focal length for each photograph a tenth of the loss goes where autofocus moved the lens (cup), half and more
+/// where some were taken with a zoom of 1.4: shares that are left were 0.87 to 1 and 0.16 to 0.67.
+const MAX_SHARED_LOSS: f64 = 0.75;
+/// Photographs whose focal lengths differ by less are of one zoom: found one by one, those of a zoom spread by a tenth.
+const MIN_ZOOM: f64 = 1.15;
 
 /// Where a focal length comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -31,6 +37,8 @@ pub struct CameraGroup {
     pub size: [u32; 2],
     /// The photographs, as indices.
     pub photos: Vec<usize>,
+    /// Of an unknown focal length, how many times as long as the shortest one of photographs of this size.
+    pub zoom: f64,
 }
 
 /// The cameras of all photographs.
@@ -61,12 +69,31 @@ impl Cameras {
             let key = format!("{:?} {key}", photo.size);
             let place = groups.iter().position(|(known, _)| *known == key).unwrap_or(groups.len());
             if place == groups.len() {
-                groups.push((key, CameraGroup { focal, source, size: photo.size, photos: Vec::new() }));
+                groups.push((key, CameraGroup { focal, source, size: photo.size, photos: Vec::new(), zoom: 1.0 }));
             }
             groups[place].1.photos.push(index);
             of_photo.push(place);
         }
         Cameras { groups: groups.into_iter().map(|(_, group)| group).collect(), of_photo }
+    }
+
+    /// The cameras where photographs of one size, whose focal length is unknown, were taken with several: one for each.
+    /// `found` are solutions with one. `None` if none of them says so.
+    pub(crate) fn by_zoom<'a>(&self, found: impl Iterator<Item = &'a SolvedApart>) -> Option<Cameras> {
+        let telling = found.filter(|apart| apart.loss < MAX_SHARED_LOSS);
+        // The most photographs, and of as many the clearest.
+        let apart = telling.max_by_key(|apart| {
+            (apart.focal.iter().flatten().count(), std::cmp::Reverse((apart.loss * 1.0e6) as u64))
+        })?;
+        let groups: Vec<CameraGroup> = self.groups.iter().flat_map(|group| zooms(group, &apart.focal)).collect();
+        if groups.len() == self.groups.len() {
+            return None;
+        }
+        let mut of_photo = vec![0; self.of_photo.len()];
+        for (index, group) in groups.iter().enumerate() {
+            group.photos.iter().for_each(|photo| of_photo[*photo] = index);
+        }
+        Some(Cameras { groups, of_photo })
     }
 
     /// Of the focal lengths that were found the first that is another one than is known: it, and the known one.
@@ -86,10 +113,40 @@ impl Cameras {
             let working = group.photos.first().map_or([1, 1], |photo| photos[*photo].working_size);
             let scale = f64::from(working[0]) / f64::from(group.size[0]);
             let longest = f64::from(group.size[0].max(group.size[1]));
-            CameraGuess { focal: scale * group.focal.unwrap_or(guess * longest), is_guess: group.focal.is_none() }
+            CameraGuess {
+                focal: scale * group.focal.unwrap_or(guess * group.zoom * longest),
+                is_guess: group.focal.is_none(),
+            }
         };
         self.groups.iter().map(guessed).collect()
     }
+}
+
+/// A group's photographs by focal lengths that were found one by one, the shortest first: where two that follow one
+/// another are a zoom apart, another camera begins. Photographs without one join the most.
+fn zooms(group: &CameraGroup, focal: &[Option<f64>]) -> Vec<CameraGroup> {
+    let mut known: Vec<(f64, usize)> =
+        group.photos.iter().filter_map(|photo| Some((focal.get(*photo).copied().flatten()?, *photo))).collect();
+    if group.source != FocalSource::Unknown || known.is_empty() {
+        return vec![group.clone()];
+    }
+    known.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut parts: Vec<Vec<(f64, usize)>> =
+        known.chunk_by(|a, b| b.0 < MIN_ZOOM * a.0).map(<[(f64, usize)]>::to_vec).collect();
+    let middle = |part: &[(f64, usize)]| part[part.len() / 2].0;
+    let shortest = middle(&parts[0]);
+    let zooms: Vec<f64> = parts.iter().map(|part| middle(part) / shortest).collect();
+    let is_unknown = |photo: &&usize| known.iter().all(|(_, known)| known != *photo);
+    let rest: Vec<(f64, usize)> = group.photos.iter().filter(is_unknown).map(|photo| (0.0, *photo)).collect();
+    if let Some(most) = parts.iter_mut().max_by_key(|part| part.len()) {
+        most.extend(rest);
+    }
+    let of_part = |(part, zoom): (Vec<(f64, usize)>, f64)| {
+        let mut photos: Vec<usize> = part.into_iter().map(|(_, photo)| photo).collect();
+        photos.sort_unstable();
+        CameraGroup { photos, zoom, ..group.clone() }
+    };
+    parts.into_iter().zip(zooms).map(of_part).collect()
 }
 
 /// The camera that photographs state, with a focal length in pixels: a digital zoom changes this, but not the lens.
@@ -110,8 +167,35 @@ mod tests {
     }
 
     #[test]
+    fn photographs_of_two_zooms_are_of_two_cameras() {
+        let group = |source, photos: &[usize]| CameraGroup {
+            focal: None,
+            source,
+            size: [4, 3],
+            photos: photos.to_vec(),
+            zoom: 1.0,
+        };
+        let unknown = group(FocalSource::Unknown, &[0, 1, 2, 3, 4]);
+        let cameras = Cameras { groups: vec![unknown], of_photo: vec![0; 5] };
+        let apart =
+            |loss, focal: [f64; 4]| SolvedApart { loss, focal: focal.map(Some).into_iter().chain([None]).collect() };
+        let zoomed = [1009.0, 1434.0, 1022.0, 1404.0];
+        let found = [apart(0.96, [900.0; 4]), apart(0.55, zoomed)];
+        let by_zoom = cameras.by_zoom(found.iter()).expect("two");
+        assert_eq!(by_zoom.of_photo, [0, 1, 0, 1, 1]);
+        let [near, far] = &by_zoom.groups[..] else { panic!("{by_zoom:?}") };
+        assert_eq!((&near.photos[..], near.zoom), (&[0, 2][..], 1.0));
+        assert_eq!((&far.photos[..], far.zoom), (&[1, 3, 4][..], 1434.0 / 1022.0));
+        assert_eq!(cameras.by_zoom([apart(0.87, zoomed)].iter()), None, "the loss is nearly the same");
+        assert_eq!(cameras.by_zoom([apart(0.6, [871.0, 880.0, 903.0, 960.0])].iter()), None, "no zoom lies between");
+        let stated = Cameras { groups: vec![group(FocalSource::Exif, &[0, 1, 2, 3, 4])], ..cameras };
+        assert_eq!(stated.by_zoom(found.iter()), None);
+    }
+
+    #[test]
     fn what_is_known_may_change_a_little() {
-        let group = |focal| CameraGroup { focal, source: FocalSource::Exif, size: [4, 3], photos: Vec::new() };
+        let group =
+            |focal| CameraGroup { focal, source: FocalSource::Exif, size: [4, 3], photos: Vec::new(), zoom: 1.0 };
         let cameras = Cameras { groups: vec![group(None), group(Some(462.0))], of_photo: Vec::new() };
         assert_eq!(cameras.changed_focal(&[300.0, 470.0]), None);
         assert_eq!(cameras.changed_focal(&[300.0, 296.0]), Some([296.0, 462.0]));

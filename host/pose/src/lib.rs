@@ -70,8 +70,8 @@ pub use matches::Matches;
 pub use openmvg::OpenMvg;
 pub use pycolmap::PyColmap;
 pub use solution::{
-    CameraGuess, Features, JobPhotograph, PoseJob, Solution, SolvedCamera, SolvedPair, SolvedPhotograph, SolvedPoint,
-    Solver, SolverError,
+    CameraGuess, Features, JobPhotograph, PoseJob, Solution, SolvedApart, SolvedCamera, SolvedPair, SolvedPhotograph,
+    SolvedPoint, Solver, SolverError,
 };
 pub use support::Support;
 pub use ties::Ties;

@@ -85,6 +85,19 @@ pub struct Solution {
     /// Pairs of photographs with matches that one geometry explains.
     #[serde(default)]
     pub pairs: Vec<SolvedPair>,
+    /// What the photographs say with a focal length each; `None` of a solver that does not ask.
+    #[serde(default)]
+    pub apart: Option<SolvedApart>,
+}
+
+/// A solution adjusted once more, with a focal length for each photograph.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SolvedApart {
+    /// The loss, as a share of that with one for each camera: well below 1 where a camera's photographs are of several
+    /// focal lengths.
+    pub loss: f64,
+    /// Focal lengths in pixels of the job's photographs, in their order; `None` without a pose.
+    pub focal: Vec<Option<f64>>,
 }
 
 /// A camera as it was refined.
@@ -176,6 +189,12 @@ impl Solution {
                     && point.error.is_finite()
                     && point.seen.len() <= MAX_SEEN * count
                     && point.seen.iter().all(|(photograph, place)| *photograph < count && finite(place))
+            })
+            && self.apart.as_ref().is_none_or(|apart| {
+                let mut known = apart.focal.iter().flatten();
+                apart.loss.is_finite()
+                    && apart.focal.len() == count
+                    && known.all(|focal| *focal > 0.0 && focal.is_finite())
             })
             && self.pairs.len() <= count * count
             && self.pairs.iter().all(|pair| pair.photographs.iter().all(|photograph| *photograph < count))

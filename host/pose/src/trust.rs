@@ -137,7 +137,10 @@ mod tests {
 
     fn cameras(focal: Option<f64>) -> Cameras {
         let source = if focal.is_some() { FocalSource::Exif } else { FocalSource::Unknown };
-        Cameras { groups: vec![CameraGroup { focal, source, size: [4, 3], photos: vec![0] }], of_photo: vec![0] }
+        Cameras {
+            groups: vec![CameraGroup { focal, source, size: [4, 3], photos: vec![0], zoom: 1.0 }],
+            of_photo: vec![0],
+        }
     }
 
     #[test]

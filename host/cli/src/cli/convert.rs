@@ -1,11 +1,12 @@
 //! `viewfuse convert`.
 
+use super::outputs::{foreign, keep_others};
 use super::printing::say;
 use super::table::table;
 use super::terminal::Terminal;
 use anyhow::{bail, ensure};
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use viewfuse_field::{genvs, pixelnerf};
 use viewfuse_job::files::{check_writable, write_whole};
@@ -69,10 +70,21 @@ fn check_settings(checkpoint: &Checkpoint, set: &[(String, String)]) -> anyhow::
     }
 }
 
+/// Refuses to replace a file that is not of these tensors: another network.
+fn keep_another(checkpoint: &Checkpoint, output: &Path) -> anyhow::Result<()> {
+    let is_there = output.metadata().is_ok_and(|metadata| metadata.len() > 0);
+    let is_same = || Checkpoint::open(output).is_ok_and(|there| there.shapes() == checkpoint.shapes());
+    match is_there && !is_same() {
+        true => Err(foreign(output, &format!("has other tensors than {}", checkpoint.path().display()))),
+        false => Ok(()),
+    }
+}
+
 /// Learned attention for firmware: for the C face, or in Rust with 8 bits a weight.
 fn for_firmware(arguments: &Arguments, is_rust: bool) -> anyhow::Result<ExitCode> {
     let Arguments { input, output, .. } = arguments;
     check_writable(output)?;
+    keep_others(output)?;
     let AttentionModel::Fourier(embedding) = AttentionModel::open(input)? else {
         bail!("{}: firmware supports only attention with the Fourier embedding (paper.0.weight)", input.display());
     };
@@ -119,6 +131,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let mut checkpoint = Checkpoint::open(&arguments.input)?;
     arguments.set.iter().for_each(|(key, value)| checkpoint.set(key, value));
     check_settings(&checkpoint, &arguments.set)?;
+    keep_another(&checkpoint, output)?;
     let progress = Terminal::new("converting");
     pixelnerf::Architecture::assumption(&checkpoint).iter().for_each(|assumption| progress.warn(assumption));
     let of_genvs = genvs::Architecture::of(&checkpoint).ok();

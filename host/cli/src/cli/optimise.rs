@@ -2,7 +2,7 @@
 
 use super::ending::INTERRUPTED;
 use super::options::{DeviceOptions, PictureOptions, SourceOptions};
-use super::outputs::{is_same, keep_file_apart};
+use super::outputs::{is_same, keep_file_apart, keep_others};
 use super::printing::{say, warn_of};
 use super::terminal::Terminal;
 use super::threads::on_threads;
@@ -136,6 +136,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let options = arguments.picture.to_render_options();
     check_writable(output)?;
     keep_file_apart([&scene], output)?;
+    keep_others(output)?;
     GaussianScene::check_place(output, &scene)?;
     let before = arguments.resume.as_ref().map(|path| GaussianFile::open(path, &scene)).transpose()?;
     let quality = arguments.quality.unwrap_or_else(|| quality_for(output, of_scene.sources.len()));

@@ -4,11 +4,16 @@
 use super::wrong::wrong;
 use clap::{Arg, ArgMatches, Command};
 use std::ffi::{OsStr, OsString};
-use std::fs::canonicalize;
+use std::fs::{File, canonicalize};
+use std::io::Read;
 use std::path::Path;
 use viewfuse_job::shell::quoted;
 use viewfuse_output::video::VideoFormat;
 use viewfuse_scene::Scene;
+
+/// How files that viewfuse writes name it, and within how many bytes.
+const MARK: &[u8] = b"viewfuse";
+const BEGINNING: u64 = 64 << 10;
 
 /// The options that name what a command writes, by identifier. All others may name what it reads.
 const WRITTEN: [&str; 3] = ["output", "npy", "matches"];
@@ -83,6 +88,24 @@ pub(super) fn refuse_extension(file: &Path, what: &str, extensions: &[&str]) -> 
     }
     let better = file.with_extension(extensions[0]);
     Err(wrong(format_args!("--output {}: {what} is written; give a name as {}", file.display(), quoted(&better))))
+}
+
+/// Refuses to replace a file in whose beginning nothing says that viewfuse wrote it: a scan, or another program's
+/// Gaussians. Files without a header, as `.splat`, say nothing, and are replaced.
+pub(super) fn keep_others(output: &Path) -> anyhow::Result<()> {
+    let mut beginning = Vec::new();
+    // Whether it can be read or replaced is asked where it is written.
+    let _ = File::open(output).and_then(|file| file.take(BEGINNING).read_to_end(&mut beginning));
+    let says_so = || beginning.windows(MARK.len()).any(|part| part.eq_ignore_ascii_case(MARK));
+    match beginning.is_empty() || output.extension().is_some_and(|given| given == "splat") || says_so() {
+        true => Ok(()),
+        false => Err(foreign(output, "was not written by viewfuse")),
+    }
+}
+
+/// Refuses to replace a file, because it is `what`.
+pub(super) fn foreign(output: &Path, what: &str) -> anyhow::Error {
+    wrong(format_args!("{}: {what}, and would be replaced; give another name, or move it", output.display()))
 }
 
 /// Refuses a file that one of the scenes is read from, or would be.

@@ -1,7 +1,7 @@
 //! `viewfuse points`.
 
 use super::options::{DeviceOptions, PictureOptions, SourceOptions};
-use super::outputs::keep_file_apart;
+use super::outputs::{keep_file_apart, keep_others};
 use super::printing::{say, warn_of};
 use super::terminal::Terminal;
 use super::threads::on_threads;
@@ -65,6 +65,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let options = arguments.picture.to_render_options();
     check_writable(&arguments.output)?;
     keep_file_apart([&scene], &arguments.output)?;
+    keep_others(&arguments.output)?;
     let Chosen { device, reason } = arguments.device.open()?;
     let renderer = field.on(&device);
     let progress = Terminal::new("points");

@@ -1,5 +1,6 @@
 //! What is written: lines of progress, then the solution or why there is none.
 
+use crate::apart::Apart;
 use serde::Serialize;
 
 /// A line of standard output.
@@ -37,6 +38,8 @@ pub(crate) struct Solution {
     pub(crate) points: Vec<Point>,
     /// Pairs of photographs with matches that one geometry explains.
     pub(crate) pairs: Vec<Pair>,
+    /// What the photographs say with a focal length each, where one of the job's is a guess.
+    pub(crate) apart: Option<Apart>,
 }
 
 /// A camera as it was refined.

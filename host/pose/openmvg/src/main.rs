@@ -4,6 +4,7 @@
 //! ```text
 //! job      photographs and what is known of their cameras
 //! answer   poses, lenses, points, or why there are none
+//! apart    whether photographs of one camera have one focal length
 //! solve    OpenMVG's front end and its incremental engine
 //! ```
 //!
@@ -12,6 +13,7 @@
 //! without poses; 1 for a job that cannot be read.
 
 mod answer;
+mod apart;
 mod job;
 mod solve;
 

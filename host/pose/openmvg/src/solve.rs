@@ -1,6 +1,7 @@
 //! OpenMVG's front end and its incremental engine.
 
 use crate::answer::{Camera, Line, Pair, Photograph, Point, Solution};
+use crate::apart::Apart;
 use crate::job::{Features, JobPhotograph, PoseJob};
 use crate::say;
 use openmvg_core::camera::{RadialDistortion, TangentialDistortion};
@@ -48,7 +49,15 @@ pub(crate) fn solve(job: &PoseJob) -> Result<Solution> {
         photographs: photographs(&output),
         points: points(found),
         pairs: pairs(&graph),
+        apart: apart(job, found),
     })
+}
+
+/// Of given focal lengths nothing is asked.
+fn apart(job: &PoseJob, found: &Reconstruction) -> Option<Apart> {
+    let sizes: Vec<_> = job.photographs.iter().map(|photograph| photograph.size).collect();
+    let cameras: Vec<_> = job.photographs.iter().map(|photograph| photograph.camera).collect();
+    job.cameras.iter().any(|camera| camera.is_guess).then(|| Apart::of(found, &sizes, &cameras))?
 }
 
 /// What is known without a pose: which photographs match.
@@ -60,6 +69,7 @@ fn unposed(job: &PoseJob, graph: &ViewGraph, error: &SfmError) -> Solution {
         photographs: job.photographs.iter().map(photograph).collect(),
         points: Vec::new(),
         pairs: pairs(graph),
+        apart: None,
     }
 }
 
@@ -88,7 +98,7 @@ fn dataset(job: &PoseJob) -> Result<Dataset> {
         .build()
 }
 
-fn camera(model: &Model) -> Camera {
+pub(crate) fn camera(model: &Model) -> Camera {
     match model {
         Model::BrownConrady(lens) => Camera {
             focal: 0.5 * (lens.focal_x() + lens.focal_y()),

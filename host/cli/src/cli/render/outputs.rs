@@ -1,10 +1,11 @@
 //! Options of what a render writes.
 
 use crate::cli::printing::complain;
-use crate::cli::wrong::not_built;
+use crate::cli::wrong::{not_built, wrong};
 use anyhow::Context;
 use clap::Args;
 use std::path::Path;
+use viewfuse_field::About;
 use viewfuse_output::depth::{DepthFormat, UnknownDepthFormat};
 use viewfuse_output::rate::FrameRate;
 use viewfuse_output::run::Outputs;
@@ -23,9 +24,10 @@ pub(crate) struct OutputOptions {
     #[arg(long, help_heading = FILES)]
     alpha: bool,
     /// Formats of depth maps: png (16 bit), exr, npy (both 32-bit floating point); units are in run.json
-    #[arg(long, value_name = "FORMATS", value_delimiter = ',', default_value = "png", value_parser = parse_depth,
+    /// [default: png]
+    #[arg(long, value_name = "FORMATS", value_delimiter = ',', value_parser = parse_depth,
         help_heading = FILES)]
-    depth: Vec<DepthFormat>,
+    depth: Option<Vec<DepthFormat>>,
     /// Write no contact sheets
     #[arg(long, help_heading = FILES)]
     no_sheets: bool,
@@ -45,8 +47,21 @@ pub(crate) struct OutputOptions {
 }
 
 impl OutputOptions {
+    /// Refuses what is asked for and a field's pictures do not come with.
+    pub(crate) fn check(&self, about: &About) -> anyhow::Result<()> {
+        let asked = [(self.alpha, "--alpha", "opacity"), (self.depth.is_some(), "--depth", "depths")];
+        match asked.into_iter().find(|(is_asked, ..)| *is_asked && !about.has_surfaces) {
+            Some((_, option, what)) => Err(wrong(format_args!("{option}: pictures of {} have no {what}", about.name))),
+            None => Ok(()),
+        }
+    }
+
     pub(crate) fn outputs(&self) -> Outputs {
-        let depths = if self.pictures_only { Vec::new() } else { self.depth.clone() };
+        let depths = match &self.depth {
+            _ if self.pictures_only => Vec::new(),
+            None => vec![DepthFormat::Png],
+            Some(formats) => formats.clone(),
+        };
         Outputs {
             alpha: self.alpha,
             depths,

@@ -84,6 +84,7 @@ impl Prepared {
         let open_time = start.elapsed();
         let field = arguments.field(&scene)?;
         let about = field.about();
+        arguments.outputs.check(&about)?;
         let selection = arguments.sources.to_selection(arguments.targets.as_deref(), arguments.path.choice());
         let job = selection.resolve(&scene, about.least_sources)?;
         let options =
