@@ -97,7 +97,7 @@ impl Pinhole {
     /// scale with their axis.
     ///
     /// # Errors
-    /// As of [`Pinhole::new`], of which the first is told: the size, or what leaves its range with it.
+    /// As of [`Pinhole::new`]: a size of 0, what leaves its range with the size, or the size.
     pub fn resized(&self, width: u32, height: u32) -> Result<Pinhole, PinholeError> {
         // A width of 0 would otherwise be found in the focal length that it scales.
         if width == 0 || height == 0 {
@@ -144,7 +144,8 @@ pub struct Projection {
     pub y: f32,
     /// Distance along the principal axis, in world units; not positive for points behind the camera.
     pub depth: f32,
-    /// The point is in front of the camera: `x` and `y` are defined.
+    /// The point is more than 1e-20 in front of the camera's plane: `x` and `y` are defined, and infinite where they
+    /// leave the range of `f32`.
     pub in_front: bool,
     /// The point is in front of the camera and inside the image.
     pub in_image: bool,
@@ -161,7 +162,8 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// The ray through the continuous image coordinate `(x, y)`; pixel centres are at halves.
+    /// The ray through the continuous image coordinate `(x, y)`; pixel centres are at halves. The direction is 0 for
+    /// coordinates so large that its square overflows: from some 1e19 focal lengths on.
     #[inline]
     pub fn ray(&self, x: f32, y: f32) -> Ray {
         let direction_world = self.block(0).towards(x, y);

@@ -70,7 +70,8 @@ impl<const C: usize> Compositor<C> {
         Compositor { accumulated: [0.0; C], weighted_depth: 0.0, optical_depth: 0.0, transmittance: 1.0 };
 
     /// Adds the next sample, front to back: its channels, its optical depth (density times length; negative or NaN
-    /// counts as 0, infinity as opaque) and its distance along the ray. Returns the sample's weight.
+    /// counts as 0, infinity as opaque) and its distance along the ray. Returns the sample's weight. Channels and the
+    /// distance are multiplied by that: one that is not finite makes NaN, also with a weight of 0.
     #[inline]
     pub fn add(&mut self, channels: &[f32; C], optical_depth: f32, depth: f32) -> f32 {
         if !(optical_depth > 0.0) {

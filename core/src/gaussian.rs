@@ -12,7 +12,7 @@
 use crate::camera::CameraBlock;
 use crate::composite::Compositor;
 use crate::fetch::Fetch;
-use crate::math::{abs, clamp, exp, has_finite_bits, ln, max, min, norm3, sqrt};
+use crate::math::{abs, clamp, exp, has_finite_bits, has_nan_bits, ln, max, min, norm3, sqrt};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
@@ -179,6 +179,11 @@ pub fn project_as(
     let [focal_x, focal_y, principal_x, principal_y] = camera.intrinsics;
     let mean = [focal_x * (place.x / place.z) + principal_x, focal_y * (place.y / place.z) + principal_y];
     let [u, v] = image_axes(gaussian, camera, place);
+    let [width, height, thickness] = gaussian.log_scales;
+    // The exponential of NaN is 0: a Gaussian without thickness.
+    if has_nan_bits(width) || has_nan_bits(height) || has_nan_bits(thickness) {
+        return hidden;
+    }
     let cross = u.cross(v);
     let (u_square, v_square, uv) = (u.dot(u), v.dot(v), u.dot(v));
     let determinant = cross.dot(cross) + DILATION * (u_square + v_square) + DILATION * DILATION;

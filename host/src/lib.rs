@@ -9,6 +9,7 @@ pub use viewfuse_device as device;
 pub use viewfuse_evaluate as evaluate;
 pub use viewfuse_field as field;
 pub use viewfuse_job as job;
+pub use viewfuse_kernels as kernels;
 pub use viewfuse_nn as nn;
 pub use viewfuse_output as output;
 #[cfg(feature = "pose")]

@@ -98,4 +98,5 @@ fn another_format_is_refused_before_the_work() {
     }
     done(&folder, "points toy --size 16x16 --sources 0..7 --agree 1 --device cpu -o toy.PLY");
     assert!(folder.join("toy.PLY").exists());
+    done(&folder, "points toy --size 16x16 --sources 0..7 --agree 1 --device cpu -o toy.PLY");
 }

@@ -39,6 +39,16 @@ fn one_picture_and_folders() {
     assert!(printed.starts_with("2 pictures\n"), "{printed}");
     assert_eq!(row(&printed, "psnr")[3], "000002.png", "the worst");
     assert_ne!(row(&printed, "ssim")[2], "1.0000");
+    // What a render writes beside its pictures is no picture to compare; in another folder a name says nothing.
+    folder.write("made/000001_depth.png", std::fs::read(folder.file("made/000001.png")).expect("a picture"));
+    assert!(done(&folder, "compare made toy/rgb").starts_with("2 pictures\n"));
+    std::fs::remove_file(folder.file("made/run.json")).expect("removed");
+    std::fs::remove_file(folder.file("made/video.webp")).expect("removed");
+    assert_refused(
+        &folder,
+        "compare made toy/rgb",
+        &["000001_depth.png: is missing, to compare made/000001_depth.png"],
+    );
     // As the published evaluation: other numbers.
     let published = done(&folder, "compare made/000002.png toy/rgb/000002.png --metrics-as viewattention");
     let plain = done(&folder, "compare made/000002.png toy/rgb/000002.png");

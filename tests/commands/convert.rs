@@ -63,6 +63,20 @@ fn refusals() {
     refused("convert page.pth out.safetensors", &["page.pth: not a checkpoint: a web page"]);
     std::fs::remove_file(folder.path().join("page.pth")).expect("removed");
     assert_eq!(files_below(folder.path()), before, "nothing is left behind");
+    // Another network under the output's name stays; the same one is written again.
+    std::fs::copy(data("attention.safetensors"), folder.path().join("mine.safetensors")).expect("a network");
+    let mine = files_below(folder.path());
+    let arguments = "convert training.pth mine.safetensors";
+    assert_wrong_arguments(folder.path(), arguments, &["mine.safetensors: has other tensors than training.pth"]);
+    std::fs::write(folder.path().join("mine.h"), "int mine;\n").expect("a header");
+    let arguments = "convert mine.safetensors mine.h";
+    assert_wrong_arguments(folder.path(), arguments, &["mine.h: was not written by viewfuse", "would be replaced"]);
+    std::fs::remove_file(folder.path().join("mine.h")).expect("removed");
+    assert_eq!(files_below(folder.path()), mine, "nothing is replaced");
+    done(folder.path(), "convert training.pth out.safetensors");
+    done(folder.path(), "convert training.pth out.safetensors --half");
+    done(folder.path(), "convert mine.safetensors out.h");
+    done(folder.path(), "convert mine.safetensors out.h");
 }
 
 /// Every command that loads a PixelNeRF of which nobody says whether it has a max pool says what is assumed; once

@@ -13,6 +13,7 @@ viewfuse_tests::trials![
     a_picture_of_any_size_a_sheet_and_a_record_without_depth,
     unless_told_otherwise_the_size_is_the_networks,
     options_reach_the_run,
+    alpha_and_depths_are_refused,
     exact_omits_nothing,
     frames_start_from_the_ones_before,
     files_of_either_network,
@@ -69,6 +70,19 @@ fn unless_told_otherwise_the_size_is_the_networks() {
     done(&scene, "render toy --targets 20 --views 2 --model genvs:small --steps 1 --device cpu -o out");
     let picture = image::open(scene.join("out/000020.png")).expect("a picture");
     assert_eq!((picture.width(), picture.height()), (64, 64));
+}
+
+/// A picture of a diffusion model has neither: an alpha of 1 everywhere would be no opacity.
+fn alpha_and_depths_are_refused() {
+    let folder = toy();
+    for (option, what) in [("--alpha", "opacity"), ("--depth exr,npy", "depths"), ("--depth png", "depths")] {
+        let arguments = format!("render toy --targets 20 --model genvs:small {option} -o out");
+        let words = format!("{}: pictures of genvs have no {what}", &option[..7]);
+        if option.contains("exr") && !cfg!(feature = "formats") {
+            continue;
+        }
+        assert_wrong_arguments(&folder, &arguments, &[words.trim_end()]);
+    }
 }
 
 fn options_reach_the_run() {

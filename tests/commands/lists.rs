@@ -3,11 +3,11 @@
 use super::{assert_near, assert_wrong_arguments, done, list_of, number_of, numbers, texts};
 use serde_json::Value;
 use std::fs;
-use viewfuse_tests::command::toy;
+use viewfuse_tests::command::{change_poses, toy};
 
 viewfuse_tests::trials![
-    weights_of_many_targets, the_few_sources_of_a_target, the_few_sources_of_a_path, labels_name_schemes,
-    nothing_counts_twice_in_a_table, tables_for_papers,
+    weights_of_many_targets, distances_are_the_files, the_few_sources_of_a_target, the_few_sources_of_a_path,
+    labels_name_schemes, nothing_counts_twice_in_a_table, tables_for_papers,
 ];
 
 fn json(text: &str) -> Value {
@@ -46,6 +46,25 @@ fn weights_of_many_targets() {
         }
     }
     assert_near(numbers(&targets[0]["world_from_camera"][3])[3], 1.0, 0.0);
+}
+
+/// Distances are those of the file, however small or large its units are.
+fn distances_are_the_files() {
+    let folder = toy();
+    let table = || done(&folder, "weights toy --targets 20 --sources 0,1 --weights mean");
+    let distances = |text: &str| -> Vec<f64> {
+        let rows = text.lines().filter_map(|line| line.split_whitespace().collect::<Vec<_>>().try_into().ok());
+        let sources = rows.filter(|row: &[&str; 4]| row[0].starts_with("0000"));
+        sources.map(|row| row[1].parse().expect("a length")).collect()
+    };
+    let before = table();
+    assert!(!before.contains("schemes measure lengths"), "{before}");
+    change_poses(&folder, |_, matrix| [3, 7, 11].into_iter().for_each(|place| matrix[place] *= 1.0e-4));
+    let after = table();
+    assert!(after.contains("units of the scene's files; schemes measure lengths in 1.0000e-4 of these"), "{after}");
+    let (before, after) = (distances(&before), distances(&after));
+    assert_eq!((before.len(), after.len()), (2, 2), "{after:?}");
+    before.iter().zip(&after).for_each(|(before, after)| assert_near(after / before, 1.0e-4, 2.0e-7));
 }
 
 fn the_few_sources_of_a_target() {

@@ -225,6 +225,18 @@ fn what_it_refuses() {
     let made = std::process::Command::new("mkfifo").arg(folder.join("pipe.ply")).status().expect("mkfifo runs");
     assert!(made.success());
     assert_refused(&folder, &format!("{OPTIMISE} -o pipe.ply"), &["pipe.ply", "no ordinary file"]);
+    // A scan of somebody else's, and a page: what viewfuse wrote is replaced, as every run does.
+    for name in ["scan.ply", "scan.spz", "page.html"] {
+        folder.write(name, "ply\nformat ascii 1.0\nelement vertex 0\nend_header\n");
+        let parts = [name, "was not written by viewfuse, and would be replaced"];
+        assert_wrong_arguments(&folder, &format!("{OPTIMISE} -o {name}"), &parts);
+    }
+    assert_wrong_arguments(&folder, "points toy -o scan.ply", &["scan.ply: was not written by viewfuse"]);
+    for name in ["again.ply", "again.spz", "again.splat", "again.html"] {
+        for _ in 0..2 {
+            assert_eq!(run(&folder, &format!("{OPTIMISE} --iterations 1 -o {name}")).code, Some(0), "{name}");
+        }
+    }
     // What makes pictures without a field has none of its options.
     scene(&folder.join("a.ply"));
     for option in ["--fast", "--samples 8", "--gaussian-count 300", "--leave-out 0.1", "--max-error 40dB"] {

@@ -53,6 +53,7 @@ viewfuse_tests::trials![
         eight_photographs_to_a_picture,
         what_does_not_belong_is_excluded_by_name,
         sizes_and_orientations_may_differ,
+        zooms_are_told_apart,
         a_step_leaves_few_enough,
         photographs_of_nothing_in_common,
         ctrl_c_leaves_nothing,
@@ -197,6 +198,25 @@ fn sizes_and_orientations_may_differ() {
     assert_eq!((turned.width(), turned.height()), (320, 240), "upright");
     assert!(scene.views.len() >= 5, "{said}");
     assert!(worst_rotation(&scene) < 2.0, "{said}");
+}
+
+/// The middle of every second photograph, as large as the others: without EXIF as a phone's digital zoom is sent on.
+fn zooms_are_told_apart() {
+    let folder = Folder::new();
+    for view in 0..6 {
+        let picture = decoded(view);
+        let zoomed = imageops::crop_imm(&picture, 48, 36, 224, 168).to_image();
+        let zoomed = imageops::resize(&zoomed, 320, 240, imageops::FilterType::CatmullRom);
+        folder.write(&format!("bare/{view:03}.jpg"), jpeg(if view % 2 == 1 { zoomed } else { picture }));
+    }
+    let said = done_with_warnings(&folder, "pose bare -o posed").stdout;
+    assert!(said.starts_with("registered 6 of 6 photographs\n"), "{said}");
+    let scene = Scene::open(folder.join("posed")).expect("a scene");
+    assert!(worst_rotation(&scene) < 1.5, "{said}");
+    for (view, zoom) in scene.views.iter().zip([1.0, 320.0 / 224.0].into_iter().cycle()) {
+        let focal = view.camera.pinhole.focal()[0];
+        assert!((focal / (294.4 * zoom) - 1.0).abs() < 0.1, "{}: {focal}\n{said}", view.name);
+    }
 }
 
 fn a_step_leaves_few_enough() {

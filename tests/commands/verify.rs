@@ -6,8 +6,9 @@ use viewfuse_tests::command::safetensors;
 use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![
-    right_weights_pass, wrong_weights_do_not, a_weight_that_is_no_number_does_not_pass, metrics_right_and_wrong,
-    scores_of_the_official_codes, scores_that_are_not_the_official_codes,
+    right_weights_pass, wrong_weights_do_not, a_weight_that_is_no_number_does_not_pass,
+    a_file_without_weights_is_no_reference, metrics_right_and_wrong, scores_of_the_official_codes,
+    scores_that_are_not_the_official_codes,
 ];
 
 /// Scores and distances by the official codes; see `tests/data/metrics.md`.
@@ -62,6 +63,19 @@ fn wrong_weights_do_not() {
         *number = json!(number_of(number) + 1.0e-3);
         folder.write("weighting.json", reference.to_string());
         assert_exceeded(&folder, "weighting.json", method);
+    }
+}
+
+/// Weights on the simplex alone agree with nothing.
+fn a_file_without_weights_is_no_reference() {
+    let folder = Folder::new();
+    for official in [json!({}), json!({ "a_method_of_the_future": { "f64": [0.5, 0.5] } })] {
+        let mut reference = weighting();
+        reference["cases"][0]["official"] = official;
+        folder.write("weighting.json", reference.to_string());
+        let outcome = run(&folder, "verify weighting.json");
+        assert_eq!((outcome.code, outcome.stdout.as_str()), (Some(1), ""));
+        assert!(outcome.stderr.contains("holds no reference values"), "{outcome:?}");
     }
 }
 

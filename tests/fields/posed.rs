@@ -6,7 +6,8 @@ use std::f64::consts::PI;
 use std::path::Path;
 use viewfuse::job::progress::{Progress, Silent};
 use viewfuse::pose::{
-    Features, Found, Options, PoseJob, Solution, SolvedApart, SolvedCamera, SolvedPhotograph, SolvedPoint, Solver, SolverError, find,
+    Features, Found, Options, PoseJob, Solution, SolvedApart, SolvedCamera, SolvedPhotograph, SolvedPoint, Solver,
+    SolverError, find,
 };
 use viewfuse::scene::Scene;
 use viewfuse::scene::rig::Rig;

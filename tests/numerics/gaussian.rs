@@ -15,6 +15,24 @@ fn camera(pose: Pose) -> CameraBlock {
     Camera { pose, pinhole }.block(0)
 }
 
+/// The exponential of NaN is 0: it would be a Gaussian without thickness.
+#[test]
+fn a_scale_that_is_nan_is_not_drawn() {
+    let camera = camera(Pose::IDENTITY);
+    for axis in 0..3 {
+        let mut gaussian = GaussianBlock {
+            position: [0.0, 0.0, 1.0],
+            opacity: 3.0,
+            log_scales: [-2.0; 3],
+            rotation: [1.0, 0.0, 0.0, 0.0],
+            ..GaussianBlock::default()
+        };
+        assert!(project(&gaussian, &camera, NEAR).opacity > 0.9);
+        gaussian.log_scales[axis] = f32::NAN;
+        assert_eq!(project(&gaussian, &camera, NEAR), ProjectedGaussian::default(), "axis {axis}");
+    }
+}
+
 /// A needle across the diagonal of the image: the difference of products of variances would be off by a tenth or
 /// negative.
 #[test]

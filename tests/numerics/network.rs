@@ -2,6 +2,7 @@
 
 use viewfuse_core::rays::RayPoint;
 use viewfuse_kernels::network::linear::rectified;
+use viewfuse_kernels::network::resample::{PoolBlock, pooled_element};
 use viewfuse_kernels::pixelnerf::radiance;
 
 #[test]
@@ -30,4 +31,26 @@ fn radiance_at_its_ends() {
     // No colour is outside [0, 1], whatever the network says; and nothing is where it says nothing.
     assert_eq!(at(f32::INFINITY), [1.0, 1.0, 1.0, f32::INFINITY]);
     assert_eq!(at(f32::NAN), [1.0, 1.0, 1.0, 0.0]);
+}
+
+/// NaN stays in a window, wherever it lies: what comes after it is no larger.
+#[test]
+fn the_largest_of_a_window_with_nan_is_nan() {
+    let block = PoolBlock {
+        in_height: 2,
+        in_width: 2,
+        channels: 1,
+        size: 2,
+        stride: 2,
+        out_height: 1,
+        out_width: 1,
+        padding: 0,
+    };
+    assert_eq!(pooled_element(&[1.0, -2.0, 3.0, 2.0][..], &block, 0), 3.0);
+    for place in 0..4 {
+        let mut window = [1.0, -2.0, 3.0, f32::INFINITY];
+        window[place] = f32::NAN;
+        assert!(pooled_element(&window[..], &block, 0).is_nan(), "place {place}");
+    }
+    assert_eq!(pooled_element(&[f32::NEG_INFINITY; 4][..], &block, 0), -f32::MAX);
 }

@@ -202,3 +202,17 @@ fn readings_are_fused_as_their_numbers() {
     let ends = [[i16::MIN, i16::MAX, 0, -1, 1]; VIEWS];
     assert_eq!(fuse_readings(&Weights::mean(1), &ends), [-32_768.0, 32_767.0, 0.0, -1.0, 1.0]);
 }
+
+/// So far away numbers overflow on the way: nothing is known of weights then, and the bound says so.
+#[test]
+fn where_numbers_overflow_nothing_is_promised() {
+    let embedding = learned("pixelnerf_cars");
+    let parameters = quantised(&embedding);
+    let mut draws = Draws(5);
+    for (distance, is_known) in [(1.3, true), (1.0e6, true), (1.0e21, false), (1.0e28, false)] {
+        let poses: Vec<Pose> = (0..VIEWS).map(|_| draws.pose(distance)).collect();
+        let sources = Sources::<VIEWS>::new(&poses).expect("sources");
+        let change = change_bound(&embedding, &parameters, &sources, &draws.pose(distance));
+        assert_eq!((change.weight < 1.0, change.logit.is_finite()), (is_known, is_known), "{distance}: {change:?}");
+    }
+}

@@ -46,6 +46,26 @@ fn what_is_written_is_read() {
     assert_eq!(GaussianScene::read(&path, &SceneFrame::FILE).expect("no Gaussians"), GaussianScene::default());
 }
 
+/// What no reader takes is not written, whatever a caller made of it.
+#[test]
+fn what_would_not_be_read_is_not_written() {
+    let cases: [(&str, fn(&mut GaussianScene), &str); 5] = [
+        ("a.ply", |scene| scene.f_rest.truncate(17), "17 harmonics of degree 1 for 2 Gaussians"),
+        ("a.ply", |scene| scene.gaussians[1].position[2] = 1.0e35, "Gaussian 1 is further than 1e30"),
+        ("a.splat", |scene| scene.gaussians[1].position[0] = -1.0e35, "Gaussian 1 is further than 1e30"),
+        ("a.splat", |scene| scene.gaussians[0].log_scales[1] = 100.0, "Gaussian 0 is larger"),
+        ("a.splat", |scene| *scene = GaussianScene::default(), "there are no Gaussians"),
+    ];
+    for (name, change, words) in cases {
+        let (folder, mut scene) = (Folder::new(), drawn(2, 1, 3));
+        scene.write(&folder.join(name), &SceneFrame::FILE).expect("two Gaussians");
+        std::fs::remove_file(folder.join(name)).expect("it was written");
+        change(&mut scene);
+        let error = scene.write(&folder.join(name), &SceneFrame::FILE).expect_err(words).to_string();
+        assert!(error.contains(words) && !folder.join(name).exists(), "{name}: {error}");
+    }
+}
+
 /// Coordinates of a survey: `f32` would hold them to a quarter of a unit.
 #[test]
 fn a_scene_that_was_moved_and_scaled_keeps_its_place_in_its_files() {

@@ -405,3 +405,29 @@ fn photographs_of_which_nothing_counts_are_told() {
     let error = sources(&[3, 7]).expect_err("nothing").to_string();
     assert!(error.contains("of the photographs nothing counts ('003' is the first)"), "{error}");
 }
+
+/// A target whose object is cut off by its border is no photograph with pixels that do not count, where the sources are
+/// of an object; and one of which all is transparent is none that could be met.
+#[test]
+fn transparency_means_for_targets_what_it_means_for_sources() {
+    let folder = toy();
+    let path = |view: u32| folder.join(format!("toy/rgb/{view:06}.png"));
+    let altered = |view: u32, alpha: fn(u32, u32, u8) -> u8| {
+        let mut picture = image::open(path(view)).expect("a picture").into_rgba8();
+        picture.enumerate_pixels_mut().for_each(|(x, y, pixel)| pixel[3] = alpha(x, y, pixel[3]));
+        picture.save(path(view)).expect("a picture");
+    };
+    altered(20, |x, y, alpha| if x < 2 || y < 2 || x > 125 || y > 125 { 255 } else { alpha });
+    altered(21, |_, _, _| 0);
+    let scene = Scene::open(folder.join("toy")).expect("a scene");
+    let album = Album::open(&scene, 0..24, &Silent).expect("photographs");
+    let white = Some([1.0; 3]);
+    let counts = |view: usize| {
+        let seen = album.truth(view, [128, 128], white).expect("a truth").seen;
+        seen.map(|seen| seen.pixels().filter(|level| level[0] > 0).count())
+    };
+    assert!(counts(20).is_some_and(|count| count < 128 * 128), "by its own border it is no object's");
+    let images = album.sources(&[0, 1, 2, 3], 128, BackgroundChoice::Auto, &Silent).expect("sources");
+    assert!(images.has_silhouettes);
+    assert_eq!((counts(20), counts(21), counts(5)), (None, Some(0), None));
+}

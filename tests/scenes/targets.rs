@@ -4,9 +4,9 @@
 use super::made::open;
 use image::{Rgba, RgbaImage};
 use viewfuse::job::progress::Silent;
-use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::{FewShot, PathChoice, Selection, Target, away_warning, item_of, target_of, view_list};
 use viewfuse::scene::photographs::{Album, BackgroundChoice};
+use viewfuse::scene::{Scene, Split};
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::pose::Pose;
@@ -75,6 +75,30 @@ fn a_pose_is_one_source() {
     near.write("pose/b.txt", moved(1.0e-5));
     assert!(open(&near).pose_warnings().iter().any(|warning| warning.contains("have the same pose")));
     assert_eq!(open(&called(&["a", "b"])).pose_warnings(), Vec::<String>::new());
+    // Whichever splits they are of: the same photographs may be in two.
+    let mut of_two = Scene::open(data("toy")).expect("a scene");
+    let mut again = of_two.views[3].clone();
+    (again.name, again.split) = ("again".to_owned(), Some(Split::Test));
+    of_two.views.push(again);
+    let selection = Selection { targets: Some("again".to_owned()), ..Selection::default() };
+    assert!(!selection.resolve(&of_two, 1).expect("a job").sources.contains(&3));
+}
+
+#[test]
+fn a_principal_point_outside_of_the_photograph_is_told() {
+    let folder = called(&["a", "b"]);
+    assert_eq!(open(&folder).pose_warnings(), Vec::<String>::new());
+    folder.write("intrinsics.txt", "20. 17. 6. 0.\n0. 0. 0.\n1.\n12 16\n");
+    let warnings = open(&folder).pose_warnings();
+    let told = "the principal point of 2 of 2 photographs lies outside of them: of 'a' at (17, 6), 16 x 12 pixels";
+    assert!(warnings.len() == 1 && warnings[0].starts_with(told), "{warnings:?}");
+}
+
+#[test]
+fn sources_that_no_scene_has_are_no_panic() {
+    let scene = Scene::open(data("toy")).expect("a scene");
+    let job = FewShot { sources: vec![1, 999], targets: vec![target_of(&scene, 0)], frames_per_second: None };
+    assert_eq!(away_warning(&scene, &job), None);
 }
 
 #[test]

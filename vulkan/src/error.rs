@@ -74,7 +74,7 @@ pub enum VulkanError {
     #[error("kernel {0}: {1}")]
     Arguments(&'static str, String),
     /// An array is not in the memory of the kernel's device, but of another one.
-    #[error("the array is in the memory of {1}, not of {0}")]
+    #[error("the array is in the memory of {1}, opened by itself, not in that of {0} as it is used here")]
     OtherDevice(String, String),
     /// Any other call that failed, with Vulkan's result code.
     #[error("{0}: {1}")]

@@ -1,6 +1,6 @@
 //! The kernels of viewfuse on any Vulkan device.
 //!
-//! The kernels are functions of `viewfuse-core`; rust-gpu makes them into SPIR-V (`shaders/`, `cargo shaders`), which
+//! The kernels are functions of `viewfuse-kernels`; rust-gpu makes them into SPIR-V (`shaders/`, `cargo shaders`), which
 //! is part of this crate. Vulkan is loaded at run time. The modules are listed in the order of the data:
 //!
 //! ```text

@@ -123,6 +123,10 @@ impl<'a> Session<'a> {
     /// weights of all sources for source `view` as a target, its own 0.
     pub(crate) fn weigh(&mut self, relevance: &[SourceWeights], progress: &dyn Progress) -> Result<(), FieldError> {
         if self.prepared.is_weighted() {
+            let (given, count) = (relevance.len(), self.encoded.len());
+            if given != count {
+                return Err(FieldError::unsuitable(format!("there are weights for {given} sources of {count}")));
+            }
             self.encoded.fill(false);
             self.prepared.weigh(relevance)?;
             self.relevance = Some(relevance.to_vec());

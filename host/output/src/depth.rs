@@ -62,11 +62,15 @@ impl FromStr for DepthFormat {
     }
 }
 
-/// Writes depths of a picture of this size, completely or not at all.
+/// Writes depths of a picture of this size, one a pixel, completely or not at all.
 ///
 /// # Errors
-/// [`WriteError`].
+/// [`WriteError`], also for another number of depths.
 pub fn write_depth(path: &Path, format: DepthFormat, depths: &[f32], size: [u32; 2]) -> Result<(), WriteError> {
+    if depths.len() as u64 != u64::from(size[0]) * u64::from(size[1]) {
+        let cause = format!("{} depths for {}x{} pixels", depths.len(), size[0], size[1]).into();
+        return Err(WriteError::Encode { path: path.to_path_buf(), cause });
+    }
     match format {
         DepthFormat::Png => write_png(path, &DynamicImage::ImageLuma16(depth_map(depths, size))),
         #[cfg(feature = "exr")]
@@ -80,4 +84,23 @@ pub fn depth_map(depths: &[f32], [width, height]: [u32; 2]) -> ImageBuffer<Luma<
     let step = depth_step(depths);
     let depth = |x: u32, y: u32| Luma([(depths[(y * width + x) as usize] / step).round() as u16]);
     ImageBuffer::from_fn(width, height, depth)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn another_number_of_depths_is_refused() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for format in DepthFormat::ALL {
+            let path = folder.path().join("depth");
+            for count in [0, 15, 100] {
+                let error = write_depth(&path, *format, &vec![1.0; count], [4, 4]).expect_err("not 16").to_string();
+                assert!(error.contains(&format!("{count} depths for 4x4 pixels")) && !path.exists(), "{error}");
+            }
+            write_depth(&path, *format, &[1.0; 16], [4, 4]).expect("one a pixel");
+            std::fs::remove_file(&path).expect("it was written");
+        }
+    }
 }

@@ -164,6 +164,9 @@ fn thumbnail(picture: &RgbImage, height: u32) -> RgbImage {
 
 /// Mean absolute error over the channels of each pixel: white where equal, through red to black at a quarter of the
 /// range.
+///
+/// # Panics
+/// If the truth is smaller.
 pub fn error_map(prediction: &RgbImage, truth: &RgbImage) -> RgbImage {
     RgbImage::from_fn(prediction.width(), prediction.height(), |x, y| {
         let (p, t) = (prediction.get_pixel(x, y), truth.get_pixel(x, y));
@@ -176,7 +179,10 @@ pub fn error_map(prediction: &RgbImage, truth: &RgbImage) -> RgbImage {
     })
 }
 
-/// A depth map as grey levels, nearest brightest; pixels whose depth is not finite are black.
+/// A depth map as grey levels, row-major, nearest brightest; pixels whose depth is not finite are black.
+///
+/// # Panics
+/// If there are fewer depths than pixels.
 pub fn depth_picture(depth: &[f32], width: u32, height: u32) -> RgbImage {
     let finite = || depth.iter().copied().filter(|z| z.is_finite());
     let (near, far) = (finite().fold(f32::INFINITY, f32::min), finite().fold(f32::NEG_INFINITY, f32::max));

@@ -86,6 +86,9 @@ pub enum VideoError {
         .0.display(), .1[0], .1[1], .2[0], .2[1]
     )]
     Sizes(PathBuf, [u32; 2], [u32; 2]),
+    /// No frame was added.
+    #[error("{0}: a video of no frames")]
+    NoFrames(PathBuf),
     /// There is no `ffmpeg` on this machine.
     #[error("there is no {FFMPEG} on the path, which mp4 needs")]
     NoProgram,
@@ -104,6 +107,8 @@ pub struct VideoWriter {
     size: [u32; 2],
     encode: Encode,
     background: [u8; 3],
+    /// Frames that were added.
+    count: usize,
     /// Frames that are not written yet.
     frames: Queue<Result<Encoded, VideoError>>,
     output: Output,
@@ -157,7 +162,15 @@ impl VideoWriter {
             }
             VideoFormat::Mp4 => (plain, Output::Mp4(Ffmpeg::begin(path, size, rate)?)),
         };
-        Ok(VideoWriter { path: path.to_path_buf(), size, encode, background, frames: Queue::default(), output })
+        Ok(VideoWriter {
+            path: path.to_path_buf(),
+            size,
+            encode,
+            background,
+            count: 0,
+            frames: Queue::default(),
+            output,
+        })
     }
 
     /// Begins to encode the next frame, which another thread makes or reads. While as many wait as there are threads,
@@ -172,6 +185,7 @@ impl VideoWriter {
         while self.frames.len() >= width() {
             self.write_oldest()?;
         }
+        self.count += 1;
         let (encode, background, first, path) = (self.encode, self.background, self.size, self.path.clone());
         self.frames.add(move || {
             let picture = picture()?;
@@ -207,6 +221,9 @@ impl VideoWriter {
     /// # Errors
     /// [`VideoError`]; then there is no file.
     pub fn finish(mut self, progress: &dyn Progress) -> Result<PathBuf, VideoError> {
+        if self.count == 0 {
+            return Err(VideoError::NoFrames(self.path));
+        }
         progress.expect(self.frames.len());
         while !self.frames.is_empty() {
             progress.check()?;
@@ -266,4 +283,21 @@ fn io_error(path: &Path, cause: io::Error) -> VideoError {
 
 fn encode_error(path: &Path, cause: impl Into<Cause>) -> VideoError {
     WriteError::Encode { path: path.to_path_buf(), cause: cause.into() }.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use viewfuse_job::progress::Silent;
+
+    #[test]
+    fn a_video_of_no_frames_is_none() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for format in [VideoFormat::Webp, VideoFormat::Gif, VideoFormat::Y4m] {
+            let path = folder.path().join(format!("video.{format}"));
+            let video = VideoWriter::begin(&path, format, [4, 4], FrameRate::DEFAULT, [0; 3]).expect("a video");
+            assert!(matches!(video.finish(&Silent), Err(VideoError::NoFrames(_))), "{format}");
+            assert!(!path.exists(), "{format}");
+        }
+    }
 }

@@ -47,8 +47,8 @@ impl Scene {
     }
 }
 
-/// The first of these views that has the same pose as each of them, and is of the same split: that view itself, if it
-/// is the only one. A second photograph of a pose shows nothing new, and next to it no depth is found.
+/// The first of these views that has the same pose as each of them: that view itself, if it is the only one. A second
+/// photograph of a pose shows nothing new, and next to it no depth is found; of a target it shows what is looked for.
 fn firsts(views: &[View]) -> Vec<usize> {
     let cameras: Vec<Camera> = views.iter().map(|view| view.camera).collect();
     let centres = || cameras.iter().map(|camera| camera.pose.centre_world());
@@ -63,8 +63,7 @@ fn firsts(views: &[View]) -> Vec<usize> {
     };
     let mut firsts: Vec<usize> = Vec::with_capacity(cameras.len());
     for (index, camera) in cameras.iter().enumerate() {
-        let is_of_split = |other: &usize| views[*other].split == views[index].split;
-        let is_first = |other: &usize| firsts[*other] == *other && is_of_split(other) && same(camera, &cameras[*other]);
+        let is_first = |other: &usize| firsts[*other] == *other && same(camera, &cameras[*other]);
         let first = (0..index).find(is_first);
         firsts.push(first.unwrap_or(index));
     }
@@ -108,6 +107,20 @@ fn warnings(views: &[View]) -> Vec<String> {
             "{odd} of {count} photographs would show more than 150 degrees: '{}' has a focal length of {focal} pixels at a \
              width of {width}; the intrinsics may be shares of the width, or millimetres, in place of pixels",
             view.name
+        ));
+    }
+    let is_beside = |view: &&View| {
+        let pinhole = &view.camera.pinhole;
+        let sides = [pinhole.width() as f32, pinhole.height() as f32];
+        view.image.is_some() && (0..2).any(|axis| !(0.0..=sides[axis]).contains(&pinhole.principal()[axis]))
+    };
+    if let Some(view) = views.iter().find(is_beside) {
+        let (pinhole, beside) = (&view.camera.pinhole, views.iter().filter(is_beside).count());
+        let [[x, y], width, height] = [pinhole.principal(), [pinhole.width() as f32; 2], [pinhole.height() as f32; 2]];
+        warnings.push(format!(
+            "the principal point of {beside} of {count} photographs lies outside of them: of '{}' at ({x}, {y}), {} x {} \
+             pixels; the intrinsics may be those of larger photographs",
+            view.name, width[0], height[0]
         ));
     }
     let firsts = firsts(views);

@@ -159,6 +159,12 @@ fn other_settings_are_refused() {
     let before = fs::read(&photograph).expect("a photograph");
     fs::copy(folder.join("toy/rgb/000004.png"), &photograph).expect("another one");
     refused(&first, &["cameras of toy: "]);
+    // Of the same length, as files that are not compressed have.
+    let mut of_its_length = before.clone();
+    let middle = of_its_length.len() / 2;
+    of_its_length[middle] ^= 1;
+    fs::write(&photograph, of_its_length).expect("a file");
+    refused(&first, &["cameras of toy: "]);
     fs::write(&photograph, before).expect("a file");
 
     // Damage is told with file and line.
@@ -277,6 +283,14 @@ fn arguments_that_do_not_fit() {
     wrong("evaluate toy --protocol farthest -o out", &["farthest", "random[:sources=N]"]);
     wrong("evaluate toy --protocol random --targets 3 -o out", &["--protocol", "--targets"]);
     wrong("evaluate toy --shard 0/2 -o out", &["required"]);
+    for option in ["--trials 7", "--targets-per-trial 2", "--pictures 3"] {
+        wrong(&format!("evaluate toy {option}"), &["required", "--protocol"]);
+    }
+    for option in ["--trials 7", "--targets-per-trial 2"] {
+        let name = option.split(' ').next().expect("a word");
+        let parts = [name, "the protocol nearest:2 draws nothing"];
+        wrong(&format!("evaluate toy --protocol nearest:2 {option}"), &parts);
+    }
     wrong("evaluate toy --protocol random --shard 2/2 -o out", &["2/2", "counted from 0"]);
     let refused = |arguments: &str, parts: &[&str]| assert_refused(&folder, arguments, parts);
     refused("evaluate toy --protocol fixed -o out", &["toy: has no view '56'"]);

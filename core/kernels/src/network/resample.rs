@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use viewfuse_core::fetch::Fetch;
 use viewfuse_core::lookup::split;
+use viewfuse_core::math::has_nan_bits;
 
 /// A dispatch of [`pooled_element`], as plain data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
@@ -26,8 +27,8 @@ pub struct PoolBlock {
     pub padding: u32,
 }
 
-/// Output number `element` of `[row][column][channel]`: the largest input of its channel in its window (max pool). A
-/// window that holds no pixel gives `-f32::MAX`.
+/// Output number `element` of `[row][column][channel]`: the largest input of its channel in its window (max pool), NaN
+/// where one of them is. A window that holds no pixel, or nothing but negative infinity, gives `-f32::MAX`.
 #[inline]
 pub fn pooled_element(inputs: &(impl Fetch<f32> + ?Sized), block: &PoolBlock, element: usize) -> f32 {
     let (channels, out_width) = (block.channels, block.out_width);
@@ -40,8 +41,8 @@ pub fn pooled_element(inputs: &(impl Fetch<f32> + ?Sized), block: &PoolBlock, el
         let column = (out_column * block.stride + place % block.size).wrapping_sub(block.padding);
         if row < block.in_height && column < block.in_width {
             let input = inputs.fetch(((row * block.in_width + column) * channels + channel) as usize);
-            // NaN is no smaller, and stays.
-            if !(input <= largest) {
+            // NaN stays, wherever in the window it is.
+            if !has_nan_bits(largest) && (has_nan_bits(input) || input > largest) {
                 largest = input;
             }
         }

@@ -79,11 +79,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
             print_table(&scene, &job, target, &weights, index)?;
         }
         let unit = RigUnit::of_scene(&scene);
-        if !unit.is_world() {
+        let length = scene.frame.file_length(unit.length());
+        if length != 1.0 {
             say(format_args!(
-                "Schemes measure lengths in {:.4e} world units: in these the cameras are {SRN_DISTANCE} from what they \
-                    look at.",
-                unit.length()
+                "Distances are in the units of the scene's files; schemes measure lengths in {length:.4e} of these, in \
+                 which the cameras are {SRN_DISTANCE} from what they look at."
             ))?;
         }
     }
@@ -104,6 +104,11 @@ fn csv_of(weights: &WeightTable) -> anyhow::Result<String> {
     Ok(String::from_utf8(writer.into_inner()?)?)
 }
 
+/// A length with three decimals, or four digits where these show nothing of it.
+fn length(length: f32) -> String {
+    if length == 0.0 || (0.1..1.0e5).contains(&length) { format!("{length:.3}") } else { format!("{length:.3e}") }
+}
+
 fn print_table(
     scene: &Scene,
     job: &FewShot,
@@ -117,9 +122,9 @@ fn print_table(
     let mut rows = table(lead.into_iter().chain(names));
     for (row, &view) in job.sources.iter().enumerate() {
         let (source, pose) = (&scene.views[view], target.camera.pose);
-        let distance = source.camera.pose.distance(&pose);
+        let distance = scene.frame.file_length(source.camera.pose.distance(&pose));
         let angle = source.camera.pose.axis_angle(&pose).to_degrees();
-        let lead = [source.name.clone(), format!("{distance:.3}"), format!("{angle:.1}\u{b0}")];
+        let lead = [source.name.clone(), length(distance), format!("{angle:.1}\u{b0}")];
         let weight = |scheme| format!("{:.4}", weights.weights(scheme, index)[row]);
         rows.add_row(lead.into_iter().chain((0..weights.schemes.len()).map(weight)));
     }

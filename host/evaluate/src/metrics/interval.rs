@@ -52,9 +52,10 @@ impl Interval {
         Interval::of(&differences.collect::<Vec<_>>())
     }
 
-    /// Whether 0 lies outside: for a difference, whether it is significant. Without a width it is unknown: `false`.
+    /// Whether 0 lies outside: for a difference, whether it is significant. Without a width it is unknown: `false`, but
+    /// for an infinite difference, of a picture that is exact.
     pub fn excludes_zero(&self) -> bool {
-        self.half_width.is_some_and(|half_width| self.mean.abs() > half_width)
+        self.half_width.map_or(self.mean.is_infinite(), |half_width| self.mean.abs() > half_width)
     }
 }
 
@@ -120,6 +121,7 @@ mod tests {
         assert_eq!(equal.half_width, Some(0.0));
         let infinite = Interval::of(&[4.0, f64::INFINITY]).expect("two scenes");
         assert_eq!((infinite.mean, infinite.half_width), (f64::INFINITY, None));
+        assert!(infinite.excludes_zero(), "one of two is exact");
     }
 
     #[test]

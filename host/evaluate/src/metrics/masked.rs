@@ -23,7 +23,7 @@ pub struct MaskedTruth {
 
 impl MaskedTruth {
     /// From the same photograph composited over white and over black, of equal size; `None` where these are equal,
-    /// because it then has no mask.
+    /// because it then has no mask, and where the mask shows nothing.
     pub fn of(over_white: GroundTruth, over_black: &GroundTruth) -> Option<MaskedTruth> {
         let GroundTruth { picture: mut over_white, seen } = over_white;
         let over_black = &over_black.picture;
@@ -41,7 +41,8 @@ impl MaskedTruth {
                 (*share, pixel.0) = (0.0, [u8::MAX; 3]);
             }
         }
-        Some(MaskedTruth { over_white, shares })
+        // Of nothing every picture would be exact.
+        shares.iter().any(|share| *share > 0.0).then_some(MaskedTruth { over_white, shares })
     }
 
     /// A picture composited over white with this truth's mask. It must have the truth's size.
@@ -81,6 +82,12 @@ mod tests {
     fn halves() -> MaskedTruth {
         let over = |behind: u8| RgbImage::from_fn(16, 8, |x, _| Rgb(if x < 8 { [100; 3] } else { [behind; 3] }));
         MaskedTruth::of(whole(over(255)), &whole(over(0))).expect("a mask")
+    }
+
+    #[test]
+    fn a_mask_that_shows_nothing_is_none() {
+        let over = |behind: u8| whole(RgbImage::from_pixel(16, 8, Rgb([behind; 3])));
+        assert_eq!(MaskedTruth::of(over(255), &over(0)), None);
     }
 
     #[test]

@@ -118,6 +118,15 @@ impl Benchmark {
         words.any(|word| self.scenes().contains(&word))
     }
 
+    /// How many targets a scene has; `None` where that follows from its photographs.
+    pub(super) const fn target_count(self) -> Option<usize> {
+        match self {
+            Benchmark::Llff => None,
+            Benchmark::Dtu => Some(DTU_TARGETS.len()),
+            Benchmark::Blender => Some(BLENDER_TEST_VIEWS.div_ceil(EVERY)),
+        }
+    }
+
     /// The benchmark's views of a scene for this many sources; otherwise what the scene lacks, in words.
     pub(super) fn choose(self, scene: &Scene, source_count: usize) -> Result<Chosen, String> {
         match self {

@@ -79,10 +79,17 @@ pub struct Published {
 
 impl Published {
     /// What was published for a protocol; `None` for a protocol without published figures. They are withheld where the
-    /// pictures have another size than the papers', where the field is given masks that the papers' methods are not, or
-    /// where their metric was not computed. `scenes` are the names of the scenes that were evaluated, `sizes` those of
-    /// their pictures, `has_masked` whether the masked metric was computed.
-    pub fn of(protocol: &Protocol, scenes: &[String], sizes: &[[u32; 2]], has_masked: bool) -> Option<Published> {
+    /// pictures have another size than the papers', where a scene lacks some of their views, where the field is given
+    /// masks that the papers' methods are not, or where their metric was not computed. `scenes` are the names of the
+    /// scenes that were evaluated, `sizes` those of their pictures, `targets` how many there are of each, `has_masked`
+    /// whether the masked metric was computed.
+    pub fn of(
+        protocol: &Protocol,
+        scenes: &[String],
+        sizes: &[[u32; 2]],
+        targets: &[usize],
+        has_masked: bool,
+    ) -> Option<Published> {
         let Protocol::Benchmark { benchmark, sources, masks_given } = protocol else { return None };
         let methods: &[Method] = match benchmark {
             Benchmark::Llff => &LLFF,
@@ -101,6 +108,11 @@ impl Published {
         let [width, height] = benchmark.published_size();
         let withheld = if let Some([own_width, own_height]) = sizes.iter().find(|size| **size != [width, height]) {
             Some(format!("they are at {width}x{height}, these pictures at {own_width}x{own_height}"))
+        } else if let Some((count, (have, name))) = benchmark.target_count().and_then(|count| {
+            let mut scenes = targets.iter().zip(scenes);
+            Some((count, scenes.find(|(have, _)| **have < count)?))
+        }) {
+            Some(format!("they are of {count} views a scene, and {name} has {have} of these"))
         } else if *masks_given {
             Some("their methods are given no masks".to_owned())
         } else if benchmark.is_masked() && !has_masked {
@@ -128,7 +140,7 @@ mod tests {
 
     fn published(protocol: &str, size: [u32; 2], has_masked: bool) -> Option<Published> {
         let protocol = protocol.parse().expect("a protocol");
-        Published::of(&protocol, &["fern".to_owned(), "cup".to_owned()], &[size], has_masked)
+        Published::of(&protocol, &["fern".to_owned(), "cup".to_owned()], &[size], &[25, 25], has_masked)
     }
 
     #[test]
@@ -145,6 +157,14 @@ mod tests {
             (0, Some("they are at 504x378, these pictures at 252x189"))
         );
         assert_eq!(published("llff:4", [504, 378], false), None);
+        // A part of the views has another mean.
+        let dtu = |targets: usize| {
+            let protocol = "dtu:3".parse().expect("a protocol");
+            Published::of(&protocol, &["scan8".to_owned()], &[[400, 300]], &[targets], true).expect("figures")
+        };
+        assert!(dtu(25).withheld.is_none() && !dtu(25).figures.is_empty());
+        assert_eq!(dtu(8).withheld.as_deref(), Some("they are of 25 views a scene, and scan8 has 8 of these"));
+        assert!(dtu(8).figures.is_empty());
         assert_eq!(published("nearest:3", [504, 378], false), None);
     }
 

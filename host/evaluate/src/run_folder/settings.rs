@@ -4,8 +4,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
-use viewfuse_job::digest::hexadecimal;
+use viewfuse_job::digest::{hexadecimal, sha256_of_part};
 use viewfuse_scene::Scene;
 
 /// Everything that determines the jobs and their results. Not included: the device (each finished job states its own),
@@ -48,10 +47,13 @@ pub struct SceneSettings {
     /// Width and height of the pictures at its first view.
     #[serde(default)]
     pub size: [u32; 2],
-    /// SHA-256 of the names, cameras, lenses and bounds of its views, of the lengths of their files and of the points,
-    /// the first eight bytes.
+    /// SHA-256 of the names, cameras, lenses and bounds of its views, of the lengths of their files with what is in
+    /// their middle, and of the points, the first eight bytes.
     pub cameras: String,
 }
+
+/// Bytes in the middle of a photograph's file that tell it from another one of the same length.
+const MIDDLE: u64 = 4096;
 
 /// What follows from the other settings.
 const FOLLOWING: [&str; 2] = ["job_count", "notes"];
@@ -74,10 +76,13 @@ impl SceneSettings {
             if let Some(lens) = &view.lens {
                 digest.update(format!("{lens:?}"));
             }
-            // Other photographs under the same names have other lengths; a file's time is that of its copy.
-            let length = |file: &PathBuf| std::fs::metadata(file).map_or(0, |file| file.len());
-            let files = view.image.iter().chain(&view.mask);
-            files.for_each(|file| digest.update(length(file).to_le_bytes()));
+            // Other photographs under the same names have other lengths, or another middle where they are not compressed;
+            // a file's time is that of its copy.
+            for file in view.image.iter().chain(&view.mask) {
+                let length = std::fs::metadata(file).map_or(0, |file| file.len());
+                digest.update(length.to_le_bytes());
+                digest.update(sha256_of_part(file, length.saturating_sub(MIDDLE) / 2, MIDDLE).unwrap_or_default());
+            }
         }
         for point in &scene.points {
             point.position_world.to_array().iter().for_each(|number| digest.update(number.to_le_bytes()));

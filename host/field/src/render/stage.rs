@@ -163,10 +163,11 @@ impl<'a> Stage<'a> {
         self.weigh_by(&relevance, progress).map_err(|error| self.error(error))
     }
 
-    /// The same with the weights of all sources for each source as a target, its own 0.
+    /// The same with the weights of all sources for each source as a target, its own 0; none will do for a network, whose
+    /// sources are encoded without.
     ///
     /// # Errors
-    /// [`FieldError`].
+    /// [`FieldError`], also for weights for another number of sources.
     pub fn weigh_by(&mut self, relevance: &[SourceWeights], progress: &dyn Progress) -> Result<(), FieldError> {
         let (session, first) = (&mut self.session, self.controller.as_ref().map(Controller::first));
         timed(&mut self.costs.encode, || {

@@ -25,9 +25,10 @@ pub(super) fn check_names(scene: &Scene, targets: &[Target]) -> Result<(), Selec
 }
 
 /// A warning about targets that look where no source looks: neither at what the sources look at, nor in any direction
-/// that a source shows.
+/// that a source shows. Nothing is said of sources that the scene does not have.
 pub fn away_warning(scene: &Scene, job: &FewShot) -> Option<String> {
-    let sources: Vec<Camera> = job.sources.iter().map(|&view| scene.views[view].camera).collect();
+    let sources: Vec<Camera> =
+        job.sources.iter().map(|&view| Some(scene.views.get(view)?.camera)).collect::<Option<_>>()?;
     let focus = Rig::of(&sources).focus;
     let reach = |camera: &Camera| half_diagonal_slope(&camera.pinhole).atan();
     let faces_away = |target: &&Target| {

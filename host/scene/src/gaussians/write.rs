@@ -5,6 +5,7 @@ use std::path::Path;
 use glam::DVec3;
 use viewfuse_core::Vec3;
 use viewfuse_core::gaussian::REST_COUNTS;
+use viewfuse_core::pose::MAX_COORDINATE;
 use viewfuse_job::files::{WriteError, write_whole};
 
 use super::file::parser_files;
@@ -25,7 +26,7 @@ impl GaussianScene {
     /// takes: with a number that is not finite, or harmonics beyond degree 3.
     pub fn write(&self, path: &Path, frame: &SceneFrame) -> Result<(), WriteError> {
         check_frame(path, frame)?;
-        self.check().map_err(|cause| unwritten(path, cause))?;
+        self.check(path, frame).map_err(|cause| unwritten(path, cause))?;
         let bytes = if has_extension(path, &["splat"]) {
             splat::bytes(self, frame)
         } else if has_extension(path, &["spz"]) {
@@ -37,9 +38,17 @@ impl GaussianScene {
     }
 
     /// Whether a reader takes what is written.
-    fn check(&self) -> Result<(), String> {
+    fn check(&self, path: &Path, frame: &SceneFrame) -> Result<(), String> {
         if self.degree > MAX_DEGREE {
             return Err(format!("harmonics of degree {}; at most {MAX_DEGREE} are possible", self.degree));
+        }
+        let rest_count = 3 * REST_COUNTS[self.degree as usize] as usize;
+        if self.f_rest.len() != self.gaussians.len() * rest_count {
+            let (count, degree) = (self.gaussians.len(), self.degree);
+            return Err(format!("{} harmonics of degree {degree} for {count} Gaussians", self.f_rest.len()));
+        }
+        if self.gaussians.is_empty() && has_extension(path, &["splat"]) {
+            return Err("there are no Gaussians, and an empty .splat is not read".to_owned());
         }
         let is_finite = |gaussian: &Gaussian| {
             let Gaussian { position, log_scales, rotation, opacity, f_dc } = gaussian;
@@ -48,6 +57,19 @@ impl GaussianScene {
         };
         if let Some(index) = self.gaussians.iter().position(|gaussian| !is_finite(gaussian)) {
             return Err(format!("Gaussian {index} has a number that is not finite"));
+        }
+        let limit = f64::from(MAX_COORDINATE) / frame.scale;
+        let is_near = |gaussian: &Gaussian| gaussian.position.iter().all(|value| f64::from(value.abs()) <= limit);
+        if let Some(index) = self.gaussians.iter().position(|gaussian| !is_near(gaussian)) {
+            return Err(format!("Gaussian {index} is further than {MAX_COORDINATE:e} from the origin"));
+        }
+        // A .splat has the scales themselves.
+        let has_size = |gaussian: &Gaussian| {
+            let size = |value: &f32| (frame.scale * f64::from(*value).exp()) as f32;
+            gaussian.log_scales.iter().all(|value| size(value).is_finite())
+        };
+        if let Some(index) = self.gaussians.iter().position(|gaussian| !has_size(gaussian)) {
+            return Err(format!("Gaussian {index} is larger than a number of 32 bits"));
         }
         match self.f_rest.iter().position(|value| !value.is_finite()) {
             Some(index) => Err(format!("coefficient {index} of f_rest is not finite")),

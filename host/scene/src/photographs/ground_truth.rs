@@ -37,16 +37,23 @@ pub fn read_over(path: &Path, size: Option<[u32; 2]>, background: Option<[f32; 3
 
 impl Album<'_> {
     /// The truth at a view, resampled to a size, rounded to 8 bits: composited over the background if there is one;
-    /// otherwise the whole photograph, of which transparent pixels do not count.
+    /// otherwise the whole photograph, of which transparent pixels do not count. Nothing counts of a photograph that is
+    /// transparent everywhere, or whose mask shows nothing.
     ///
     /// # Errors
     /// [`SceneError`] if it cannot be read.
     pub fn truth(&self, view: usize, size: [u32; 2], background: Option<[f32; 3]>) -> Result<GroundTruth, SceneError> {
         let mut photograph = self.photograph(view)?;
+        let shows_nothing = photograph.has_alpha
+            && self.scene.mask_choice != MaskChoice::None
+            && photograph.pixels.pixels().all(|pixel| pixel[3] == 0);
         if self.has_own_alpha(view, &photograph) {
             let ignores = match (background, self.scene.mask_choice) {
                 (None, _) | (_, MaskChoice::Ignore) => true,
-                (_, MaskChoice::Auto) => ignored::is_of_ignored(vec![ignored::border_share(&photograph)]),
+                (_, MaskChoice::Auto) => {
+                    let alone = || ignored::is_of_ignored(vec![ignored::border_share(&photograph)]);
+                    self.ignores.get().copied().unwrap_or_else(alone)
+                }
                 _ => false,
             };
             if ignores {
@@ -58,7 +65,10 @@ impl Album<'_> {
         let background = background.unwrap_or_default();
         let size_before = photograph.pixels.dimensions();
         let texels = resample::area_average(&matte::laid_over(&photograph, background), size_before.into(), size);
-        let seen = photograph.seen.as_ref().map(|seen| resample::seen(seen, size.into()));
+        let seen = match shows_nothing {
+            true => Some(GrayImage::new(size[0], size[1])),
+            false => photograph.seen.as_ref().map(|seen| resample::seen(seen, size.into())),
+        };
         Ok(GroundTruth { picture: to_rgb8(&texels, size), seen: seen.filter(|seen| seen.as_raw().contains(&0)) })
     }
 }

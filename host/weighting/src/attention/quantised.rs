@@ -23,6 +23,8 @@ use viewfuse_core::sources::Sources;
 
 /// The largest weight of 8 bits.
 const MAX_WEIGHT: f64 = 127.0;
+/// Sums of magnitudes from which on one of `f32` may overflow before it is added up.
+const MAX_SIZE: f64 = 1.0e36;
 /// Roundings of an output in `f32`: four of them, each of half a unit in the last place, and their products.
 const ROUNDING: f64 = 5.0 / 16_777_216.0;
 
@@ -195,7 +197,9 @@ impl Network {
     }
 }
 
-/// Bounds the change of the weights of these sources for this target, from the parameters and the poses alone.
+/// Bounds the change of the weights of these sources for this target, from the parameters and the poses alone, but for
+/// the roundings of the network that is not quantised. Where cameras are so far away that `f32` may overflow on the way
+/// (from some 1e18 units on), nothing is known: the bound is infinite for a logit, and 1 for a weight.
 pub fn change_bound<const S: usize>(
     embedding: &FourierEmbedding,
     quantised: &QuantisedAttention,
@@ -222,6 +226,9 @@ pub fn change_bound<const S: usize>(
             logit.value += x.value * key.value;
             logit.error += x.value.abs() * key.error + (key.value.abs() + key.error) * x.error;
             size += (x.value.abs() + x.error) * (key.value.abs() + key.error);
+        }
+        if !(size < MAX_SIZE) {
+            return Change { logit: f64::INFINITY, weight: 1.0 };
         }
         known.push(Known { value: logit.value, error: logit.error + ROUNDING * size });
     }

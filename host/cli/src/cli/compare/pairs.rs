@@ -29,10 +29,10 @@ pub(super) fn pairs(prediction: &Path, truth: &Path) -> anyhow::Result<Vec<Pair>
         let base = SUFFIXES.iter().filter(|suffix| !suffix.is_empty()).find_map(|suffix| stem.strip_suffix(suffix));
         base.is_some_and(|stem| all.iter().any(|other| self::stem(other) == stem))
     };
-    // Some videos are pictures, too.
+    // Some videos are pictures, too. In another folder every picture is one to compare.
     let is_run = prediction.join(RECORD).is_file();
     let is_video = |path: &Path| VideoFormat::ALL.iter().any(|format| path.ends_with(format!("video.{format}")));
-    let is_other = |path: &Path| is_beside(path) || is_run && is_video(path);
+    let is_other = |path: &Path| is_run && (is_beside(path) || is_video(path));
     let predictions: Vec<&PathBuf> = all.iter().filter(|path| !is_other(path)).collect();
     if predictions.is_empty() {
         bail!("{}: has no pictures ({})", prediction.display(), EXTENSIONS[..3].join(", "));

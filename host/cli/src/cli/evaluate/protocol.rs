@@ -30,6 +30,7 @@ use viewfuse_scene::photographs::reduced_size;
 use viewfuse_weighting::OpenedChoice;
 
 const PROTOCOLS: &str = "Options of protocols";
+const DEFAULT_TARGETS: u16 = 4;
 /// Options that change no number, or that the settings hold in another form.
 const NO_SETTINGS: &str =
     "output shard threads device cache pictures time-limit weights protocol targets json latex verbose";
@@ -46,18 +47,18 @@ pub(crate) struct ProtocolOptions {
     #[arg(long, value_name = "PROTOCOL", conflicts_with_all = ["sources", "views"], help_heading = PROTOCOLS)]
     pub(super) protocol: Option<Protocol>,
     /// Draw sources and targets this many times for every scene
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000),
-        help_heading = PROTOCOLS)]
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "protocol",
+        value_parser = clap::value_parser!(u32).range(1..=100_000), help_heading = PROTOCOLS)]
     trials: u32,
     /// Targets of a trial
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=10_000),
-        help_heading = PROTOCOLS)]
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_TARGETS, requires = "protocol",
+        value_parser = clap::value_parser!(u16).range(1..=10_000), help_heading = PROTOCOLS)]
     targets_per_trial: u16,
     /// Do only part INDEX of COUNT, counted from 0: every COUNT-th job
     #[arg(long, value_name = "INDEX/COUNT", requires_all = ["protocol", "output"], help_heading = PROTOCOLS)]
     shard: Option<Shard>,
     /// Keep the pictures of this many jobs, the first ones, for the report
-    #[arg(long, value_name = "N", default_value_t = 4, help_heading = PROTOCOLS)]
+    #[arg(long, value_name = "N", default_value_t = 4, requires = "protocol", help_heading = PROTOCOLS)]
     pictures: usize,
 }
 
@@ -68,6 +69,13 @@ pub(super) fn run(
     mut options: BTreeMap<String, String>,
 ) -> anyhow::Result<ExitCode> {
     let protocol = &with_targets(protocol, arguments.targets.as_deref())?;
+    let ProtocolOptions { trials, targets_per_trial, .. } = arguments.protocol;
+    let drawn = [("--trials", trials != 1), ("--targets-per-trial", targets_per_trial != DEFAULT_TARGETS)];
+    if let Some((option, _)) = drawn.iter().find(|(_, is_given)| *is_given && !protocol.draws()) {
+        return Err(wrong(format_args!(
+            "{option}: the protocol {protocol} draws nothing: it has one trial, of its views"
+        )));
+    }
     let folder = arguments.output.as_deref();
     folder.map_or(Ok(()), |folder| check_writable(&folder.join(SETTINGS)))?;
     let field = arguments.model.open(arguments.seed, None)?;
@@ -247,7 +255,11 @@ impl Outcome<'_> {
         let scenes: Vec<String> = taken.iter().map(|&scene| self.scenes[scene].name()).collect();
         let sizes: Vec<[u32; 2]> = taken.iter().map(|&scene| self.sizes[scene]).collect();
         let has_masked = self.results.iter().flat_map(|table| &table.metrics).any(|metric| metric.name == PSNR_MASKED);
-        Published::of(self.protocol, &scenes, &sizes, has_masked).filter(|_| !self.results.is_empty())
+        let targets: Vec<usize> = taken
+            .iter()
+            .map(|scene| self.plan.jobs.iter().filter(|job| job.scene == *scene).map(|job| job.targets.len()).sum())
+            .collect();
+        Published::of(self.protocol, &scenes, &sizes, &targets, has_masked).filter(|_| !self.results.is_empty())
     }
 
     /// All of it for other programs.
