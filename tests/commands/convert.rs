@@ -64,7 +64,8 @@ fn refusals() {
     std::fs::remove_file(folder.path().join("page.pth")).expect("removed");
     assert_eq!(files_below(folder.path()), before, "nothing is left behind");
     // Another network under the output's name stays; the same one is written again.
-    std::fs::copy(data("attention.safetensors"), folder.path().join("mine.safetensors")).expect("a network");
+    let attention = repository().join("host/models/pixelnerf_cars_attention.safetensors");
+    std::fs::copy(attention, folder.path().join("mine.safetensors")).expect("a network");
     let mine = files_below(folder.path());
     let arguments = "convert training.pth mine.safetensors";
     assert_wrong_arguments(folder.path(), arguments, &["mine.safetensors: has other tensors than training.pth"]);

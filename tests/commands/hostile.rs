@@ -77,7 +77,7 @@ const NAMING: [&str; 24] = [
     "render SCENE --camera-path PATH --sources 0,1,2 --size 16x16 --device cpu -o path",
     "evaluate SCENE --targets VIEW --sources 0,1,2 --size 16x16 --weights mean --device cpu",
     "evaluate SCENE --targets VIEW --sources 0,1,2 --size 16x16 --weights mean --device cpu -o NAME.csv",
-    "evaluate SCENE --protocol nearest:2 --targets-per-trial 1 --size 16x16 --weights mean --device cpu -o NAME-p",
+    "evaluate SCENE --protocol nearest:2 --targets VIEW --size 16x16 --weights mean --device cpu -o NAME-p",
     "pareto SCENE --targets VIEW --sources 0,1,2 --size 16x16 --repeat 1 --only exact --device cpu -o NAME-q",
     "export SCENE --layout srn -o NAME-srn",
     "pose SCENE -o NAME-posed",

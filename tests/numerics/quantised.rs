@@ -213,6 +213,7 @@ fn where_numbers_overflow_nothing_is_promised() {
         let poses: Vec<Pose> = (0..VIEWS).map(|_| draws.pose(distance)).collect();
         let sources = Sources::<VIEWS>::new(&poses).expect("sources");
         let change = change_bound(&embedding, &parameters, &sources, &draws.pose(distance));
-        assert_eq!((change.weight < 1.0, change.logit.is_finite()), (is_known, is_known), "{distance}: {change:?}");
+        assert_eq!(change.logit.is_finite(), is_known, "{distance}: {change:?}");
+        assert!(is_known || change.weight == 1.0, "{distance}: {change:?}");
     }
 }

@@ -39,6 +39,8 @@ pub struct Tried {
     pub focal: Vec<f64>,
     /// Mean reprojection error in pixels at working size.
     pub reprojection_error: f64,
+    /// The share of the loss that is left with a focal length for each photograph: below 0.8 they are of several.
+    pub loss_apart: Option<f64>,
     /// Number of points.
     pub points: usize,
     /// What the points tell.
@@ -106,6 +108,7 @@ pub(crate) fn attempts(
             registered: found.map_or(0, |solution| solution.registered().len()),
             focal: found.map_or(Vec::new(), |solution| focal(solution, cameras, photos)),
             reprojection_error: found.map_or(0.0, Solution::reprojection_error),
+            loss_apart: found.and_then(|solution| Some(solution.apart.as_ref()?.loss)),
             points: found.map_or(0, |solution| solution.points.len()),
             support: found.map(|solution| Support::of(solution, &part)).transpose()?,
             seconds: start.elapsed().as_secs_f64(),

@@ -9,8 +9,8 @@ use crate::solution::{CameraGuess, SolvedApart};
 const MAX_KNOWN_CHANGE: f64 = 0.15;
 
 /// With a focal length for each photograph a tenth of the loss goes where autofocus moved the lens (cup), half and more
-/// where some were taken with a zoom of 1.4: shares that are left were 0.87 to 1 and 0.16 to 0.69.
-const MAX_SHARED_LOSS: f64 = 0.75;
+/// where some were taken with a zoom of 1.4: shares that are left were 0.87 to 1 and 0.16 to 0.74.
+const MAX_SHARED_LOSS: f64 = 0.8;
 /// Photographs whose focal lengths differ by less are of one zoom: found one by one, those of a zoom spread by a tenth.
 const MIN_ZOOM: f64 = 1.15;
 

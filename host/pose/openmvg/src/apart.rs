@@ -3,8 +3,9 @@
 //! a pixel.
 
 use openmvg_ba::{
-    BundleAdjuster, BundleIntrinsic, BundleObservation, BundlePoint, BundlePose, BundleProblem, IntrinsicCertification,
-    IntrinsicVariables, NativeBundleAdjuster, PoseVariables, ResidualScale, RobustLoss, Solution, SolveConfig,
+    BundleAdjuster, BundleIntrinsic, BundleObservation, BundlePoint, BundlePose, BundleProblem, Gauge,
+    IntrinsicCertification, IntrinsicVariables, NativeBundleAdjuster, PoseVariables, ResidualScale, RobustLoss,
+    Solution, SolveConfig,
 };
 use openmvg_core::model::CameraIntrinsics;
 use openmvg_core::units::PixelThreshold;
@@ -20,7 +21,7 @@ const MAX_ITERATIONS: usize = 100;
 /// The same photographs adjusted once more, each with a focal length of its own.
 #[derive(Serialize)]
 pub(crate) struct Apart {
-    /// The loss (Cauchy's, over all observations), as a share of that with a focal length for each camera.
+    /// The loss (Huber's, over all observations), as a share of that with a focal length for each camera.
     pub(crate) loss: f64,
     /// Focal lengths in pixels, in the order of the job; null without a pose.
     pub(crate) focal: Vec<Option<f64>>,
@@ -76,6 +77,12 @@ fn adjusted(
             observations.push(BundleObservation::try_new(*pose, lens, *point, observation.pixel).ok()?);
         }
     }
+    // The solver holds a lens whose uncertainty it cannot tell: a free gauge, and a loss that is not convex, would add to
+    // these.
+    let centre = |view: &usize| Some(found.pose(ViewId::new(*view))?.pose.center());
+    let first = centre(views.first()?)?;
+    let away = |view: &usize| centre(view).map_or(0.0, |centre| (centre - first).norm());
+    let (second, distance) = views.iter().map(away).enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
     let scale = ResidualScale::Pixels(PixelThreshold::try_new(LOSS_SCALE).ok()?);
     let problem = BundleProblem::builder(
         views.iter().map(pose).collect::<Option<_>>()?,
@@ -83,6 +90,10 @@ fn adjusted(
         points.collect::<Option<_>>()?,
         observations,
     );
-    let problem = problem.with_robust_loss(RobustLoss::Cauchy(scale)).build().ok()?;
+    let problem = problem
+        .with_robust_loss(RobustLoss::Huber(scale))
+        .with_gauge(Gauge::FixedBaseline { first: 0, second, distance })
+        .build()
+        .ok()?;
     NativeBundleAdjuster::new().solve(&problem, SolveConfig::default().with_max_iterations(MAX_ITERATIONS)).ok()
 }
