@@ -212,6 +212,10 @@ fn sources_without_a_weight_change_no_bit() {
         sources.images.push(photograph(camera(Vec3::new(0.2, 0.2, 0.0), 72, 54), gain));
         let among_three = |view| without(view, 3, 4);
         on_sources(&sources, &TrainingFree::default(), &Silent, |stage| {
+            for few in [0, 3] {
+                let error = stage.weigh_by(&vec![among_three(0); few], &Silent).expect_err("of four").to_string();
+                assert_eq!(error, format!("there are weights for {few} sources of 4"));
+            }
             stage.weigh_by(&[0, 1, 2, 3].map(among_three), &Silent).expect("a weighting");
             let render = |stage: &mut Stage<'_>, weights: &SourceWeights| {
                 stage.picture(&target, weights, 0.0, &Silent).expect("a picture")

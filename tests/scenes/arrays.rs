@@ -1,8 +1,13 @@
-//! Layouts with NumPy's arrays: LLFF and NeuS, and the arrays' own forms.
+//! Layouts with NumPy's arrays: LLFF and NeuS, and the arrays' own forms; what is written of nothing.
 
 use super::made::*;
+use viewfuse::job::progress::Silent;
+use viewfuse::output::depth::{DepthFormat, write_depth};
+use viewfuse::output::rate::FrameRate;
+use viewfuse::output::video::{VideoError, VideoFormat, VideoWriter};
 use viewfuse::scene::Scene;
 use viewfuse_core::Vec3;
+use viewfuse_tests::scenes::Folder;
 
 #[test]
 fn llff_at_an_eighth() {
@@ -164,4 +169,30 @@ fn damaged_archives_are_told() {
     let folder = neus();
     folder.write("cameras_sphere.npz", "no archive");
     assert_refused(&folder, "cameras_sphere.npz: not a readable zip archive", &[]);
+}
+
+/// A header of a shape without its numbers would be a file that nobody reads.
+#[test]
+fn depths_are_one_a_pixel() {
+    let folder = Folder::new();
+    for format in DepthFormat::ALL {
+        let path = folder.join("depth");
+        for count in [0, 15, 100] {
+            let error = write_depth(&path, *format, &vec![1.0; count], [4, 4]).expect_err("not 16").to_string();
+            assert!(error.contains(&format!("{count} depths for 4x4 pixels")) && !path.exists(), "{error}");
+        }
+        write_depth(&path, *format, &[1.0; 16], [4, 4]).expect("one a pixel");
+        std::fs::remove_file(&path).expect("it was written");
+    }
+}
+
+#[test]
+fn a_video_of_no_frames_is_none() {
+    let folder = Folder::new();
+    for format in [VideoFormat::Webp, VideoFormat::Gif, VideoFormat::Y4m] {
+        let path = folder.join(format!("video.{format}"));
+        let video = VideoWriter::begin(&path, format, [4, 4], FrameRate::DEFAULT, [0; 3]).expect("a video");
+        assert!(matches!(video.finish(&Silent), Err(VideoError::NoFrames(_))), "{format}");
+        assert!(!path.exists(), "{format}");
+    }
 }

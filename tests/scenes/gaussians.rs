@@ -49,7 +49,8 @@ fn what_is_written_is_read() {
 /// What no reader takes is not written, whatever a caller made of it.
 #[test]
 fn what_would_not_be_read_is_not_written() {
-    let cases: [(&str, fn(&mut GaussianScene), &str); 5] = [
+    type Change = fn(&mut GaussianScene);
+    let cases: [(&str, Change, &str); 5] = [
         ("a.ply", |scene| scene.f_rest.truncate(17), "17 harmonics of degree 1 for 2 Gaussians"),
         ("a.ply", |scene| scene.gaussians[1].position[2] = 1.0e35, "Gaussian 1 is further than 1e30"),
         ("a.splat", |scene| scene.gaussians[1].position[0] = -1.0e35, "Gaussian 1 is further than 1e30"),

@@ -58,6 +58,7 @@ impl Gpu {
     /// Dispatches a kernel for some of its elements. `parameters` are the kernel's own push constants, `arrays` its
     /// bindings, both as in its row. Elements of a tiled kernel are counted in [`Form::Single`], and are all of them:
     /// the device takes the form that was the fastest when it was measured, at the first use of such a size.
+    /// No elements are no work: nothing else is looked at then.
     ///
     /// # Errors
     /// [`VulkanError::Arguments`] if they are not, [`VulkanError::OtherDevice`], [`VulkanError::Limit`] if an array

@@ -284,20 +284,3 @@ fn io_error(path: &Path, cause: io::Error) -> VideoError {
 fn encode_error(path: &Path, cause: impl Into<Cause>) -> VideoError {
     WriteError::Encode { path: path.to_path_buf(), cause: cause.into() }.into()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use viewfuse_job::progress::Silent;
-
-    #[test]
-    fn a_video_of_no_frames_is_none() {
-        let folder = tempfile::tempdir().expect("a folder");
-        for format in [VideoFormat::Webp, VideoFormat::Gif, VideoFormat::Y4m] {
-            let path = folder.path().join(format!("video.{format}"));
-            let video = VideoWriter::begin(&path, format, [4, 4], FrameRate::DEFAULT, [0; 3]).expect("a video");
-            assert!(matches!(video.finish(&Silent), Err(VideoError::NoFrames(_))), "{format}");
-            assert!(!path.exists(), "{format}");
-        }
-    }
-}

@@ -159,7 +159,7 @@ fn blender_on_a_scene_in_its_layout() {
     let mut train: Vec<_> = (0..).zip(random_views(&sphere, 5, 0, 100).expect("cameras")).collect();
     train.retain(|(view, _)| [2, 16, 26, 55, 73, 75, 86, 93].contains(view));
     let mut test: Vec<_> = (0..).zip(spiral_views(&sphere, 200).expect("cameras")).collect();
-    let validation = vec![test[7].clone()];
+    let validation = vec![test[7]];
     test.retain(|(view, _)| [0, 3, 40, 104].contains(view));
     let lorry = lorry();
     let angle = 2.0 * (f64::from(sphere.pinhole.width()) / 2.0 / f64::from(sphere.pinhole.focal()[0])).atan();

@@ -122,6 +122,12 @@ impl Hull {
 impl<D: Device> Silhouettes<D> {
     /// Uploads images and finds the object.
     fn upload(device: &D, images: &[SourceImage], progress: &dyn Progress) -> Result<Silhouettes<D>, FieldError> {
+        if images.len() < 2 {
+            return Err(FieldError::unsuitable(format!(
+                "{} silhouettes bound no object: two are needed",
+                images.len()
+            )));
+        }
         let (cameras, texels) = joined(images);
         let object = bounding_box(&cameras, &texels).ok_or_else(|| FieldError::unsuitable(NoObject))?;
         let footprints: Vec<f32> = cameras.iter().map(|camera| footprint(&object, camera)).collect();
