@@ -71,6 +71,7 @@ fn a_file_without_weights_is_no_reference() {
     let folder = Folder::new();
     for official in [json!({}), json!({ "a_method_of_the_future": { "f64": [0.5, 0.5] } })] {
         let mut reference = weighting();
+        reference["extreme"] = reference["cases"].clone();
         reference["cases"][0]["official"] = official;
         folder.write("weighting.json", reference.to_string());
         let outcome = run(&folder, "verify weighting.json");
