@@ -82,6 +82,10 @@ fn number(value: &Value) -> Option<f64> {
         Value::Rational(all) => all.first()?.to_f64(),
         Value::Short(all) => f64::from(*all.first()?),
         Value::Long(all) => f64::from(*all.first()?),
+        // Not of the standard's types for these, and written all the same.
+        Value::SRational(all) => all.first()?.to_f64(),
+        Value::Float(all) => f64::from(*all.first()?),
+        Value::Double(all) => *all.first()?,
         _ => return None,
     };
     number.is_finite().then_some(number).filter(|number| *number > 0.0)
@@ -90,6 +94,24 @@ fn number(value: &Value) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_of_every_type_are_read() {
+        let ratio = exif::SRational { num: 54, denom: 2 };
+        for value in [
+            Value::Short(vec![27]),
+            Value::Long(vec![27]),
+            Value::Rational(vec![exif::Rational { num: 54, denom: 2 }]),
+            Value::SRational(vec![ratio]),
+            Value::Float(vec![27.0]),
+            Value::Double(vec![27.0]),
+        ] {
+            assert_eq!(number(&value), Some(27.0), "{value:?}");
+        }
+        for value in [Value::Double(vec![f64::NAN]), Value::Float(vec![-1.0]), Value::Double(Vec::new())] {
+            assert_eq!(number(&value), None, "{value:?}");
+        }
+    }
 
     #[test]
     fn the_focal_plane_counts_where_it_agrees() {

@@ -143,7 +143,7 @@ impl DeviceOptions {
 /// The choice of source views.
 #[derive(Args)]
 pub(crate) struct SourceOptions {
-    /// Source views: names or indices (`inspect --views` lists them; '#3' is always the index 3), ranges A..B with both
+    /// Source views: names or indices (`inspect --views` lists them; '#3' is the index 3), ranges A..B with both
     /// ends included, `all`, each with /STEP, separated by commas [default: all but the targets; in
     /// evaluate all but the target that is rendered]
     #[arg(long, value_name = "VIEWS")]
