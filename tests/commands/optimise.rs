@@ -232,7 +232,7 @@ fn what_it_refuses() {
         assert_wrong_arguments(&folder, &format!("{OPTIMISE} -o {name}"), &parts);
     }
     assert_wrong_arguments(&folder, "points toy -o scan.ply", &["scan.ply: was not written by viewfuse"]);
-    for name in ["again.ply", "again.spz", "again.splat", "again.html"] {
+    for name in ["again.ply", "again.spz", "again.SPLAT", "again.html"] {
         for _ in 0..2 {
             assert_eq!(run(&folder, &format!("{OPTIMISE} --iterations 1 -o {name}")).code, Some(0), "{name}");
         }

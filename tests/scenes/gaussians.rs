@@ -62,6 +62,10 @@ fn what_would_not_be_read_is_not_written() {
         scene.write(&folder.join(name), &SceneFrame::FILE).expect("two Gaussians");
         std::fs::remove_file(folder.join(name)).expect("it was written");
         change(&mut scene);
+        // Other formats have the logarithm.
+        if name == "a.splat" && words.ends_with("larger") {
+            scene.write(&folder.join("a.ply"), &SceneFrame::FILE).expect("a large one");
+        }
         let error = scene.write(&folder.join(name), &SceneFrame::FILE).expect_err(words).to_string();
         assert!(error.contains(words) && !folder.join(name).exists(), "{name}: {error}");
     }

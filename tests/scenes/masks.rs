@@ -430,4 +430,7 @@ fn transparency_means_for_targets_what_it_means_for_sources() {
     let images = album.sources(&[0, 1, 2, 3], 128, BackgroundChoice::Auto, &Silent).expect("sources");
     assert!(images.has_silhouettes);
     assert_eq!((counts(20), counts(21), counts(5)), (None, Some(0), None));
+    // What earlier sources were says nothing of a later run's.
+    album.sources(&[20], 128, BackgroundChoice::Auto, &Silent).expect("a source");
+    assert!(counts(20).is_some(), "these are no object's");
 }

@@ -14,7 +14,7 @@ use crate::{MaskChoice, MaskMeaning, Photograph, Scene, SceneError, View};
 use image::RgbImage;
 use rayon::prelude::*;
 use std::borrow::Cow;
-use std::sync::OnceLock;
+use std::sync::{Mutex, PoisonError};
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, PinholeError};
 use viewfuse_job::hint::{Hint, Hinted};
@@ -140,9 +140,9 @@ pub struct Album<'a> {
     kept: Vec<Option<Photograph>>,
     /// The size at which each is kept.
     sizes: Vec<(u32, u32)>,
-    /// Whether alpha channels say which pixels do not count, as the first sources that had some decided it: targets
-    /// mean the same by theirs.
-    ignores: OnceLock<bool>,
+    /// Whether alpha channels say which pixels do not count, as the latest sources have it; `None` if these have none.
+    /// Their targets mean the same by theirs.
+    ignores: Mutex<Option<bool>>,
 }
 
 impl<'a> Album<'a> {
@@ -158,7 +158,7 @@ impl<'a> Album<'a> {
         views: impl IntoIterator<Item = usize>,
         progress: &dyn Progress,
     ) -> Result<Album<'a>, PhotographsError> {
-        Album { scene, kept: vec![None; scene.views.len()], sizes: sizes(scene, own_size), ignores: OnceLock::new() }
+        Album { scene, kept: vec![None; scene.views.len()], sizes: sizes(scene, own_size), ignores: Mutex::default() }
             .filled(views, progress)
     }
 
@@ -197,7 +197,7 @@ impl<'a> Album<'a> {
             let is_large = self::longest_side(camera) / 2 >= times.saturating_mul(width.max(height));
             if is_large { (times * width, times * height) } else { own_size(camera) }
         };
-        Album { scene, kept: vec![None; scene.views.len()], sizes: sizes(scene, kept), ignores: OnceLock::new() }
+        Album { scene, kept: vec![None; scene.views.len()], sizes: sizes(scene, kept), ignores: Mutex::default() }
             .filled(views, progress)
     }
 
@@ -301,9 +301,10 @@ impl<'a> Album<'a> {
         let shares: Vec<f32> = shares.into_iter().flatten().collect();
         let transparent_count = shares.len();
         let ignores = match self.scene.mask_choice {
-            MaskChoice::Auto if transparent_count > 0 => *self.ignores.get_or_init(|| ignored::is_of_ignored(shares)),
+            MaskChoice::Auto => ignored::is_of_ignored(shares),
             asked => asked == MaskChoice::Ignore && transparent_count > 0,
         };
+        *self.ignores.lock().unwrap_or_else(PoisonError::into_inner) = (transparent_count > 0).then_some(ignores);
         if ignores {
             let look = |&view: &usize| {
                 progress.check()?;

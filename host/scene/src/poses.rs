@@ -116,11 +116,11 @@ fn warnings(views: &[View]) -> Vec<String> {
     };
     if let Some(view) = views.iter().find(is_beside) {
         let (pinhole, beside) = (&view.camera.pinhole, views.iter().filter(is_beside).count());
-        let [[x, y], width, height] = [pinhole.principal(), [pinhole.width() as f32; 2], [pinhole.height() as f32; 2]];
+        let ([x, y], width, height) = (pinhole.principal(), pinhole.width(), pinhole.height());
         warnings.push(format!(
-            "the principal point of {beside} of {count} photographs lies outside of them: of '{}' at ({x}, {y}), {} x {} \
-             pixels; the intrinsics may be those of larger photographs",
-            view.name, width[0], height[0]
+            "the principal point of {beside} of {count} photographs lies outside of them: of '{}' at ({x}, {y}), {width} x \
+             {height} pixels; the intrinsics may be those of larger photographs",
+            view.name
         ));
     }
     let firsts = firsts(views);

@@ -97,7 +97,10 @@ pub(super) fn keep_others(output: &Path) -> anyhow::Result<()> {
     // Whether it can be read or replaced is asked where it is written.
     let _ = File::open(output).and_then(|file| file.take(BEGINNING).read_to_end(&mut beginning));
     let says_so = || beginning.windows(MARK.len()).any(|part| part.eq_ignore_ascii_case(MARK));
-    match beginning.is_empty() || output.extension().is_some_and(|given| given == "splat") || says_so() {
+    match beginning.is_empty()
+        || output.extension().is_some_and(|given| given.eq_ignore_ascii_case("splat"))
+        || says_so()
+    {
         true => Ok(()),
         false => Err(foreign(output, "was not written by viewfuse")),
     }

@@ -63,12 +63,13 @@ impl GaussianScene {
         if let Some(index) = self.gaussians.iter().position(|gaussian| !is_near(gaussian)) {
             return Err(format!("Gaussian {index} is further than {MAX_COORDINATE:e} from the origin"));
         }
-        // A .splat has the scales themselves.
+        // A .splat has the scales themselves, where others have their logarithms.
         let has_size = |gaussian: &Gaussian| {
             let size = |value: &f32| (frame.scale * f64::from(*value).exp()) as f32;
             gaussian.log_scales.iter().all(|value| size(value).is_finite())
         };
-        if let Some(index) = self.gaussians.iter().position(|gaussian| !has_size(gaussian)) {
+        let too_large = self.gaussians.iter().position(|gaussian| !has_size(gaussian));
+        if let Some(index) = too_large.filter(|_| has_extension(path, &["splat"])) {
             return Err(format!("Gaussian {index} is larger than a number of 32 bits"));
         }
         match self.f_rest.iter().position(|value| !value.is_finite()) {

@@ -5,6 +5,7 @@ use crate::{MaskChoice, Photograph, SceneError, read_picture};
 use image::{GrayImage, RgbImage};
 use std::borrow::Cow;
 use std::path::Path;
+use std::sync::PoisonError;
 
 /// A photograph at the size of a prediction.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,7 +53,7 @@ impl Album<'_> {
                 (None, _) | (_, MaskChoice::Ignore) => true,
                 (_, MaskChoice::Auto) => {
                     let alone = || ignored::is_of_ignored(vec![ignored::border_share(&photograph)]);
-                    self.ignores.get().copied().unwrap_or_else(alone)
+                    self.ignores.lock().unwrap_or_else(PoisonError::into_inner).unwrap_or_else(alone)
                 }
                 _ => false,
             };
