@@ -4,12 +4,14 @@
 
 use crate::candidate::{Candidate, said, tests};
 use libtest_mimic::Failed;
+use std::sync::Mutex;
 use viewfuse::device::cpu::Cpu;
+use viewfuse::device::vulkan::Vulkan;
 use viewfuse::device::{Device, Memory};
 use viewfuse::field::FieldError;
 use viewfuse::field::genvs::sampling::{Plan, Steps};
 use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, Omissions, test_networks};
-use viewfuse::job::progress::Silent;
+use viewfuse::job::progress::{Progress, Silent};
 use viewfuse_core::sampler::Sampler;
 use viewfuse_tests::fields;
 use viewfuse_tests::lorry::{photographs, target};
@@ -19,6 +21,7 @@ use viewfuse_vulkan::kernel::Kernel;
 tests!(
     genvss_pictures_are_the_cpus,
     genvs_without_denoiser_runs_no_kernel_of_it,
+    a_call_of_the_denoiser_is_one_submission,
     genvss_feature_image_stays_on_the_device
 );
 
@@ -35,15 +38,26 @@ fn picture<D: Device + Sync>(
     omissions: Omissions,
     has_denoiser: bool,
 ) -> Result<Vec<[f32; 4]>, FieldError> {
+    picture_in(device, omissions, has_denoiser, 3, &Silent)
+}
+
+/// The same with so many calls of the denoiser.
+fn picture_in<D: Device + Sync>(
+    device: &D,
+    omissions: Omissions,
+    has_denoiser: bool,
+    level_count: u32,
+    progress: &dyn Progress,
+) -> Result<Vec<[f32; 4]>, FieldError> {
     let small = Architecture::small();
     let architecture = Architecture { denoiser: small.denoiser.clone().filter(|_| has_denoiser), ..small };
-    let steps = Steps::Fixed { sampler: Sampler::Ipndm, level_count: 3 };
+    let steps = Steps::Fixed { sampler: Sampler::Ipndm, level_count };
     let plan = Plan { steps, ..Plan::published(0) };
     let options = GenvsOptions { plan, omissions, ..GenvsOptions::default() };
     let field = Genvs::new(test_networks::deterministic(&architecture), options)?;
     let weights = fields::weights([0.7, 0.0, 0.3], 3);
     let sources = photographs(3, 30);
-    Ok(fields::picture(device, &field, &sources, &weights, &target(22), 0.0, &Silent)?.0.colours)
+    Ok(fields::picture(device, &field, &sources, &weights, &target(22), 0.0, progress)?.0.colours)
 }
 
 fn compare(ours: &[[f32; 4]], reference: &[[f32; 4]]) -> Result<(), Failed> {
@@ -72,6 +86,32 @@ fn genvs_without_denoiser_runs_no_kernel_of_it(candidate: &Candidate) -> Result<
         assert_eq!(device.tally(kernel).dispatches, 0, "{}", kernel.name());
     }
     Ok(())
+}
+
+/// From the third call on: the first makes the images between layers, the second is recorded.
+fn a_call_of_the_denoiser_is_one_submission(candidate: &Candidate) -> Result<(), Failed> {
+    let device = candidate.vulkan(&GpuOptions::default())?;
+    let seen = Submissions { device: &device, after_steps: Mutex::default() };
+    let ours = picture_in(&device, Omissions::NONE, true, 8, &seen).map_err(said)?;
+    let reference = picture_in(&Cpu, Omissions::NONE, true, 8, &Silent).expect("a picture on the CPU");
+    compare(&ours, &reference)?;
+    let after_steps = seen.after_steps.into_inner()?;
+    // The last pieces of the work are the calls.
+    let calls: Vec<u64> = after_steps[after_steps.len() - 7..].windows(2).map(|pair| pair[1] - pair[0]).collect();
+    assert_eq!(calls, [1; 6], "{after_steps:?}");
+    Ok(())
+}
+
+/// What was submitted by the end of each piece of work.
+struct Submissions<'a> {
+    device: &'a Vulkan,
+    after_steps: Mutex<Vec<u64>>,
+}
+
+impl Progress for Submissions<'_> {
+    fn step(&self) {
+        self.after_steps.lock().expect("no panic").push(self.device.submission_count());
+    }
 }
 
 /// What comes back from the device: the picture, with a denoiser once more for every call, and indices of numbers that

@@ -17,6 +17,7 @@ mod memory;
 mod picture;
 mod pixelnerf;
 mod precision;
+mod recording;
 mod time;
 mod transfers;
 mod validation;
@@ -59,6 +60,7 @@ fn main() -> ExitCode {
         limits::TESTS,
         expectations::TESTS,
         forms::TESTS,
+        recording::TESTS,
         gaussians::TESTS,
     ]
     .concat();

@@ -1,12 +1,12 @@
 //! Dispatches of kernels: arguments checked, split to fit the device, in the fastest form of their tiles.
 
 use crate::buffer::{self, Array, Bound, ranges};
+use crate::commands::Commands;
 use crate::error::VulkanError;
 use crate::forms::Class;
 use crate::gpu::{Gpu, State, WIDEST_PAGED, barrier};
 use crate::kernel::{Access, Form, Kernel, Layout, Piece};
 use crate::pipelines::Pipeline;
-use crate::submissions::Submission;
 use ash::vk;
 use std::ops::Range;
 use std::sync::Arc;
@@ -150,12 +150,12 @@ impl Gpu {
         let per_piece = self.handle.limits.workgroup_count.saturating_mul(form.invocations());
         let expected = state.rates[kernel as usize].time_of(counted).unwrap_or(UNKNOWN);
         let mut dispatches = 0;
-        self.record(state, &uses, |device, submission, submissions| {
-            let set = self.bind(submission, &pipeline, listed, page_shift)?;
-            submissions.start_clock(submission);
+        self.record_dispatch(state, &uses, |device, open, submissions| {
+            let set = self.bind(open, &pipeline, listed, page_shift)?;
+            submissions.start_clock(open);
             // SAFETY: pipeline, set and constants are of the kernel's layout; the counts are within the limits.
             unsafe {
-                let (commands, compute) = (submission.commands, vk::PipelineBindPoint::COMPUTE);
+                let (commands, compute) = (open.raw, vk::PipelineBindPoint::COMPUTE);
                 device.cmd_bind_pipeline(commands, compute, pipeline.raw);
                 device.cmd_bind_descriptor_sets(commands, compute, pipeline.layout, 0, &[set], &[]);
                 for first in elements.clone().step_by(per_piece as usize) {
@@ -172,7 +172,7 @@ impl Gpu {
                     dispatches += 1;
                 }
             }
-            submissions.stop_clock(submission, kernel, counted, expected);
+            submissions.stop_clock(open, kernel, counted, expected);
             Ok(())
         })?;
         Ok(dispatches)
@@ -180,15 +180,14 @@ impl Gpu {
 
     fn bind<'a>(
         &self,
-        submission: &Submission,
+        commands: &Commands,
         pipeline: &Pipeline,
         arrays: impl Iterator<Item = (&'a crate::kernel::Array, &'a Bound<'a>)>,
         page_shift: u32,
     ) -> Result<vk::DescriptorSet, VulkanError> {
         let layouts = [pipeline.set_layout];
-        let info =
-            vk::DescriptorSetAllocateInfo::default().descriptor_pool(submission.descriptors).set_layouts(&layouts);
-        // SAFETY: the pool has room for a largest set of each of a submission's dispatches, and is reset with it.
+        let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(commands.descriptors).set_layouts(&layouts);
+        // SAFETY: the pool has room for a largest set of each of the commands' dispatches, and is reset with them.
         let set = unsafe { self.handle.device.allocate_descriptor_sets(&info) }
             .map_err(|result| self.handle.failure("vkAllocateDescriptorSets", result))?[0];
         let mut infos = [[vk::DescriptorBufferInfo::default()]; MAX_BINDINGS];
@@ -206,7 +205,7 @@ impl Gpu {
                 .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
                 .buffer_info(info);
         }
-        // SAFETY: the ranges lie in their buffers, which the submission holds.
+        // SAFETY: the ranges lie in their buffers, which the commands hold.
         unsafe { self.handle.device.update_descriptor_sets(&writes[..count], &[]) };
         Ok(set)
     }

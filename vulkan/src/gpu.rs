@@ -3,6 +3,7 @@
 use crate::adapter::{Adapter, AdapterKind, Limits};
 use crate::ahead::Ahead;
 use crate::buffer::Array;
+use crate::commands::{Commands, Done};
 use crate::error::{Missing, VulkanError};
 use crate::forms::Choices;
 use crate::handle::{Handle, Memory};
@@ -10,7 +11,7 @@ use crate::instance::Instance;
 use crate::kernel::{Access, Form, Kernel};
 use crate::pipelines::{Key, Pipeline, Pipelines};
 use crate::staging::Ring;
-use crate::submissions::{Done, Submission, Submissions};
+use crate::submissions::Submissions;
 use crate::verdicts::Verdicts;
 use ash::vk;
 use std::collections::HashMap;
@@ -322,37 +323,81 @@ impl Gpu {
         outcome
     }
 
-    /// Records commands that use these arrays, after a barrier if they depend on commands since the last one.
+    /// Records commands that use these arrays, after a barrier if they depend on commands since the last one. They are
+    /// submitted once: what they transfer changes.
     pub(crate) fn record(
         &self,
         state: &mut State,
         uses: &[(&Arc<Array>, Access)],
-        commands: impl FnOnce(&ash::Device, &mut Submission, &Submissions) -> Result<(), VulkanError>,
+        commands: impl FnOnce(&ash::Device, &mut Commands, &Submissions) -> Result<(), VulkanError>,
     ) -> Result<(), VulkanError> {
-        let State { submissions, tallies, rates, stretch, .. } = state;
-        let mut submission = submissions.take_open(&mut |done| count(tallies, rates, done))?;
+        state.submissions.note(false);
+        self.record_into_open(state, uses, commands)
+    }
+
+    /// The same for a dispatch, which may be submitted again.
+    pub(crate) fn record_dispatch(
+        &self,
+        state: &mut State,
+        uses: &[(&Arc<Array>, Access)],
+        commands: impl FnOnce(&ash::Device, &mut Commands, &Submissions) -> Result<(), VulkanError>,
+    ) -> Result<(), VulkanError> {
+        state.submissions.note(true);
+        self.record_into_open(state, uses, commands)
+    }
+
+    fn record_into_open(
+        &self,
+        state: &mut State,
+        uses: &[(&Arc<Array>, Access)],
+        commands: impl FnOnce(&ash::Device, &mut Commands, &Submissions) -> Result<(), VulkanError>,
+    ) -> Result<(), VulkanError> {
+        let mut open = state.take_open()?;
+        let stretch = &mut state.stretch;
         let depends = uses.iter().any(|(array, access)| {
             array.written_in.is(*stretch) || (*access == Access::Write && array.read_in.is(*stretch))
         });
         if depends {
             if self.barriers {
-                barrier(&self.handle.device, submission.commands);
+                barrier(&self.handle.device, open.raw);
             }
             *stretch += 1;
         }
         for (array, access) in uses {
-            Submissions::hold(&mut submission, array);
+            open.hold(array);
             match access {
                 Access::Read => array.read_in.set(*stretch),
                 Access::Write => array.written_in.set(*stretch),
             }
         }
-        let recorded = commands(&self.handle.device, &mut submission, submissions);
-        submissions.go_on(submission).and(recorded)
+        let recorded = commands(&self.handle.device, &mut open, &state.submissions);
+        state.submissions.go_on(open).and(recorded)
+    }
+
+    /// Records a barrier behind everything before it, whatever comes.
+    pub(crate) fn record_barrier(&self, state: &mut State) -> Result<(), VulkanError> {
+        let mut open = state.take_open()?;
+        if self.barriers {
+            barrier(&self.handle.device, open.raw);
+        }
+        (open.is_used, state.stretch) = (true, state.stretch + 1);
+        state.submissions.go_on(open)
     }
 }
 
 impl State {
+    /// [`Submissions::take_open`].
+    fn take_open(&mut self) -> Result<Commands, VulkanError> {
+        let State { submissions, tallies, rates, .. } = self;
+        submissions.take_open(&mut |done| count(tallies, rates, done))
+    }
+
+    /// [`Submissions::queue_again`].
+    pub(crate) fn queue_again(&mut self, mark: &Arc<()>) -> Result<bool, VulkanError> {
+        let State { submissions, tallies, rates, .. } = self;
+        submissions.queue_again(mark, &mut |done| count(tallies, rates, done))
+    }
+
     pub(crate) fn wait(&mut self) -> Result<(), VulkanError> {
         let State { submissions, tallies, rates, .. } = self;
         submissions.wait(&mut |done| count(tallies, rates, done))

@@ -12,11 +12,12 @@
 //! forms, verdicts                forms of tiles: what is measured, what is chosen, what is trusted
 //! excerpt, pipelines             the part of a module that a kernel needs, pipelines of kernels
 //! ahead                          pipelines that are compiled before their first use
-//! submissions                    submitted commands
+//! commands, submissions          command buffers, submitted
 //! staging                        the memory that uploads pass through
 //! gpu                            an opened device: its state, recorded commands
 //! remembered                     pipelines and forms from one process to the next
 //! dispatch, pieces               dispatches, split to fit the device and its watchdog
+//! recording                      dispatches that are recorded once and submitted again
 //! measure                        forms compared and timed
 //! transfers                      arrays between host and device
 //! trust                          products by matrix units, tried before they are used
@@ -27,6 +28,7 @@
 mod adapter;
 mod ahead;
 mod buffer;
+mod commands;
 mod dispatch;
 mod error;
 mod excerpt;
@@ -40,6 +42,7 @@ mod measure;
 mod messages;
 mod pieces;
 mod pipelines;
+mod recording;
 mod remembered;
 mod staging;
 mod subgroups;
@@ -54,6 +57,7 @@ pub use error::{Missing, VulkanError, version};
 pub use gpu::{Faults, Gpu, GpuOptions, Tally};
 pub use instance::{Instance, InstanceOptions};
 pub use messages::Messages;
+pub use recording::Recording;
 
 /// The examples of the README, compiled and run.
 #[cfg(doctest)]

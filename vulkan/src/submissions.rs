@@ -1,86 +1,48 @@
 //! Submissions to the queue.
 //!
-//! Commands are recorded one behind the other into the open submission, which is submitted when somebody waits for it,
-//! or when it is full: of dispatches, of time that they are expected to take, or of memory that they hold. Up to
+//! Commands are recorded one behind the other into the open command buffer, which is submitted when somebody waits for
+//! it, or when it is full: of dispatches, of time that they are expected to take, or of memory that they hold. Up to
 //! [`MAX_IN_FLIGHT`] submissions are in flight at once, so that the device works while the host prepares the next ones.
-//! A submission keeps its resources alive until its fence is signalled.
+//! Commands keep their resources alive until the fence of their submission is signalled.
+//!
+//! Commands of a [recording](crate::Recording) stay when they are done. They are submitted again with what was recorded
+//! before them and what comes behind them: one submission.
 
-use crate::buffer::Array;
+use crate::commands::{Commands, Done, MAX_TIME, work};
 use crate::error::VulkanError;
 use crate::handle::Handle;
 use crate::kernel::Kernel;
 use ash::vk;
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::thread::{self, ThreadId};
 use std::time::{Duration, Instant};
 
 /// The most submissions in flight.
 const MAX_IN_FLIGHT: usize = 4;
-/// The most dispatches of a submission.
-const MAX_DISPATCHES: usize = 128;
-/// The longest time that a submission is expected to take: far below the time limit, and short enough that a display
-/// that shares the device is not stopped.
-const MAX_TIME: Duration = Duration::from_millis(200);
-/// The most bytes of arrays that a submission holds, counted at each use.
-const MAX_HELD: u64 = 256 << 20;
 
-/// A dispatch that is done, for statistics.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Done {
-    pub(crate) kernel: Kernel,
-    pub(crate) elements: u64,
-    /// Time on the device, if it has timestamps.
-    pub(crate) time: Option<Duration>,
-}
+/// Commands that are in flight; the fence of the last of them is signalled when all are done.
+type InFlight = Vec<Commands>;
 
-/// Commands that are being recorded or in flight.
-pub(crate) struct Submission {
-    pub(crate) commands: vk::CommandBuffer,
-    pub(crate) descriptors: vk::DescriptorPool,
-    queries: vk::QueryPool,
-    fence: vk::Fence,
-    held: Vec<Arc<Array>>,
-    held_bytes: u64,
-    /// The kernels that are dispatched, and for how many elements.
-    dispatched: Vec<(Kernel, u64)>,
-    /// The time that they are expected to take.
-    expected: Duration,
-    /// Whether anything is recorded.
-    is_used: bool,
-}
-
-impl Submission {
-    fn clear(&mut self) {
-        self.held.clear();
-        self.held_bytes = 0;
-        self.dispatched.clear();
-        self.expected = Duration::ZERO;
-        self.is_used = false;
-    }
-
-    fn is_full(&self) -> bool {
-        self.dispatched.len() >= MAX_DISPATCHES || self.expected >= MAX_TIME || self.held_bytes >= MAX_HELD
-    }
-
-    /// What it does, for an error.
-    fn work(&self) -> String {
-        match (self.dispatched.first(), self.dispatched.last()) {
-            (Some((first, _)), Some((last, _))) if self.dispatched.iter().any(|(kernel, _)| kernel != first) => {
-                format!("{} kernels, from {} to {},", self.dispatched.len(), first.name(), last.name())
-            }
-            (Some((only, _)), _) => format!("kernel {}", only.name()),
-            (None, _) => "a transfer".to_owned(),
-        }
-    }
+/// What is being recorded to be submitted again.
+struct Recorder {
+    /// As long as it holds nothing but dispatches of this thread.
+    mark: Option<Arc<()>>,
+    thread: ThreadId,
 }
 
 /// The queue's submissions, in order.
 pub(crate) struct Submissions {
     pool: vk::CommandPool,
-    free: Vec<Submission>,
-    /// The one that commands are recorded into.
-    open: Option<Submission>,
-    running: VecDeque<Submission>,
+    free: Vec<Commands>,
+    /// What the next submission begins with.
+    queued: Vec<Commands>,
+    /// Those that commands are recorded into, behind what is queued.
+    open: Option<Commands>,
+    running: VecDeque<InFlight>,
+    /// Parts of recordings that are done, each recording's in its order.
+    kept: Vec<Commands>,
+    recorder: Option<Recorder>,
     /// Time limit of the oldest; `None` without a limit.
     time_limit: Option<Duration>,
     /// The least time that closing the device waits for submissions in flight.
@@ -113,8 +75,11 @@ impl Submissions {
         Ok(Submissions {
             pool,
             free: Vec::new(),
+            queued: Vec::new(),
             open: None,
             running: VecDeque::new(),
+            kept: Vec::new(),
+            recorder: None,
             time_limit,
             closing,
             is_late: false,
@@ -135,90 +100,169 @@ impl Submissions {
         self.count + 1
     }
 
-    /// The open submission, or a new one. If all are in flight, it waits for the oldest first. It comes back through
-    /// [`Submissions::go_on`].
-    pub(crate) fn take_open(&mut self, done: &mut dyn FnMut(Done)) -> Result<Submission, VulkanError> {
+    /// The open commands, or new ones. If all submissions are in flight, it waits for the oldest first. They come back
+    /// through [`Submissions::go_on`].
+    pub(crate) fn take_open(&mut self, done: &mut dyn FnMut(Done)) -> Result<Commands, VulkanError> {
         if let Some(open) = self.open.take() {
             return Ok(open);
         }
-        if self.running.len() >= MAX_IN_FLIGHT {
-            self.wait_for_oldest(done)?;
-        }
-        let submission = match self.free.pop() {
-            Some(submission) => submission,
-            None => self.create()?,
+        self.wait_for_room(done)?;
+        self.release();
+        let mut commands = match self.free.pop() {
+            Some(commands) => commands,
+            None => Commands::new(&self.handle, self.pool, self.has_clock())?,
         };
-        let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        let flags = match self.recorder {
+            Some(_) => vk::CommandBufferUsageFlags::empty(),
+            None => vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT,
+        };
+        let info = vk::CommandBufferBeginInfo::default().flags(flags);
         // SAFETY: the commands are not in flight; the pool allows to record them again.
-        let begun = unsafe { self.handle.device.begin_command_buffer(submission.commands, &info) };
+        let begun = unsafe { self.handle.device.begin_command_buffer(commands.raw, &info) };
         match begun {
             Ok(()) => {
-                if self.tick.is_some() {
-                    let count = 2 * MAX_DISPATCHES as u32;
+                if self.has_clock() {
                     let Handle { device, .. } = &*self.handle;
                     // SAFETY: the commands are being recorded; the pool has so many queries.
-                    unsafe { device.cmd_reset_query_pool(submission.commands, submission.queries, 0, count) };
+                    unsafe { device.cmd_reset_query_pool(commands.raw, commands.queries, 0, Commands::QUERIES) };
                 }
-                Ok(submission)
+                let mark = self.recorder.as_ref().and_then(|recorder| recorder.mark.as_ref());
+                commands.part_of = mark.map(Arc::downgrade);
+                Ok(commands)
             }
             Err(result) => {
-                self.free.push(submission);
+                self.free.push(commands);
                 Err(self.handle.failure("vkBeginCommandBuffer", result))
             }
         }
     }
 
-    /// Takes back the open submission, and submits it if it is full. What was recorded before a failure stays recorded:
-    /// a command that failed was not.
-    pub(crate) fn go_on(&mut self, submission: Submission) -> Result<(), VulkanError> {
-        let is_full = submission.is_full();
-        self.open = Some(submission);
+    /// Takes back the open commands, and submits them if they are full. What was recorded before a failure stays
+    /// recorded: a command that failed was not.
+    pub(crate) fn go_on(&mut self, commands: Commands) -> Result<(), VulkanError> {
+        let is_full = commands.is_full();
+        self.open = Some(commands);
         if is_full { self.flush() } else { Ok(()) }
     }
 
     /// Submits what is recorded.
     pub(crate) fn flush(&mut self) -> Result<(), VulkanError> {
-        match self.open.take() {
-            Some(open) if open.is_used => self.submit(open),
-            open => {
-                self.open = open;
-                Ok(())
-            }
-        }
+        self.queue_open()?;
+        self.submit_queued()
     }
 
-    /// Takes back a submission that could not be submitted.
-    fn discard(&mut self, mut submission: Submission) {
+    /// Queues the open commands, if there are any in them.
+    fn queue_open(&mut self) -> Result<(), VulkanError> {
+        let Some(open) = self.open.take_if(|open| open.is_used) else { return Ok(()) };
+        // SAFETY: the commands are being recorded.
+        let ended = unsafe { self.handle.device.end_command_buffer(open.raw) };
+        match ended {
+            Ok(()) => self.queued.push(open),
+            Err(_) => self.discard(open),
+        }
+        ended.map_err(|result| self.handle.failure("vkEndCommandBuffer", result))
+    }
+
+    /// Takes back commands that are not in flight.
+    fn discard(&mut self, mut commands: Commands) {
         let no_flags = vk::DescriptorPoolResetFlags::empty();
         // By the specification this call cannot fail; if it does, the next allocation reports it.
-        // SAFETY: the submission is not in flight.
-        let _ = unsafe { self.handle.device.reset_descriptor_pool(submission.descriptors, no_flags) };
-        submission.clear();
-        self.free.push(submission);
+        // SAFETY: the commands are not in flight.
+        let _ = unsafe { self.handle.device.reset_descriptor_pool(commands.descriptors, no_flags) };
+        commands.clear();
+        self.free.push(commands);
     }
 
-    fn submit(&mut self, submission: Submission) -> Result<(), VulkanError> {
-        let commands = [submission.commands];
+    /// Takes back parts of recordings that nobody has any more.
+    fn release(&mut self) {
+        let (kept, gone): (Vec<_>, Vec<_>) = std::mem::take(&mut self.kept).into_iter().partition(Commands::is_kept);
+        self.kept = kept;
+        gone.into_iter().for_each(|commands| self.discard(commands));
+    }
+
+    fn submit_queued(&mut self) -> Result<(), VulkanError> {
+        let parts = std::mem::take(&mut self.queued);
+        let Some(last) = parts.last() else { return Ok(()) };
+        let commands: Vec<_> = parts.iter().map(|part| part.raw).collect();
         let info = [vk::SubmitInfo::default().command_buffers(&commands)];
         let Handle { device, queue, .. } = &*self.handle;
-        // SAFETY: the commands are recorded, and hold all that they use; the fence is not in use.
-        let submitted = unsafe {
-            device
-                .end_command_buffer(submission.commands)
-                .map_err(|result| self.handle.failure("vkEndCommandBuffer", result))
-                .and_then(|()| {
-                    let submitted = device.queue_submit(*queue, &info, submission.fence);
-                    submitted.map_err(|result| self.handle.failure("vkQueueSubmit", result))
-                })
-        };
+        // SAFETY: the commands are recorded, and hold all that they use; none is in flight, nor is the fence.
+        let submitted = unsafe { device.queue_submit(*queue, &info, last.fence) };
         match submitted {
             Ok(()) => {
                 self.count += 1;
-                self.running.push_back(submission);
+                self.running.push_back(parts);
             }
-            Err(_) => self.discard(submission),
+            Err(_) => parts.into_iter().for_each(|part| self.discard(part)),
         }
-        submitted
+        submitted.map_err(|result| self.handle.failure("vkQueueSubmit", result))
+    }
+
+    /// Begins to keep what is recorded from now on. Returns `false` if that is already done.
+    pub(crate) fn begin_recording(&mut self) -> Result<bool, VulkanError> {
+        if self.recorder.is_some() {
+            return Ok(false);
+        }
+        self.flush()?;
+        // Commands that were begun to be submitted once.
+        if let Some(mut open) = self.open.take() {
+            open.is_used = true;
+            self.open = Some(open);
+            self.queue_open()?;
+            self.queued.pop().into_iter().for_each(|open| self.discard(open));
+        }
+        self.recorder = Some(Recorder { mark: Some(Arc::new(())), thread: thread::current().id() });
+        Ok(true)
+    }
+
+    /// Notes that commands are recorded: dispatches, or others, which cannot be submitted again.
+    pub(crate) fn note(&mut self, are_dispatches: bool) {
+        if let Some(recorder) = &mut self.recorder
+            && !(are_dispatches && recorder.thread == thread::current().id())
+        {
+            recorder.mark = None;
+        }
+    }
+
+    /// Submits what is recorded, and ends the recording: what it is known by, if it can be submitted again.
+    pub(crate) fn end_recording(&mut self) -> Result<Option<Arc<()>>, VulkanError> {
+        let ended = self.flush();
+        let mark = self.recorder.take().and_then(|recorder| recorder.mark);
+        ended.map(|()| mark.filter(|mark| self.has_pending(mark) || self.kept.iter().any(|part| part.is_of(mark))))
+    }
+
+    /// Ends a recording, if there is one, that nobody will ask for.
+    pub(crate) fn drop_recording(&mut self) {
+        self.recorder = None;
+    }
+
+    /// Whether a part of a recording is queued or in flight.
+    fn has_pending(&self, mark: &Arc<()>) -> bool {
+        self.queued.iter().chain(self.running.iter().flatten()).any(|part| part.is_of(mark))
+    }
+
+    /// Queues the parts of a recording behind what is recorded. Returns `false` if there are none.
+    pub(crate) fn queue_again(&mut self, mark: &Arc<()>, done: &mut dyn FnMut(Done)) -> Result<bool, VulkanError> {
+        self.queue_open()?;
+        while self.has_pending(mark) {
+            self.submit_queued()?;
+            self.wait_for_oldest(done)?;
+        }
+        let (parts, others): (Vec<_>, Vec<_>) =
+            std::mem::take(&mut self.kept).into_iter().partition(|part| part.is_of(mark));
+        self.kept = others;
+        let is_there = !parts.is_empty();
+        for part in parts {
+            let queued: Duration = self.queued.iter().map(|part| part.expected).sum();
+            // Where there is no time limit, there is no display either.
+            let is_long = self.time_limit.is_some() && queued + part.expected > MAX_TIME;
+            if is_long && !self.queued.is_empty() {
+                self.wait_for_room(done)?;
+                self.submit_queued()?;
+            }
+            self.queued.push(part);
+        }
+        Ok(is_there)
     }
 
     /// Submits what is recorded, and waits until all submissions are done.
@@ -227,7 +271,13 @@ impl Submissions {
         while !self.running.is_empty() {
             self.wait_for_oldest(done)?;
         }
+        self.release();
         Ok(())
+    }
+
+    /// Waits for the oldest submission if no more may be in flight.
+    fn wait_for_room(&mut self, done: &mut dyn FnMut(Done)) -> Result<(), VulkanError> {
+        if self.running.len() >= MAX_IN_FLIGHT { self.wait_for_oldest(done) } else { Ok(()) }
     }
 
     /// Waits until the submission of this number is done: at once for 0.
@@ -241,52 +291,52 @@ impl Submissions {
         Ok(())
     }
 
-    /// Waits for the oldest submission, at most for the time limit: earlier ones are done, so all of that time is its
-    /// own.
+    /// Waits for the oldest submission, at most for the time limit of each of its parts: earlier ones are done, so all
+    /// of that time is its own.
     fn wait_for_oldest(&mut self, done: &mut dyn FnMut(Done)) -> Result<(), VulkanError> {
         let Some(oldest) = self.running.front() else { return Ok(()) };
+        let Some(fence) = oldest.last().map(|last| last.fence) else { return Ok(()) };
+        let limit = self.time_limit.map(|limit| limit.saturating_mul(oldest.len() as u32));
         let nanoseconds = |limit: Duration| u64::try_from(limit.as_nanos()).unwrap_or(u64::MAX);
-        let nanoseconds = self.time_limit.map_or(u64::MAX, nanoseconds);
         let Handle { device, .. } = &*self.handle;
         // SAFETY: the fence belongs to a submission that is in flight.
-        let waited = unsafe { device.wait_for_fences(&[oldest.fence], true, nanoseconds) };
+        let waited = unsafe { device.wait_for_fences(&[fence], true, limit.map_or(u64::MAX, nanoseconds)) };
         self.is_late |= waited == Err(vk::Result::TIMEOUT);
         waited.map_err(|result| match result {
             vk::Result::TIMEOUT => VulkanError::TimeLimit {
                 device: self.handle.name.clone(),
-                work: oldest.work(),
-                limit: self.time_limit.unwrap_or_default(),
+                work: work(oldest),
+                limit: limit.unwrap_or_default(),
             },
             result => self.handle.failure("vkWaitForFences", result),
         })?;
-        let ticks = self.ticks(oldest)?;
-        for (index, (kernel, elements)) in oldest.dispatched.iter().enumerate() {
-            let time = ticks.get(2 * index..2 * index + 2).map(|ticks| self.time_between(ticks[0], ticks[1]));
-            done(Done { kernel: *kernel, elements: *elements, time });
+        for part in oldest {
+            let ticks = self.ticks(part)?;
+            for (index, (kernel, elements)) in part.dispatched.iter().enumerate() {
+                let time = ticks.get(2 * index..2 * index + 2).map(|ticks| self.time_between(ticks[0], ticks[1]));
+                done(Done { kernel: *kernel, elements: *elements, time });
+            }
         }
-        let no_flags = vk::DescriptorPoolResetFlags::empty();
         // SAFETY: the submission is done.
-        let (fences, descriptors) = unsafe {
-            (device.reset_fences(&[oldest.fence]), device.reset_descriptor_pool(oldest.descriptors, no_flags))
-        };
-        fences.map_err(|result| self.handle.failure("vkResetFences", result))?;
-        descriptors.map_err(|result| self.handle.failure("vkResetDescriptorPool", result))?;
-        if let Some(mut oldest) = self.running.pop_front() {
-            oldest.clear();
-            self.free.push(oldest);
+        unsafe { device.reset_fences(&[fence]) }.map_err(|result| self.handle.failure("vkResetFences", result))?;
+        for part in self.running.pop_front().into_iter().flatten() {
+            match part.is_kept() {
+                true => self.kept.push(part),
+                false => self.discard(part),
+            }
         }
         self.handle.check_messages()
     }
 
-    /// The timestamps of a submission that is done, two for each dispatch; none where the device has none.
-    fn ticks(&self, submission: &Submission) -> Result<Vec<u64>, VulkanError> {
-        if self.tick.is_none() || submission.dispatched.is_empty() {
+    /// The timestamps of commands that are done, two for each dispatch; none where the device has none.
+    fn ticks(&self, commands: &Commands) -> Result<Vec<u64>, VulkanError> {
+        if self.tick.is_none() || commands.dispatched.is_empty() {
             return Ok(Vec::new());
         }
-        let mut ticks = vec![0_u64; 2 * submission.dispatched.len()];
+        let mut ticks = vec![0_u64; 2 * commands.dispatched.len()];
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
-        // SAFETY: these queries were written by the submission, which is done.
-        unsafe { self.handle.device.get_query_pool_results(submission.queries, 0, &mut ticks, flags) }
+        // SAFETY: these queries were written by the commands, which are done.
+        unsafe { self.handle.device.get_query_pool_results(commands.queries, 0, &mut ticks, flags) }
             .map_err(|result| self.handle.failure("vkGetQueryPoolResults", result))?;
         Ok(ticks)
     }
@@ -302,88 +352,23 @@ impl Submissions {
     }
 
     /// Writes the timestamp before a kernel, after all earlier commands: waiting for them is not its time.
-    pub(crate) fn start_clock(&self, submission: &Submission) {
-        self.write_timestamp(submission, 0);
+    pub(crate) fn start_clock(&self, commands: &Commands) {
+        self.write_timestamp(commands, 0);
     }
 
     /// Writes the timestamp behind it, and counts it. `expected` is the time that it is expected to take.
-    pub(crate) fn stop_clock(&self, submission: &mut Submission, kernel: Kernel, elements: u64, expected: Duration) {
-        self.write_timestamp(submission, 1);
-        submission.dispatched.push((kernel, elements));
-        submission.expected += expected;
+    pub(crate) fn stop_clock(&self, commands: &mut Commands, kernel: Kernel, elements: u64, expected: Duration) {
+        self.write_timestamp(commands, 1);
+        commands.dispatched.push((kernel, elements));
+        commands.expected += expected;
     }
 
-    fn write_timestamp(&self, submission: &Submission, place: u32) {
+    fn write_timestamp(&self, commands: &Commands, place: u32) {
         if self.tick.is_some() {
-            let query = 2 * submission.dispatched.len() as u32 + place;
+            let query = 2 * commands.dispatched.len() as u32 + place;
             let bottom = vk::PipelineStageFlags::BOTTOM_OF_PIPE;
             // SAFETY: the commands are being recorded; the pool has two queries for each dispatch, which were reset.
-            unsafe { self.handle.device.cmd_write_timestamp(submission.commands, bottom, submission.queries, query) };
-        }
-    }
-
-    /// Keeps an array alive until the submission is done.
-    pub(crate) fn hold(submission: &mut Submission, array: &Arc<Array>) {
-        submission.held_bytes += (array.len * array.stride) as u64;
-        submission.held.push(array.clone());
-        submission.is_used = true;
-    }
-
-    fn create(&self) -> Result<Submission, VulkanError> {
-        let Handle { device, .. } = &*self.handle;
-        let failed = |call| move |result| self.handle.failure(call, result);
-        let bindings = Kernel::ALL.into_iter().map(|kernel| kernel.binding_count()).max().unwrap_or(1);
-        let sizes = [vk::DescriptorPoolSize::default()
-            .ty(vk::DescriptorType::STORAGE_BUFFER)
-            .descriptor_count((bindings * MAX_DISPATCHES) as u32)];
-        let pool = vk::DescriptorPoolCreateInfo::default().max_sets(MAX_DISPATCHES as u32).pool_sizes(&sizes);
-        let queries = vk::QueryPoolCreateInfo::default()
-            .query_type(vk::QueryType::TIMESTAMP)
-            .query_count(2 * MAX_DISPATCHES as u32);
-        let commands = vk::CommandBufferAllocateInfo::default().command_pool(self.pool).command_buffer_count(1);
-        let mut submission = Submission {
-            commands: vk::CommandBuffer::null(),
-            descriptors: vk::DescriptorPool::null(),
-            queries: vk::QueryPool::null(),
-            fence: vk::Fence::null(),
-            held: Vec::new(),
-            held_bytes: 0,
-            dispatched: Vec::new(),
-            expected: Duration::ZERO,
-            is_used: false,
-        };
-        // SAFETY: all infos are complete. What was made before a failure is destroyed.
-        let made = unsafe {
-            (|| {
-                submission.commands =
-                    device.allocate_command_buffers(&commands).map_err(failed("vkAllocateCommandBuffers"))?[0];
-                submission.descriptors =
-                    device.create_descriptor_pool(&pool, None).map_err(failed("vkCreateDescriptorPool"))?;
-                submission.fence =
-                    device.create_fence(&vk::FenceCreateInfo::default(), None).map_err(failed("vkCreateFence"))?;
-                if self.tick.is_some() {
-                    submission.queries =
-                        device.create_query_pool(&queries, None).map_err(failed("vkCreateQueryPool"))?;
-                }
-                Ok(())
-            })()
-        };
-        match made {
-            Ok(()) => Ok(submission),
-            Err(error) => {
-                self.destroy(&submission);
-                Err(error)
-            }
-        }
-    }
-
-    fn destroy(&self, submission: &Submission) {
-        let Handle { device, .. } = &*self.handle;
-        // SAFETY: the submission is not in flight; null handles are ignored. Commands go with their pool.
-        unsafe {
-            device.destroy_query_pool(submission.queries, None);
-            device.destroy_fence(submission.fence, None);
-            device.destroy_descriptor_pool(submission.descriptors, None);
+            unsafe { self.handle.device.cmd_write_timestamp(commands.raw, bottom, commands.queries, query) };
         }
     }
 }
@@ -391,9 +376,8 @@ impl Submissions {
 impl Drop for Submissions {
     fn drop(&mut self) {
         // Nobody waits for what is recorded only.
-        if let Some(open) = self.open.take() {
-            self.discard(open);
-        }
+        let recorded = self.queued.drain(..).chain(self.open.take()).chain(self.kept.drain(..)).collect::<Vec<_>>();
+        recorded.into_iter().for_each(|commands| self.discard(commands));
         // One that exceeded the time limit may still run: it gets a little longer, then its resources are not freed.
         let patience =
             if self.is_late { Some(self.closing) } else { self.time_limit.map(|limit| limit.max(self.closing)) };
@@ -409,7 +393,9 @@ impl Drop for Submissions {
                 }
             }
         }
-        self.free.iter().for_each(|submission| self.destroy(submission));
+        // Parts of recordings that were in flight.
+        self.free.append(&mut self.kept);
+        self.free.iter().for_each(|commands| commands.destroy(&self.handle));
         // SAFETY: no commands of the pool are in flight.
         unsafe { self.handle.device.destroy_command_pool(self.pool, None) };
     }

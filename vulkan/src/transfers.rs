@@ -60,9 +60,9 @@ impl Gpu {
                 dst_offset: offset + written as u64,
                 size: place.len() as u64,
             };
-            self.record(state, &[(array, Access::Write)], |device, submission, _| {
+            self.record(state, &[(array, Access::Write)], |device, commands, _| {
                 // SAFETY: both ranges exist; the submission is waited for before staging is written again there.
-                unsafe { device.cmd_copy_buffer(submission.commands, from, to, &[copy]) };
+                unsafe { device.cmd_copy_buffer(commands.raw, from, to, &[copy]) };
                 Ok(())
             })?;
             if let Some(ring) = &mut state.upload {
@@ -79,9 +79,9 @@ impl Gpu {
         let mut padded = bytes.to_vec();
         padded.resize(bytes.len().next_multiple_of(4), 0);
         let to = array.chunks[0].buffer;
-        self.record(state, &[(array, Access::Write)], |device, submission, _| {
+        self.record(state, &[(array, Access::Write)], |device, commands, _| {
             // SAFETY: the buffer is so long, and so is the longest update.
-            unsafe { device.cmd_update_buffer(submission.commands, to, 0, &padded) };
+            unsafe { device.cmd_update_buffer(commands.raw, to, 0, &padded) };
             Ok(())
         })
     }
@@ -98,10 +98,10 @@ impl Gpu {
 
     fn clear(&self, array: &Arc<Array>) -> Result<(), VulkanError> {
         self.with_state(|gpu, state| {
-            gpu.record(state, &[(array, Access::Write)], |device, submission, _| {
+            gpu.record(state, &[(array, Access::Write)], |device, commands, _| {
                 for memory in &array.chunks {
                     // SAFETY: the buffer is a multiple of four bytes long.
-                    unsafe { device.cmd_fill_buffer(submission.commands, memory.buffer, 0, vk::WHOLE_SIZE, 0) };
+                    unsafe { device.cmd_fill_buffer(commands.raw, memory.buffer, 0, vk::WHOLE_SIZE, 0) };
                 }
                 Ok(())
             })
@@ -149,8 +149,8 @@ impl Gpu {
                 submission = state.submissions.next();
                 let (source, target, size) = (memory.buffer, to.chunks[0].buffer, range.len() as u64);
                 let copy = vk::BufferCopy { src_offset: offset, dst_offset: range.start as u64, size };
-                gpu.record(state, &[(from, Access::Read), (&to, Access::Write)], |device, submission, _| {
-                    copy_to_host(device, submission.commands, source, target, copy);
+                gpu.record(state, &[(from, Access::Read), (&to, Access::Write)], |device, commands, _| {
+                    copy_to_host(device, commands.raw, source, target, copy);
                     Ok(())
                 })
             })
@@ -198,8 +198,8 @@ impl Gpu {
         let (to, _) = self.mapped(state.download.as_mut())?;
         let copy = vk::BufferCopy::default().src_offset(offset).size(bytes.len() as u64);
         let from = memory.buffer;
-        self.record(state, &[(array, Access::Read)], |device, submission, _| {
-            copy_to_host(device, submission.commands, from, to, copy);
+        self.record(state, &[(array, Access::Read)], |device, commands, _| {
+            copy_to_host(device, commands.raw, from, to, copy);
             Ok(())
         })?;
         state.wait()?;
@@ -217,9 +217,9 @@ impl Gpu {
         word: u32,
     ) -> Result<(), VulkanError> {
         let to = array.chunks[0].buffer;
-        self.record(state, &[(array, Access::Write)], |device, submission, _| {
+        self.record(state, &[(array, Access::Write)], |device, commands, _| {
             // SAFETY: the range is the buffer's, and a multiple of four bytes long.
-            unsafe { device.cmd_fill_buffer(submission.commands, to, 0, bytes as u64, word) };
+            unsafe { device.cmd_fill_buffer(commands.raw, to, 0, bytes as u64, word) };
             Ok(())
         })
     }

@@ -8,7 +8,7 @@
 //!
 //! ```text
 //! error         the errors of any device                                DeviceError
-//! memory        buffers on a device                                     Memory, Element, KernelTime
+//! memory        buffers on a device                                     Memory, Element, KernelTime, Recorded
 //! parallel      one parallel driver under all kernels of the CPU
 //! queue         work on other threads while the caller goes on          Queue
 //! precision     how precisely a layer multiplies                        Precision
@@ -33,7 +33,7 @@ pub mod vulkan;
 pub use bundles::{HullScene, Layer, Pixels, Rays};
 pub use error::DeviceError;
 pub use kernels::{Device, LayerShape};
-pub use memory::{Element, KernelTime, Later, Memory, TransferCounter, Transfers};
+pub use memory::{Element, KernelTime, Later, Memory, Recorded, TransferCounter, Transfers};
 pub use precision::Precision;
 
 /// The examples of the README, compiled and run.

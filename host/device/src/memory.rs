@@ -99,6 +99,24 @@ impl<'d, T> Later<'d, T> {
     }
 }
 
+/// Work of a device that was recorded, to be done again.
+pub struct Recorded<'d>(Box<dyn Fn() -> Result<(), DeviceError> + 'd>);
+
+impl<'d> Recorded<'d> {
+    /// What does it again.
+    pub fn new(again: impl Fn() -> Result<(), DeviceError> + 'd) -> Recorded<'d> {
+        Recorded(Box::new(again))
+    }
+
+    /// Does it again, in the same arrays, with what they contain by then.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub fn again(&self) -> Result<(), DeviceError> {
+        (self.0)()
+    }
+}
+
 /// Memory that kernels work on.
 pub trait Memory {
     /// Memory of the device that holds `T`s.
@@ -174,5 +192,18 @@ pub trait Memory {
     fn download_later<T: Element>(&self, buffer: &Self::Buffer<T>) -> Result<Later<'_, T>, DeviceError> {
         let values = self.download(buffer)?;
         Ok(Later::new(move || Ok(values)))
+    }
+
+    /// Does work, and records what it dispatches, where the device gains by that and can repeat it: where nothing but
+    /// kernels ran, on arrays that were there before. What depends on the host, as parameters of a kernel do, is
+    /// repeated as it was.
+    ///
+    /// # Errors
+    /// The work's, or if the device is lost.
+    fn recorded<T>(
+        &self,
+        work: impl FnOnce() -> Result<T, DeviceError>,
+    ) -> Result<(T, Option<Recorded<'_>>), DeviceError> {
+        Ok((work()?, None))
     }
 }

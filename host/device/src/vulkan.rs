@@ -2,7 +2,7 @@
 
 use super::error::DeviceError;
 use super::kernels::{Device, LayerShape};
-use super::memory::{Element, KernelTime, Later, Memory, TransferCounter, Transfers};
+use super::memory::{Element, KernelTime, Later, Memory, Recorded, TransferCounter, Transfers};
 use super::precision::Precision;
 use crate::argument;
 use bytemuck::bytes_of;
@@ -185,6 +185,14 @@ impl Memory for Vulkan {
             }
             Ok(self.gpu.arrived(coming)?)
         }))
+    }
+
+    fn recorded<T>(
+        &self,
+        work: impl FnOnce() -> Result<T, DeviceError>,
+    ) -> Result<(T, Option<Recorded<'_>>), DeviceError> {
+        let (value, recording) = self.gpu.recorded(work)?;
+        Ok((value, recording.map(|recording| Recorded::new(move || Ok(self.gpu.submit_again(&recording)?)))))
     }
 }
 

@@ -5,26 +5,23 @@
 //! Song et al. 2021. The image of a skip connection is written directly behind the channels that the decoder
 //! concatenates it with: nothing is copied.
 
-use viewfuse_device::DeviceError;
 mod block;
+mod calls;
 mod embedding;
 
-use super::architecture::{self, COLOUR_CHANNELS, DenoiserStep, group_count};
+use super::architecture::{self, DenoiserStep, group_count};
 use crate::FieldError;
 use block::Block;
+pub(super) use calls::Calls;
 use embedding::{Embedding, ShiftLayers};
 use std::f32::consts::FRAC_1_SQRT_2;
-use viewfuse_core::schedule::Preconditioning;
-use viewfuse_device::Device;
-use viewfuse_kernels::genvs::DenoiserInputBlock;
+use viewfuse_device::{Device, DeviceError};
 use viewfuse_nn::convolution::{Convolution, ConvolutionOptions, Residual};
 use viewfuse_nn::image::{Image, Size};
 use viewfuse_nn::loader::Loader;
 use viewfuse_nn::norm::GroupNorm;
 use viewfuse_nn::scratch::Scratch;
 
-/// Channels of a picture.
-const PICTURE_CHANNELS: u32 = COLOUR_CHANNELS as u32;
 /// Added to variances by group norms (epsilon, `networks.py`).
 const GROUP_NORM_EPSILON: f32 = 1.0e-6;
 
@@ -95,26 +92,15 @@ impl<D: Device> Denoiser<D> {
         })
     }
 
-    /// The network's output (red, green, blue a pixel) for a noisy picture `[row][column][3]` and a condition
-    /// `[row][column][channel]`. Rows and columns are multiples of two to the number of halvings.
-    pub(super) fn run(
+    /// What its layers make of its input and the shifts: red, green, blue a pixel.
+    fn run(
         &self,
         scratch: &mut Scratch<'_, D>,
-        noisy: &D::Buffer<f32>,
-        condition: &Image<D>,
-        at: &Preconditioning,
+        inputs: &Image<D>,
+        shifts: &D::Buffer<f32>,
     ) -> Result<Image<D>, DeviceError> {
-        let (device, size) = (scratch.device(), condition.size);
-        let block = DenoiserInputBlock {
-            picture_channels: PICTURE_CHANNELS,
-            condition_channels: size.channels,
-            scale: at.input,
-        };
-        let mut inputs = scratch.image(size.with_channels(PICTURE_CHANNELS + size.channels))?;
-        device.denoiser_input(&block, size.pixel_count(), noisy, &condition.values, &mut inputs.values)?;
-        let shifts = self.embedding.shifts(device, at.noise)?;
-        let skips = self.encode(scratch, inputs, &shifts)?;
-        let x = self.decode(scratch, skips, &shifts)?;
+        let skips = self.encode(scratch, inputs, shifts)?;
+        let x = self.decode(scratch, skips, shifts)?;
         let normalised = self.aux_norm.run(scratch, &x, true)?;
         let output = self.aux_conv.run(scratch, PLAIN, &normalised, Residual::None)?;
         scratch.recycle(x);
@@ -126,7 +112,7 @@ impl<D: Device> Denoiser<D> {
     fn encode(
         &self,
         scratch: &mut Scratch<'_, D>,
-        inputs: Image<D>,
+        inputs: &Image<D>,
         shifts: &D::Buffer<f32>,
     ) -> Result<Vec<Image<D>>, DeviceError> {
         // The last image is read first, behind the channels of the block before its reader.
@@ -139,7 +125,7 @@ impl<D: Device> Denoiser<D> {
         // Where the last residual input is, once it is not the network's own.
         let mut residual: Option<usize> = None;
         for step in &self.encoder {
-            let x = skips.last().unwrap_or(&inputs);
+            let x = skips.last().unwrap_or(inputs);
             let next = match step {
                 Step::First(layer) => {
                     let mut first = place(scratch, x.size.with_channels(layer.channels))?;
@@ -156,7 +142,7 @@ impl<D: Device> Denoiser<D> {
                     block.run(scratch, shifts, x, &mut halved)?;
                     let mut first = place(scratch, halved.size)?;
                     let options = ConvolutionOptions { stride: 2, padding: Some(1), scale: FRAC_1_SQRT_2, ..PLAIN };
-                    let input = residual.map_or(&inputs, |index| &skips[index]);
+                    let input = residual.map_or(inputs, |index| &skips[index]);
                     aux_residual.run_into(scratch, options, input, Residual::Image(&halved), &mut first)?;
                     scratch.recycle(halved);
                     residual = Some(skips.len());
@@ -165,7 +151,6 @@ impl<D: Device> Denoiser<D> {
             };
             skips.push(next);
         }
-        scratch.recycle(inputs);
         Ok(skips)
     }
 
@@ -194,6 +179,8 @@ impl<D: Device> Denoiser<D> {
             let channels = output.pitch;
             x = Some(output.channel_slice(0, channels));
         }
+        // The last image, which lies in front of no other.
+        skips.into_iter().for_each(|image| scratch.recycle(image));
         Ok(x.unwrap_or_else(|| unreachable!("a decoder has blocks")))
     }
 }

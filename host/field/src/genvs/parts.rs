@@ -1,7 +1,7 @@
 //! The network's parts on a device and their evaluation. NaN and infinity are reported at the part that produced them.
 
 use super::architecture::{Architecture, COLOUR_CHANNELS, Estimate};
-use super::denoiser::Denoiser;
+use super::denoiser::{Calls, Denoiser};
 use super::encoder::Encoder;
 use super::feature_image::{PointNetwork, Views, render};
 use super::ray_sampling::RaySampling;
@@ -111,7 +111,7 @@ impl<D: Device> Parts<D> {
         progress: &dyn Progress,
     ) -> Result<Sampled<D>, FieldError> {
         let count = features.size.pixel_count() as usize * COLOUR_CHANNELS;
-        if self.denoiser.is_none() {
+        let Some((denoiser, _)) = &self.denoiser else {
             let colours = leading_channels(scratch, features, COLOUR_CHANNELS as u32)?;
             return Ok(Sampled {
                 picture: colours.values,
@@ -119,7 +119,7 @@ impl<D: Device> Parts<D> {
                 left_out: 0,
                 accuracy: Accuracy::default(),
             });
-        }
+        };
         let condition = self.condition(device, scratch, features)?;
         let start = match (start, &condition.colours) {
             (Start::Noise, Some(picture)) if plan.from_colours => {
@@ -127,9 +127,12 @@ impl<D: Device> Parts<D> {
             }
             (start, _) => start,
         };
-        sample(device, plan, count, start, progress, |noisy, level, denoised| {
-            Ok(self.denoise(device, scratch, noisy, &condition, level, denoised)?)
-        })
+        let mut calls = Calls::new(denoiser, scratch, features.size)?;
+        let sampled = sample(device, plan, count, start, progress, |noisy, level, denoised| {
+            Ok(denoise(device, &mut calls, noisy, &condition, level, denoised)?)
+        })?;
+        calls.end();
+        Ok(sampled)
     }
 
     /// What a precision changes in the denoiser's estimate of a picture behind noise of the plan's largest level: the
@@ -143,6 +146,7 @@ impl<D: Device> Parts<D> {
         plan: &Plan,
         precision: Precision,
     ) -> Result<f32, FieldError> {
+        let Some((denoiser, _)) = &self.denoiser else { return Ok(0.0) };
         let condition = self.condition(device, scratch, features)?;
         let (level, count) = (plan.schedule.level(0, 2), features.size.pixel_count() as usize * COLOUR_CHANNELS);
         let block = NoiseBlock { seed: [plan.seed as u32, (plan.seed >> 32) as u32], stream: 0, scale: level };
@@ -153,7 +157,9 @@ impl<D: Device> Parts<D> {
         for precision in [precision, finer] {
             scratch.precision = precision;
             let mut denoised = device.zeros(count)?;
-            self.denoise(device, scratch, &noisy, &condition, level, &mut denoised)?;
+            let mut calls = Calls::new(denoiser, scratch, features.size)?;
+            denoise(device, &mut calls, &noisy, &condition, level, &mut denoised)?;
+            calls.end();
             estimates.push(download_finite(device, &denoised, "trying a precision", "denoised picture")?);
         }
         let changes: Vec<f32> = estimates[0].iter().zip(&estimates[1]).map(|(a, b)| a - b).collect();
@@ -181,8 +187,7 @@ impl<D: Device> Parts<D> {
         Ok(Condition { features, colours })
     }
 
-    /// The denoiser's estimate of the picture behind a noisy one of a level; see [`Estimate`]. Without a denoiser,
-    /// nothing is written.
+    /// The denoiser's estimate of the picture behind a noisy one of a level. Without a denoiser, nothing is written.
     pub(super) fn denoise(
         &self,
         device: &D,
@@ -193,19 +198,30 @@ impl<D: Device> Parts<D> {
         denoised: &mut D::Buffer<f32>,
     ) -> Result<(), DeviceError> {
         let Some((denoiser, _)) = &self.denoiser else { return Ok(()) };
-        let at = Preconditioning::at(level);
-        let output = denoiser.run(scratch, noisy, condition.features, &at)?;
-        let (count, unused) = (output.size.pixel_count() * output.size.channels, noisy);
-        let (colours, of_colours) = match &condition.colours {
-            // Cancels only where the share is invisible.
-            Some(colours) => (colours, 1.0 - at.skip),
-            None => (unused, 0.0),
-        };
-        let mix = Mix { state: at.skip, results: [at.output, of_colours, 0.0, 0.0] };
-        device.mix_pictures(&mix, count, noisy, &output.values, colours, unused, unused, denoised)?;
-        scratch.recycle(output);
-        Ok(())
+        let mut calls = Calls::new(denoiser, scratch, condition.features.size)?;
+        denoise(device, &mut calls, noisy, condition, level, denoised)
     }
+}
+
+/// The denoiser's estimate of the picture behind a noisy one of a level; see [`Estimate`].
+fn denoise<D: Device>(
+    device: &D,
+    calls: &mut Calls<'_, '_, D>,
+    noisy: &D::Buffer<f32>,
+    condition: &Condition<'_, D>,
+    level: f32,
+    denoised: &mut D::Buffer<f32>,
+) -> Result<(), DeviceError> {
+    let at = Preconditioning::at(level);
+    let output = calls.run(noisy, condition.features, &at)?;
+    let (count, unused) = (output.size.pixel_count() * output.size.channels, noisy);
+    let (colours, of_colours) = match &condition.colours {
+        // Cancels only where the share is invisible.
+        Some(colours) => (colours, 1.0 - at.skip),
+        None => (unused, 0.0),
+    };
+    let mix = Mix { state: at.skip, results: [at.output, of_colours, 0.0, 0.0] };
+    device.mix_pictures(&mix, count, noisy, &output.values, colours, unused, unused, denoised)
 }
 
 /// The stage's name in errors.

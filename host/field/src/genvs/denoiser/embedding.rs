@@ -54,15 +54,19 @@ impl<D: Device> Embedding<D> {
         Ok(Embedding { map_layer0, map_layer1, affine })
     }
 
-    /// The shifts of all blocks at a noise level, given as [`viewfuse_core::schedule::Preconditioning::noise`].
-    pub(super) fn shifts(&self, device: &D, noise: f32) -> Result<D::Buffer<f32>, DeviceError> {
+    /// How many shifts all blocks have.
+    pub(super) fn shift_count(&self) -> usize {
+        self.affine.out_count as usize
+    }
+
+    /// Writes the shifts of all blocks at a noise level, given as
+    /// [`viewfuse_core::schedule::Preconditioning::noise`].
+    pub(super) fn shifts(&self, device: &D, noise: f32, shifts: &mut D::Buffer<f32>) -> Result<(), DeviceError> {
         let mapped =
             |layer: &LinearWeights, inputs: &[f32]| layer.run(inputs).into_iter().map(silu).collect::<Vec<f32>>();
         let waves = waves(noise, self.map_layer0.in_count());
         let embedded = mapped(&self.map_layer1, &mapped(&self.map_layer0, &waves));
-        let mut shifts = device.zeros(self.affine.out_count as usize)?;
-        self.affine.run(device, 1, LinearOptions::PLAIN, &device.upload(&embedded)?, None, &mut shifts)?;
-        Ok(shifts)
+        self.affine.run(device, 1, LinearOptions::PLAIN, &device.upload(&embedded)?, None, shifts)
     }
 }
 
