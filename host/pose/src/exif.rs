@@ -31,6 +31,8 @@ pub struct Exif {
     pub camera: Option<String>,
     /// Focal length in millimetres: a zoom lens has several.
     pub millimetres: Option<f64>,
+    /// Width and height that it had when it was taken, or when a program last wrote them.
+    pub size: Option<[f64; 2]>,
 }
 
 impl Exif {
@@ -54,6 +56,7 @@ impl Exif {
             focal: focal(&plane, number(Tag::FocalLengthIn35mmFilm), size),
             camera: (!names.is_empty()).then(|| names.join(" ")),
             millimetres,
+            size: stored[0].zip(stored[1]).map(|(width, height)| [width, height]),
         }
     }
 }

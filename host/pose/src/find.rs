@@ -2,7 +2,7 @@
 
 use crate::attempt::{Attempt, attempts};
 use crate::focal::Cameras;
-use crate::intake::{Intake, IntakeError};
+use crate::intake::{Intake, IntakeError, crop_warning};
 use crate::matches::Matches;
 use crate::solution::{Solver, SolverError};
 use crate::verdict::{Refusal, Verdict, verdict};
@@ -86,6 +86,9 @@ pub fn find(
     if intake.photos.len() < 3 {
         let unusable = intake.unusable.iter().map(|photo| format!("; {}: {}", photo.name, photo.reason)).collect();
         return Err(PoseError::Few(folder.display().to_string(), intake.photos.len(), unusable));
+    }
+    if let Some(warning) = crop_warning(&intake.photos) {
+        progress.warn(&warning);
     }
     let mut cameras = Cameras::of(&intake.photos, options.focal);
     let photos = &intake.photos;

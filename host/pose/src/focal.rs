@@ -160,7 +160,8 @@ mod tests {
 
     #[test]
     fn a_digital_zoom_is_another_camera() {
-        let phone = |focal| Exif { focal: Some(focal), camera: Some("phone".to_owned()), millimetres: Some(6.8) };
+        let phone =
+            |focal| Exif { focal: Some(focal), camera: Some("phone".to_owned()), millimetres: Some(6.8), size: None };
         let camera = |focal| camera_of(&phone(focal), focal);
         assert_eq!(camera(427.0), camera(427.2));
         assert_ne!(camera(427.0), camera(480.0));

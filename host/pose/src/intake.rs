@@ -2,10 +2,12 @@
 //! that cannot be used, by name with the reason.
 
 mod checks;
+mod crops;
 mod working;
 
 use crate::exif::Exif;
 use checks::{is_same, sharpness, unread};
+pub(crate) use crops::warning as crop_warning;
 use image::imageops;
 use image::metadata::Orientation;
 use image::{DynamicImage, RgbImage};
