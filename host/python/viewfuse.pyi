@@ -89,7 +89,8 @@ class Scene:
         """Renders targets; all frames stay in memory. Ctrl-C ends it with KeyboardInterrupt.
 
         weights: the scheme; "auto" (the default without a model) chooses the best for the scene. Or weights of your own, none
-            below 0, which are divided by their sum: an array, [source] or [target][source]; or a function of the sources'
+            below 0, which are divided by their sum: an array, [source] or [target][source], both in the order of the scene
+            (`scene.names`), then paths and poses; or a function of the sources'
             camera-to-world matrices, [source][4][4], and the target's, [4][4], which returns an array [source]. It is called
             for each target and, for the sources' own depths, for each source with others; with an array the default scheme
             chooses those. What it raises ends the render.
@@ -220,7 +221,10 @@ class Frame:
         """Names of the sources."""
     @property
     def weights(self) -> NDArray[np.float32]:
-        """The sources' weights: [source]; they sum to 1."""
+        """The weights that the sources were used with: [source]; they sum to 1. `weights` of run.json."""
+    @property
+    def weights_before(self) -> NDArray[np.float32]:
+        """Those of the scheme, before sources were left out (`leave_out`): [source]. `weights_before` of run.json."""
     @property
     def pose(self) -> NDArray[np.float64]:
         """Camera-to-world matrix, as those of the scene: [4][4]."""
@@ -241,7 +245,7 @@ class Frame:
         """The same after a gain and an offset of each channel were fitted to the photograph. None without one."""
     @property
     def ssim(self) -> Optional[float]:
-        """Structural similarity with the photograph. None without one, or if the picture is smaller than 7x7."""
+        """Structural similarity with the photograph where it is seen. None without one, or if it shows no 7x7 pixels together."""
     @property
     def expected(self) -> Optional[tuple[float, float, float]]:
         """The PSNR to expect and the ends of the interval that holds four of five, decibels.
@@ -259,7 +263,10 @@ class Frame:
     def seconds(self) -> float:
         """Time for this view alone."""
     def save(self, path: Union[str, PathLike[str]]) -> None:
-        """Writes the picture as a PNG, whole or not at all: the bytes that the command writes. OSError if it cannot."""
+        """Writes the picture as a PNG, whole or not at all: the bytes that the command writes. Missing folders are made.
+
+        OSError if it cannot, or if the path is no ordinary file (a device, a pipe, a link to nothing).
+        """
     def __repr__(self) -> str: ...
 
 @final

@@ -58,7 +58,9 @@ fn weights_are_the_same() {
         let scene = sample(name);
         let weightings: Vec<Weighting> =
             schemes().iter().map(|scheme| Weighting::open(scheme).expect("a scheme")).collect();
-        let table = |scene: &Scene| WeightTable::of(scene, &job(scene, sources, target), &weightings).expect("weights");
+        let table = |scene: &Scene| {
+            WeightTable::of(scene, &job(scene, sources, target), &weightings, &Silent).expect("weights")
+        };
         let expected = table(&scene);
         // Not all alike: a scheme that ignores the cameras would be the same at every scale, too.
         let gaussian = schemes().iter().position(|scheme| scheme.starts_with("gaussian")).expect("a scheme");

@@ -5,6 +5,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use viewfuse_core::pose::Pose;
 use viewfuse_core::sources::SourcesError;
+use viewfuse_job::progress::{Interrupted, Progress};
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::FewShot;
 use viewfuse_scene::numpy::npy;
@@ -45,18 +46,35 @@ pub struct TargetWeights {
     pub weights: BTreeMap<String, Vec<f32>>,
 }
 
+/// Why sources were not weighed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum TableError {
+    /// There are too few or too many of them.
+    #[error(transparent)]
+    Sources(#[from] SourcesError),
+    /// The work was cancelled.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
+}
+
 impl WeightTable {
     /// Weighs a job's sources for each of its targets.
     ///
     /// # Errors
-    /// [`SourcesError`] if there are too few or too many sources.
-    pub fn of(scene: &Scene, job: &FewShot, weightings: &[Weighting]) -> Result<WeightTable, SourcesError> {
+    /// [`TableError`].
+    pub fn of(
+        scene: &Scene,
+        job: &FewShot,
+        weightings: &[Weighting],
+        progress: &dyn Progress,
+    ) -> Result<WeightTable, TableError> {
         let unit = RigUnit::of_scene(scene);
         let poses: Vec<Pose> = job.sources.iter().map(|&view| unit.pose(&scene.views[view].camera.pose)).collect();
         let sources = SourcePoses::new(&poses)?;
         let mut values = Vec::with_capacity(weightings.len() * job.targets.len() * poses.len());
         for weighting in weightings {
             for target in &job.targets {
+                progress.check()?;
                 let weights = weighting.weigh(&sources, &unit.pose(&target.camera.pose));
                 values.extend_from_slice(&weights.values()[..poses.len()]);
             }

@@ -47,9 +47,11 @@ impl<'py> Picture<'py> {
 
     /// Row-major.
     pub(crate) fn values(&self) -> Cow<'_, [u8]> {
-        match self.0.as_slice() {
-            Ok(values) => Cow::Borrowed(values),
-            Err(_) => Cow::Owned(self.0.as_array().iter().copied().collect()),
+        // Not numpy's own slice: of an array whose columns come first that has another order.
+        let array = self.0.as_array();
+        match array.to_slice() {
+            Some(values) => Cow::Borrowed(values),
+            None => Cow::Owned(array.iter().copied().collect()),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::error::Failure;
 use crate::given_weights::{GivenWeights, Raised};
+use crate::progress::UntilRaised;
 use crate::request::{Pictures, device};
 use pyo3::prelude::*;
 use std::time::Duration;
@@ -77,6 +78,7 @@ pub(crate) struct Evaluation {
 impl Evaluation {
     /// The scores, target by target: the baselines and then every scheme.
     pub(crate) fn carry_out(&self, scene: &Scene, progress: &dyn Progress) -> Result<Vec<PyScore>, Failure> {
+        let progress = &UntilRaised { progress, raised: &self.raised };
         let weightings = self.weightings(scene)?;
         let field = self.pictures.field()?;
         let about = field.about();

@@ -9,6 +9,7 @@ use std::path::PathBuf;
 use viewfuse::core::camera::Pinhole;
 use viewfuse::field::auto::{Beyond, Expected};
 use viewfuse::field::render::{Frame, Truth};
+use viewfuse::job::files::check_writable;
 use viewfuse::output::png::write_png;
 use viewfuse::scene::Scene;
 
@@ -30,8 +31,10 @@ pub(crate) struct PyFrame {
     confidences: Option<Py<PyArray2<f32>>>,
     /// Names of the sources.
     sources: Vec<String>,
-    /// The sources' weights: float32 [source]; they sum to 1.
+    /// The weights that the sources were used with: float32 [source]; they sum to 1.
     weights: Py<PyArray1<f32>>,
+    /// Those of the scheme, before sources were left out: float32 [source].
+    weights_before: Py<PyArray1<f32>>,
     /// Camera-to-world matrix, as those of the scene: float64 [4][4].
     pose: Py<PyArray2<f64>>,
     /// The camera's matrix in pixels of this picture: float64 [3][3].
@@ -45,7 +48,7 @@ pub(crate) struct PyFrame {
     /// The same after a gain and an offset of each channel were fitted to the photograph: without the price of its
     /// exposure. None without one.
     corrected_psnr: Option<f64>,
-    /// Structural similarity with the photograph. None without one, or if the picture is smaller than 7x7.
+    /// Structural similarity with the photograph. None without one, or if it shows no 7x7 pixels together.
     ssim: Option<f64>,
     /// The PSNR to expect and the ends of the interval that holds four of five, decibels. None unless the scheme was
     /// chosen.
@@ -59,8 +62,9 @@ pub(crate) struct PyFrame {
 
 #[pymethods]
 impl PyFrame {
-    /// Writes the picture as a PNG, whole or not at all: the bytes that the command writes.
+    /// Writes the picture as a PNG, whole or not at all: the bytes that the command writes. Missing folders are made.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        check_writable(&path).map_err(Failure::from)?;
         let picture = Picture::of(self.picture.bind(py))?;
         let [width, height] = picture.size().map(|side| side as u32);
         let picture = RgbImage::from_raw(width, height, picture.values().into_owned());
@@ -86,7 +90,7 @@ pub(crate) struct Finished {
 /// The arrays take the frame's memory. `sources` are views of the scene.
 pub(crate) fn to_python(py: Python<'_>, scene: &Scene, sources: &[usize], finished: Finished) -> PyResult<PyFrame> {
     let Finished { frame, scheme, expected, beyond } = finished;
-    let Frame { target, weights, colours, picture, mut depths, confidences, truth, time, .. } = frame;
+    let Frame { target, weights, omission, colours, picture, mut depths, confidences, truth, time, .. } = frame;
     let (width, height) = (picture.width() as usize, picture.height() as usize);
     if scene.frame.scale != 1.0 {
         depths.iter_mut().for_each(|depth| *depth = scene.frame.file_length(*depth));
@@ -109,7 +113,8 @@ pub(crate) fn to_python(py: Python<'_>, scene: &Scene, sources: &[usize], finish
         depths: pixels(depths)?,
         confidences: pixels(confidences)?,
         sources: sources.iter().map(|&view| scene.views[view].name.clone()).collect(),
-        weights: array(py, [sources.len()], weights.values()[..sources.len()].to_vec())?,
+        weights: array(py, [sources.len()], omission.weights.values()[..sources.len()].to_vec())?,
+        weights_before: array(py, [sources.len()], weights.values()[..sources.len()].to_vec())?,
         pose: array(py, [4, 4], pose.as_flattened().to_vec())?,
         intrinsics: array(py, [3, 3], matrix.as_flattened().to_vec())?,
         truth: truth.map(|truth| array(py, [height, width, 3], truth.into_raw())).transpose()?,

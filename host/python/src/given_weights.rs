@@ -1,6 +1,7 @@
 //! Weights of the caller's own: an array, or a function of the cameras.
 
 use crate::error::Failure;
+use crate::request::Request;
 use numpy::{AllowTypeChange, PyArray2, PyArray3, PyArrayLikeDyn};
 use pyo3::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -41,6 +42,7 @@ impl GivenWeights {
         &self,
         scene: &Scene,
         job: &FewShot,
+        request: &Request,
         errors: &Raised,
     ) -> Result<Option<Weighting>, Failure> {
         let object = match self {
@@ -57,9 +59,11 @@ impl GivenWeights {
         let targets = job.targets.iter().map(|target| unit.pose(&target.camera.pose)).collect();
         let weighting = Python::attach(|py| {
             if object.bind(py).is_callable() {
-                return Ok(custom(py, object, scene, errors));
+                return Ok::<Weighting, Failure>(custom(py, object, scene, errors));
             }
-            Array::of(object.bind(py), targets, job.sources.len()).map(Weighting::custom)
+            let array = Array::of(object.bind(py), targets, job.sources.len())?;
+            request.check_order(scene, array.is_for_all)?;
+            Ok(Weighting::custom(array))
         })?;
         // What a function returns for the first target says whether it can be used, before any work.
         let cameras: Vec<Camera> = job.source_cameras(scene);
@@ -119,6 +123,8 @@ fn weights_of(numbers: &[f64], count: usize) -> Result<SourceWeights, String> {
 /// Weights by target, as an array has them. Where the sources' own depths are sought, which the array does not speak
 /// of, the default scheme decides which neighbours count.
 struct Array {
+    /// One row.
+    is_for_all: bool,
     rows: Vec<(Pose, SourceWeights)>,
 }
 
@@ -141,7 +147,16 @@ impl Array {
             let weights = weights_of(&numbers[start..start + source_count], source_count);
             Ok((target, weights.map_err(|what| wrong(format!("of target {index}: {what}")))?))
         };
-        Ok(Array { rows: targets.into_iter().enumerate().map(row).collect::<Result<_, Failure>>()? })
+        let rows: Vec<(Pose, SourceWeights)> =
+            targets.into_iter().enumerate().map(row).collect::<Result<_, Failure>>()?;
+        // A row is found by its pose.
+        for (index, (pose, weights)) in rows.iter().enumerate() {
+            if let Some(first) = rows[..index].iter().position(|(other, before)| other == pose && before != weights) {
+                let text = format!("targets {first} and {index} have one pose, and other rows: render them one by one");
+                return Err(wrong(text));
+            }
+        }
+        Ok(Array { is_for_all, rows })
     }
 }
 

@@ -5,14 +5,15 @@
 
 use crate::error::Failure;
 use crate::progress::{Course, Reporter};
-use pyo3::exceptions::PyUserWarning;
+use pyo3::exceptions::{PyRuntimeError, PyUserWarning};
 use pyo3::prelude::*;
 use std::ffi::CString;
 use std::ops::Range;
 use std::panic::resume_unwind;
+use std::process;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread;
 use std::time::Duration;
 use viewfuse::job::progress::Progress;
@@ -60,8 +61,27 @@ impl Progress for Watched {
     }
 }
 
+/// The process in which the library worked first.
+static PROCESS: OnceLock<u32> = OnceLock::new();
+
+/// The library's threads are those of the process in which it worked first: a process that was forked from that one has
+/// none of them, and would wait for them for ever.
+///
+/// # Errors
+/// `RuntimeError` in such a process.
+fn check_process() -> PyResult<()> {
+    match *PROCESS.get_or_init(process::id) == process::id() {
+        true => Ok(()),
+        false => Err(PyRuntimeError::new_err(
+            "viewfuse worked in the process that this one was forked from, and its threads are there; start processes \
+             with multiprocessing.get_context(\"spawn\")",
+        )),
+    }
+}
+
 /// Runs short work that cannot be cancelled while other Python threads run. After Ctrl-C nobody waits for its end.
 pub(crate) fn left_alone<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
+    check_process()?;
     let (sender, done) = channel();
     thread::spawn(move || sender.send(work()).ok());
     py.detach(move || {
@@ -114,6 +134,7 @@ fn reported<T: Send>(
     reporter: Option<&Reporter>,
     work: impl FnOnce(&dyn Progress) -> Result<T, Failure> + Send,
 ) -> PyResult<T> {
+    check_process()?;
     let watched = Watched::default();
     let mut last = Course::default();
     let mut look = |py: Python<'_>| {

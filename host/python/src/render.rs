@@ -3,8 +3,8 @@
 use crate::error::Failure;
 use crate::frame::Finished;
 use crate::given_weights::{GivenWeights, Raised};
+use crate::progress::UntilRaised;
 use crate::request::{Pictures, Request, device};
-use std::sync::PoisonError;
 use viewfuse::field::auto::{self, Chosen};
 use viewfuse::field::render::{Frame, RenderRun};
 use viewfuse::job::progress::Progress;
@@ -29,13 +29,12 @@ impl Order {
         scene: &Scene,
         progress: &dyn Progress,
     ) -> Result<(Vec<usize>, Vec<Finished>), Failure> {
+        let progress = &UntilRaised { progress, raised: &self.raised };
         let field = self.pictures.field()?;
         let about = field.about();
         let job = self.request.resolve(scene, about.least_sources)?;
         let weighting = self.weighting(scene, &job)?;
-        if self.has_raised() {
-            return Ok((job.sources, Vec::new()));
-        }
+        progress.check().map_err(Failure::from)?;
         let options = self.pictures.options(&about)?;
         let device = device(&self.pictures.device)?;
         let renderer = field.on(&device);
@@ -57,13 +56,8 @@ impl Order {
     /// long.
     fn weighting(&self, scene: &Scene, job: &FewShot) -> Result<Option<Weighting>, Failure> {
         match &self.weights {
-            Some(given) => given.weighting(scene, job, &self.raised),
+            Some(given) => given.weighting(scene, job, &self.request, &self.raised),
             None => Ok(self.pictures.model.is_some().then(Weighting::default_scheme)),
         }
-    }
-
-    /// Whether a function that gives weights cannot be used.
-    fn has_raised(&self) -> bool {
-        self.raised.lock().unwrap_or_else(PoisonError::into_inner).is_some()
     }
 }

@@ -1,9 +1,11 @@
 //! What to render: targets and sources from Python's arguments.
 
 use crate::error::Failure;
+use crate::whole::Whole;
 use glam::DVec3;
 use numpy::ndarray::ArrayViewD;
 use numpy::{AllowTypeChange, PyArrayLikeDyn};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
@@ -13,8 +15,9 @@ use viewfuse::device::choice::{self, AnyDevice, DeviceChoice, DeviceOptions};
 use viewfuse::field::options::Given;
 use viewfuse::field::render::{DEFAULT_EARLY_TERMINATION, RenderOptions};
 use viewfuse::field::{About, AnyField, rows};
+use viewfuse::job::text::listed as listed_names;
 use viewfuse::nn::checkpoint::Checkpoint;
-use viewfuse::scene::few_shot::{FewShot, PathChoice, Selection, SelectionFault, Target};
+use viewfuse::scene::few_shot::{FewShot, PathChoice, Selection, SelectionFault, Target, view_list};
 use viewfuse::scene::photographs::BackgroundChoice;
 use viewfuse::scene::{Scene, SceneFrame};
 
@@ -44,8 +47,8 @@ impl Request {
                 continue;
             }
             match name.as_str() {
-                "targets" => request.selection.targets = Some(value.extract()?),
-                "sources" => request.selection.sources = Some(value.extract()?),
+                "targets" => request.selection.targets = Some(list(&name, &value)?),
+                "sources" => request.selection.sources = Some(list(&name, &value)?),
                 "views" => request.selection.view_count = Some(count(&name, &value)?),
                 "orbit" => paths.push(PathChoice::Orbit(count(&name, &value)?)),
                 "between" => {
@@ -63,6 +66,32 @@ impl Request {
         }
         request.selection.path = paths.pop();
         Ok(request)
+    }
+
+    /// An array's columns are the sources, and its rows the targets unless one `is_for_all`, in the order of the scene:
+    /// a list in another order would mean others.
+    ///
+    /// # Errors
+    /// If a list has another order, or a view twice.
+    pub(crate) fn check_order(&self, scene: &Scene, is_for_all: bool) -> Result<(), Failure> {
+        let Selection { targets, sources, .. } = &self.selection;
+        let rows = if is_for_all { None } else { targets.as_deref() };
+        let lists = [("sources", "columns", sources.as_deref()), ("targets", "rows", rows)];
+        for (name, parts, list) in lists.into_iter().filter_map(|(name, parts, list)| Some((name, parts, list?))) {
+            let items = list.split(',').map(|item| view_list(scene, item));
+            let listed: Vec<usize> = items.collect::<Result<Vec<_>, _>>()?.concat();
+            let ordered = view_list(scene, list)?;
+            if listed != ordered {
+                let ordered: Vec<&str> = ordered.iter().map(|&view| scene.views[view].name.as_str()).collect();
+                let text = format!(
+                    "weights: an array's {parts} are the {name} in the order of the scene, each once ({}), and {name}=\"{list}\" \
+                     has another",
+                    listed_names(&ordered, 8)
+                );
+                return Err(Failure::Input(text));
+            }
+        }
+        Ok(())
     }
 
     /// The sources and targets of a scene.
@@ -150,9 +179,17 @@ pub(crate) fn held_out(
     Ok(Selection { targets, path: None, sources, view_count })
 }
 
+/// A list of views.
+fn list(name: &str, value: &Bound<'_, PyAny>) -> PyResult<String> {
+    value.extract().map_err(|_| {
+        let kind = value.get_type();
+        PyTypeError::new_err(format!("{name}: a list of views is a text such as \"2,5,8\", not {kind}"))
+    })
+}
+
 /// A number of views or cameras.
 fn count(name: &str, value: &Bound<'_, PyAny>) -> PyResult<usize> {
-    let count: i64 = value.extract()?;
+    let Whole(count): Whole<i64> = value.extract()?;
     match usize::try_from(count) {
         Ok(count) if (1..=10_000).contains(&count) => Ok(count),
         _ => Err(Failure::Input(format!("{name}: {count} is not a whole number from 1 to 10000")).into()),

@@ -2,10 +2,12 @@
 
 use crate::arrays::array;
 use crate::error::Failure;
+use crate::interrupt::interruptible;
 use crate::request::Request;
 use numpy::{PyArray3, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use viewfuse::output::weights::WeightTable;
+use viewfuse::output::weights::{TableError, WeightTable};
 use viewfuse::scene::Scene;
 use viewfuse::weighting::{Weighting, WeightingSpec, scheme_names};
 
@@ -41,6 +43,13 @@ impl PyWeights {
     ) -> PyResult<Bound<'py, PyAny>> {
         let values = self.values.bind(py).as_any();
         match (dtype, copy) {
+            (Some(dtype), Some(false)) => {
+                let wanted = values.py().import("numpy")?.call_method1("dtype", (dtype,))?;
+                match wanted.eq(values.getattr("dtype")?)? {
+                    true => Ok(values.clone()),
+                    false => Err(PyValueError::new_err(format!("the weights are float32, not {wanted}: copy=False"))),
+                }
+            }
             (Some(dtype), _) => values.call_method1("astype", (dtype,)),
             (None, Some(true)) => values.call_method0("copy"),
             (None, _) => Ok(values.clone()),
@@ -65,11 +74,14 @@ pub(crate) fn weigh(py: Python<'_>, scene: &Scene, schemes: Option<Schemes>, req
         Some(Schemes::One(scheme)) => vec![scheme],
         Some(Schemes::Several(schemes)) => schemes,
     };
-    let table = py.detach(|| {
+    let table = interruptible(py, |progress| {
         let open = |text: &String| Ok::<Weighting, Failure>(text.parse::<WeightingSpec>()?.open()?);
         let weightings = schemes.iter().map(open).collect::<Result<Vec<_>, _>>()?;
         let job = request.resolve(scene, 1)?;
-        WeightTable::of(scene, &job, &weightings).map_err(|error| Failure::Input(error.to_string()))
+        WeightTable::of(scene, &job, &weightings, progress).map_err(|error| match error {
+            TableError::Interrupted(interrupted) => interrupted.into(),
+            TableError::Sources(error) => Failure::Input(error.to_string()),
+        })
     })?;
     let [scheme_count, target_count, source_count] = table.shape();
     let mut values = Vec::with_capacity(scheme_count * target_count * source_count);

@@ -182,6 +182,7 @@ class Pictures(unittest.TestCase):
                 (frame.confidences, (30, 40), np.float32),
                 (frame.truth, (30, 40, 3), np.uint8),
                 (frame.weights, (len(frame.sources),), np.float32),
+                (frame.weights_before, (len(frame.sources),), np.float32),
                 (frame.pose, (4, 4), np.float64),
                 (frame.intrinsics, (3, 3), np.float64),
             ]:
@@ -344,7 +345,7 @@ class OwnWeights(unittest.TestCase):
             return 1 / np.linalg.norm(sources[:, :3, 3] - target[:3, 3], axis=1) ** 2
 
         for own, named in zip(self.render(nearest, leave_out=0), self.render("distance:power=2", leave_out=0)):
-            np.testing.assert_allclose(own.weights, named.weights, atol=1e-4)
+            np.testing.assert_allclose(own.weights_before, named.weights_before, atol=1e-4)
         targets = [target for _, target in seen]
         for view in [2, 5]:
             self.assertTrue(any(np.allclose(target, poses[view], atol=1e-5) for target in targets))
@@ -353,16 +354,63 @@ class OwnWeights(unittest.TestCase):
         row = [0, 4, 0, 1, 0, 0]
         for weights in (row, np.array(row, np.float32), np.array([row, row]), 1e-60 * np.array(row)):
             for frame in self.render(weights, leave_out=0):
-                np.testing.assert_allclose(frame.weights, np.array(row) / 5, atol=1e-6)
+                np.testing.assert_allclose(frame.weights_before, np.array(row) / 5, atol=1e-6)
                 self.assertEqual(frame.scheme, "array")
         first, second = self.render(np.array([row, row[::-1]]), leave_out=0)
-        np.testing.assert_allclose(second.weights, first.weights[::-1], atol=1e-6)
+        np.testing.assert_allclose(second.weights_before, first.weights_before[::-1], atol=1e-6)
 
     def test_whole_numbers_that_are_none(self):
         room = viewfuse.open(ROOM)
         for wrong in [{"size": (-1, 10)}, {"size": (2**40, 10)}, {"seed": -1}]:
             with self.assertRaisesRegex(ValueError, "is below 0, or too large"):
                 room.render(**wrong)
+        with self.assertRaisesRegex(ValueError, "is below 0, or too large"):
+            room.weights(orbit=10**30)
+        with self.assertRaisesRegex(TypeError, "targets: a list of views is a text"):
+            room.weights(targets=5)
+
+    def test_the_order_of_an_array(self):
+        room, weights = viewfuse.open(ROOM), [[1, 0], [0, 1]]
+        for keywords, text in [
+            ({"targets": "5,2", "sources": "4,9"}, "rows are the targets in the order of the scene, each once \\(002, 005\\)"),
+            ({"targets": "2,5", "sources": "9,4"}, "columns are the sources in the order of the scene"),
+        ]:
+            with self.assertRaisesRegex(ValueError, text):
+                room.render(weights, size=SMALL, **keywords)
+        poses = np.stack([room.poses[5]] * 2)
+        with self.assertRaisesRegex(ValueError, "targets 0 and 1 have one pose, and other rows"):
+            room.render(weights, poses=poses, sources="4,9", size=SMALL)
+        frames = room.render(weights, targets="2,5", sources="4,9", size=SMALL, leave_out=0)
+        self.assertEqual([(frame.name, *frame.weights) for frame in frames], [("002", 1, 0), ("005", 0, 1)])
+        # One row serves targets in any order.
+        self.assertEqual(len(room.render([1, 2], targets="5,2", sources="4,9", size=SMALL)), 2)
+
+    def test_what_a_function_raises_ends_the_render(self):
+        calls, shares = [], []
+
+        def fails(sources, target):
+            calls.append(len(sources))
+            if len(calls) == 12:
+                raise KeyError("mine")
+            return np.ones(len(sources))
+
+        with self.assertRaisesRegex(KeyError, "mine"):
+            viewfuse.open(ROOM).render(
+                fails, orbit=40, size=SMALL, progress=lambda share, stage: shares.append(share)
+            )
+        self.assertEqual(len(calls), 12)
+        self.assertLess(max(shares, default=0), 0.9)
+
+    def test_the_weights_of_a_frame_are_those_of_the_record(self):
+        with tempfile.TemporaryDirectory() as folder:
+            options = ["--targets", "2", "--size", "40x30", "--weights", "error:alpha=1", "--leave-out", "0.05", "-o", folder]
+            self.assertEqual(run("render", ROOM, *options).returncode, 0)
+            (record,) = json.loads((Path(folder) / "run.json").read_text())["frames"]
+        (frame,) = viewfuse.open(ROOM).render("error:alpha=1", targets="2", size=SMALL, leave_out=0.05)
+        np.testing.assert_allclose(frame.weights, record["weights"], atol=1e-6)
+        np.testing.assert_allclose(frame.weights_before, record["weights_before"], atol=1e-6)
+        self.assertEqual(frame.weights.min(), 0)
+        self.assertGreater(frame.weights_before.min(), 0)
 
     def test_what_cannot_be_weights(self):
         def fails(sources, target):
@@ -572,6 +620,10 @@ class Scores(unittest.TestCase):
         self.assertEqual(viewfuse.psnr(wide[:, :30], truth), viewfuse.psnr(other, truth))
         self.assertEqual(viewfuse.ssim(wide[:, :30], truth), viewfuse.ssim(other, truth))
         self.assertIsNone(viewfuse.ssim(truth[:6], other[:6]))
+        # Nor are columns first in the order of rows.
+        columns_first = np.asfortranarray(other)
+        self.assertEqual(viewfuse.psnr(columns_first, truth), viewfuse.psnr(other, truth))
+        self.assertEqual(viewfuse.ssim(columns_first, truth), viewfuse.ssim(other, truth))
 
     def test_other_threads_run_and_ctrl_c_ends_it(self):
         # Seconds of work.
@@ -651,6 +703,29 @@ class Errors(unittest.TestCase):
         (frame,) = viewfuse.Scene(ROOM).render("mean", targets="5", sources="4,6", size=SMALL)
         with self.assertRaises(OSError):
             frame.save(Path(__file__) / "view.png")
+        with tempfile.TemporaryDirectory() as folder:
+            pipe = Path(folder) / "pipe"
+            os.mkfifo(pipe)
+            with self.assertRaisesRegex(OSError, "no ordinary file"):
+                frame.save(pipe)
+            self.assertTrue(pipe.is_fifo())
+
+    def test_a_forked_process_is_told(self):
+        script = """
+import multiprocessing, os, sys
+import viewfuse
+scene = viewfuse.Scene(sys.argv[1])
+scene.render("mean", targets="5", sources="4,6", size=(8, 6))
+def child(_):
+    try:
+        scene.render("mean", targets="5", sources="4,6", size=(8, 6))
+    except RuntimeError as error:
+        return str(error)
+with multiprocessing.get_context("fork").Pool(1) as pool:
+    print(pool.map(child, [0])[0])
+"""
+        done = subprocess.run([sys.executable, "-c", script, ROOM], capture_output=True, text=True, timeout=60)
+        self.assertIn('get_context("spawn")', done.stdout, done.stderr)
 
     def test_warnings_are_python_s(self):
         scene = viewfuse.Scene(ROOM)

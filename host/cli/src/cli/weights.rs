@@ -11,6 +11,7 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use viewfuse_job::files::write_whole;
+use viewfuse_job::progress::Silent;
 use viewfuse_output::weights::WeightTable;
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{FewShot, Target, away_warning};
@@ -55,7 +56,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     if let Some(warning) = away_warning(&scene, &job) {
         complain(format_args!("warning: {warning}"));
     }
-    let weights = WeightTable::of(&scene, &job, &weightings)?;
+    let weights = WeightTable::of(&scene, &job, &weightings, &Silent)?;
     if arguments.json {
         let mut documents = weights.documents();
         // One target is the rule; several become a list.
