@@ -75,6 +75,13 @@ fn refusals() {
     std::fs::remove_file(folder.path().join("mine.h")).expect("removed");
     assert_eq!(files_below(folder.path()), mine, "nothing is replaced");
     done(folder.path(), "convert training.pth out.safetensors");
+    // Another training of it stays.
+    let mut other = std::fs::read(folder.path().join("out.safetensors")).expect("a network");
+    *other.last_mut().expect("numbers") ^= 1;
+    std::fs::write(folder.path().join("other.safetensors"), &other).expect("a file");
+    let arguments = "convert training.pth other.safetensors";
+    assert_wrong_arguments(folder.path(), arguments, &["other.safetensors: has other numbers in '", "training.pth"]);
+    assert!(std::fs::read(folder.path().join("other.safetensors")).expect("a file") == other);
     done(folder.path(), "convert training.pth out.safetensors --half");
     done(folder.path(), "convert mine.safetensors out.h");
     done(folder.path(), "convert mine.safetensors out.h");

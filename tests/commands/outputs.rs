@@ -123,8 +123,9 @@ fn inputs_are_not_replaced() {
     assert_kept(&folder, &format!("train weighting {model} cars -o runs"), &parts);
     assert_kept(&folder, &format!("train pixelnerf cars --from {model} -o runs"), &parts);
     done(&folder, "evaluate toy --protocol random --weights mean --size 16x16 --device cpu -o out");
-    assert_kept(&folder, "report out -o out/run.json", &["out/run.json", "belongs to out"]);
-    assert_kept(&folder, "report out -o out/scores-0-of-1.jsonl", &["belongs to out"]);
+    assert_kept(&folder, "report out -o out/run.json", &["out/run.json", "a page is written", "run.html"]);
+    folder.write("mine.html", "<p>My own page.");
+    assert_kept(&folder, "report out -o mine.html", &["mine.html", "was not written by viewfuse"]);
     for _ in 0..2 {
         done(&folder, "report out -o out/page.html");
     }

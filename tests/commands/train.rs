@@ -7,7 +7,7 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::Stdio;
 use viewfuse::job::files::FolderLock;
-use viewfuse_tests::command::{interrupt, names_in};
+use viewfuse_tests::command::{files_below, interrupt, names_in};
 use viewfuse_tests::patience;
 use viewfuse_tests::scenes::Folder;
 
@@ -17,6 +17,7 @@ viewfuse_tests::trials![
     genvs_goes_on_too,
     data_are_told_by_what_is_in_them,
     wrong_input_is_told,
+    scores_are_finite_and_of_other_scenes,
     numbers_without_sense_are_refused,
     a_damaged_state_is_refused_and_an_empty_one_is_none,
     a_loss_is_shown_once_there_is_one,
@@ -143,6 +144,7 @@ fn genvs_goes_on_too() {
     let model = "whole/model.safetensors";
     let from = GENVS.replace("--width 4", &format!("--from {model} --rate 0"));
     done(&folder, &format!("{from} -o more"));
+    assert_refused(&folder, &format!("{from} -o fewer --levels 2"), &["the setting levels is 2", "more levels"]);
     assert_eq!(bytes(&folder, "more/model.safetensors"), bytes(&folder, model));
     let small = from.replace("--side 32", "--side 16");
     assert_refused(&folder, &format!("{small} -o out"), &[model, "for pictures of 32x32 pixels", "not of 16x16"]);
@@ -186,10 +188,47 @@ fn wrong_input_is_told() {
     assert_wrong_arguments(&folder, attention, &["--weights", "formulas only"]);
     refused("train pixelnerf learn/cars -o out --sources 3,10", &["has 10 photographs; 11 are needed"]);
     refused("train genvs learn/cars -o out --sources 3,9 --targets 2", &["has 10 photographs; 11 are needed"]);
+    // Nothing is written among the data, nor over files of another program.
+    for inside in ["learn/cars_train", "learn/cars_train/000000", "learn/cars_val/000000/rgb/new"] {
+        assert_wrong_arguments(
+            &folder,
+            &format!("train pixelnerf learn/cars -o {inside}"),
+            &[inside, "the scene", "is there"],
+        );
+    }
+    folder.write("mine/record.json", "{}");
+    refused("train pixelnerf learn/cars -o mine", &["mine/record.json: is there, and no state"]);
     // Validation has three sources, however few the steps have.
     done(&folder, "scenes make cars few --train 1 --val 1 --test 0 --views 3 --test-views 3 --size 64");
     refused("train genvs few/cars --side 16 -o out --sources 1 --targets 1", &["has 3 photographs; 4 are needed"]);
     assert!(!folder.join("out").exists());
+}
+
+/// Pictures without an error have a score, from which a run goes on; and what is in both splits is told.
+fn scores_are_finite_and_of_other_scenes() {
+    let folder = scenes();
+    for (name, _) in files_below(&folder.join("learn")) {
+        if name.extension().is_some_and(|ending| ending == "png") {
+            let white = image::open(&name).expect("a picture").to_rgb8();
+            let white = image::RgbImage::from_pixel(white.width(), white.height(), image::Rgb([255; 3]));
+            white.save(&name).expect("a white picture");
+        }
+    }
+    // Of one object by its content, whatever it is called.
+    for (name, _) in files_below(&folder.join("learn/cars_train/000001")) {
+        let inside = name.strip_prefix(folder.join("learn/cars_train/000001")).expect("inside").to_owned();
+        folder.write(&format!("learn/cars_val/000009/{}", inside.display()), fs::read(&name).expect("a file"));
+    }
+    let run = PIXELNERF.replace("--steps 30", "--steps 12 --rate 0.05");
+    let outcome = super::run(&folder, &format!("{run} -o run"));
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let parts = ["1 of the 2 scenes of validation are scenes of training, too (", "000009"];
+    assert!(parts.iter().all(|part| outcome.stderr.contains(part)), "{}", outcome.stderr);
+    let record = read_json(folder.join("run/record.json"));
+    let finite =
+        |scores: &[serde_json::Value]| scores.iter().all(|score| score[1].as_f64().is_some_and(|score| score <= 100.0));
+    assert!(record["scores"].as_array().is_some_and(|scores| finite(scores)), "{record}");
+    done(&folder, &format!("{} -o run", run.replace("--steps 12", "--steps 14")));
 }
 
 /// Numbers with which nothing would be computed, learned or written, or that no memory holds.
@@ -275,8 +314,11 @@ fn a_damaged_state_is_refused_and_an_empty_one_is_none() {
     }
     fs::write(&path, with_progress(&state, sound)).expect("a file");
     done(&folder, &run);
-    // A machine that lost its power leaves an empty file: the run begins again.
+    // A machine that lost its power leaves an empty file: the run begins again, and no other in its place.
     fs::write(&path, "").expect("a file");
+    let before = bytes(&folder, "run/model.safetensors");
+    assert_refused(&folder, &format!("{run} --seed 5"), &["run/model.safetensors: is there, and no state"]);
+    assert!(bytes(&folder, "run/model.safetensors") == before);
     assert!(done(&folder, &run).contains("2 steps in"));
     fs::remove_file(&path).expect("a file");
     fs::create_dir(&path).expect("a folder in the way");

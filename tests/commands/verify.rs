@@ -8,7 +8,7 @@ use viewfuse_tests::scenes::Folder;
 viewfuse_tests::trials![
     right_weights_pass, wrong_weights_do_not, a_weight_that_is_no_number_does_not_pass,
     a_file_without_weights_is_no_reference, metrics_right_and_wrong, scores_of_the_official_codes,
-    scores_that_are_not_the_official_codes,
+    scores_that_are_not_the_official_codes, an_infinite_reference_says_nothing, one_file_of_several_may_be_broken,
 ];
 
 /// Scores and distances by the official codes; see `tests/data/metrics.md`.
@@ -160,4 +160,28 @@ fn changed(tensor: &str, change: f64) -> Vec<u8> {
         *number = (f32::from_le_bytes(*number) + change as f32).to_le_bytes();
     }
     bytes
+}
+
+/// A tolerance that is a share of the largest number, which is infinite.
+fn an_infinite_reference_says_nothing() {
+    let folder = Folder::new();
+    let mut bytes = std::fs::read(viewfuse_tests::places::data("genvs_small.safetensors")).expect("a reference");
+    let length = u64::from_le_bytes(bytes[..8].try_into().expect("eight bytes")) as usize;
+    let header: Value = serde_json::from_slice(&bytes[8..8 + length]).expect("a header");
+    let [first, last] =
+        [0, 1].map(|end| header["volume_value"]["data_offsets"][end].as_u64().expect("a place") as usize);
+    let values = &mut bytes[8 + length..][first..last];
+    values.chunks_exact_mut(4).for_each(|value| value.copy_from_slice(&7.0_f32.to_le_bytes()));
+    values[..4].copy_from_slice(&f32::INFINITY.to_le_bytes());
+    folder.write("genvs.safetensors", bytes);
+    assert_exceeded(&folder, "genvs.safetensors --device cpu", "GeNVS volumes");
+}
+
+fn one_file_of_several_may_be_broken() {
+    let folder = Folder::new();
+    folder.write("weighting.json", weighting().to_string()).write("broken.json", "[");
+    let outcome = run(&folder, "verify broken.json weighting.json none.json");
+    assert!(outcome.stdout.contains("8 of 8 quantities within tolerance"), "{}", outcome.stdout);
+    assert!(outcome.code == Some(1) && outcome.stderr.contains("broken.json"), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("none.json"), "{}", outcome.stderr);
 }

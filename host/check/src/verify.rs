@@ -124,9 +124,10 @@ impl Quantity {
         }
     }
 
-    /// Whether the quantity was compared and every difference is within the tolerance.
+    /// Whether the quantity was compared and every difference is within the tolerance, which is finite: one that is a
+    /// share of an infinite reference says nothing.
     pub fn passes(&self) -> bool {
-        self.count > 0 && self.worst <= self.tolerance
+        self.count > 0 && self.worst <= self.tolerance && self.tolerance.is_finite()
     }
 }
 

@@ -120,7 +120,7 @@ enum Command {
 pub(crate) use ending::INTERRUPTED;
 pub use ending::be_patient;
 pub(crate) use hints::{hint, is_of_arguments};
-pub use outputs::keep_input;
+pub use outputs::{keep_input, keep_others, refuse_extension};
 pub use parse::parse_size;
 pub use printing::say;
 pub(crate) use printing::{complain, complain_of_arguments};

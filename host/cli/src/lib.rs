@@ -8,7 +8,9 @@ use std::process::ExitCode;
 
 /// What the laboratory's command has of this one: the terminal, outputs that replace no inputs, exit codes.
 pub mod shared {
-    pub use crate::cli::{Terminal, be_patient, keep_input, listen, on_threads, parse_size, say, wrong};
+    pub use crate::cli::{
+        Terminal, be_patient, keep_input, keep_others, listen, on_threads, parse_size, refuse_extension, say, wrong,
+    };
 
     use crate::cli;
     use std::process::ExitCode;

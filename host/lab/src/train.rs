@@ -95,9 +95,9 @@ pub enum TrainError {
     Write(#[from] WriteError),
     #[error("the training graph: {0}")]
     Graph(#[from] candle_core::Error),
-    /// A network is there, and no state from which its training could go on.
+    /// A file that a run writes is there, and no state from which its training could go on.
     #[error(
-        "{}: a network is there and no state.safetensors to continue its training from; move it, or give another folder",
+        "{}: is there, and no state.safetensors to continue its training from; move it, or give another folder",
         .0.display()
     )]
     NoState(PathBuf),

@@ -8,6 +8,7 @@ use anyhow::{bail, ensure};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use viewfuse_core::half_precision::{f16_bits, f16_value};
 use viewfuse_field::{genvs, pixelnerf};
 use viewfuse_job::files::{check_writable, write_whole};
 use viewfuse_job::progress::Progress;
@@ -70,14 +71,27 @@ fn check_settings(checkpoint: &Checkpoint, set: &[(String, String)]) -> anyhow::
     }
 }
 
-/// Refuses to replace a file that is not of these tensors: another network.
+/// Refuses to replace a file that does not hold these numbers, or these in half precision: another network, or another
+/// training of the same one.
 fn keep_another(checkpoint: &Checkpoint, output: &Path) -> anyhow::Result<()> {
-    let is_there = output.metadata().is_ok_and(|metadata| metadata.len() > 0);
-    let is_same = || Checkpoint::open(output).is_ok_and(|there| there.shapes() == checkpoint.shapes());
-    match is_there && !is_same() {
-        true => Err(foreign(output, &format!("has other tensors than {}", checkpoint.path().display()))),
-        false => Ok(()),
+    if !output.metadata().is_ok_and(|metadata| metadata.len() > 0) {
+        return Ok(());
     }
+    let is_of_it = |(there, value): (&f32, &f32)| there == value || *there == f16_value(f16_bits(*value));
+    let holds = |there: &Checkpoint, name: &String| match (there.tensor(name), checkpoint.tensor(name)) {
+        (Ok(there), Ok(values)) => there.iter().zip(&values).all(is_of_it),
+        _ => false,
+    };
+    let what = match Checkpoint::open(output) {
+        Ok(there) if there.shapes() == checkpoint.shapes() => {
+            match there.shapes().keys().find(|name| !holds(&there, name)) {
+                None => return Ok(()),
+                Some(name) => format!("has other numbers in '{name}'"),
+            }
+        }
+        _ => "has other tensors".to_owned(),
+    };
+    Err(foreign(output, &format!("{what} than {}", checkpoint.path().display())))
 }
 
 /// Learned attention for firmware: for the C face, or in Rust with 8 bits a weight.

@@ -81,7 +81,10 @@ pub(super) fn refuse_file(folder: &Path) -> anyhow::Result<()> {
 
 /// Refuses a file whose name says that it holds something else than what is written: `what`, whose names end in one of
 /// `extensions`. A name without an extension says nothing.
-pub(super) fn refuse_extension(file: &Path, what: &str, extensions: &[&str]) -> anyhow::Result<()> {
+///
+/// # Errors
+/// That of wrong arguments.
+pub fn refuse_extension(file: &Path, what: &str, extensions: &[&str]) -> anyhow::Result<()> {
     let Some(given) = file.extension() else { return Ok(()) };
     if extensions.iter().any(|extension| given.eq_ignore_ascii_case(extension)) {
         return Ok(());
@@ -92,7 +95,10 @@ pub(super) fn refuse_extension(file: &Path, what: &str, extensions: &[&str]) -> 
 
 /// Refuses to replace a file in whose beginning nothing says that viewfuse wrote it: a scan, or another program's
 /// Gaussians. Files without a header, as `.splat`, say nothing, and are replaced.
-pub(super) fn keep_others(output: &Path) -> anyhow::Result<()> {
+///
+/// # Errors
+/// That of wrong arguments.
+pub fn keep_others(output: &Path) -> anyhow::Result<()> {
     let mut beginning = Vec::new();
     // Whether it can be read or replaced is asked where it is written.
     let _ = File::open(output).and_then(|file| file.take(BEGINNING).read_to_end(&mut beginning));

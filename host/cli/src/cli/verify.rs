@@ -1,7 +1,7 @@
 //! `viewfuse verify`.
 
 use super::options::DeviceOptions;
-use super::printing::say;
+use super::printing::{complain, say};
 use super::table::table;
 use super::terminal::Terminal;
 use super::wrong::wrong;
@@ -30,6 +30,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     }
     let Chosen { device, .. } = arguments.device.open()?;
     let mut all_pass = true;
+    let mut unread = Vec::new();
     let (terminal, count) = (Terminal::new("verifying"), arguments.files.len());
     for (index, path) in arguments.files.iter().enumerate() {
         let progress = Part::begin(&terminal, path.display().to_string(), index..index + 1, count);
@@ -39,9 +40,19 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         };
         // The error of a cancelled comparison is the cancellation.
         progress.check()?;
-        let report = report?;
-        terminal.aside(|| print_report(&report))?;
-        all_pass &= report.passes();
+        match report {
+            Ok(report) => {
+                terminal.aside(|| print_report(&report))?;
+                all_pass &= report.passes();
+            }
+            Err(error) => unread.push(error),
+        }
+    }
+    drop(terminal);
+    // The others were compared all the same.
+    if let Some(last) = unread.pop() {
+        unread.into_iter().for_each(|error| complain(error));
+        return Err(last.into());
     }
     Ok(if all_pass { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }

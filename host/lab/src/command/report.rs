@@ -2,10 +2,9 @@
 
 use crate::report::{Evaluation, Report, Sweep, Training, page};
 use clap::Args;
-use std::fs::canonicalize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
-use viewfuse_cli::shared::{say, wrong};
+use viewfuse_cli::shared::{keep_others, refuse_extension, say};
 use viewfuse_job::files::{check_writable, write_whole};
 
 #[derive(Args)]
@@ -43,9 +42,9 @@ fn size_words(bytes: usize) -> String {
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    refuse_extension(&arguments.output, "a page", &["html", "htm"])?;
     check_writable(&arguments.output)?;
-    let Arguments { evaluations, pareto, training, output, .. } = arguments;
-    keep_runs(evaluations.iter().chain(pareto).chain(training).map(PathBuf::as_path), output)?;
+    keep_others(&arguments.output)?;
     let report = Report {
         title: arguments.title.clone(),
         evaluations: arguments.evaluations.iter().map(|path| Evaluation::open(path)).collect::<Result<_, _>>()?,
@@ -56,19 +55,4 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     write_whole(&arguments.output, page.as_bytes())?;
     say(format_args!("{}: {}", arguments.output.display(), size_words(page.len())))?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// Refuses an existing file in one of these folders, or in a folder in them, that is no page: it belongs to the
-/// folder's run.
-fn keep_runs<'a>(folders: impl IntoIterator<Item = &'a Path>, output: &Path) -> anyhow::Result<()> {
-    let is_page = output.extension().is_some_and(|extension| extension == "html" || extension == "htm");
-    let Some(output) = canonicalize(output).ok().filter(|_| !is_page) else { return Ok(()) };
-    let holds = |folder: &&Path| canonicalize(folder).is_ok_and(|folder| output.starts_with(folder));
-    match folders.into_iter().find(holds) {
-        Some(folder) => {
-            let (output, folder) = (output.display(), folder.display());
-            Err(wrong(format_args!("--output {output}: belongs to {folder}; give the name of a page (.html)")))
-        }
-        None => Ok(()),
-    }
 }

@@ -5,9 +5,10 @@ use crate::train::{
     train_genvs, train_pixelnerf, train_weighting,
 };
 use clap::{Args, Subcommand};
+use std::fs::canonicalize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use viewfuse_cli::shared::{Terminal, be_patient, keep_input, on_threads, say};
+use viewfuse_cli::shared::{Terminal, be_patient, keep_input, on_threads, say, wrong};
 use viewfuse_field::pixelnerf;
 use viewfuse_job::files::check_writable;
 use viewfuse_job::progress::Progress;
@@ -125,6 +126,7 @@ fn trained(
     network.map_or(Ok(()), |network| keep_input(network, &output.join(MODEL)))?;
     let sets = [Dataset::open(data, Split::Train)?.scenes, Dataset::open(data, Split::Validation)?.scenes];
     sets.iter().flatten().try_for_each(|scene| keep_input(scene, output))?;
+    sets.iter().flatten().try_for_each(|scene| keep_data(scene, output))?;
     let progress = Terminal::new("reading the scenes");
     if sets[0] == sets[1] {
         progress.warn(
@@ -144,4 +146,19 @@ fn trained(
     }
     say(format_args!("{}", outcome.model.display()))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Refuses a folder of the run within a scene's, or that of a split's scenes.
+fn keep_data(scene: &Path, output: &Path) -> anyhow::Result<()> {
+    let nearest =
+        output.ancestors().find_map(|folder| canonicalize(if folder == "" { Path::new(".") } else { folder }).ok());
+    let (Ok(scene), Some(nearest)) = (canonicalize(scene), nearest) else { return Ok(()) };
+    let is_split = canonicalize(output).is_ok_and(|output| scene.parent() == Some(&output));
+    match nearest.starts_with(&scene) || is_split {
+        true => {
+            let (output, scene) = (output.display(), scene.display());
+            Err(wrong(format_args!("--output {output}: the scene {scene} is there; give another folder")))
+        }
+        false => Ok(()),
+    }
 }

@@ -95,6 +95,10 @@ pub(crate) fn train_pixelnerf(
         Some(checkpoint) => PixelNerf::continued(checkpoint, levels.unwrap_or(1), DType::F32, seed)?,
         None => PixelNerf::new(architecture.with_levels(levels.unwrap_or(LEVELS)), DType::F32, seed)?,
     };
+    if let Some(levels) = levels.filter(|levels| *levels < network.architecture.levels.len()) {
+        let allowed = "the file's network has more levels, and none are removed";
+        return Err(TrainError::Setting { name: "levels", value: levels as f64, allowed });
+    }
     network.architecture.source_side = settings.side;
     (settings.width, settings.levels) = (network.architecture.width, Some(network.architecture.levels.len()));
     let learner = PixelNerfLearner { network, data, settings };
@@ -102,9 +106,15 @@ pub(crate) fn train_pixelnerf(
     run::run(&learner, &plan, task)
 }
 
-/// Ten times the logarithm of one over the mean square.
+/// The PSNR of pictures without a difference: not infinite, for the mean of several is to say something of the others,
+/// and JSON has no infinity.
+const MAX_DECIBELS: f64 = 100.0;
+
+/// Ten times the logarithm of one over the mean square, at most [`MAX_DECIBELS`].
 pub(super) fn decibels(mean_square: &Tensor) -> Result<f64> {
-    Ok(-10.0 * f64::from(mean_square.to_dtype(DType::F32)?.to_scalar::<f32>()?).log10())
+    let mean_square = f64::from(mean_square.to_dtype(DType::F32)?.to_scalar::<f32>()?);
+    let decibels = -10.0 * mean_square.log10();
+    Ok(if decibels > MAX_DECIBELS { MAX_DECIBELS } else { decibels })
 }
 
 /// Mean PSNR over some rays of scenes, with the weights `weigh` of the views: the same rays and sources every time,

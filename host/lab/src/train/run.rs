@@ -23,9 +23,12 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Instant;
 use viewfuse_job::digest::sha256_of;
-use viewfuse_job::files::{FolderLock, WriteError, check_writable, write_whole};
+use viewfuse_job::files::{FolderLock, WriteError, check_writable, read_at_most, write_whole};
 use viewfuse_job::progress::{Progress, Silent};
 use viewfuse_nn::checkpoint::{Checkpoint, Precision};
+
+/// Most bytes of a record that is read.
+const LONGEST_RECORD: u64 = 64 << 20;
 
 /// Length and learning rate of a run.
 #[derive(Args, Clone, Copy, Debug, PartialEq, Serialize)]
@@ -189,9 +192,12 @@ pub(crate) fn run<S: Serialize>(
     let average = Average::new(learner.parameters(), AVERAGING)?;
     let learned = Learned { parameters: learner.parameters(), adam: Adam::new(learner.parameters())?, average };
     let found = state::read(&run.state(), settings, &learned)?;
-    // An empty one is of a machine that lost its power.
-    if found.is_none() && run.model().exists() && !run.state().exists() {
-        return Err(TrainError::NoState(run.model()));
+    // An empty state is of a machine that lost its power: the record says whether it was this run's.
+    if found.is_none() && !(run.state().exists() && run.is_recorded()) {
+        let files = [run.model(), folder.join(CURVE), folder.join(NUMBERS), folder.join(RECORD)];
+        if let Some(file) = files.into_iter().find(|file| file.exists()) {
+            return Err(TrainError::NoState(file));
+        }
     }
     let is_new = found.is_none();
     let mut so_far = found.unwrap_or_default();
@@ -201,11 +207,11 @@ pub(crate) fn run<S: Serialize>(
             schedule.steps
         ));
     }
-    run.tell(&so_far)?;
     if is_new {
         // From here on this folder is this run's: another one does not begin in it.
         state::write(&run.state(), settings, &so_far, &learned)?;
     }
+    run.tell(&so_far)?;
     progress.stage("training", 1..STAGES, STAGES);
     progress.expect(schedule.steps.saturating_sub(so_far.steps) as usize);
     let mut written = Instant::now();
@@ -235,6 +241,9 @@ pub(crate) fn run<S: Serialize>(
         }
         if so_far.steps % schedule.validate_every == 0 || so_far.steps == schedule.steps {
             let Validated { score, remark } = learned.as_written(|| learner.validate())?;
+            if !score.is_finite() {
+                return Err(not_finite("validation score"));
+            }
             so_far.scores.push((so_far.steps, score));
             progress.note(&run.status(&so_far, &remark));
             run.tell(&so_far)?;
@@ -266,6 +275,16 @@ impl Run<'_> {
 
     fn model(&self) -> PathBuf {
         self.folder.join("model.safetensors")
+    }
+
+    /// Whether the folder's record is of this run, however long that was to be.
+    fn is_recorded(&self) -> bool {
+        let record = read_at_most(&self.folder.join(RECORD), LONGEST_RECORD).ok();
+        let record: Option<serde_json::Value> = record.and_then(|bytes| serde_json::from_slice(&bytes).ok());
+        record.is_some_and(|record| {
+            let same = |key: &str| record.pointer(&format!("/settings/{key}")) == self.settings.get(key);
+            ["model", "settings", "checkpoint", "data"].into_iter().all(same)
+        })
     }
 
     fn status(&self, so_far: &Progressed, remark: &str) -> String {

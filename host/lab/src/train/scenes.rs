@@ -5,11 +5,13 @@ use image::imageops::{FilterType, crop_imm, resize};
 use image::{Rgb, RgbImage};
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
+use std::collections::HashSet;
 use std::path::PathBuf;
 use viewfuse_core::camera::{Camera, CameraBlock, Pinhole, PinholeError};
 use viewfuse_field::learned::default_near_far;
 use viewfuse_job::digest::hexadecimal;
 use viewfuse_job::progress::Progress;
+use viewfuse_job::text::listed;
 use viewfuse_scene::Scene;
 use viewfuse_scene::unit::RigUnit;
 
@@ -37,16 +39,35 @@ impl Data {
         }
         progress.stage("reading the scenes", 0..1, STAGES);
         let [training, validation] = lists.map(|list| TrainingScene::open_all(list, side, least_views, progress));
-        Ok(Data { training: training?, validation: validation? })
+        let data = Data { training: training?, validation: validation? };
+        // Of one list for both its caller knows.
+        if lists[0] != lists[1] {
+            data.overlap().iter().for_each(|warning| progress.warn(warning));
+        }
+        Ok(data)
+    }
+
+    /// What is said of scenes of validation that are scenes of training, too, by what they show.
+    fn overlap(&self) -> Option<String> {
+        let known: HashSet<[u8; 32]> = self.training.iter().map(TrainingScene::digest).collect();
+        let seen = self.validation.iter().filter(|scene| known.contains(&scene.digest()));
+        let paths: Vec<String> = seen.map(|scene| scene.path.display().to_string()).collect();
+        (!paths.is_empty()).then(|| {
+            format!(
+                "{} of the {} scenes of validation are scenes of training, too ({}): the score says less about other \
+                 scenes",
+                paths.len(),
+                self.validation.len(),
+                listed(&paths, 3)
+            )
+        })
     }
 
     /// SHA-256 of all cameras and pictures as training sees them.
     pub(crate) fn digest(&self) -> String {
         let mut digest = Sha256::new();
         for scene in self.training.iter().chain(&self.validation) {
-            digest.update((scene.pictures.len() as u64).to_le_bytes());
-            digest.update(bytemuck::cast_slice(&scene.blocks));
-            scene.pictures.iter().for_each(|picture| digest.update(picture.as_raw()));
+            scene.add_to(&mut digest);
         }
         hexadecimal(&digest.finalize())
     }
@@ -80,6 +101,19 @@ pub(crate) struct TrainingScene {
 }
 
 impl TrainingScene {
+    /// Adds its cameras and pictures.
+    fn add_to(&self, digest: &mut Sha256) {
+        digest.update((self.pictures.len() as u64).to_le_bytes());
+        digest.update(bytemuck::cast_slice(&self.blocks));
+        self.pictures.iter().for_each(|picture| digest.update(picture.as_raw()));
+    }
+
+    fn digest(&self) -> [u8; 32] {
+        let mut digest = Sha256::new();
+        self.add_to(&mut digest);
+        digest.finalize().into()
+    }
+
     /// Reads all photographs of a scene at `side` x `side`.
     pub(crate) fn open(path: &PathBuf, side: u32, progress: &dyn Progress) -> Result<TrainingScene, TrainError> {
         let scene = Scene::open(path)?;
