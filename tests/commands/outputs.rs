@@ -128,6 +128,14 @@ fn inputs_are_not_replaced() {
     assert_kept(&folder, "report out -o mine.html", &["mine.html", "was not written by viewfuse"]);
     for _ in 0..2 {
         done(&folder, "report out -o out/page.html");
+        done(&folder, "inspect toy -o map.png");
+        done(&folder, "evaluate toy --targets 20 --views 3 --weights mean --size 16x16 --device cpu -o scores.csv");
+    }
+    // Pictures and tables that others wrote stay.
+    fs::copy(folder.join("toy/rgb/000020.png"), folder.file("mine.png")).expect("a copy");
+    folder.write("mine.csv", "name,grade\na,1\n");
+    for arguments in ["inspect toy -o mine.png", "evaluate toy --targets 20 --size 16x16 -o mine.csv"] {
+        assert_kept(&folder, arguments, &["mine.", "was not written by viewfuse"]);
     }
 }
 

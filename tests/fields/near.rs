@@ -57,7 +57,7 @@ fn frame(stage: &mut Stage<'_>, weighting: &Weighting, camera: Camera) -> Frame 
 fn pictures_become_the_photograph_as_the_camera_comes_nearer() {
     let scene = sample("room");
     let sources = (0..scene.views.len()).collect();
-    let job = FewShot { sources, targets: Vec::new(), frames_per_second: None };
+    let job = FewShot { sources, ..FewShot::default() };
     let renderer = On { device: &Cpu, field: &TrainingFree::default() };
     for (leave_out, count) in DROPPED {
         let options = RenderOptions { size: Some([48, 36]), leave_out, ..RenderOptions::default() };

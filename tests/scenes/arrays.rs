@@ -33,7 +33,11 @@ fn the_largest_whole_folder_of_photographs_is_taken() {
     }
     // A folder that is not whole is passed over.
     folder.remove("images/b.png");
-    assert_eq!(open(&folder).views[0].camera.pinhole.width(), 32);
+    let scene = open(&folder);
+    assert_eq!(scene.views[0].camera.pinhole.width(), 32);
+    let told =
+        |warning: &String| warning.contains("images: 1 photographs for the 2 rows") && warning.contains("images_4");
+    assert!(scene.warnings.iter().any(told), "{:?}", scene.warnings);
     folder.remove("images_4/b.png").remove("images_8/b.png");
     assert_refused(&folder, "images: found 1 photographs (rows of poses_bounds.npy) instead of 2", &[]);
     let folder = llff();
@@ -143,6 +147,16 @@ fn neus_by_position_and_without_a_sphere() {
     assert_pixel(&scene, 3, [12.5, 3.5]);
     folder.remove("image/102.png");
     assert_refused(&folder, "cameras_sphere.npz: found 4 matrices world_mat_N", &["instead of 3"]);
+}
+
+/// The sphere is the object's: photographs without masks show more.
+#[test]
+fn a_sphere_bounds_masked_photographs_alone() {
+    let folder = neus();
+    assert!(open(&folder).views.iter().all(|view| view.near_far.is_some()), "with masks");
+    std::fs::rename(folder.join("mask"), folder.join("elsewhere")).expect("a folder");
+    let scene = open(&folder);
+    assert!(scene.views.iter().all(|view| view.mask.is_none() && view.near_far.is_none()), "{:?}", scene.views[0]);
 }
 
 #[test]

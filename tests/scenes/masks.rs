@@ -122,6 +122,53 @@ fn levels_of_0_and_1_are_whole() {
     }
 }
 
+/// Of an object the greatest value counts whole, too: other programs write 128, a label's number or its colour.
+#[test]
+fn an_object_is_whole_at_any_level() {
+    type Shape = fn(GrayImage) -> DynamicImage;
+    fn coloured(mask: &GrayImage, colour: [u8; 3]) -> DynamicImage {
+        let pixel = |x, y| image::Rgb(if mask.get_pixel(x, y)[0] > 0 { colour } else { [0; 3] });
+        RgbImage::from_fn(320, 240, pixel).into()
+    }
+    let shapes: [(&str, Shape); 5] = [
+        ("128", |mask| GrayImage::from_fn(320, 240, |x, y| Luma([mask.get_pixel(x, y)[0] / 2])).into()),
+        ("7", |mask| GrayImage::from_fn(320, 240, |x, y| Luma([mask.get_pixel(x, y)[0].min(7)])).into()),
+        ("16 bits, 1000", |mask| {
+            let level = |x, y| Luma([1000 * u16::from(mask.get_pixel(x, y)[0] / 255)]);
+            DynamicImage::ImageLuma16(ImageBuffer::from_fn(320, 240, level))
+        }),
+        ("dark red", |mask| coloured(&mask, [128, 0, 0])),
+        ("blue", |mask| coloured(&mask, [0, 0, 255])),
+    ];
+    for (shape, shaped) in shapes {
+        let folder = sample("room");
+        for view in 0..COUNT {
+            let picture = shaped(mask(|x, y| object(view, x, y, 40.0)));
+            picture.save(folder.file(&format!("room/masks/{view:03}.png"))).expect("a mask");
+        }
+        let scene = opened(&folder, MaskChoice::Object);
+        let photograph = scene.photograph(5).expect("a photograph");
+        assert!(
+            photograph.pixels.enumerate_pixels().all(|(x, y, pixel)| pixel[3] == mask_level(5, x, y)),
+            "{shape}: the object is not whole"
+        );
+    }
+    // Of a view that does not show it a compressed mask is nearly black.
+    let folder = sample("room");
+    for view in 0..COUNT {
+        let level = |x: u32, y: u32| if (x + y) % 5 == 0 { 3 } else { 0 };
+        let black = GrayImage::from_fn(320, 240, |x, y| Luma([level(x, y)]));
+        let shown = if view == 5 { black } else { mask(|x, y| object(view, x, y, 40.0)) };
+        shown.save(folder.file(&format!("room/masks/{view:03}.jpg"))).expect("a mask");
+    }
+    let photograph = opened(&folder, MaskChoice::Object).photograph(5).expect("a photograph");
+    assert!(photograph.pixels.pixels().all(|pixel| pixel[3] == 0));
+}
+
+fn mask_level(view: u32, x: u32, y: u32) -> u8 {
+    if object(view, x, y, 40.0) { 255 } else { 0 }
+}
+
 #[test]
 fn masks_that_are_alike_are_ignore_masks() {
     // The circle of a fisheye is one region away from the border, and the same in every photograph.

@@ -104,7 +104,9 @@ fn the_world_of_nerfstudios_training() {
     let parser = json!({ "transform": [[0, 0, 1, 4], [0, 1, 0, 4], [-1, 0, 0, 5]], "scale": 0.5 });
     folder.write("run/dataparser_transforms.json", parser.to_string());
     let open_path = || CameraPath::open(&folder.join("run/camera_path.json"), &scene, &scene.views[0].camera.pinhole);
-    let camera = open_path().expect("a path").cameras[0].camera;
+    let path = open_path().expect("a path");
+    assert_eq!(path.warning, None);
+    let camera = path.cameras[0].camera;
     let rows = scene.views[0].camera.pose.to_opencv();
     for (row, expected) in camera.pose.to_opencv().iter().zip(rows) {
         row.iter().zip(expected).for_each(|(value, expected)| assert!((value - expected).abs() < 1.0e-5, "{row:?}"));
@@ -301,4 +303,16 @@ fn names_of_a_table_are_kept_or_refused() {
         let error = table(&["a", name]).expect_err("no name of a file");
         assert!(error.contains("cannot be the name of a view") && error.contains(reason), "{error}");
     }
+}
+
+/// Nobody knows what nerfstudio did to the world.
+#[test]
+fn a_path_of_the_viewer_alone_is_doubtful() {
+    let folder = scenes::srn();
+    let scene = open(&folder);
+    folder.write("run/camera_path.json", camera_path().to_string());
+    let path = folder.join("run/camera_path.json").display().to_string();
+    let choice = |text: &str| Selection { path: Some(PathChoice::File(text.into())), ..Selection::default() };
+    let warning = choice(&path).resolve(&scene, 1).expect("a job").warning.expect("a warning");
+    assert!(warning.contains("camera_path.json") && warning.contains("dataparser_transforms.json"), "{warning}");
 }

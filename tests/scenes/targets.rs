@@ -92,12 +92,20 @@ fn a_principal_point_outside_of_the_photograph_is_told() {
     let warnings = open(&folder).pose_warnings();
     let told = "the principal point of 2 of 2 photographs lies outside of them: of 'a' at (17, 6), 16 x 12 pixels";
     assert!(warnings.len() == 1 && warnings[0].starts_with(told), "{warnings:?}");
+    // That of photographs twice as large lies at the corner.
+    folder.write("intrinsics.txt", "20. 16. 12. 0.\n0. 0. 0.\n1.\n12 16\n");
+    let warnings = open(&folder).pose_warnings();
+    let told =
+        "the principal point of 2 of 2 photographs lies far from their middle: of 'a' at (16, 12), 16 x 12 pixels";
+    assert!(warnings.len() == 1 && warnings[0].starts_with(told), "{warnings:?}");
+    folder.write("intrinsics.txt", "20. 10. 6. 0.\n0. 0. 0.\n1.\n12 16\n");
+    assert_eq!(open(&folder).pose_warnings(), Vec::<String>::new(), "a lens that is not centred");
 }
 
 #[test]
 fn sources_that_no_scene_has_are_no_panic() {
     let scene = Scene::open(data("toy")).expect("a scene");
-    let job = FewShot { sources: vec![1, 999], targets: vec![target_of(&scene, 0)], frames_per_second: None };
+    let job = FewShot { sources: vec![1, 999], targets: vec![target_of(&scene, 0)], ..FewShot::default() };
     assert_eq!(away_warning(&scene, &job), None);
 }
 
@@ -129,7 +137,7 @@ fn intrinsics_that_are_no_pixels_are_told() {
 
 fn job(scene: &Scene, target: Camera) -> FewShot {
     let target = Target { name: "away".to_owned(), camera: target, truth: None };
-    FewShot { sources: (0..8).collect(), targets: vec![target_of(scene, 20), target], frames_per_second: None }
+    FewShot { sources: (0..8).collect(), targets: vec![target_of(scene, 20), target], ..FewShot::default() }
 }
 
 #[test]
@@ -167,6 +175,22 @@ fn every_view_is_an_item_of_a_list() {
 fn warnings(scene: &Scene, views: &[usize]) -> Vec<String> {
     let album = Album::open(scene, views.iter().copied(), &Silent).expect("photographs");
     album.sources(views, 64, BackgroundChoice::None, &Silent).expect("sources").warnings
+}
+
+#[test]
+fn grey_photographs_among_others_are_told() {
+    let folder = called(&["0", "1", "2"]);
+    for (name, colour) in [("0", [90, 120, 80]), ("1", [100, 102, 104]), ("2", [80, 110, 70])] {
+        let [red, green, blue] = colour;
+        let picture = RgbaImage::from_pixel(16, 12, Rgba([red, green, blue, 255]));
+        picture.save(folder.file(&format!("rgb/{name}.png"))).expect("saved");
+    }
+    let scene = open(&folder);
+    let told = warnings(&scene, &[0, 1, 2]);
+    assert!(told.len() == 1 && told[0].starts_with("1 of 3 photographs are grey ('1' is the first)"), "{told:?}");
+    // All of them may be.
+    assert_eq!(warnings(&scene, &[1]), Vec::<String>::new());
+    assert_eq!(warnings(&scene, &[0, 2]), Vec::<String>::new());
 }
 
 #[test]

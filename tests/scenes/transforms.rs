@@ -46,6 +46,24 @@ fn parts_in_files_are_one_scene() {
     assert_eq!((names(&open(&folder)), open(&folder).views[0].split), (vec!["r_0"], None));
 }
 
+/// Intrinsics that name no size are those of the photographs that the file names.
+#[test]
+fn reduced_photographs_have_reduced_intrinsics() {
+    let transforms = |names: &[&str]| {
+        let frames: Vec<Value> = names.iter().map(|name| frame(name)).collect();
+        json!({ "fl_x": 20, "cx": 8, "cy": 6, "frames": frames }).to_string()
+    };
+    let folder = Folder::new();
+    folder.image("images_2/a.png", 8, 6).write("transforms.json", transforms(&["images/a.png"]));
+    let pinhole = open(&folder).views[0].camera.pinhole;
+    assert_eq!((pinhole.width(), pinhole.focal(), pinhole.principal()), (8, [10.0; 2], [4.0, 3.0]));
+    // A file that names the reduced ones speaks of them.
+    folder.write("transforms.json", transforms(&["images_2/a.png"]));
+    assert_eq!(open(&folder).views[0].camera.pinhole.focal(), [20.0; 2]);
+    folder.image("images/a.png", 16, 12).write("transforms.json", transforms(&["images/a.png"]));
+    assert_eq!(open(&folder).views[0].camera.pinhole.focal(), [20.0; 2]);
+}
+
 #[test]
 fn a_photograph_may_lie_outside_the_folder() {
     let elsewhere = Folder::new();
@@ -125,7 +143,9 @@ fn masks_are_named_or_stand_beside() {
     };
     mask("other/m.png", 0, 16, 12);
     mask("masks/1.png", 255, 16, 12);
-    mask("masks/2.png.png", 51, 16, 12);
+    // A fifth of what it has elsewhere.
+    let level = |x, _| image::Luma([if x == 15 { 255 } else { 51 }]);
+    image::GrayImage::from_fn(16, 12, level).save(folder.file("masks/2.png.png")).expect("a mask");
     mask("masks/3.jpg", 255, 32, 24);
     let scene = Scene::open_masked(&folder, MaskChoice::Object).expect("a scene");
     let found: Vec<_> = scene.views.iter().map(|view| view.mask.as_ref().map(|mask| mask.file_name())).collect();
@@ -136,7 +156,12 @@ fn masks_are_named_or_stand_beside() {
     for (view, alpha) in [(0, 0), (1, 51), (2, 255)] {
         let photograph = scene.photograph(view).expect("a photograph");
         assert!(
-            photograph.has_alpha && photograph.pixels.pixels().all(|pixel| pixel.0 == [10, 20, 30, alpha]),
+            photograph.has_alpha
+                && photograph
+                    .pixels
+                    .enumerate_pixels()
+                    .filter(|(x, ..)| *x < 15)
+                    .all(|(.., pixel)| pixel.0 == [10, 20, 30, alpha]),
             "{view}"
         );
     }

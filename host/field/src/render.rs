@@ -29,6 +29,7 @@ pub use stage::{Stage, StageCosts};
 
 use crate::{Record, Renderer};
 use viewfuse_job::progress::{Progress, Silent};
+use viewfuse_job::text::listed;
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::FewShot;
 use viewfuse_scene::photographs::SourceImages;
@@ -84,9 +85,11 @@ pub(crate) fn render_chosen<C, X: From<RenderError>>(
     let shown = job.sources.iter().copied().chain(truths);
     let (count, stage_count) = (job.targets.len(), 3 + job.targets.len());
     progress.stage("reading the sources", 0..1, stage_count);
-    viewfuse_scene::few_shot::away_warning(scene, job).iter().for_each(|warning| progress.warn(warning));
+    let away = viewfuse_scene::few_shot::away_warning(scene, job);
+    job.warning.iter().chain(&away).for_each(|warning| progress.warn(warning));
     let album = open_album(scene, shown, renderer, options, progress)?;
     let mut stage = Stage::prepare(scene, &album, &job.sources, renderer, options, progress)?;
+    other_sizes(&stage, job, options)?.iter().for_each(|warning| progress.warn(warning));
     progress.stage("choosing the scheme", 1..2, stage_count);
     let (weighting, chosen) = choose(&mut stage)?;
     progress.stage("encoding the sources", 2..3, stage_count);
@@ -97,6 +100,22 @@ pub(crate) fn render_chosen<C, X: From<RenderError>>(
         deliver(&stage.images, frame, &chosen)?;
     }
     Ok((Finished { costs: stage.costs, record: stage.record() }, chosen))
+}
+
+/// What is said of targets whose pictures do not get the size that was asked for, because they have another shape.
+fn other_sizes(stage: &Stage<'_>, job: &FewShot, options: &RenderOptions) -> Result<Option<String>, RenderError> {
+    let Some([width, height]) = options.size else { return Ok(None) };
+    let mut other = Vec::new();
+    for target in &job.targets {
+        let [own_width, own_height] = stage.size_at(&target.camera)?;
+        if [own_width, own_height] != [width, height] {
+            other.push(format!("'{}' {own_width}x{own_height}", target.name));
+        }
+    }
+    Ok((!other.is_empty()).then(|| {
+        let (count, all, shown) = (other.len(), job.targets.len(), listed(&other, 3));
+        format!("{count} of {all} targets have another shape than {width}x{height}, and keep it: {shown}")
+    }))
 }
 
 /// As [`render`] without progress reports: returns the frames of all target views, which stay in memory.

@@ -1,6 +1,7 @@
 //! Pictures as PNG files.
 
-use image::{DynamicImage, Rgba, RgbaImage};
+use image::codecs::png::PngEncoder;
+use image::{DynamicImage, ImageEncoder, Rgba, RgbaImage};
 use std::path::Path;
 use viewfuse_job::files::{WriteError, write_whole};
 use viewfuse_scene::encode_png;
@@ -14,6 +15,23 @@ pub fn write_png(path: &Path, picture: &DynamicImage) -> Result<(), WriteError> 
     let bytes = bytes.map_err(|cause| WriteError::Encode { path: path.to_path_buf(), cause: cause.into() })?;
     write_whole(path, &bytes)
 }
+
+/// As [`write_png`], with EXIF that names this program, by which it knows the file again.
+///
+/// # Errors
+/// [`WriteError`].
+pub fn write_marked_png(path: &Path, picture: &DynamicImage) -> Result<(), WriteError> {
+    let mut bytes = Vec::new();
+    let mut encoder = PngEncoder::new(&mut bytes);
+    // Of an encoder without EXIF the picture is as good, and another time replaced by none.
+    let _ = encoder.set_exif_metadata(SOFTWARE.to_vec());
+    let written = picture.write_with_encoder(encoder);
+    written.map_err(|cause| WriteError::Encode { path: path.to_path_buf(), cause: cause.into() })?;
+    write_whole(path, &bytes)
+}
+
+/// EXIF with one entry: the software, 9 bytes of text behind it.
+const SOFTWARE: &[u8] = b"II*\0\x08\0\0\0\x01\0\x31\x01\x02\0\x09\0\0\0\x1a\0\0\0\0\0\0\0viewfuse\0";
 
 /// A picture with its opacity as straight alpha: what is in front of a background of one colour (in `[0, 1]`), which
 /// was mixed into `colours` (red, green, blue in `[0, 1]` and opacity, row-major, of this width and height). Black

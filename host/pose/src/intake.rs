@@ -100,7 +100,7 @@ pub enum IntakeError {
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// There are no photographs.
-    #[error("{}: no photographs here (JPEG, PNG, WebP)", .0.display())]
+    #[error("{}: no photographs here (JPEG, PNG, WebP){}", .0.display(), others(.0))]
     None(PathBuf),
     /// A photograph's format that is not read, and a command that converts it.
     #[error("{0}: {1} is not read; convert it to JPEG first, for example `{2}`")]
@@ -236,6 +236,16 @@ fn blurred(photos: &mut Vec<Photo>) -> Vec<Unusable> {
     let found = photos.iter().filter(|photo| !is_sharp(photo)).map(refused).collect();
     photos.retain(is_sharp);
     found
+}
+
+/// Pictures of other formats in a folder, for an error.
+fn others(folder: &Path) -> String {
+    const OTHERS: [&str; 6] = ["bmp", "gif", "tga", "ppm", "jp2", "psd"];
+    let is_other = |path: &Path| OTHERS.contains(&extension(path).as_str());
+    match list(folder, is_other).unwrap_or_default().first() {
+        Some(first) => format!("; convert {} and the like to JPEG", file_name(first)),
+        None => String::new(),
+    }
 }
 
 /// `my 4.HEIC.jpg` for `my 4.HEIC`.
@@ -376,7 +386,12 @@ enum Refused {
 
 /// Reads one, and writes its copies.
 fn photo(path: &Path, root: &Path, scratch: &Path) -> Result<Photo, Refused> {
-    let unreadable = |error: SceneError| Refused::Photograph(error.fault.to_string());
+    let unreadable = |error: SceneError| match error.hint() {
+        Some(Hint::BuildWithTiff) => {
+            Refused::Photograph("TIFF is not read by this build; convert it to JPEG".to_owned())
+        }
+        _ => Refused::Photograph(error.fault.to_string()),
+    };
     let header = ImageFile::open(path).map_err(unreadable)?;
     let exif = Exif::read(path, header.size());
     let picture = read_picture(path).map_err(unreadable)?;

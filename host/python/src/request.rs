@@ -104,7 +104,7 @@ impl Request {
             selection.resolve(scene, least_sources)?
         } else {
             let sources = selection.sources_without(scene, &[], least_sources)?;
-            FewShot { sources, targets: Vec::new(), frames_per_second: None }
+            FewShot { sources, ..FewShot::default() }
         };
         let pinhole = scene.views[job.sources[0]].camera.pinhole;
         for (index, matrix) in poses.iter().enumerate() {

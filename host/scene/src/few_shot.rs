@@ -124,7 +124,7 @@ pub struct Target {
 }
 
 /// Sources and targets of one run, as indices into the scene's views.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct FewShot {
     /// Source views, in the order of the scene.
     pub sources: Vec<usize>,
@@ -132,6 +132,8 @@ pub struct FewShot {
     pub targets: Vec<Target>,
     /// Frames per second, if the targets are from a file that states them.
     pub frames_per_second: Option<f64>,
+    /// [`CameraPath::warning`] of the targets.
+    pub warning: Option<String>,
 }
 
 /// Targets that are cameras along a path.
@@ -184,11 +186,11 @@ impl Selection {
         };
         let sources = self.sources_without(scene, &target_views, least_sources)?;
         let mut targets: Vec<Target> = target_views.iter().map(|&view| target_of(scene, view)).collect();
-        let mut frames_per_second = None;
+        let (mut frames_per_second, mut warning) = (None, None);
         if let Some(choice) = &self.path {
             check_count(scene, sources.len(), 1)?;
             let path = along(choice, scene, &sources)?;
-            frames_per_second = path.frames_per_second;
+            (frames_per_second, warning) = (path.frames_per_second, path.warning);
             let target = |NamedCamera { name, camera }| Target { name, camera, truth: None };
             targets.extend(path.cameras.into_iter().map(target));
         }
@@ -196,7 +198,7 @@ impl Selection {
             return Err(SelectionFault::NoTargets.in_scene(scene));
         }
         targets::check_names(scene, &targets)?;
-        Ok(FewShot { sources, targets, frames_per_second })
+        Ok(FewShot { sources, targets, frames_per_second, warning })
     }
 
     /// The source views when `targets` are rendered.
@@ -365,5 +367,6 @@ fn along(choice: &PathChoice, scene: &Scene, sources: &[usize]) -> Result<Camera
         }
     };
     let named = |(index, camera)| NamedCamera { name: numbered(what, index), camera };
-    Ok(CameraPath { cameras: cameras.into_iter().enumerate().map(named).collect(), frames_per_second: None })
+    let cameras = cameras.into_iter().enumerate().map(named).collect();
+    Ok(CameraPath { cameras, frames_per_second: None, warning: None })
 }

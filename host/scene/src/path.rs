@@ -50,6 +50,8 @@ pub struct CameraPath {
     pub cameras: Vec<NamedCamera>,
     /// Frames per second, if the file states them; finite and above 0.
     pub frames_per_second: Option<f64>,
+    /// What makes it doubtful that its cameras are in the coordinates of the scene's files.
+    pub warning: Option<String>,
 }
 
 /// What a file of a path holds, unchecked.
@@ -58,6 +60,7 @@ struct RawPath {
     /// An empty name stands for none.
     views: Vec<RawView>,
     frames_per_second: Option<f64>,
+    warning: Option<String>,
 }
 
 impl CameraPath {
@@ -88,14 +91,14 @@ impl CameraPath {
         } else {
             return Err(unknown());
         };
-        let RawPath { views, frames_per_second } = raw;
+        let RawPath { views, frames_per_second, warning } = raw;
         if views.is_empty() {
             return Err(FilePlace::file(path).fault(SceneFault::NoCameras));
         }
         let cameras = views.iter().map(|view| camera_in(view, pinhole, &scene.frame)).collect::<Result<Vec<_>, _>>()?;
         let names = names(path, views)?;
         let cameras = names.into_iter().zip(cameras).map(|(name, camera)| NamedCamera { name, camera }).collect();
-        Ok(CameraPath { cameras, frames_per_second })
+        Ok(CameraPath { cameras, frames_per_second, warning })
     }
 }
 

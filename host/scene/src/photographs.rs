@@ -383,6 +383,7 @@ impl<'a> Album<'a> {
             ));
         }
         warnings.extend(exposure::warning(&images, views.iter().map(|&view| name(view))));
+        warnings.extend(exposure::grey_warning(&images, views.iter().map(|&view| name(view))));
         let (points, near_far) = self.space(views);
         Ok(SourceImages { images, background, has_silhouettes, points, near_far, warnings })
     }

@@ -4,7 +4,7 @@ use crate::rig::Rig;
 use crate::{Scene, View};
 use std::collections::HashSet;
 use viewfuse_core::Vec3;
-use viewfuse_core::camera::Camera;
+use viewfuse_core::camera::{Camera, Pinhole};
 
 /// Cameras nearer to one another than this share of their distance from what they look at show no depth: half a pixel
 /// at a focal length of 500. Nor is that more than this share of their median distance from their middle: where axes
@@ -16,6 +16,10 @@ const MIN_COSINE: f32 = 0.999_95;
 /// Tangent of half of the greatest angle of a photograph's width that is no fault: 75 degrees. What lenses see beyond, a
 /// pinhole's picture does not show.
 const MAX_HALF_ANGLE_TANGENT: f32 = 3.732;
+
+/// Most by which the principal point of most photographs is off their middle, as a share of a side. That of photographs
+/// half as large lies at a corner.
+const MAX_OFF_MIDDLE: f32 = 0.2;
 
 /// Which views of a scene have the same pose.
 pub struct SamePoses<'a> {
@@ -70,6 +74,12 @@ fn firsts(views: &[View]) -> Vec<usize> {
     firsts
 }
 
+/// How far the principal point is from a photograph's middle, as a share of its sides, the larger one.
+fn off_middle(pinhole: &Pinhole) -> f32 {
+    let sides = [pinhole.width() as f32, pinhole.height() as f32];
+    (0..2).map(|axis| (pinhole.principal()[axis] / sides[axis] - 0.5).abs()).fold(0.0, f32::max)
+}
+
 /// The upper one of the middle values; 0 of none.
 fn median(values: impl Iterator<Item = f32>) -> f32 {
     let mut sorted: Vec<f32> = values.collect();
@@ -109,17 +119,22 @@ fn warnings(views: &[View]) -> Vec<String> {
             view.name
         ));
     }
-    let is_beside = |view: &&View| {
-        let pinhole = &view.camera.pinhole;
-        let sides = [pinhole.width() as f32, pinhole.height() as f32];
-        view.image.is_some() && (0..2).any(|axis| !(0.0..=sides[axis]).contains(&pinhole.principal()[axis]))
+    // Of one photograph it may lie anywhere: it may be a part of a larger one.
+    let is_off = |view: &&View| view.image.is_some() && off_middle(&view.camera.pinhole) > MAX_OFF_MIDDLE;
+    let is_outside = |view: &&View| view.image.is_some() && off_middle(&view.camera.pinhole) > 0.5;
+    let (off, outside) = (views.iter().filter(is_off).count(), views.iter().filter(is_outside).count());
+    let photographs = views.iter().filter(|view| view.image.is_some()).count();
+    let (told, view) = match outside {
+        0 if 2 * off > photographs => (off, views.iter().find(is_off)),
+        _ => (outside, views.iter().find(is_outside)),
     };
-    if let Some(view) = views.iter().find(is_beside) {
-        let (pinhole, beside) = (&view.camera.pinhole, views.iter().filter(is_beside).count());
+    if let Some(view) = view {
+        let pinhole = &view.camera.pinhole;
         let ([x, y], width, height) = (pinhole.principal(), pinhole.width(), pinhole.height());
+        let place = if outside > 0 { "outside of them" } else { "far from their middle" };
         warnings.push(format!(
-            "the principal point of {beside} of {count} photographs lies outside of them: of '{}' at ({x}, {y}), {width} x \
-             {height} pixels; the intrinsics may be those of larger photographs",
+            "the principal point of {told} of {count} photographs lies {place}: of '{}' at ({x}, {y}), {width} x {height} \
+             pixels; the intrinsics may be those of photographs of another size",
             view.name
         ));
     }

@@ -54,7 +54,7 @@ impl Target for Paths {
     fn run(&mut self, bytes: &[u8]) -> Result<Verdict, String> {
         let path = self.file.write(bytes);
         let outcome = CameraPath::open(path, &self.scene, &self.scene.views[0].camera.pinhole);
-        if let Ok(CameraPath { cameras, frames_per_second }) = &outcome {
+        if let Ok(CameraPath { cameras, frames_per_second, .. }) = &outcome {
             let mut names: Vec<&str> = cameras.iter().map(|camera| camera.name.as_str()).collect();
             names.sort_unstable();
             names.dedup();

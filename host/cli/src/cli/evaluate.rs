@@ -15,7 +15,7 @@ mod tables;
 use super::metrics_options::MetricOptions;
 use super::model::ModelOptions;
 use super::options::{BoundOptions, DeviceOptions, OmissionOptions, PictureOptions, SourceOptions};
-use super::outputs::{keep_file_apart, refuse_extension};
+use super::outputs::{keep_file_apart, keep_others_than, refuse_extension};
 use super::printing::{counted, say, warn_of};
 use super::terminal::Terminal;
 use super::threads::on_threads;
@@ -164,6 +164,7 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
     arguments.output.as_deref().map_or(Ok(()), |path| keep_file_apart(&scenes, path))?;
     let csv = |path: &Path| refuse_extension(path, "a table as CSV", &["csv", "txt"]);
     arguments.output.as_deref().map_or(Ok(()), csv)?;
+    arguments.output.as_deref().map_or(Ok(()), |path| keep_others_than(path, files::CSV_BEGINNING))?;
     let (mut all, mut json_tables): (Vec<Vec<Score>>, Vec<serde_json::Value>) = (Vec::new(), Vec::new());
     let mut tell = |name: &str, results: &Table| -> anyhow::Result<()> {
         let title = format!("{name}: {}", counted(results.target_count, "target"));

@@ -3,7 +3,7 @@
 mod quality;
 
 use super::options::MaskOption;
-use super::outputs::{keep_file_apart, refuse_extension};
+use super::outputs::{keep_file_apart, keep_others, refuse_extension};
 use super::posed::PoseOption;
 use super::printing::say;
 use super::table::table;
@@ -16,7 +16,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use viewfuse_job::files::check_writable;
 use viewfuse_output::camera_map::camera_map;
-use viewfuse_output::png::write_png;
+use viewfuse_output::png::write_marked_png;
 use viewfuse_scene::inspect::{Inspection, inspect};
 use viewfuse_scene::listing::{ListedView, Neighbour, list_views};
 use viewfuse_scene::photographs::BackgroundChoice;
@@ -63,6 +63,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     arguments.output.as_deref().map_or(Ok(()), check_writable)?;
     arguments.output.as_deref().map_or(Ok(()), |path| keep_file_apart([&scene], path))?;
     arguments.output.as_deref().map_or(Ok(()), |path| refuse_extension(path, "a picture as PNG", &["png"]))?;
+    arguments.output.as_deref().map_or(Ok(()), keep_others)?;
     let progress = Terminal::new("reading the photographs");
     let inspection = inspect(&scene, arguments.background, &progress)?;
     let measure = || Quality::of(&scene, arguments.background, &progress);
@@ -83,7 +84,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         print_warnings(&inspection)?;
     }
     if let Some(path) = &arguments.output {
-        write_png(path, &DynamicImage::ImageRgb8(camera_map(&scene, &inspection)))?;
+        write_marked_png(path, &DynamicImage::ImageRgb8(camera_map(&scene, &inspection)))?;
         if !arguments.json {
             say(format_args!("cameras    {}", path.display()))?;
         }

@@ -112,6 +112,16 @@ pub fn keep_others(output: &Path) -> anyhow::Result<()> {
     }
 }
 
+/// Refuses to replace a file that does not begin as viewfuse's own tables do.
+pub(super) fn keep_others_than(output: &Path, own: &str) -> anyhow::Result<()> {
+    let mut beginning = Vec::new();
+    let _ = File::open(output).and_then(|file| file.take(own.len() as u64).read_to_end(&mut beginning));
+    match beginning.is_empty() || beginning == own.as_bytes() {
+        true => Ok(()),
+        false => Err(foreign(output, "was not written by viewfuse")),
+    }
+}
+
 /// Refuses to replace a file, because it is `what`.
 pub(super) fn foreign(output: &Path, what: &str) -> anyhow::Error {
     wrong(format_args!("{}: {what}, and would be replaced; give another name, or move it", output.display()))

@@ -2,6 +2,7 @@
 
 mod solvers;
 
+use super::outputs::keep_others;
 use super::printing::{complain, say};
 use super::terminal::Terminal;
 use super::threads::on_threads;
@@ -17,7 +18,7 @@ use viewfuse_job::progress::{Interrupted, Progress};
 use viewfuse_job::shell::quoted;
 use viewfuse_output::camera_map::camera_map;
 use viewfuse_output::match_graph::match_graph;
-use viewfuse_output::png::write_png;
+use viewfuse_output::png::write_marked_png;
 use viewfuse_pose::{
     FocalSource, Found, Kept, Matches, Options, Record, Refusal, Solver, Verdict, find, has_record, write,
 };
@@ -106,6 +107,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     if let Some(file) = &arguments.matches {
         keep_picture_apart(file, photographs, output)?;
         check_writable(file)?;
+        keep_others(file)?;
     }
     let options = Options { focal: arguments.focal, seed: arguments.seed, every: arguments.every.into() };
     let (from, to) = (solvers(&arguments.from), (arguments.layout, output.as_path()));
@@ -192,7 +194,7 @@ fn written(
     let progress = Terminal::new("reading the photographs");
     let found = find(photographs, from, options, &progress)?;
     if let Some(file) = matches {
-        write_png(file, &DynamicImage::ImageRgb8(picture_of_matches(&found)))?;
+        write_marked_png(file, &DynamicImage::ImageRgb8(picture_of_matches(&found)))?;
     }
     let verdict = match &found.verdict {
         Ok(verdict) => verdict,

@@ -53,9 +53,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     warn_of(&scene);
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), arguments.path.choice());
     let job = selection.resolve(&scene, 1)?;
-    if let Some(warning) = away_warning(&scene, &job) {
-        complain(format_args!("warning: {warning}"));
-    }
+    let away = away_warning(&scene, &job);
+    job.warning.iter().chain(&away).for_each(|warning| complain(format_args!("warning: {warning}")));
     let weights = WeightTable::of(&scene, &job, &weightings, &Silent)?;
     if arguments.json {
         let mut documents = weights.documents();

@@ -65,13 +65,10 @@ pub fn working_side(scene: &Scene, options: &RenderOptions, longest: u32) -> Res
         return Ok(largest.unwrap_or(longest).min(longest));
     };
     if let Some(View { camera, .. }) = scene.views.first() {
-        let (view_width, view_height) = (camera.pinhole.width(), camera.pinhole.height());
         camera.pinhole.resized(width, height).map_err(|error| RenderError::Size { width, height, error })?;
-        let fitting_height = (f64::from(view_height) * f64::from(width) / f64::from(view_width)).round() as u32;
-        // Of a narrow picture a width of whole pixels says little: the size to which the views are reduced is right.
-        let is_reduced = scaled_size(camera, width.max(height)) == (width, height);
-        if !is_reduced && fitting_height.abs_diff(height) > 1 {
-            let scene = scene.path.display().to_string();
+        if !scene.views.iter().any(|view| keeps_shape(&view.camera, [width, height])) {
+            let (view_width, view_height) = (camera.pinhole.width(), camera.pinhole.height());
+            let (scene, fitting_height) = (scene.path.display().to_string(), fitting_height(camera, width));
             return Err(RenderError::Shape { scene, width, height, view_width, view_height, fitting_height });
         }
     }
@@ -89,16 +86,27 @@ pub fn picture_size(
     camera: &Camera,
 ) -> Result<[u32; 2], RenderError> {
     let side = working_side(scene, options, longest)?;
-    Ok(size_at(camera, options.size, scene.views.first().map(|view| &view.camera), side))
+    Ok(size_at(camera, options.size, side))
 }
 
-/// The size of a picture: that of the options at a camera like the `first`, otherwise with its longest side `side`.
-pub(super) fn size_at(camera: &Camera, size: Option<[u32; 2]>, first: Option<&Camera>, side: u32) -> [u32; 2] {
-    let shape = |camera: &Camera| [camera.pinhole.width(), camera.pinhole.height()];
-    match (size, first) {
-        (Some(size), Some(first)) if shape(first) == shape(camera) => size,
-        (Some(_), _) => scaled_size(camera, side).into(),
-        (None, _) => reduced_size(camera, side).into(),
+/// Whether a picture of a size has the shape of a camera's, to a pixel.
+fn keeps_shape(camera: &Camera, [width, height]: [u32; 2]) -> bool {
+    // Of a narrow picture a width of whole pixels says little: the size to which the views are reduced is right.
+    scaled_size(camera, width.max(height)) == (width, height) || fitting_height(camera, width).abs_diff(height) <= 1
+}
+
+/// The height that goes with a width.
+fn fitting_height(camera: &Camera, width: u32) -> u32 {
+    let pinhole = &camera.pinhole;
+    (f64::from(pinhole.height()) * f64::from(width) / f64::from(pinhole.width())).round() as u32
+}
+
+/// The size of a picture: that of the options at a camera of that shape, otherwise with its longest side `side`.
+pub(super) fn size_at(camera: &Camera, size: Option<[u32; 2]>, side: u32) -> [u32; 2] {
+    match size {
+        Some(size) if keeps_shape(camera, size) => size,
+        Some(_) => scaled_size(camera, side).into(),
+        None => reduced_size(camera, side).into(),
     }
 }
 
@@ -115,7 +123,6 @@ pub fn open_album<'a>(
 ) -> Result<Album<'a>, RenderError> {
     let about = renderer.about();
     let side = working_side(scene, options, about.longest_side)?;
-    let first = scene.views.first().map(|view| &view.camera);
-    let picture = |camera: &Camera| size_at(camera, options.size, first, side);
+    let picture = |camera: &Camera| size_at(camera, options.size, side);
     Ok(Album::open_for(scene, views, picture, side.max(about.source_side.of(side)), progress)?)
 }

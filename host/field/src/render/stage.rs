@@ -36,8 +36,6 @@ pub struct Stage<'a> {
     scene: Option<SceneSources<'a>>,
     options: &'a RenderOptions,
     side: u32,
-    /// A camera whose pictures have the options' size: the scene's first, or the first source's.
-    first: Option<Camera>,
     /// The unit of weightings.
     unit: RigUnit,
     /// In that unit.
@@ -108,8 +106,7 @@ impl<'a> Stage<'a> {
         let side = working_side(scene, options, renderer.about().longest_side)?;
         let stage = Stage::new(images, (unit, source_poses), side, renderer, options, progress);
         let sources = Some(SceneSources { scene, album, views: sources.to_vec() });
-        let first = scene.views.first().map(|view| view.camera);
-        Ok(Stage { scene: sources, first, ..stage.map_err(|error| RenderError::of(error, scene))? })
+        Ok(Stage { scene: sources, ..stage.map_err(|error| RenderError::of(error, scene))? })
     }
 
     /// The same for images of no scene: frames have no truth.
@@ -145,10 +142,9 @@ impl<'a> Stage<'a> {
             let controller = options.bound.map(|bound| Controller::new(bound, &session));
             Ok::<_, FieldError>((session, controller))
         })?;
-        let first = images.images.first().map(|image| image.camera);
         let counts_gaps = renderer.about().draws_all && !images.has_silhouettes;
         let mut stage =
-            Stage { counts_gaps, scene: None, options, side, first, unit, sources, images, session, controller, costs };
+            Stage { counts_gaps, scene: None, options, side, unit, sources, images, session, controller, costs };
         stage.session.vary(options.field.as_ref(), options.mixture.as_ref(), progress)?;
         Ok(stage)
     }

@@ -281,9 +281,13 @@ impl Run<'_> {
     fn is_recorded(&self) -> bool {
         let record = read_at_most(&self.folder.join(RECORD), LONGEST_RECORD).ok();
         let record: Option<serde_json::Value> = record.and_then(|bytes| serde_json::from_slice(&bytes).ok());
+        let without_steps = |settings: &serde_json::Value| {
+            let mut settings = settings.clone();
+            settings.pointer_mut(state::STEPS).into_iter().for_each(|steps| *steps = serde_json::Value::Null);
+            settings
+        };
         record.is_some_and(|record| {
-            let same = |key: &str| record.pointer(&format!("/settings/{key}")) == self.settings.get(key);
-            ["model", "settings", "checkpoint", "data"].into_iter().all(same)
+            record.get("settings").is_some_and(|settings| without_steps(settings) == without_steps(self.settings))
         })
     }
 

@@ -33,7 +33,7 @@ pub(crate) struct Progressed {
 }
 
 /// Where the settings have the steps of a run.
-const STEPS: &str = "/schedule/steps";
+pub(crate) const STEPS: &str = "/schedule/steps";
 
 /// Most bytes of a state.
 const LONGEST_STATE: u64 = 16 << 30;

@@ -186,5 +186,5 @@ pub(super) fn read(path: &Path, text: &str, scene: &Scene) -> Result<RawPath, Sc
         }
         views.push(RawView::new(name, None, pose, row.intrinsics()?));
     }
-    Ok(RawPath { views, frames_per_second: None })
+    Ok(RawPath { views, ..RawPath::default() })
 }

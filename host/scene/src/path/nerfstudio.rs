@@ -7,14 +7,14 @@
 //! The viewer's world is that of nerfstudio's training: oriented, centred and scaled by its data parser, which writes
 //! what it did to `dataparser_transforms.json` in the folder of the run. If that file is beside the path, it is undone,
 //! together with `applied_transform` and `applied_scale` of the scene's `transforms.json`; otherwise the poses are
-//! taken as they are.
+//! taken as they are, and a warning says so.
 
 use std::f64::consts::PI;
 use std::path::Path;
 
 use super::RawPath;
 use crate::Scene;
-use crate::parser_world::ParserWorld;
+use crate::parser_world::{PARSER, ParserWorld};
 use crate::scene::check::size;
 use crate::scene::json::Object;
 use crate::scene::reader::{PoseForm, RawIntrinsics, RawPose, RawView};
@@ -55,5 +55,12 @@ pub(super) fn read(path: &Path, top: &Object<'_>, scene: &Scene) -> Result<RawPa
         let pose = RawPose { matrix, form: PoseForm::WorldFromOpenGl, place };
         views.push(RawView::new(String::new(), None, pose, Some(intrinsics)));
     }
-    Ok(RawPath { views, frames_per_second: top.number("fps")? })
+    let warning = world.is_none().then(|| {
+        format!(
+            "{}: the viewer's cameras are in the world of nerfstudio's training, turned, moved and scaled, unless that was \
+             switched off; put the run's {PARSER} beside the file",
+            path.display()
+        )
+    });
+    Ok(RawPath { views, frames_per_second: top.number("fps")?, warning })
 }

@@ -21,5 +21,5 @@ pub(super) fn read(path: &Path, top: &Object<'_>, pinhole: &Pinhole) -> Result<R
         let frame = TransformsFrame { path, scopes: [Object::new(path, &key, value)?, top.clone()], key };
         views.push(frame.camera_alone([pinhole.width(), pinhole.height()])?);
     }
-    Ok(RawPath { views, frames_per_second: top.number("fps")? })
+    Ok(RawPath { views, frames_per_second: top.number("fps")?, warning: None })
 }

@@ -1,4 +1,4 @@
-//! How bright photographs are, and a warning where some are much darker than others.
+//! How bright and how coloured photographs are, and warnings where some are much darker than others, or grey.
 
 use super::SourceImage;
 
@@ -6,6 +6,9 @@ use super::SourceImage;
 /// one scene seldom differ by half of that; gains between sources are equalised up to 2 in stored values, which is
 /// about 5.
 const MAX_RATIO: f64 = 6.0;
+
+/// Most by which the channels of grey pixels differ: what a lossy file rounds.
+const MAX_GREY_SPREAD: f32 = 6.0 / 255.0;
 
 /// Brightness of a black photograph: half a step of 8 bits, in linear light.
 const BLACK: f64 = 1.0e-6;
@@ -32,6 +35,31 @@ fn brightness(image: &SourceImage) -> Option<f64> {
         }
     }
     (opacity > 0.0).then(|| (sum / opacity).max(BLACK))
+}
+
+/// The greatest difference of the channels that a photograph shows.
+fn greatest_colour(image: &SourceImage) -> f32 {
+    let spread = |[red, green, blue, _]: &[f32; 4]| red.max(*green).max(*blue) - red.min(*green).min(*blue);
+    image.texels.iter().map(spread).fold(0.0, f32::max)
+}
+
+/// A warning that names the first photograph without colours among others that have them; `names` in their order.
+pub(super) fn grey_warning<'a>(images: &[SourceImage], names: impl Iterator<Item = &'a str>) -> Option<String> {
+    let grey: Vec<&str> = images
+        .iter()
+        .zip(names)
+        .filter(|(image, _)| greatest_colour(image) <= MAX_GREY_SPREAD)
+        .map(|(_, name)| name)
+        .collect();
+    (!grey.is_empty() && grey.len() < images.len()).then(|| {
+        format!(
+            "{} of {} photographs are grey ('{}' is the first) and the others in colour: pictures become partly grey; \
+             exclude them",
+            grey.len(),
+            images.len(),
+            grey[0]
+        )
+    })
 }
 
 /// A warning that names the darkest and the brightest of photographs, if they are far apart; `names` in their order.

@@ -108,7 +108,7 @@ pub(super) fn image_folders(root: &Path) -> Result<Vec<PathBuf>, SceneError> {
 }
 
 /// How many times smaller the photographs in a folder `images` or `images_N` are.
-fn reduction(name: &str) -> Option<u64> {
+pub(super) fn reduction(name: &str) -> Option<u64> {
     match name.strip_prefix("images")? {
         "" => Some(1),
         rest => rest.strip_prefix('_')?.parse().ok(),

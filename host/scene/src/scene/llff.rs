@@ -56,9 +56,10 @@ impl Reader for Llff {
                 return Err(FilePlace::file(file).fault(fault));
             }
         };
-        let images = photographs(file, rows.len())?;
+        let (images, warning) = photographs(file, rows.len())?;
         let views = rows.iter().enumerate().zip(images).map(|((row, numbers), image)| view(file, row, numbers, &image));
         let mut scene = RawScene::from(views.collect::<Result<Vec<_>, _>>()?);
+        scene.warnings.extend(warning);
         match points(file, &scene.views) {
             Ok((points, path)) => (scene.points, scene.points_path) = (points, path),
             Err(reason) => scene.warnings.push(format!("{reason}; the scene is read without its points")),
@@ -87,8 +88,9 @@ fn points(file: &Path, views: &[RawView]) -> Result<(Vec<RawPoint>, PathBuf), St
     Ok((points, points_path))
 }
 
-/// The photographs in the order of their names (by character, as the authors' code sorts them).
-fn photographs(file: &Path, row_count: usize) -> Result<Vec<PathBuf>, SceneError> {
+/// The photographs in the order of their names (by character, as the authors' code sorts them), and a warning where a
+/// folder of larger ones has others.
+fn photographs(file: &Path, row_count: usize) -> Result<(Vec<PathBuf>, Option<String>), SceneError> {
     let root = file.with_file_name("");
     let mut wrong = None;
     for folder in files::image_folders(&root)? {
@@ -96,7 +98,16 @@ fn photographs(file: &Path, row_count: usize) -> Result<Vec<PathBuf>, SceneError
         images.sort();
         match images.len() {
             0 => {}
-            count if count == row_count => return Ok(images),
+            count if count == row_count => {
+                let told = wrong.map(|(larger, found): (PathBuf, usize)| {
+                    format!(
+                        "{}: {found} photographs for the {row_count} rows of poses_bounds.npy: those of {} are taken",
+                        larger.display(),
+                        folder.display()
+                    )
+                });
+                return Ok((images, told));
+            }
             found => _ = wrong.get_or_insert((folder, found)),
         }
     }

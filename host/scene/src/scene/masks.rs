@@ -1,7 +1,8 @@
 //! Masks: images that state which pixels of the photographs count, or where the object is ([`meaning`]).
 //!
 //! A mask is 0 where the photograph does not count and has the greatest value where it does: in NeuS's data objects are
-//! white on black, in COLMAP's and nerfstudio's ignored pixels are black. Some programs write 1 for the greatest value.
+//! white on black, in COLMAP's and nerfstudio's ignored pixels are black. Some programs write 1 or 128 for the greatest value, or a
+//! colour.
 //! Values between are fractions of a pixel of an object; of an ignore mask, pixels count from half of the greatest on.
 //! instant-ngp's `dynamic_mask_NAME.png` beside the photograph is inverted: 0 where it counts. A mask has the
 //! photograph's size, or another of the same shape; of a photograph that carries an orientation (EXIF), it may be a
@@ -17,7 +18,7 @@ use std::path::{Path, PathBuf};
 
 use image::imageops::{FilterType, resize};
 use image::metadata::Orientation;
-use image::{DynamicImage, GrayImage, Luma};
+use image::{DynamicImage, GrayImage, Luma, Rgb};
 
 use super::Photograph;
 use super::View;
@@ -32,6 +33,11 @@ const FOLDERS: [&str; 2] = ["mask", "masks"];
 
 /// What the names of instant-ngp's masks begin with.
 const INVERTED: &str = "dynamic_mask_";
+
+/// Below this level all of a compressed mask is black.
+const MIN_LOSSY: u8 = 32;
+/// Most by which the channels of a grey pixel differ: compression changes them by less.
+const MAX_GREY_SPREAD: u8 = 48;
 
 /// From this share of the greatest level on a pixel counts, of 255.
 const HALF: u8 = 128;
@@ -187,29 +193,46 @@ pub(super) fn read(path: &Path, photograph: &Turn, meaning: MaskMeaning) -> Resu
         true => GrayImage::from_fn(rgba.width(), rgba.height(), |x, y| Luma([rgba.get_pixel(x, y)[3]])),
         false => levels(decoded),
     };
+    let is_lossy = files::has_extension(path, &["jpg", "jpeg"]);
+    if is_lossy && mask.iter().all(|level| *level < MIN_LOSSY) {
+        // A mask of nothing, and what compression made of it.
+        mask.fill(0);
+    }
     let greatest = mask.iter().copied().max().unwrap_or(0);
     let (is_inverted, is_object) = (is_inverted(path), meaning == MaskMeaning::Object);
     for level in mask.iter_mut() {
         let counts = if *level > greatest / 2 { u8::MAX } else { 0 };
-        *level = match (is_inverted, is_object && greatest > 1) {
+        *level = match (is_inverted, is_object) {
             (true, _) => u8::MAX - counts,
-            (false, true) => *level,
+            // The greatest value counts whole, whatever it is.
+            (false, true) => ((u32::from(*level) * 255 + u32::from(greatest) / 2) / u32::from(greatest).max(1)) as u8,
             (false, false) => counts,
         };
     }
     Ok(mask)
 }
 
-/// The levels of a picture. Those of 16 bits are taken as of 8 where they are no more than these hold.
+/// The levels of a picture. Those of 16 bits are as shares of the greatest; of colours (a palette's, a label's) all count
+/// that are not black.
 fn levels(picture: DynamicImage) -> GrayImage {
-    if !matches!(picture, DynamicImage::ImageLuma16(_)) {
+    if let DynamicImage::ImageLuma16(wide) = &picture {
+        let greatest = u32::from(wide.iter().copied().max().unwrap_or(0)).max(u32::from(u8::MAX));
+        let level = |value: u16| ((u32::from(value) * 255 + greatest / 2) / greatest) as u8;
+        return GrayImage::from_fn(wide.width(), wide.height(), |x, y| Luma([level(wide.get_pixel(x, y)[0])]));
+    }
+    let rgb = match picture.color().has_color() {
+        true => picture.to_rgb8(),
+        false => return picture.into_luma8(),
+    };
+    let [least, greatest] = [|a: u8, b: u8| a.min(b), |a: u8, b: u8| a.max(b)];
+    let of = |pixel: &Rgb<u8>, pick: fn(u8, u8) -> u8| pick(pick(pixel[0], pixel[1]), pixel[2]);
+    let is_coloured = rgb.pixels().any(|pixel| of(pixel, greatest) - of(pixel, least) > MAX_GREY_SPREAD);
+    if !is_coloured {
         return picture.into_luma8();
     }
-    let wide = picture.into_luma16();
-    match wide.iter().all(|level| *level <= u16::from(u8::MAX)) {
-        true => GrayImage::from_fn(wide.width(), wide.height(), |x, y| Luma([wide.get_pixel(x, y)[0] as u8])),
-        false => DynamicImage::from(wide).into_luma8(),
-    }
+    GrayImage::from_fn(rgb.width(), rgb.height(), |x, y| {
+        Luma([if of(rgb.get_pixel(x, y), greatest) > MAX_GREY_SPREAD { u8::MAX } else { 0 }])
+    })
 }
 
 /// Whether a mask's file is one of the photograph's pixels in memory as it is stored: neither carries an orientation,

@@ -99,6 +99,10 @@ impl Reader for Neus {
             view.mask = masks.get(&files::trailing_number(&files::stem(image)).unwrap_or(*number)).cloned();
             views.push(view);
         }
+        // Without masks the photographs show more than the sphere, which is the object's.
+        if !has_masks(&root)? {
+            views.iter_mut().for_each(|view| view.near_far = None);
+        }
         Ok(RawScene { views, warnings: missing.warning(file)?.into_iter().collect(), ..RawScene::default() })
     }
 
@@ -122,6 +126,17 @@ pub(crate) fn matrices_of(names: &[&str], worlds: &BTreeSet<u64>) -> Option<Vec<
     };
     let in_order = || (names.len() == worlds.len()).then(|| worlds.iter().copied().collect());
     by_name.filter(fit).or_else(in_order)
+}
+
+/// Whether there are masks, whatever they are called.
+fn has_masks(root: &Path) -> Result<bool, SceneError> {
+    let folders = MASK_FOLDERS.iter().map(|name| root.join(name)).filter(|folder| folder.is_dir());
+    for folder in folders {
+        if !files::list(&folder, |path| files::has_extension(path, &IMAGE_EXTENSIONS))?.is_empty() {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// Masks by the number that their names end in; those with a photograph's name are found by it ([`super::masks`]).

@@ -7,6 +7,9 @@ use viewfuse_evaluate::{PSNR, SSIM, Score};
 /// A score, with what stands before it on its line.
 pub(super) type Line<'a> = (Vec<String>, &'a Score);
 
+/// What a table of scenes begins with.
+pub(super) const CSV_BEGINNING: &str = "scene,scheme,target,sources,";
+
 /// Every score, a line each, behind columns of other names. A metric that a picture lacks is empty.
 pub(super) fn csv_of(first_columns: &[&str], lines: &[Line<'_>]) -> anyhow::Result<Vec<u8>> {
     let mut metrics: Vec<&str> = vec![PSNR, SSIM];

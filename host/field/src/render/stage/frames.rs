@@ -194,7 +194,7 @@ impl Stage<'_> {
     /// # Errors
     /// [`RenderError::Size`].
     pub fn at_working_size(&self, camera: &Camera) -> Result<Camera, RenderError> {
-        let [width, height] = size_at(camera, self.options.size, self.first.as_ref(), self.side);
+        let [width, height] = size_at(camera, self.options.size, self.side);
         let pinhole =
             camera.pinhole.resized(width, height).map_err(|error| RenderError::Size { width, height, error })?;
         Ok(Camera { pinhole, ..*camera })

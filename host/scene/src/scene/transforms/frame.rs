@@ -91,7 +91,7 @@ impl<'a> TransformsFrame<'a> {
             return Ok(Listed::Missing(FilePlace::key(self.path, frame.full("file_path")), given));
         };
         let image = ImageFile::open(&image)?;
-        let intrinsics = Some(self.intrinsics(image.size())?);
+        let intrinsics = Some(self.intrinsics(image.size(), reduced(&given, image.path()))?);
         let mut view = RawView::new(files::stem(image.path()), Some(image), pose, intrinsics);
         view.mask = self.mask()?;
         view.split = split;
@@ -104,7 +104,7 @@ impl<'a> TransformsFrame<'a> {
         let [frame, _] = &self.scopes;
         let pose = self.pose()?;
         let has_focal = ["fl_x", "camera_angle_x", "x_fov"].iter().any(|key| self.get(key).is_some());
-        let intrinsics = if has_focal { Some(RawIntrinsics { lens: None, ..self.intrinsics(size)? }) } else { None };
+        let intrinsics = if has_focal { Some(RawIntrinsics { lens: None, ..self.intrinsics(size, 1)? }) } else { None };
         let intrinsics = intrinsics.map(|raw| RawIntrinsics { size: raw.size.or(Some(size)), ..raw });
         let name = frame.get("file_path").and_then(Value::as_str).map(|path| files::picture_stem(&self.beside(path)));
         Ok(RawView::new(name.unwrap_or_default(), None, pose, intrinsics))
@@ -142,7 +142,8 @@ impl<'a> TransformsFrame<'a> {
         beside(self.path, path)
     }
 
-    fn intrinsics(&self, image_size: [u32; 2]) -> Result<RawIntrinsics, SceneError> {
+    /// Of a photograph of this size, which is `reduction` times smaller than the one that the file speaks of.
+    fn intrinsics(&self, image_size: [u32; 2], reduction: u32) -> Result<RawIntrinsics, SceneError> {
         let place = FilePlace::key(self.path, &self.key);
         let stated = match (self.number("w")?, self.number("h")?) {
             (None, None) => None,
@@ -150,6 +151,7 @@ impl<'a> TransformsFrame<'a> {
             (Some(_), None) => return Err(self.missing("h")),
             (None, Some(_)) => return Err(self.missing("w")),
         };
+        let stated = stated.or((reduction > 1).then(|| image_size.map(|side| side.saturating_mul(reduction))));
         let size = stated.unwrap_or(image_size);
         let focal_x = self.focal("x", size[0])?.ok_or_else(|| self.missing("fl_x (or camera_angle_x)"))?;
         let focal_y = self.focal("y", size[1])?.unwrap_or(focal_x);
@@ -249,6 +251,16 @@ fn photograph(given: &Path) -> Option<PathBuf> {
     let with_extension = |extension: &&str| files::appended(given, extension);
     let mut candidates = std::iter::once(given.to_path_buf()).chain(IMAGE_EXTENSIONS.iter().map(with_extension));
     candidates.find(|candidate| candidate.is_file())
+}
+
+/// How many times smaller a photograph is than the one that was given, as the name of its folder says.
+fn reduced(given: &Path, image: &Path) -> u32 {
+    let folder =
+        |path: &Path| path.ancestors().find_map(|folder| files::reduction(&folder.file_name()?.to_string_lossy()));
+    match (folder(given), folder(image)) {
+        (Some(1), Some(reduction)) => u32::try_from(reduction).unwrap_or(1).max(1),
+        _ => 1,
+    }
 }
 
 /// The downscaled photograph for a missing one in `images`: from `images_2`, `images_4` and so on.

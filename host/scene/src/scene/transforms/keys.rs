@@ -60,7 +60,9 @@ impl<'a> Keys<'a> {
         self.frame_count += 1;
         let differs = |(key, value): &(&str, &Value)| {
             let is_camera = is_in(INTRINSICS, key) || is_in(LENS_KEYS, key);
-            is_camera && self.top.get(key).is_some_and(|top| top != *value && top.as_f64() != value.as_f64())
+            // `1` and `1.0` are one number.
+            let same = |top: &Value| top == *value || top.as_f64().is_some_and(|top| value.as_f64() == Some(top));
+            is_camera && self.top.get(key).is_some_and(|top| !same(top))
         };
         let overridden: Vec<&str> = frame.entries().filter(differs).map(|(key, _)| key).collect();
         self.overriding_count += usize::from(!overridden.is_empty());
