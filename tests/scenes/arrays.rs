@@ -1,11 +1,13 @@
 //! Layouts with NumPy's arrays: LLFF and NeuS, and the arrays' own forms; what is written of nothing.
 
 use super::made::*;
+use image::{GrayImage, Luma};
 use viewfuse::job::progress::Silent;
 use viewfuse::output::depth::{DepthFormat, write_depth};
 use viewfuse::output::rate::FrameRate;
 use viewfuse::output::video::{VideoError, VideoFormat, VideoWriter};
 use viewfuse::scene::Scene;
+use viewfuse::scene::photographs::{Album, BackgroundChoice};
 use viewfuse_core::Vec3;
 use viewfuse_tests::scenes::Folder;
 
@@ -152,11 +154,22 @@ fn neus_by_position_and_without_a_sphere() {
 /// The sphere is the object's: photographs without masks show more.
 #[test]
 fn a_sphere_bounds_masked_photographs_alone() {
+    let near_far = |folder: &Folder| {
+        let (scene, views) = (open(folder), [0, 1]);
+        let album = Album::open(&scene, views, &Silent).expect("photographs");
+        album.sources(&views, 16, BackgroundChoice::Auto, &Silent).expect("sources").near_far
+    };
     let folder = neus();
-    assert!(open(&folder).views.iter().all(|view| view.near_far.is_some()), "with masks");
-    std::fs::rename(folder.join("mask"), folder.join("elsewhere")).expect("a folder");
-    let scene = open(&folder);
-    assert!(scene.views.iter().all(|view| view.mask.is_none() && view.near_far.is_none()), "{:?}", scene.views[0]);
+    let whole = GrayImage::from_pixel(16, 12, Luma([255]));
+    for name in ["mask/03.png", "mask/05.png"] {
+        let mut mask = whole.clone();
+        mask.put_pixel(0, 0, Luma([0]));
+        mask.save(folder.file(name)).expect("a mask");
+    }
+    assert!(near_far(&folder).is_some(), "the object is cut out");
+    folder.remove("mask/03.png").remove("mask/05.png");
+    assert_eq!(near_far(&folder), None);
+    assert!(open(&folder).views[0].near_far.is_some(), "they are of the layout all the same");
 }
 
 #[test]

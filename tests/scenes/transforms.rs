@@ -167,7 +167,8 @@ fn masks_are_named_or_stand_beside() {
     }
     assert!(scene.views[3].image.is_none());
     mask("masks/3.jpg", 255, 16, 13);
-    let error = open(&folder).photograph(2).expect_err("another shape").to_string();
+    let scene = Scene::open_masked(&folder, MaskChoice::Object).expect("a scene");
+    let error = scene.photograph(2).expect_err("another shape").to_string();
     assert!(error.contains("masks/3.jpg: the image is 16 x 13, but the photograph that it is for"), "{error}");
 }
 

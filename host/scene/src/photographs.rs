@@ -10,6 +10,7 @@ mod resample;
 pub use ground_truth::{GroundTruth, read_over};
 pub use matte::BackgroundChoice;
 
+use crate::scene::neus;
 use crate::{MaskChoice, MaskMeaning, Photograph, Scene, SceneError, View};
 use image::RgbImage;
 use rayon::prelude::*;
@@ -385,6 +386,9 @@ impl<'a> Album<'a> {
         warnings.extend(exposure::warning(&images, views.iter().map(|&view| name(view))));
         warnings.extend(exposure::grey_warning(&images, views.iter().map(|&view| name(view))));
         let (points, near_far) = self.space(views);
+        // A sphere is the object's: photographs that are not cut out show more.
+        let is_of_object = self.scene.layout == neus::NAME;
+        let near_far = near_far.filter(|_| has_silhouettes || !is_of_object);
         Ok(SourceImages { images, background, has_silhouettes, points, near_far, warnings })
     }
 

@@ -35,12 +35,15 @@ const SCALE: &str = "scale_mat_";
 /// Largest skew that rounding of 32-bit matrices may cause, in pixels.
 const MAX_SKEW: f64 = 0.05;
 
+/// The layout's name.
+pub(crate) const NAME: &str = "neus";
+
 /// NeuS and IDR: `cameras*.npz`, `image/`, `mask/`.
 pub(super) struct Neus;
 
 impl Reader for Neus {
     fn name(&self) -> &'static str {
-        "neus"
+        NAME
     }
 
     fn form(&self) -> &'static str {
@@ -99,10 +102,6 @@ impl Reader for Neus {
             view.mask = masks.get(&files::trailing_number(&files::stem(image)).unwrap_or(*number)).cloned();
             views.push(view);
         }
-        // Without masks the photographs show more than the sphere, which is the object's.
-        if !has_masks(&root)? {
-            views.iter_mut().for_each(|view| view.near_far = None);
-        }
         Ok(RawScene { views, warnings: missing.warning(file)?.into_iter().collect(), ..RawScene::default() })
     }
 
@@ -126,17 +125,6 @@ pub(crate) fn matrices_of(names: &[&str], worlds: &BTreeSet<u64>) -> Option<Vec<
     };
     let in_order = || (names.len() == worlds.len()).then(|| worlds.iter().copied().collect());
     by_name.filter(fit).or_else(in_order)
-}
-
-/// Whether there are masks, whatever they are called.
-fn has_masks(root: &Path) -> Result<bool, SceneError> {
-    let folders = MASK_FOLDERS.iter().map(|name| root.join(name)).filter(|folder| folder.is_dir());
-    for folder in folders {
-        if !files::list(&folder, |path| files::has_extension(path, &IMAGE_EXTENSIONS))?.is_empty() {
-            return Ok(true);
-        }
-    }
-    Ok(false)
 }
 
 /// Masks by the number that their names end in; those with a photograph's name are found by it ([`super::masks`]).
