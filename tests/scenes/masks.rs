@@ -156,7 +156,7 @@ fn an_object_is_whole_at_any_level() {
     // Of a view that does not show it a compressed mask is nearly black.
     let folder = sample("room");
     for view in 0..COUNT {
-        let level = |x: u32, y: u32| if (x + y) % 5 == 0 { 3 } else { 0 };
+        let level = |x: u32, y: u32| if (x + y).is_multiple_of(5) { 3 } else { 0 };
         let black = GrayImage::from_fn(320, 240, |x, y| Luma([level(x, y)]));
         let shown = if view == 5 { black } else { mask(|x, y| object(view, x, y, 40.0)) };
         shown.save(folder.file(&format!("room/masks/{view:03}.jpg"))).expect("a mask");

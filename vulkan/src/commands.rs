@@ -138,7 +138,7 @@ impl Commands {
 /// What the commands of a submission do, for an error.
 pub(crate) fn work(parts: &[Commands]) -> String {
     let all = || parts.iter().flat_map(|part| &part.dispatched).map(|(kernel, _)| kernel);
-    match (all().next(), all().last()) {
+    match (all().next(), all().next_back()) {
         (Some(first), Some(last)) if all().any(|kernel| kernel != first) => {
             format!("{} kernels, from {} to {},", all().count(), first.name(), last.name())
         }

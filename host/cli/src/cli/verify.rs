@@ -51,7 +51,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     drop(terminal);
     // The others were compared all the same.
     if let Some(last) = unread.pop() {
-        unread.into_iter().for_each(|error| complain(error));
+        unread.into_iter().for_each(complain);
         return Err(last.into());
     }
     Ok(if all_pass { ExitCode::SUCCESS } else { ExitCode::from(1) })
