@@ -98,12 +98,12 @@ fn names_control_the_terminal_in_no_command() {
     }
     fs::rename(toy, folder.join(scene)).expect("a folder of that name");
     let path = format!("name,x,y,z,look_x,look_y,look_z\na{name},0.1,0.2,1.3,0,0,0\nb{name},0.2,0.1,1.3,0,0,0\n");
-    folder.write(&format!("{name}.csv"), path);
+    folder.write(&format!("{name}-path.csv"), path);
     let (mut shown, mut failed) = (0, Vec::new());
     for arguments in NAMING {
         let mut command = command(&folder, "");
         let words = arguments.split_whitespace().map(|word| match word {
-            "PATH" => format!("{name}.csv"),
+            "PATH" => format!("{name}-path.csv"),
             _ => word.replace("SCENE", scene).replace("NAME", name).replace("VIEW", name),
         });
         let outcome = command.args(words).env("VIEWFUSE_PROGRESS", "0").output().expect("it starts");

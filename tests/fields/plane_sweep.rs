@@ -3,11 +3,12 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use viewfuse::device::cpu::Cpu;
-use viewfuse::field::render::{RenderOptions, Stage, render_all};
+use viewfuse::field::render::{RenderError, RenderOptions, RenderRun, Stage, render, render_all};
 use viewfuse::field::training_free::{Cache, Sweep, TrainingFree};
 use viewfuse::field::{DepthMap, On, Rendered};
 use viewfuse::job::digest::{SEAL, sealed, sha256};
 use viewfuse::job::progress::{Progress, Silent};
+use viewfuse::scene::few_shot::{FewShot, Target};
 use viewfuse::scene::photographs::{SourceImage, SourceImages};
 use viewfuse::weighting::Weighting;
 use viewfuse::weighting::sources::SourceWeights;
@@ -386,4 +387,29 @@ fn second_disparities_are_the_same_bits_whether_the_first_comparison_is_kept_or_
         [(); 2].map(|()| stage.picture(&target, &weights, 0.0, &Silent).expect("a picture"))
     });
     assert_eq!(twice, [expected.clone(), expected]);
+}
+
+/// A target of another shape than the size keeps its own, and that is said.
+#[test]
+fn pictures_of_another_size_are_told() {
+    let scene = sample("room");
+    let wide = scene.views[5].camera;
+    let [focal, pinhole] = [wide.pinhole.focal(), wide.pinhole.principal()];
+    let high =
+        Pinhole::new(focal, [pinhole[1], pinhole[0]], wide.pinhole.height(), wide.pinhole.width()).expect("a pinhole");
+    let target = |name: &str, camera| Target { name: name.to_owned(), camera, truth: None };
+    let targets = vec![target("wide", wide), target("high", Camera { pinhole: high, ..wide })];
+    let job = FewShot { sources: vec![4, 6], targets, ..FewShot::default() };
+    let (renderer, progress) = (On { device: &Cpu, field: &TrainingFree::default() }, Listener::default());
+    let options = RenderOptions { size: Some([32, 24]), ..RenderOptions::default() };
+    let run = RenderRun { scene: &scene, job: &job, renderer: &renderer, options: &options, progress: &progress };
+    let mut sizes = Vec::new();
+    render(&run, &Weighting::default_scheme(), |_, frame| {
+        sizes.push(frame.picture.dimensions());
+        Ok::<(), RenderError>(())
+    })
+    .expect("two pictures");
+    assert_eq!(sizes, [(32, 24), (24, 32)]);
+    let told = "1 of 2 targets have another shape than 32x24, and keep it: 'high' 24x32";
+    assert!(progress.warnings().contains(&told.to_owned()), "{:?}", progress.warnings());
 }

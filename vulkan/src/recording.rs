@@ -9,8 +9,8 @@ use crate::gpu::{Gpu, Tally};
 use crate::kernel::Kernel;
 use std::sync::Arc;
 
-/// Dispatches that [`Gpu::recorded`] has recorded. They hold their arrays, and the memory of these is given back when
-/// it is dropped and nothing of it is in flight.
+/// Dispatches that [`Gpu::recorded`] has recorded. They hold their arrays, whose memory is given back by what the device
+/// does after it was dropped ([`Gpu::release`]).
 pub struct Recording {
     mark: Arc<()>,
     device: String,
@@ -30,19 +30,16 @@ impl Gpu {
         &self,
         work: impl FnOnce() -> Result<T, E>,
     ) -> Result<(T, Option<Recording>), E> {
-        let before = self.with_state(|gpu, state| {
-            let begins = state.submissions.begin_recording()?;
-            if begins {
-                gpu.record_barrier(state)?;
-            }
-            Ok(begins.then_some(state.tallies))
-        })?;
-        let Some(before) = before else { return Ok((work()?, None)) };
-        let end = End(self);
+        let begun = self.with_state(|_, state| Ok(state.submissions.begin_recording()?.zip(Some(state.tallies))))?;
+        let Some((mark, before)) = begun else { return Ok((work()?, None)) };
+        let _end = End(self, &mark);
+        self.with_state(|gpu, state| gpu.record_barrier(state))?;
         let value = work()?;
         let recording = self.with_state(|gpu, state| {
             gpu.record_barrier(state)?;
-            let Some(mark) = state.submissions.end_recording()? else { return Ok(None) };
+            if !state.submissions.end_recording(&mark)? {
+                return Ok(None);
+            }
             let counts =
                 Kernel::ALL.into_iter().zip(state.tallies.iter().zip(&before)).map(|(kernel, (now, before))| {
                     let (dispatches, elements) = (now.dispatches - before.dispatches, now.elements - before.elements);
@@ -50,10 +47,14 @@ impl Gpu {
                 });
             let counts: Vec<_> = counts.filter(|(_, counted)| counted.dispatches > 0).collect();
             let is_work = !counts.is_empty();
-            Ok(is_work.then(|| Recording { mark, device: gpu.handle.name.clone(), counts }))
-        });
-        drop(end);
-        Ok((value, recording?))
+            Ok(is_work.then(|| Recording { mark: mark.clone(), device: gpu.handle.name.clone(), counts }))
+        })?;
+        Ok((value, recording))
+    }
+
+    /// Gives back what recordings that were dropped have held, unless it is in flight. New commands do that, too.
+    pub fn release(&self) {
+        self.lock().submissions.release();
     }
 
     /// Submits the dispatches of a recording again, behind all earlier work: they read what their arrays contain by
@@ -78,10 +79,10 @@ impl Gpu {
 }
 
 /// Ends a recording also where the work fails or panics.
-struct End<'a>(&'a Gpu);
+struct End<'a>(&'a Gpu, &'a Arc<()>);
 
 impl Drop for End<'_> {
     fn drop(&mut self) {
-        self.0.lock().submissions.drop_recording();
+        self.0.lock().submissions.drop_recording(self.1);
     }
 }

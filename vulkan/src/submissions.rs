@@ -26,9 +26,11 @@ type InFlight = Vec<Commands>;
 
 /// What is being recorded to be submitted again.
 struct Recorder {
-    /// As long as it holds nothing but dispatches of this thread.
-    mark: Option<Arc<()>>,
+    /// What it is known by.
+    mark: Arc<()>,
     thread: ThreadId,
+    /// Whether it holds nothing but dispatches of this thread.
+    is_whole: bool,
 }
 
 /// The queue's submissions, in order.
@@ -126,8 +128,8 @@ impl Submissions {
                     // SAFETY: the commands are being recorded; the pool has so many queries.
                     unsafe { device.cmd_reset_query_pool(commands.raw, commands.queries, 0, Commands::QUERIES) };
                 }
-                let mark = self.recorder.as_ref().and_then(|recorder| recorder.mark.as_ref());
-                commands.part_of = mark.map(Arc::downgrade);
+                let whole = self.recorder.as_ref().filter(|recorder| recorder.is_whole);
+                commands.part_of = whole.map(|recorder| Arc::downgrade(&recorder.mark));
                 Ok(commands)
             }
             Err(result) => {
@@ -140,7 +142,9 @@ impl Submissions {
     /// Takes back the open commands, and submits them if they are full. What was recorded before a failure stays
     /// recorded: a command that failed was not.
     pub(crate) fn go_on(&mut self, commands: Commands) -> Result<(), VulkanError> {
-        let is_full = commands.is_full();
+        // Where there is no time limit, there is no display either.
+        let queued = self.queued_time().filter(|_| self.time_limit.is_some());
+        let is_full = commands.is_full() || queued.is_some_and(|queued| queued + commands.expected >= MAX_TIME);
         self.open = Some(commands);
         if is_full { self.flush() } else { Ok(()) }
     }
@@ -174,7 +178,7 @@ impl Submissions {
     }
 
     /// Takes back parts of recordings that nobody has any more.
-    fn release(&mut self) {
+    pub(crate) fn release(&mut self) {
         let (kept, gone): (Vec<_>, Vec<_>) = std::mem::take(&mut self.kept).into_iter().partition(Commands::is_kept);
         self.kept = kept;
         gone.into_iter().for_each(|commands| self.discard(commands));
@@ -198,10 +202,15 @@ impl Submissions {
         submitted.map_err(|result| self.handle.failure("vkQueueSubmit", result))
     }
 
-    /// Begins to keep what is recorded from now on. Returns `false` if that is already done.
-    pub(crate) fn begin_recording(&mut self) -> Result<bool, VulkanError> {
+    /// The time that what is queued is expected to take, if there is anything.
+    fn queued_time(&self) -> Option<Duration> {
+        (!self.queued.is_empty()).then(|| self.queued.iter().map(|part| part.expected).sum())
+    }
+
+    /// Begins to keep what is recorded from now on: what the recording is known by. `None` if that is already done.
+    pub(crate) fn begin_recording(&mut self) -> Result<Option<Arc<()>>, VulkanError> {
         if self.recorder.is_some() {
-            return Ok(false);
+            return Ok(None);
         }
         self.flush()?;
         // Commands that were begun to be submitted once.
@@ -211,8 +220,9 @@ impl Submissions {
             self.queue_open()?;
             self.queued.pop().into_iter().for_each(|open| self.discard(open));
         }
-        self.recorder = Some(Recorder { mark: Some(Arc::new(())), thread: thread::current().id() });
-        Ok(true)
+        let mark = Arc::new(());
+        self.recorder = Some(Recorder { mark: mark.clone(), thread: thread::current().id(), is_whole: true });
+        Ok(Some(mark))
     }
 
     /// Notes that commands are recorded: dispatches, or others, which cannot be submitted again.
@@ -220,20 +230,21 @@ impl Submissions {
         if let Some(recorder) = &mut self.recorder
             && !(are_dispatches && recorder.thread == thread::current().id())
         {
-            recorder.mark = None;
+            recorder.is_whole = false;
         }
     }
 
-    /// Submits what is recorded, and ends the recording: what it is known by, if it can be submitted again.
-    pub(crate) fn end_recording(&mut self) -> Result<Option<Arc<()>>, VulkanError> {
+    /// Submits what is recorded, and ends a recording: whether it can be submitted again.
+    pub(crate) fn end_recording(&mut self, mark: &Arc<()>) -> Result<bool, VulkanError> {
         let ended = self.flush();
-        let mark = self.recorder.take().and_then(|recorder| recorder.mark);
-        ended.map(|()| mark.filter(|mark| self.has_pending(mark) || self.kept.iter().any(|part| part.is_of(mark))))
+        let is_whole = self.drop_recording(mark);
+        ended.map(|()| is_whole && (self.has_pending(mark) || self.kept.iter().any(|part| part.is_of(mark))))
     }
 
-    /// Ends a recording, if there is one, that nobody will ask for.
-    pub(crate) fn drop_recording(&mut self) {
-        self.recorder = None;
+    /// Ends a recording, if it is under way. Returns whether it holds nothing but dispatches.
+    pub(crate) fn drop_recording(&mut self, mark: &Arc<()>) -> bool {
+        let ended = self.recorder.take_if(|recorder| Arc::ptr_eq(&recorder.mark, mark));
+        ended.is_some_and(|recorder| recorder.is_whole)
     }
 
     /// Whether a part of a recording is queued or in flight.
@@ -251,14 +262,14 @@ impl Submissions {
         let (parts, others): (Vec<_>, Vec<_>) =
             std::mem::take(&mut self.kept).into_iter().partition(|part| part.is_of(mark));
         self.kept = others;
-        let is_there = !parts.is_empty();
-        for part in parts {
-            let queued: Duration = self.queued.iter().map(|part| part.expected).sum();
-            // Where there is no time limit, there is no display either.
-            let is_long = self.time_limit.is_some() && queued + part.expected > MAX_TIME;
-            if is_long && !self.queued.is_empty() {
-                self.wait_for_room(done)?;
-                self.submit_queued()?;
+        let (is_there, mut parts) = (!parts.is_empty(), VecDeque::from(parts));
+        while let Some(part) = parts.pop_front() {
+            let queued = self.queued_time().filter(|_| self.time_limit.is_some());
+            if queued.is_some_and(|queued| queued + part.expected > MAX_TIME)
+                && let Err(error) = self.wait_for_room(done).and_then(|()| self.submit_queued())
+            {
+                self.kept.extend([part].into_iter().chain(parts));
+                return Err(error);
             }
             self.queued.push(part);
         }
@@ -291,37 +302,44 @@ impl Submissions {
         Ok(())
     }
 
-    /// Waits for the oldest submission, at most for the time limit of each of its parts: earlier ones are done, so all
-    /// of that time is its own.
+    /// Waits for the oldest submission, at most for the time limit: earlier ones are done, so all of that time is its
+    /// own.
     fn wait_for_oldest(&mut self, done: &mut dyn FnMut(Done)) -> Result<(), VulkanError> {
         let Some(oldest) = self.running.front() else { return Ok(()) };
         let Some(fence) = oldest.last().map(|last| last.fence) else { return Ok(()) };
-        let limit = self.time_limit.map(|limit| limit.saturating_mul(oldest.len() as u32));
         let nanoseconds = |limit: Duration| u64::try_from(limit.as_nanos()).unwrap_or(u64::MAX);
         let Handle { device, .. } = &*self.handle;
         // SAFETY: the fence belongs to a submission that is in flight.
-        let waited = unsafe { device.wait_for_fences(&[fence], true, limit.map_or(u64::MAX, nanoseconds)) };
+        let waited = unsafe { device.wait_for_fences(&[fence], true, self.time_limit.map_or(u64::MAX, nanoseconds)) };
         self.is_late |= waited == Err(vk::Result::TIMEOUT);
         waited.map_err(|result| match result {
             vk::Result::TIMEOUT => VulkanError::TimeLimit {
                 device: self.handle.name.clone(),
                 work: work(oldest),
-                limit: limit.unwrap_or_default(),
+                limit: self.time_limit.unwrap_or_default(),
             },
             result => self.handle.failure("vkWaitForFences", result),
         })?;
+        let mut took = Vec::with_capacity(oldest.len());
         for part in oldest {
             let ticks = self.ticks(part)?;
+            let mut all = Some(Duration::ZERO);
             for (index, (kernel, elements)) in part.dispatched.iter().enumerate() {
                 let time = ticks.get(2 * index..2 * index + 2).map(|ticks| self.time_between(ticks[0], ticks[1]));
                 done(Done { kernel: *kernel, elements: *elements, time });
+                all = all.zip(time).map(|(all, time)| all + time);
             }
+            took.push(all);
         }
         // SAFETY: the submission is done.
         unsafe { device.reset_fences(&[fence]) }.map_err(|result| self.handle.failure("vkResetFences", result))?;
-        for part in self.running.pop_front().into_iter().flatten() {
+        for (mut part, took) in self.running.pop_front().into_iter().flatten().zip(took) {
             match part.is_kept() {
-                true => self.kept.push(part),
+                true => {
+                    // What it took is a better guess of the next time.
+                    part.expected = took.unwrap_or(part.expected);
+                    self.kept.push(part);
+                }
                 false => self.discard(part),
             }
         }

@@ -140,7 +140,15 @@ impl Gpu {
             return Ok(None);
         }
         let bytes = ((len * stride) as u64).next_multiple_of(4).max(4);
-        let chunks = vec![self.handle.memory(bytes, MemoryLocation::GpuToCpu)?];
+        let chunk = match self.handle.memory(bytes, MemoryLocation::GpuToCpu) {
+            // As in `array_of`.
+            Err(VulkanError::OutOfMemory { .. }) => {
+                self.wait()?;
+                self.handle.memory(bytes, MemoryLocation::GpuToCpu)?
+            }
+            chunk => chunk?,
+        };
+        let chunks = vec![chunk];
         let (read_in, written_in) = (Stretch::default(), Stretch::default());
         let to = Arc::new(Array { chunks, chunk_len: len.max(1), len, stride, read_in, written_in });
         let mut submission = 0;

@@ -12,7 +12,7 @@ use std::time::Duration;
 use viewfuse_job::files::{FolderLock, read_at_most, write_whole};
 use viewfuse_kernels::rows::*;
 use viewfuse_kernels::{elements, for_each_kernel};
-use viewfuse_vulkan::{Adapter, AdapterKind, Buffer, Gpu, GpuOptions, Instance, Tally, VulkanError};
+use viewfuse_vulkan::{Adapter, AdapterKind, Buffer, Gpu, GpuOptions, Instance, Recording, Tally, VulkanError};
 
 /// A Vulkan device. Calls return when their work is recorded; it is submitted when a download waits for it, or when
 /// there is enough of it.
@@ -105,6 +105,26 @@ impl Vulkan {
     }
 }
 
+/// A recording, whose memory is given back with it.
+struct KeptRecording<'a> {
+    gpu: &'a Gpu,
+    /// Until it is dropped.
+    recording: Option<Recording>,
+}
+
+impl KeptRecording<'_> {
+    fn again(&self) -> Result<(), DeviceError> {
+        Ok(self.recording.as_ref().map_or(Ok(()), |recording| self.gpu.submit_again(recording))?)
+    }
+}
+
+impl Drop for KeptRecording<'_> {
+    fn drop(&mut self) {
+        self.recording = None;
+        self.gpu.release();
+    }
+}
+
 impl Drop for Vulkan {
     fn drop(&mut self) {
         let Some(file) = self.memory.as_ref().filter(|_| self.gpu.has_new_memories()) else { return };
@@ -192,7 +212,8 @@ impl Memory for Vulkan {
         work: impl FnOnce() -> Result<T, DeviceError>,
     ) -> Result<(T, Option<Recorded<'_>>), DeviceError> {
         let (value, recording) = self.gpu.recorded(work)?;
-        Ok((value, recording.map(|recording| Recorded::new(move || Ok(self.gpu.submit_again(&recording)?)))))
+        let kept = recording.map(|recording| KeptRecording { gpu: &self.gpu, recording: Some(recording) });
+        Ok((value, kept.map(|kept| Recorded::new(move || kept.again()))))
     }
 }
 

@@ -1,8 +1,7 @@
 //! Schemes on held-out views, with the defaults of the command.
 
 use crate::error::Failure;
-use crate::given_weights::{GivenWeights, Raised};
-use crate::progress::UntilRaised;
+use crate::given_weights::{GivenWeights, Raised, UntilRaised};
 use crate::request::{Pictures, device};
 use pyo3::prelude::*;
 use std::time::Duration;

@@ -4,9 +4,11 @@ use crate::error::Failure;
 use crate::request::Request;
 use numpy::{AllowTypeChange, PyArray2, PyArray3, PyArrayLikeDyn};
 use pyo3::prelude::*;
+use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 use viewfuse::core::camera::Camera;
 use viewfuse::core::pose::Pose;
+use viewfuse::job::progress::Progress;
 use viewfuse::scene::few_shot::FewShot;
 use viewfuse::scene::unit::RigUnit;
 use viewfuse::scene::{Scene, SceneFrame};
@@ -30,6 +32,42 @@ pub(crate) type Raised = Arc<Mutex<Option<PyErr>>>;
 /// Takes what was raised.
 pub(crate) fn raised(raised: &Raised) -> PyResult<()> {
     raised.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
+}
+
+/// The progress of work that ends when a function has raised something.
+pub(crate) struct UntilRaised<'a> {
+    pub(crate) progress: &'a dyn Progress,
+    pub(crate) raised: &'a Raised,
+}
+
+impl Progress for UntilRaised<'_> {
+    fn stage(&self, name: &str, place: Range<usize>, of: usize) {
+        self.progress.stage(name, place, of);
+    }
+
+    fn expect(&self, pieces: usize) {
+        self.progress.expect(pieces);
+    }
+
+    fn step(&self) {
+        self.progress.step();
+    }
+
+    fn status(&self, words: &str) {
+        self.progress.status(words);
+    }
+
+    fn warn(&self, warning: &str) {
+        self.progress.warn(warning);
+    }
+
+    fn note(&self, news: &str) {
+        self.progress.note(news);
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.progress.is_cancelled() || self.raised.lock().unwrap_or_else(PoisonError::into_inner).is_some()
+    }
 }
 
 impl GivenWeights {

@@ -4,46 +4,6 @@ use pyo3::exceptions::{PyImportError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict};
 use std::ops::Range;
-use std::sync::PoisonError;
-use viewfuse::job::progress::Progress;
-
-use crate::given_weights::Raised;
-
-/// The progress of work that ends when a function has raised something.
-pub(crate) struct UntilRaised<'a> {
-    pub(crate) progress: &'a dyn Progress,
-    pub(crate) raised: &'a Raised,
-}
-
-impl Progress for UntilRaised<'_> {
-    fn stage(&self, name: &str, place: Range<usize>, of: usize) {
-        self.progress.stage(name, place, of);
-    }
-
-    fn expect(&self, pieces: usize) {
-        self.progress.expect(pieces);
-    }
-
-    fn step(&self) {
-        self.progress.step();
-    }
-
-    fn status(&self, words: &str) {
-        self.progress.status(words);
-    }
-
-    fn warn(&self, warning: &str) {
-        self.progress.warn(warning);
-    }
-
-    fn note(&self, news: &str) {
-        self.progress.note(news);
-    }
-
-    fn is_cancelled(&self) -> bool {
-        self.progress.is_cancelled() || self.raised.lock().unwrap_or_else(PoisonError::into_inner).is_some()
-    }
-}
 
 /// How far the work is. The share never falls.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -2,8 +2,7 @@
 
 use crate::error::Failure;
 use crate::frame::Finished;
-use crate::given_weights::{GivenWeights, Raised};
-use crate::progress::UntilRaised;
+use crate::given_weights::{GivenWeights, Raised, UntilRaised};
 use crate::request::{Pictures, Request, device};
 use viewfuse::field::auto::{self, Chosen};
 use viewfuse::field::render::{Frame, RenderRun};
