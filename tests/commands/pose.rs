@@ -293,6 +293,12 @@ fn too_many_and_too_few() {
     assert_refused(&folder, "pose nowhere -o posed", &["nowhere: no such file or folder"]);
     folder.write("empty/notes.txt", "nothing");
     assert_refused(&folder, "pose empty -o posed", &["empty: no photographs here"]);
+    folder.write("empty/scan.BMP", "BM");
+    assert_refused(
+        &folder,
+        "pose empty -o posed",
+        &["empty: no photographs here", "; convert scan.BMP and the like to JPEG"],
+    );
     for number in 0..300 {
         folder.write(&format!("many/{number}.jpg"), room(0));
     }

@@ -275,13 +275,15 @@ fn what_is_not_read_is_said() {
         transforms["white_transparent"] = json!(true);
         transforms["frames"][0]["rolling_shutter"] = json!([0, 0, 0.5, 0]);
         (0..3).for_each(|index| transforms["frames"][index]["time"] = json!(0.5 * index as f64));
+        transforms["camera_model"] = json!("OPENCV");
+        transforms["frames"][2]["camera_model"] = json!("PINHOLE");
         transforms["frames"][2]["k1"] = json!(0.25);
         transforms["frames"][2]["fl_x"] = json!(20);
     }));
     let [telling, moving] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
     let [overriding] = &scene.conventions[..] else { panic!("{:?}", scene.conventions) };
     assert!(
-        overriding.contains("1 of 3 frames state k1 otherwise than the top of the file: each frame's"),
+        overriding.contains("1 of 3 frames state camera_model, k1 otherwise than the top of the file: each frame's"),
         "{overriding}"
     );
     assert!(telling.contains("rolling_shutter, white_transparent change pictures and are not read"), "{telling}");
