@@ -224,7 +224,7 @@ class Frame:
         """The weights that the sources were used with: [source]; they sum to 1. `weights` of run.json."""
     @property
     def weights_before(self) -> NDArray[np.float32]:
-        """Those of the scheme, before sources were left out (`leave_out`): [source]. `weights_before` of run.json."""
+        """Those of the scheme, before sources were dropped (`leave_out`): [source]. `weights_before` of run.json."""
     @property
     def pose(self) -> NDArray[np.float64]:
         """Camera-to-world matrix, as those of the scene: [4][4]."""

@@ -449,6 +449,7 @@ fn photographs_of_which_nothing_counts_are_told() {
         warnings.iter().any(|warning| warning.contains("of the photograph '003', and of 1 more nothing counts")),
         "{warnings:?}"
     );
+    assert!(warnings.iter().all(|warning| !warning.contains("grey")), "what shows nothing is not grey: {warnings:?}");
     let error = sources(&[3, 7]).expect_err("nothing").to_string();
     assert!(error.contains("of the photographs nothing counts ('003' is the first)"), "{error}");
 }

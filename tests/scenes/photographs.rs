@@ -53,8 +53,8 @@ fn a_size_of_any_shape_in_the_scene() {
     let scene = Scene::open(&folder).expect("a scene");
     let sizes = |size| {
         let options = RenderOptions { size: Some(size), ..RenderOptions::default() };
-        let of = |view: usize| picture_size(&scene, &options, LONGEST_DEFAULT_SIDE, &scene.views[view].camera);
-        Ok::<_, RenderError>([of(0)?, of(1)?])
+        let at = |view: usize| picture_size(&scene, &options, LONGEST_DEFAULT_SIDE, &scene.views[view].camera);
+        Ok::<_, RenderError>([at(0)?, at(1)?])
     };
     for size in [[8, 6], [6, 8]] {
         assert_eq!(sizes(size).expect("a size"), [[8, 6], [6, 8]], "{size:?}");

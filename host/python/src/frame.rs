@@ -33,7 +33,7 @@ pub(crate) struct PyFrame {
     sources: Vec<String>,
     /// The weights that the sources were used with: float32 [source]; they sum to 1.
     weights: Py<PyArray1<f32>>,
-    /// Those of the scheme, before sources were left out: float32 [source].
+    /// Those of the scheme, before sources were dropped: float32 [source].
     weights_before: Py<PyArray1<f32>>,
     /// Camera-to-world matrix, as those of the scene: float64 [4][4].
     pose: Py<PyArray2<f64>>,

@@ -89,10 +89,10 @@ mod tests {
     #[test]
     fn a_photograph_may_state_the_shape_that_it_had() {
         let stated = Some([4032.0, 3024.0]);
-        let of = |size| warning(&[photo("a", size, stated)]);
-        assert_eq!(of([1008, 756]), None, "smaller");
-        assert_eq!(of([756, 1008]), None, "turned");
-        assert!(of([1008, 567]).is_some(), "16:9 of 4:3");
+        let told = |size| warning(&[photo("a", size, stated)]);
+        assert_eq!(told([1008, 756]), None, "smaller");
+        assert_eq!(told([756, 1008]), None, "turned");
+        assert!(told([1008, 567]).is_some(), "16:9 of 4:3");
         assert_eq!(warning(&[photo("a", [1000, 930], Some([1000.0, 930.0]))]), None, "what it states counts");
     }
 }

@@ -48,7 +48,7 @@ pub(super) fn grey_warning<'a>(images: &[SourceImage], names: impl Iterator<Item
     let grey: Vec<&str> = images
         .iter()
         .zip(names)
-        .filter(|(image, _)| greatest_colour(image) <= MAX_GREY_SPREAD)
+        .filter(|(image, _)| brightness(image).is_some() && greatest_colour(image) <= MAX_GREY_SPREAD)
         .map(|(_, name)| name)
         .collect();
     (!grey.is_empty() && grey.len() < images.len()).then(|| {

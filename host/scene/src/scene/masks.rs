@@ -193,7 +193,7 @@ pub(super) fn read(path: &Path, photograph: &Turn, meaning: MaskMeaning) -> Resu
         true => GrayImage::from_fn(rgba.width(), rgba.height(), |x, y| Luma([rgba.get_pixel(x, y)[3]])),
         false => levels(decoded),
     };
-    let is_lossy = files::has_extension(path, &["jpg", "jpeg"]);
+    let is_lossy = meaning == MaskMeaning::Object && files::has_extension(path, &["jpg", "jpeg"]);
     if is_lossy && mask.iter().all(|level| *level < MIN_LOSSY) {
         // A mask of nothing, and what compression made of it.
         mask.fill(0);
@@ -225,13 +225,13 @@ fn levels(picture: DynamicImage) -> GrayImage {
         false => return picture.into_luma8(),
     };
     let [least, greatest] = [|a: u8, b: u8| a.min(b), |a: u8, b: u8| a.max(b)];
-    let of = |pixel: &Rgb<u8>, pick: fn(u8, u8) -> u8| pick(pick(pixel[0], pixel[1]), pixel[2]);
-    let is_coloured = rgb.pixels().any(|pixel| of(pixel, greatest) - of(pixel, least) > MAX_GREY_SPREAD);
+    let channel = |pixel: &Rgb<u8>, pick: fn(u8, u8) -> u8| pick(pick(pixel[0], pixel[1]), pixel[2]);
+    let is_coloured = rgb.pixels().any(|pixel| channel(pixel, greatest) - channel(pixel, least) > MAX_GREY_SPREAD);
     if !is_coloured {
         return picture.into_luma8();
     }
     GrayImage::from_fn(rgb.width(), rgb.height(), |x, y| {
-        Luma([if of(rgb.get_pixel(x, y), greatest) > MAX_GREY_SPREAD { u8::MAX } else { 0 }])
+        Luma([if channel(rgb.get_pixel(x, y), greatest) > MAX_GREY_SPREAD { u8::MAX } else { 0 }])
     })
 }
 
