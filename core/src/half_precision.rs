@@ -29,6 +29,12 @@ pub fn f16_bits(number: f32) -> u32 {
     if exponent < 102 { sign } else { sign | rounded(magnitude & 0x007f_ffff | 0x0080_0000, 126 - exponent) }
 }
 
+/// As [`f16_bits`], but NaN for what is larger than [`MAX_F16`]: for factors, of which no product may look right.
+#[inline]
+pub fn f16_bits_or_nan(number: f32) -> u32 {
+    if number.to_bits() & 0x7fff_ffff > MAX_F16.to_bits() { 0x7e00 } else { f16_bits(number) }
+}
+
 /// `number / 2^shift`, the nearest or the even one; `shift` is 1 to 24.
 #[inline(always)]
 fn rounded(number: u32, shift: u32) -> u32 {
@@ -72,8 +78,19 @@ impl<W: Fetch<u32> + ?Sized> Fetch<f32> for Halves<'_, W> {
 /// Word `element`: numbers `2 element` and the one behind it, where there is one.
 #[inline]
 pub fn packed_f16(numbers: &(impl Fetch<f32> + ?Sized), number_count: u32, element: usize) -> u32 {
-    let lower = f16_bits(numbers.fetch(2 * element));
-    if 2 * element + 1 < number_count as usize { lower | f16_bits(numbers.fetch(2 * element + 1)) << 16 } else { lower }
+    packed(numbers, number_count, element, f16_bits)
+}
+
+/// As [`packed_f16`], of factors: NaN for what is larger than [`MAX_F16`].
+#[inline]
+pub fn packed_factors(numbers: &(impl Fetch<f32> + ?Sized), number_count: u32, element: usize) -> u32 {
+    packed(numbers, number_count, element, f16_bits_or_nan)
+}
+
+#[inline(always)]
+fn packed(numbers: &(impl Fetch<f32> + ?Sized), number_count: u32, element: usize, bits: impl Fn(f32) -> u32) -> u32 {
+    let lower = bits(numbers.fetch(2 * element));
+    if 2 * element + 1 < number_count as usize { lower | bits(numbers.fetch(2 * element + 1)) << 16 } else { lower }
 }
 
 /// Words that this many numbers take.

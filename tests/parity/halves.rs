@@ -6,12 +6,12 @@ use super::trial_on;
 use libtest_mimic::{Failed, Trial};
 use std::sync::Arc;
 use viewfuse::device::vulkan::Vulkan;
-use viewfuse::device::{Device, Layer, LayerShape, Memory};
+use viewfuse::device::{Device, Layer, LayerShape, Memory, Precision};
 use viewfuse_kernels::network::convolve::{ConvolveBlock, patch_value};
 use viewfuse_kernels::network::linear::LinearBlock;
 use viewfuse_tests::devices::{exchanged_stand_ins, stand_ins, takes_stand_ins};
 use viewfuse_vulkan::kernel::{Form, Kernel};
-use viewfuse_vulkan::{Adapter, AdapterKind, Gpu, GpuOptions, Instance};
+use viewfuse_vulkan::{Adapter, AdapterKind, Gpu, GpuOptions, Instance, Limits};
 
 /// The trials of a device.
 pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> {
@@ -37,6 +37,8 @@ pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> 
         }
     }
     trials.push(trial_on(instance, adapter, "rounded_forms_are_trusted_after_a_probe", trusted_after_a_probe));
+    trials.push(trial_on(instance, adapter, "written_weights_are_rounded_again", written_weights_are_rounded_again));
+    trials.push(trial_on(instance, adapter, "without_memory_for_f16_products_are_exact", without_memory_for_f16));
     trials
 }
 
@@ -70,15 +72,16 @@ fn compare(form: Form, product: &Product, outputs: &[f32]) -> Result<f64, Failed
     for (element, found) in outputs.iter().enumerate() {
         let (row, column) = (element / columns, element % columns);
         let left = &left[row * inners..(row + 1) * inners];
-        if form.needs_matrices() && left.iter().any(|number| number.abs() > 65_504.0) {
+        let right = || weights.iter().skip(column).step_by(*columns);
+        if form.needs_matrices() && left.iter().chain(right()).any(|number| number.abs() > 65_504.0) {
             if !found.is_nan() {
                 return Err(format!("{found} hides a factor that is too large").into());
             }
             continue;
         }
         let (mut sum, mut total, mut bound) = (f64::from(first[element]), f64::from(first[element].abs()), 0.0);
-        for (inner, a) in left.iter().enumerate() {
-            let (a, b) = (f64::from(*a), f64::from(weights[inner * columns + column]));
+        for (a, b) in left.iter().zip(right()) {
+            let (a, b) = (f64::from(*a), f64::from(*b));
             sum += a * b;
             total += (a * b).abs();
             bound += off(a) * b.abs() + off(b) * a.abs() + off(a) * off(b);
@@ -107,13 +110,17 @@ fn is_within_its_bound(
     let shapes = [(1, 4, 4), (5, 28, 4), (64, 32, 64), (128, 64, 128), (131, 68, 196), (130, 300, 68)];
     for (rows, inners, columns) in shapes {
         let mut left = numbers(rows * inners, 1);
-        let weights = numbers(inners * columns, 2);
+        let mut weights = numbers(inners * columns, 2);
         let (bias, residual) = (numbers(columns, 3), numbers(rows * columns, 4));
         if rows > 100 {
             left[inners + 1] = 70_000.0;
             left[3 * inners] = if form.needs_matrices() { f32::NEG_INFINITY } else { -1e9 };
             left[5 * inners] = 60_000.0;
             left[5 * inners + 1] = 3e-6;
+            // One that every row of its column multiplies, and those that f16 has just.
+            weights[2 * columns + 1] = if form.needs_matrices() { 65_510.0 } else { 1e9 };
+            weights[2] = -65_504.0;
+            weights[columns + 2] = 3e-6;
         }
         let block = LinearBlock {
             row_count: rows as u32,
@@ -198,5 +205,66 @@ fn trusted_after_a_probe(instance: &Arc<Instance>, adapter: &Adapter) -> Result<
     let largest = wrong.largest(Form::TwoHalves);
     assert!(!wrong.trusts(Kernel::Linear, largest)?, "another form in its place");
     assert_eq!(wrong.distrusted_forms(), [(Kernel::Linear, largest)]);
+    Ok(())
+}
+
+/// Rows, inner indices and columns of the products below, as parameters.
+fn block(sizes: [u32; 3]) -> LinearBlock {
+    let [row_count, inner_count, column_count] = sizes;
+    LinearBlock { row_count, inner_count, column_count, ..LinearBlock::default() }
+}
+
+/// The device keeps weights as f16: not those from before a kernel wrote others.
+fn written_weights_are_rounded_again(instance: &Arc<Instance>, adapter: &Adapter) -> Result<(), Failed> {
+    let device =
+        Vulkan::open(instance, adapter, &GpuOptions { stand_ins: Some(stand_ins()), ..GpuOptions::default() })?;
+    const SIDE: usize = 64;
+    let block = block([SIDE as u32; 3]);
+    let identity = |scale: f32| -> Vec<f32> {
+        (0..SIDE * SIDE).map(|at| if at / SIDE == at % SIDE { scale } else { 0.0 }).collect()
+    };
+    let (inputs, bias) = (device.upload(&numbers(SIDE * SIDE, 1))?, device.upload(&[0.0; SIDE])?);
+    let product = |weights: &_| -> Result<Vec<f32>, Failed> {
+        let mut outputs = device.upload(&[f32::INFINITY; SIDE * SIDE])?;
+        device.linear_in(Precision::Half, &block, &inputs, weights, &bias, None, &mut outputs)?;
+        Ok(device.download(&outputs)?)
+    };
+    let (first, second) = (numbers(SIDE * SIDE, 2), numbers(SIDE * SIDE, 3));
+    let mut weights = device.upload(&first)?;
+    let before = product(&weights)?;
+    assert_eq!(before, product(&weights)?, "the same weights");
+    let (doubled, of_others) = (device.upload(&identity(2.0))?, device.upload(&second)?);
+    device.linear(&block, &doubled, &of_others, &bias, None, &mut weights)?;
+    let expected: Vec<f32> = second.iter().map(|number| 2.0 * number).collect();
+    assert_eq!(device.download(&weights)?, expected);
+    let after = product(&weights)?;
+    assert_ne!(after, before, "the weights from before");
+    assert_eq!(after, product(&device.upload(&expected)?)?);
+    Ok(())
+}
+
+/// Where there is no memory for weights as f16, a product is exact.
+fn without_memory_for_f16(instance: &Arc<Instance>, adapter: &Adapter) -> Result<(), Failed> {
+    let limits = Limits { memory: 96 << 20, ..GpuOptions::default().limits };
+    let options = GpuOptions { stand_ins: Some(stand_ins()), limits, ..GpuOptions::default() };
+    let device = Vulkan::open(instance, adapter, &options)?;
+    const SIDE: usize = 1024;
+    let block = block([32, SIDE as u32, SIDE as u32]);
+    let (inputs, weights) = (device.upload(&numbers(32 * SIDE, 1))?, device.upload(&numbers(SIDE * SIDE, 2))?);
+    let (bias, mut outputs) = (device.upload(&[0.0; SIDE])?, device.zeros::<f32>(32 * SIDE)?);
+    assert!(device.rounds(Precision::Half));
+    device.linear(&block, &inputs, &weights, &bias, None, &mut outputs)?;
+    let exact = device.download(&outputs)?;
+    // Pieces that are smaller than the weights in f16, until none is left.
+    let mut taken = Vec::new();
+    while let Ok(piece) = device.zeros::<u32>(1 << 18) {
+        taken.push(piece);
+    }
+    assert!(!taken.is_empty());
+    device.linear_in(Precision::Half, &block, &inputs, &weights, &bias, None, &mut outputs)?;
+    assert_eq!(device.download(&outputs)?, exact);
+    drop(taken);
+    device.linear_in(Precision::Half, &block, &inputs, &weights, &bias, None, &mut outputs)?;
+    assert_ne!(device.download(&outputs)?, exact, "there is memory now");
     Ok(())
 }

@@ -344,6 +344,8 @@ impl Breaches<'_> {
 /// What a binding should hold. Structs that exist once are no arrays.
 fn wanted_content(array: &Array, form: Form) -> Content {
     match array.layout {
+        // Four numbers, too.
+        Layout::Whole if form.has_f16_weights() && array.is_weights => Content::Elements { stride: 2 * array.stride },
         Layout::Whole if form.needs_fours() => Content::Elements { stride: 4 * array.stride },
         Layout::One => Content::Fixed { bytes: array.least_bytes },
         Layout::Whole | Layout::Pages => Content::Elements { stride: array.stride },

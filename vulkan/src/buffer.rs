@@ -5,8 +5,8 @@ use crate::handle::{Handle, Memory};
 use crate::kernel::Layout;
 use ash::vk;
 use std::marker::PhantomData;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use viewfuse_kernels::pages::MAX_PAGES;
 
 /// An array of `T` in a device's memory. An array that is too large for one allocation is stored in several chunks of a
@@ -64,9 +64,45 @@ pub(crate) struct Array {
     pub(crate) read_in: Stretch,
     /// The interval in which it was last written.
     pub(crate) written_in: Stretch,
+    pub(crate) halves: Halves,
+}
+
+/// The numbers of an array as f16, from when a form needed them until the array is written.
+#[derive(Default)]
+pub(crate) struct Halves {
+    version: AtomicU64,
+    kept: Mutex<Option<(u64, Arc<Array>)>>,
+}
+
+impl Halves {
+    /// Which writing of the array was the last.
+    pub(crate) fn version(&self) -> u64 {
+        self.version.load(Ordering::Relaxed)
+    }
+
+    /// The array is written: what is kept is not its own any more.
+    pub(crate) fn outdate(&self) {
+        self.version.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Those of the array's present version.
+    pub(crate) fn get(&self) -> Option<Arc<Array>> {
+        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.as_ref().filter(|(version, _)| *version == self.version()).map(|(_, array)| array.clone())
+    }
+
+    /// Keeps those of a version.
+    pub(crate) fn keep(&self, version: u64, array: &Arc<Array>) {
+        *self.kept.lock().unwrap_or_else(PoisonError::into_inner) = Some((version, array.clone()));
+    }
 }
 
 impl Array {
+    pub(crate) fn new(chunks: Vec<Memory>, chunk_len: usize, len: usize, stride: usize) -> Array {
+        let (read_in, written_in, halves) = Default::default();
+        Array { chunks, chunk_len, len, stride, read_in, written_in, halves }
+    }
+
     /// The array's device: handles are not valid on another one.
     pub(crate) fn check_owner(&self, handle: &Handle) -> Result<(), VulkanError> {
         let owner = self.chunks[0].owner();

@@ -93,17 +93,32 @@ impl Gpu {
             .zip(arrays)
             .any(|(array, bound)| array.layout == Layout::Pages && bound.0.len > page_len);
         let page_shift = if needs_pages { self.page_shift } else { 0 };
+        let is_in_fours = lies_in_fours(kernel, parameters, arrays);
         let job = DispatchJob { kernel, parameters, arrays, page_shift };
+        // A form that is fixed for all is used of arrays in fours, too.
+        if !is_in_fours || !form.or(self.form).is_some_and(Form::has_f16_weights) {
+            return self.dispatch_job(&job, form, is_in_fours, elements);
+        }
+        let arrays = self.with_weights_in_f16(kernel, arrays)?;
+        let arrays: Vec<Bound<'_>> = arrays.iter().map(Bound).collect();
+        self.dispatch_job(&DispatchJob { arrays: &arrays, ..job }, form, is_in_fours, elements)
+    }
+
+    /// Dispatches a job whose arrays are as the form needs them.
+    fn dispatch_job(
+        &self,
+        job: &DispatchJob<'_>,
+        form: Option<Form>,
+        is_in_fours: bool,
+        elements: Range<u32>,
+    ) -> Result<(), VulkanError> {
+        let DispatchJob { kernel, parameters, .. } = *job;
         self.with_state(|gpu, state| {
             let (form, of_form) = match kernel.shape(parameters) {
                 Some(shape) => {
                     let form = match form {
                         Some(form) => form,
-                        None => gpu.form(
-                            state,
-                            &job,
-                            &Class::new(kernel, shape, lies_in_fours(kernel, parameters, arrays)),
-                        )?,
+                        None => gpu.form(state, job, &Class::new(kernel, shape, is_in_fours))?,
                     };
                     (form, 0..form.elements(shape.row_count, shape.column_count))
                 }
@@ -117,7 +132,7 @@ impl Gpu {
                 }
             };
             let count = u64::from(elements.end - elements.start);
-            let dispatches = gpu.record_in_pieces(state, &job, form, of_form, count)?;
+            let dispatches = gpu.record_in_pieces(state, job, form, of_form, count)?;
             let tally = &mut state.tallies[kernel as usize];
             tally.dispatches += dispatches;
             tally.elements += count;

@@ -367,7 +367,10 @@ impl Gpu {
             open.hold(array);
             match access {
                 Access::Read => array.read_in.set(*stretch),
-                Access::Write => array.written_in.set(*stretch),
+                Access::Write => {
+                    array.written_in.set(*stretch);
+                    array.halves.outdate();
+                }
             }
         }
         let recorded = commands(&self.handle.device, &mut open, &state.submissions);

@@ -16,7 +16,7 @@
 //! staging                        the memory that uploads pass through
 //! gpu                            an opened device: its state, recorded commands
 //! remembered                     pipelines and forms from one process to the next
-//! dispatch, pieces               dispatches, split to fit the device and its watchdog
+//! packed, dispatch, pieces       dispatches, split to fit the device and its watchdog; weights as f16
 //! recording                      dispatches that are recorded once and submitted again
 //! measure                        forms compared and timed
 //! transfers                      arrays between host and device
@@ -40,6 +40,7 @@ pub mod kernel;
 mod matrices;
 mod measure;
 mod messages;
+mod packed;
 mod pieces;
 mod pipelines;
 mod recording;

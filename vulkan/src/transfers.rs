@@ -1,6 +1,6 @@
 //! Arrays between host and device.
 
-use crate::buffer::{Array, Buffer, Coming, Stretch};
+use crate::buffer::{Array, Buffer, Coming};
 use crate::error::VulkanError;
 use crate::gpu::{Gpu, State};
 use crate::handle::Memory;
@@ -149,8 +149,7 @@ impl Gpu {
             chunk => chunk?,
         };
         let chunks = vec![chunk];
-        let (read_in, written_in) = (Stretch::default(), Stretch::default());
-        let to = Arc::new(Array { chunks, chunk_len: len.max(1), len, stride, read_in, written_in });
+        let to = Arc::new(Array::new(chunks, len.max(1), len, stride));
         let mut submission = 0;
         self.with_state(|gpu, state| {
             for_each_stretch(from, len, usize::MAX, |memory, offset, range| {
@@ -263,8 +262,7 @@ impl Gpu {
             }
             chunks => chunks?,
         };
-        let (read_in, written_in) = (Stretch::default(), Stretch::default());
-        Ok(Array { chunks, chunk_len, len, stride, read_in, written_in })
+        Ok(Array::new(chunks, chunk_len, len, stride))
     }
 
     /// Memory for `len` elements, but at least one, `chunk_len` in each piece. If the whole does not fit, no piece is

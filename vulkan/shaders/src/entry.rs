@@ -228,18 +228,15 @@ macro_rules! entry {
     };
 }
 
-/// The entry points of a kernel for arrays in fours. In brackets: the row's block and shape, then the arrays.
+/// The entry points of a kernel for arrays in fours, whose arrays are a layer's. In brackets: the row's shape.
 macro_rules! entries_in_fours {
-    (
-        $method:ident, $Block:ty, $block:ident [$row_count:expr, $inner_count:expr, $column_count:expr],
-        [$($binding:literal $array:ident),*], $last:literal
-    ) => {
+    ($method:ident, $Block:ty, $block:ident [$row_count:expr, $inner_count:expr, $column_count:expr]) => {
         /// The forms of a kernel.
         pub mod $method {
             use super::super::*;
 
             entries_in_fours! {
-                staged $method, $Block, $block [$row_count, $inner_count, $column_count], [$($binding $array),*], $last,
+                staged $method, $Block, $block [$row_count, $inner_count, $column_count],
                 /// In tiles of 128 times 64.
                 large Large (256) LargeRows LargeColumns,
                 /// In tiles of 64 times 64.
@@ -250,13 +247,16 @@ macro_rules! entries_in_fours {
                 least Least (64) LeastRows LeastColumns
             }
             entries_in_fours! {
-                halves $method, $Block, $block [$row_count, $inner_count, $column_count], [$($binding $array),*], $last,
+                halves $method, $Block, $block [$row_count, $inner_count, $column_count], UVec2 EndlessHalves,
                 /// By matrix units, in f16.
                 half half_stand_in Half (128) SharedOfHalf,
                 /// The same in tiles of 64 times 64.
                 half_small half_small_stand_in HalfSmall (128) SharedOfHalfSmall,
                 /// The same in tiles of 32 times 32.
-                half_tiny half_tiny_stand_in HalfTiny (128) SharedOfHalfTiny,
+                half_tiny half_tiny_stand_in HalfTiny (128) SharedOfHalfTiny
+            }
+            entries_in_fours! {
+                halves $method, $Block, $block [$row_count, $inner_count, $column_count], Vec4 EndlessFours,
                 /// By matrix units, in f16 in two parts.
                 two_halves two_halves_stand_in TwoHalves (256) SharedOfTwoHalves,
                 /// The same in tiles of 64 times 64.
@@ -268,10 +268,10 @@ macro_rules! entries_in_fours {
     };
     (
         staged $method:ident, $Block:ty, $block:ident [$row_count:expr, $inner_count:expr, $column_count:expr],
-        $arrays:tt, $last:literal, $($(#[$doc:meta])* $form:ident $Form:ident ($threads:literal) $Rows:ident $Columns:ident),+
+        $($(#[$doc:meta])* $form:ident $Form:ident ($threads:literal) $Rows:ident $Columns:ident),+
     ) => {
         $(entries_in_fours! {
-            one $method, $Block, $block [$row_count, $inner_count, $column_count], $arrays, $last,
+            one $method, $Block, $block [$row_count, $inner_count, $column_count], Vec4 EndlessFours,
             [$(#[$doc])*] $form ($threads) [] [
                 #[spirv(workgroup)] rows: &mut shared::$Rows,
                 #[spirv(workgroup)] columns: &mut shared::$Columns,
@@ -281,11 +281,11 @@ macro_rules! entries_in_fours {
     };
     (
         halves $method:ident, $Block:ty, $block:ident [$row_count:expr, $inner_count:expr, $column_count:expr],
-        $arrays:tt, $last:literal,
+        $Weights:ident $Endless:ident,
         $($(#[$doc:meta])* $form:ident $stand_in:ident $Form:ident ($threads:literal) $Shared:ident),+
     ) => {
         $(entries_in_fours! {
-            one $method, $Block, $block [$row_count, $inner_count, $column_count], $arrays, $last,
+            one $method, $Block, $block [$row_count, $inner_count, $column_count], $Weights $Endless,
             [$(#[$doc])* #[cfg(target_arch = "spirv")]] $form ($threads) [
                 #[spirv(subgroup_id)] subgroup: u32,
                 #[spirv(subgroup_local_invocation_id)] lane: u32,
@@ -295,7 +295,7 @@ macro_rules! entries_in_fours {
             id { $Form { units: PhantomData::<Matrices>, shared, subgroup, lane } }
         }
         entries_in_fours! {
-            one $method, $Block, $block [$row_count, $inner_count, $column_count], $arrays, $last,
+            one $method, $Block, $block [$row_count, $inner_count, $column_count], $Weights $Endless,
             [$(#[$doc])* #[doc = "\n\nBy plain arithmetic in the place of matrix units."]] $stand_in ($threads) [] [
                 #[spirv(workgroup)] shared: &mut $Shared,
             ]
@@ -304,9 +304,10 @@ macro_rules! entries_in_fours {
             }
         })+
     };
+    // How the weights lie, and how the body gets them.
     (
         one $method:ident, $Block:ty, $block:ident [$row_count:expr, $inner_count:expr, $column_count:expr],
-        [$($binding:literal $array:ident),*], $last:literal,
+        $Weights:ident $Endless:ident,
         [$(#[$mark:meta])*] $form:ident ($threads:literal) [$($before:tt)*] [$($memory:tt)*] $id:ident { $($tiles:tt)* }
     ) => {
         $(#[$mark])*
@@ -316,15 +317,19 @@ macro_rules! entries_in_fours {
             #[spirv(global_invocation_id)] $id: UVec3,
             $($before)*
             #[spirv(push_constant)] push: &Push<$Block>,
-            $(#[spirv(storage_buffer, descriptor_set = 0, binding = $binding)] $array: &[Vec4],)*
-            #[spirv(storage_buffer, descriptor_set = 0, binding = $last)] outputs: &mut [Vec4],
+            #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] inputs: &[Vec4],
+            #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] weights: &[$Weights],
+            #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] bias: &[Vec4],
+            #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] residual: &[Vec4],
+            #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] outputs: &mut [Vec4],
             $($memory)*
         ) {
             let $block = &push.parameters;
             let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
-            let tiles = $($tiles)*;
-            let invocation = push.piece.first + $id.x;
-            bodies::$method($block, shape, $(EndlessFours($array),)* UncheckedFours(outputs), tiles, invocation);
+            let (inputs, weights) = (EndlessFours(inputs), $Endless(weights));
+            let (bias, residual, outputs) = (EndlessFours(bias), EndlessFours(residual), UncheckedFours(outputs));
+            let (tiles, invocation) = ($($tiles)*, push.piece.first + $id.x);
+            bodies::$method($block, shape, inputs, weights, bias, residual, outputs, tiles, invocation);
         }
     };
 }

@@ -21,7 +21,7 @@ pub use viewfuse_kernels::rows::Piece;
 
 use core::marker::PhantomData;
 use loads::{InVectors, Vectors, VectorsMut};
-use spirv_std::glam::{UVec3, Vec4};
+use spirv_std::glam::{UVec2, UVec3, Vec4};
 use spirv_std::spirv;
 #[cfg(target_arch = "spirv")]
 use tile::Matrices;
@@ -29,7 +29,7 @@ use tile::{Half, HalfSmall, HalfTiny, StandIns, TwoHalves, TwoHalvesSmall, TwoHa
 use tile::{InFours, Large, Least, SharedOfSingle, Small, Staged, Subgroup, Tiny, shared};
 use tile::{SharedOfHalf, SharedOfHalfSmall, SharedOfHalfTiny};
 use tile::{SharedOfTwoHalves, SharedOfTwoHalvesSmall, SharedOfTwoHalvesTiny};
-use unchecked::{Endless, EndlessFours, Together, Unchecked, UncheckedFours};
+use unchecked::{Endless, EndlessFours, EndlessHalves, Together, Unchecked, UncheckedFours};
 use viewfuse_kernels::bodies;
 use viewfuse_kernels::for_each_kernel;
 use viewfuse_kernels::network::tile::Shape;
@@ -51,11 +51,9 @@ for_each_kernel!(entries);
 /// The forms of arrays in fours of the kernels that have them ([`Kernel::used_in_fours`]).
 pub mod in_fours {
     entries_in_fours! {
-        linear, LinearBlock, block [block.row_count, block.inner_count, block.column_count],
-        [0 inputs, 1 weights, 2 bias, 3 residual], 4
+        linear, LinearBlock, block [block.row_count, block.inner_count, block.column_count]
     }
     entries_in_fours! {
-        convolve, ConvolveBlock, block [block.pixel_count(), block.patch_len(), block.out_channels],
-        [0 inputs, 1 weights, 2 bias, 3 residual], 4
+        convolve, ConvolveBlock, block [block.pixel_count(), block.patch_len(), block.out_channels]
     }
 }

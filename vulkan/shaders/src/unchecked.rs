@@ -3,8 +3,9 @@
 
 use crate::tile::wait_for_all;
 use spirv_std::arch::IndexUnchecked;
-use spirv_std::glam::Vec4;
+use spirv_std::glam::{UVec2, Vec4};
 use viewfuse_core::fetch::Fetch;
+use viewfuse_core::half_precision::f16_value;
 use viewfuse_kernels::network::tile::Fours;
 use viewfuse_kernels::store::{Store, StoreFours};
 use viewfuse_kernels::workgroup::Workgroup;
@@ -39,6 +40,25 @@ impl Fetch<f32> for EndlessFours<'_> {
 impl Fours for EndlessFours<'_> {
     #[inline(always)]
     fn four(&self, index: u32) -> Vec4 {
+        Endless(self.0).fetch((index / 4) as usize)
+    }
+}
+
+/// An array of whole fours of numbers in half precision, at least one; an index beyond its end reads the last four.
+#[derive(Clone, Copy)]
+pub(crate) struct EndlessHalves<'a>(pub(crate) &'a [UVec2]);
+
+impl Fetch<f32> for EndlessHalves<'_> {
+    #[inline(always)]
+    fn fetch(&self, index: usize) -> f32 {
+        let UVec2 { x, y } = self.four_halves(index as u32);
+        f16_value(if index & 2 == 0 { x } else { y } >> (index as u32 % 2 * 16))
+    }
+}
+
+impl Fours for EndlessHalves<'_> {
+    #[inline(always)]
+    fn four_halves(&self, index: u32) -> UVec2 {
         Endless(self.0).fetch((index / 4) as usize)
     }
 }

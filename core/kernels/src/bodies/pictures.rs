@@ -12,6 +12,12 @@ pub fn pack_f16(number_count: &u32, numbers: &[f32], words: &mut (impl Store<u32
     words.store(word as usize, half_precision::packed_f16(numbers, *number_count, word as usize));
 }
 
+/// A word of two factors in half precision.
+#[inline]
+pub fn pack_factors(number_count: &u32, numbers: &[f32], words: &mut (impl Store<u32> + ?Sized), word: u32) {
+    words.store(word as usize, half_precision::packed_factors(numbers, *number_count, word as usize));
+}
+
 /// A linear combination.
 #[inline]
 #[allow(clippy::too_many_arguments)]

@@ -14,11 +14,11 @@ use glam::Vec4;
 /// A convolution of pixels and output channels.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
-pub fn convolve<A: Fours>(
+pub fn convolve<A: Fours, W: Fours>(
     block: &ConvolveBlock,
     shape: Shape,
     inputs: A,
-    weights: A,
+    weights: W,
     bias: A,
     residual: A,
     outputs: impl StoreFours,
@@ -84,11 +84,11 @@ impl<A: Fours, O: Store<f32>> Outputs for Transposed<'_, A, O> {
 /// A linear layer of rows and columns.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
-pub fn linear<A: Fours>(
+pub fn linear<A: Fours, W: Fours>(
     block: &LinearBlock,
     shape: Shape,
     inputs: A,
-    weights: A,
+    weights: W,
     bias: A,
     residual: A,
     outputs: impl StoreFours,

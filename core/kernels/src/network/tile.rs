@@ -5,8 +5,9 @@
 //! has rows.
 
 use super::linear::{rectified, rectified_four};
-use glam::Vec4;
+use glam::{UVec2, Vec4};
 use viewfuse_core::fetch::Fetch;
+use viewfuse_core::half_precision::f16_bits_or_nan;
 
 /// Rows and columns of the tile that elements are counted in.
 pub const TILE: u32 = 64;
@@ -30,6 +31,18 @@ pub trait Fours: Fetch<f32> + Copy {
         let number = |more: u32| self.fetch((index + more) as usize);
         Vec4::new(number(0), number(1), number(2), number(3))
     }
+
+    /// The same in half precision, two in a word, NaN for what is too large.
+    #[inline(always)]
+    fn four_halves(&self, index: u32) -> UVec2 {
+        halves_of(self.four(index))
+    }
+}
+
+#[inline(always)]
+fn halves_of(four: Vec4) -> UVec2 {
+    let pair = |lower: f32, upper: f32| f16_bits_or_nan(lower) | f16_bits_or_nan(upper) << 16;
+    UVec2::new(pair(four.x, four.y), pair(four.z, four.w))
 }
 
 /// The left matrix of a product. What many numbers have in common may take divisions: a device computes it once.
@@ -89,6 +102,12 @@ pub trait Right: Copy {
         let number = |more: u32| self.number(inner, column + more);
         Vec4::new(number(0), number(1), number(2), number(3))
     }
+
+    /// The same in half precision, two in a word, NaN for what is too large.
+    #[inline(always)]
+    fn four_halves(self, inner: u32, column: u32) -> UVec2 {
+        halves_of(self.four(inner, column))
+    }
 }
 
 /// What becomes of a product's sums.
@@ -123,6 +142,11 @@ impl<A: Fours> Right for Weights<A> {
     #[inline(always)]
     fn four(self, inner: u32, column: u32) -> Vec4 {
         self.numbers.four(inner * self.column_count + column)
+    }
+
+    #[inline(always)]
+    fn four_halves(self, inner: u32, column: u32) -> UVec2 {
+        self.numbers.four_halves(inner * self.column_count + column)
     }
 }
 

@@ -167,6 +167,11 @@ impl Form {
         )
     }
 
+    /// Whether it reads weights as f16, two in a word ([`Kernel::PackFactors`]).
+    pub const fn has_f16_weights(self) -> bool {
+        matches!(self, Form::Half | Form::HalfSmall | Form::HalfTiny)
+    }
+
     /// Whether it loads and stores whole fours: inner indices and columns are multiples of four, and all rows of its
     /// arrays begin at such ones ([`Kernel::used_in_fours`]).
     pub const fn needs_fours(self) -> bool {
@@ -258,11 +263,13 @@ pub struct Array {
     pub stride: usize,
     /// Bytes that the kernel reads without checking the length; 0 where it checks.
     pub least_bytes: usize,
+    /// Whether these are a layer's weights, which some forms read as [f16](Form::has_f16_weights).
+    pub is_weights: bool,
 }
 
 impl Array {
     const fn new<E>(name: &'static str, access: Access, layout: Layout) -> Array {
-        Array { name, access, layout, stride: size_of::<E>(), least_bytes: 0 }
+        Array { name, access, layout, stride: size_of::<E>(), least_bytes: 0, is_weights: false }
     }
 
     const fn not_empty(self) -> Array {
@@ -283,7 +290,7 @@ macro_rules! array {
     ($kind:ident $name:ident $host:ty, vectors) => { array!($kind $name $host) };
     (read $name:ident $host:ty) => { Array::new::<$host>(stringify!($name), Access::Read, Layout::Whole) };
     (filled $name:ident $host:ty) => { array!(read $name $host).not_empty() };
-    (layer $name:ident $host:ty) => { array!(read $name $host).not_empty() };
+    (layer $name:ident $host:ty) => { Array { is_weights: true, ..array!(read $name $host).not_empty() } };
     (optional $name:ident $host:ty) => { array!(read $name $host).not_empty() };
     (paged $name:ident $host:ty) => { Array::new::<$host>(stringify!($name), Access::Read, Layout::Pages) };
     (write $name:ident $host:ty) => { Array::new::<$host>(stringify!($name), Access::Write, Layout::Whole) };

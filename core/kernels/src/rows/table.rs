@@ -67,6 +67,12 @@ macro_rules! for_each_kernel {
                 read numbers: f32,
                 write words: u32,
             }
+            /// Factors in half precision, two in a word, the first in the lower half: NaN for what is larger than 65,504.
+            /// An element is a word.
+            PackFactors pack_factors(number_count: u32) for word in [0..word_count(*number_count); 4096 a core] {
+                read numbers: f32,
+                write words: u32,
+            }
             /// As `gather_latents`, from the words of a grid in half precision. An element is four channels of a point.
             GatherLatentsF16 gather_latents_f16(block: GatherBlock)
             for four in [0..block.point_count * block.four_count()], twin {

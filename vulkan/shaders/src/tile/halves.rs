@@ -5,8 +5,9 @@
 //! A workgroup has subgroups of 32 invocations below, beside and behind one another, each of which has a part of the
 //! tile, in matrices of 16 times 16 sums; those behind one another have the same part and other inner indices. For each
 //! step along the inner index the workgroup rounds its rows of the left matrix and its columns of the right one into
-//! its memory, while the next step's numbers are on their way. Beyond the inner index both are 0; beyond rows and
-//! columns the last ones are read and nothing is stored.
+//! its memory, while the next step's numbers are on their way; in one part the right one lies in f16 already, since it
+//! is read again by each tile below another. Beyond the inner index both are 0; beyond rows and columns the last ones
+//! are read and nothing is stored.
 //!
 //! In two parts a factor is `high + low / 2048`: `high` is the nearest f16, or 0 below 2^-14, and `low` the nearest f16
 //! of 2048 times what is missing. One sum has the products of `high`, another one those of a `high` and a `low`. The
@@ -198,17 +199,60 @@ fn finished_row<L: Left>(left: L, is_last: bool, first: u32, [near, far]: [Loade
     ]
 }
 
-/// Loads eight numbers of an inner index from a column on.
-#[inline(always)]
-fn fetch_columns(right: impl Right, inner: u32, first: u32, shape: Shape) -> Eight {
-    let four = move |column: u32| right.four(inner, column.min(shape.column_count - 4));
-    [four(first), four(first + 4)]
+/// Eight numbers of an inner index from a column on, as they are loaded.
+trait Columns: Copy {
+    const ZERO: Self;
+
+    fn fetch(right: impl Right, inner: u32, first: u32, shape: Shape) -> Self;
+
+    /// Writes them into the workgroup's memory, a low part `low` further if there are two.
+    fn put<U: Units, const N: usize>(self, shared: &mut [UVec4; N], place: u32, low: u32);
+
+    /// They themselves, 0 beyond the inner indices.
+    #[inline(always)]
+    fn finished(self, is_last: bool, inner: u32, shape: Shape) -> Self {
+        if is_last && inner >= shape.inner_count { Self::ZERO } else { self }
+    }
 }
 
-/// They themselves, 0 beyond the inner indices.
+/// Both fours of eight columns: beyond the matrix the last one, again.
 #[inline(always)]
-fn finished_columns(is_last: bool, inner: u32, columns: Eight, shape: Shape) -> Eight {
-    if is_last && inner >= shape.inner_count { [Vec4::ZERO; 2] } else { columns }
+fn fours(first: u32, shape: Shape) -> [u32; 2] {
+    let last = shape.column_count - 4;
+    [first.min(last), (first + 4).min(last)]
+}
+
+/// Of a form of two parts.
+impl Columns for Eight {
+    const ZERO: Eight = [Vec4::ZERO; 2];
+
+    #[inline(always)]
+    fn fetch(right: impl Right, inner: u32, first: u32, shape: Shape) -> Eight {
+        let [near, far] = fours(first, shape);
+        [right.four(inner, near), right.four(inner, far)]
+    }
+
+    #[inline(always)]
+    fn put<U: Units, const N: usize>(self, shared: &mut [UVec4; N], place: u32, low: u32) {
+        put::<U, true, N>(shared, place, low, self);
+    }
+}
+
+/// Of a form of one part: they lie in f16.
+impl Columns for UVec4 {
+    const ZERO: UVec4 = UVec4::ZERO;
+
+    #[inline(always)]
+    fn fetch(right: impl Right, inner: u32, first: u32, shape: Shape) -> UVec4 {
+        let [near, far] = fours(first, shape);
+        let (near, far) = (right.four_halves(inner, near), right.four_halves(inner, far));
+        UVec4::new(near.x, near.y, far.x, far.y)
+    }
+
+    #[inline(always)]
+    fn put<U: Units, const N: usize>(self, shared: &mut [UVec4; N], place: u32, _: u32) {
+        write(shared, place, self);
+    }
 }
 
 /// Blocks once for each number, with the number as a constant: only so an array stays in registers.
@@ -220,7 +264,7 @@ macro_rules! unroll {
 /// what an invocation fetches of each matrix, and a subgroup's matrices below and beside one another.
 macro_rules! form {
     (
-        $(#[$doc:meta])* $Form:ident, $Shared:ident, two parts $two:literal, subgroups $subgroups:expr,
+        $(#[$doc:meta])* $Form:ident, $Shared:ident, two parts $two:literal, columns $Columns:ty, subgroups $subgroups:expr,
         step $step:literal in [$($chunk:literal)*], fetches [$($l:literal)*], matrices [$($i:literal)*] x [$($j:literal)*]
     ) => {
         $(#[$doc])*
@@ -291,7 +335,8 @@ macro_rules! form {
                 let own_rows = [$(left.row((first_row + row + $l * NEXT_ROW).min(shape.row_count - 1))),*];
                 let fetch_rows = move |place: L::Inner| [$(fetch_row(left, own_rows[$l], place)),*];
                 let fetch_columns = move |start: u32| {
-                    [$(fetch_columns(right, start + column_inner + $l * NEXT_INNER, first_column + column * 8, shape)),*]
+                    let first = start + column_inner;
+                    [$(<$Columns>::fetch(right, first + $l * NEXT_INNER, first_column + column * 8, shape)),*]
                 };
                 let mut place = left.inner(row_inner);
                 let (rows, columns) = (fetch_rows(place), fetch_columns(0));
@@ -301,8 +346,8 @@ macro_rules! form {
                     put::<U, $two, _>(shared, row_place + $l * NEXT_ROW * LEFT_STRIDE, LEFT, eight);
                 )*
                 $(
-                    let eight = finished_columns(is_last, column_inner + $l * NEXT_INNER, columns[$l], shape);
-                    put::<U, $two, _>(shared, column_place + $l * NEXT_INNER * RIGHT_STRIDE, RIGHT, eight);
+                    let eight = columns[$l].finished(is_last, column_inner + $l * NEXT_INNER, shape);
+                    eight.put::<U, _>(shared, column_place + $l * NEXT_INNER * RIGHT_STRIDE, RIGHT);
                 )*
                 wait_for_all();
 
@@ -340,9 +385,8 @@ macro_rules! form {
                         put::<U, $two, _>(shared, row_place + $l * NEXT_ROW * LEFT_STRIDE, LEFT, eight);
                     )*
                     $(
-                        let inner = next + column_inner + $l * NEXT_INNER;
-                        let eight = finished_columns(is_last, inner, columns[$l], shape);
-                        put::<U, $two, _>(shared, column_place + $l * NEXT_INNER * RIGHT_STRIDE, RIGHT, eight);
+                        let eight = columns[$l].finished(is_last, next + column_inner + $l * NEXT_INNER, shape);
+                        eight.put::<U, _>(shared, column_place + $l * NEXT_INNER * RIGHT_STRIDE, RIGHT);
                     )*
                     wait_for_all();
                     start = next;
@@ -390,31 +434,31 @@ macro_rules! form {
 
 form! {
     /// Factors of one f16.
-    Half, SharedOfHalf, two parts false, subgroups [2, 2, 1], step 32 in [0 1], fetches [0 1 2 3],
+    Half, SharedOfHalf, two parts false, columns UVec4, subgroups [2, 2, 1], step 32 in [0 1], fetches [0 1 2 3],
     matrices [0 1 2 3] x [0 1 2 3]
 }
 form! {
     /// The same in tiles of a quarter of the size.
-    HalfSmall, SharedOfHalfSmall, two parts false, subgroups [2, 2, 1], step 32 in [0 1], fetches [0 1],
+    HalfSmall, SharedOfHalfSmall, two parts false, columns UVec4, subgroups [2, 2, 1], step 32 in [0 1], fetches [0 1],
     matrices [0 1] x [0 1]
 }
 form! {
     /// The same in tiles of a sixteenth of the size.
-    HalfTiny, SharedOfHalfTiny, two parts false, subgroups [1, 1, 4], step 64 in [0], fetches [0 1],
+    HalfTiny, SharedOfHalfTiny, two parts false, columns UVec4, subgroups [1, 1, 4], step 64 in [0], fetches [0 1],
     matrices [0 1] x [0 1]
 }
 form! {
     /// Factors in two parts.
-    TwoHalves, SharedOfTwoHalves, two parts true, subgroups [2, 4, 1], step 32 in [0 1], fetches [0 1],
+    TwoHalves, SharedOfTwoHalves, two parts true, columns Eight, subgroups [2, 4, 1], step 32 in [0 1], fetches [0 1],
     matrices [0 1 2 3] x [0 1]
 }
 form! {
     /// The same in tiles of a quarter of the size.
-    TwoHalvesSmall, SharedOfTwoHalvesSmall, two parts true, subgroups [2, 2, 1], step 32 in [0 1], fetches [0 1],
+    TwoHalvesSmall, SharedOfTwoHalvesSmall, two parts true, columns Eight, subgroups [2, 2, 1], step 32 in [0 1], fetches [0 1],
     matrices [0 1] x [0 1]
 }
 form! {
     /// The same in tiles of a sixteenth of the size.
-    TwoHalvesTiny, SharedOfTwoHalvesTiny, two parts true, subgroups [1, 1, 4], step 64 in [0], fetches [0 1],
+    TwoHalvesTiny, SharedOfTwoHalvesTiny, two parts true, columns Eight, subgroups [1, 1, 4], step 64 in [0], fetches [0 1],
     matrices [0 1] x [0 1]
 }
