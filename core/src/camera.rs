@@ -250,6 +250,6 @@ impl CameraBlock {
     pub fn texel_at(&self, x: f32, y: f32) -> usize {
         let column = (x as u32).min(self.width - 1);
         let row = (y as u32).min(self.height - 1);
-        (self.first_texel + row * self.width + column) as usize
+        self.first_texel as usize + row as usize * self.width as usize + column as usize
     }
 }

@@ -21,7 +21,8 @@
 //! photographs): the functions are generic over [`Real`].
 //!
 //! Limits: a lens's polynomials are fitted to its image and may fold over outside it. [`Undistorted::residual`] detects
-//! a point that no ideal point maps to; [`Lens::reach`] is the radius up to which the map is one to one.
+//! a point that no ideal point maps to; [`Lens::reach`] is the radius up to which the map is one to one, but for what a
+//! large tangential part does.
 
 use crate::math;
 use bytemuck::{Pod, Zeroable};
@@ -36,6 +37,8 @@ const MAX_HALVINGS: u32 = 12;
 const WIDE: f32 = 1.0;
 /// Radii at which it is looked for.
 const STARTS: u32 = 64;
+/// Squared residual of a guess that has not converged.
+const FAR_SQUARED: f32 = 1.0e-8;
 /// Greatest magnitude of a coefficient: powers of eight of them stay finite in `f32`.
 pub const MAX_COEFFICIENT: f64 = 1.0e4;
 /// Coefficients `[k1, k2, k3, k4, k5, k6, p1, p2, q4]`; a fisheye ignores all but the first four.
@@ -320,12 +323,12 @@ fn radial_slope(is_fisheye: bool, coefficients: &Coefficients<f64>, radius: f64)
 
 /// The ideal point that appears at a point of the photograph: Newton's method, each step halved until it reduces the
 /// residual, from the point itself, and beyond a radius of 1 from where the lens, seen from the centre, is about to reach
-/// it. It ends if no step helps, after 24 steps at most. Total: if no ideal point maps to the given one, or it is not
+/// it; where that ends far from the point, once more from half of it. It ends if no step helps, after 24 steps at most. Total: if no ideal point maps to the given one, or it is not
 /// finite, the residual is large or not finite.
 ///
 /// Inside [`Lens::reach`] the residual is a few units in the last place of the point (below 1e-14 of its length or of 1
-/// in `f64`, below 2e-6 of it in `f32`), but close to a fold, where the inverse has no slope, and to a pole of a rational
-/// factor. A small residual does not say that the point is inside: beyond a fold other ones map to the same.
+/// in `f64`, below 2e-6 of it in `f32`), but close to a fold, where the inverse has no slope, to a pole of a rational
+/// factor, and at ideal radii above 3 of lenses that grow with the eighth power. A small residual does not say that the point is inside: beyond a fold other ones map to the same.
 #[inline]
 pub fn undistort<T: Real>(is_fisheye: bool, coefficients: &Coefficients<T>, point: [T; 2]) -> Undistorted<T> {
     let guess = if is_fisheye { unbent(coefficients, point) } else { straightened(coefficients, point) };
@@ -445,6 +448,7 @@ fn straightened<T: Real>(coefficients: &Coefficients<T>, point: [T; 2]) -> [T; 2
     let end = if is_wide { end * end } else { zero };
     let start = if start < radius { [point[0] * (start / radius), point[1] * (start / radius)] } else { point };
     let mut guess = Guess::at(coefficients, start, point);
+    let mut given_up = None;
     let mut step = 0;
     while step < MAX_STEPS {
         let ([x, y], [factor, slope], [a, b]) = (guess.point, guess.factor, guess.off);
@@ -474,7 +478,16 @@ fn straightened<T: Real>(coefficients: &Coefficients<T>, point: [T; 2]) -> [T; 2
             share = share * T::of(0.5);
             halving += 1;
         }
+        if !moved && given_up.is_none() && guess.miss > T::of(FAR_SQUARED) {
+            // Just before a fold a step is so long that none of its shares helps: once more from nearer to the centre.
+            given_up = Some(guess);
+            guess = Guess::at(coefficients, [point[0] * T::of(0.5), point[1] * T::of(0.5)], point);
+            moved = true;
+        }
         step = if moved { step + 1 } else { MAX_STEPS };
     }
-    guess.point
+    match given_up {
+        Some(first) if first.miss < guess.miss => first.point,
+        _ => guess.point,
+    }
 }

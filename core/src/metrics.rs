@@ -5,9 +5,11 @@
 
 use crate::math::log10;
 
-/// Mean squared difference in units of 8-bit steps squared. Equal lengths are required; of empty images it is 0.
+/// Mean squared difference in units of 8-bit steps squared: NaN if the lengths differ, 0 for empty images.
 pub fn mean_squared_error(prediction: &[u8], truth: &[u8]) -> f64 {
-    debug_assert_eq!(prediction.len(), truth.len());
+    if prediction.len() != truth.len() {
+        return f64::NAN;
+    }
     let mut sum = 0_u64;
     let mut i = 0;
     while i < truth.len() {
@@ -18,7 +20,7 @@ pub fn mean_squared_error(prediction: &[u8], truth: &[u8]) -> f64 {
     if truth.is_empty() { 0.0 } else { sum as f64 / truth.len() as f64 }
 }
 
-/// Peak signal to noise ratio in decibels for a peak of 255; infinite for equal images.
+/// Peak signal to noise ratio in decibels for a peak of 255; infinite for equal images, NaN if the lengths differ.
 pub fn psnr(prediction: &[u8], truth: &[u8]) -> f64 {
     let error = mean_squared_error(prediction, truth);
     if error == 0.0 { f64::INFINITY } else { 10.0 * log10(255.0 * 255.0 / error) }
@@ -29,10 +31,12 @@ pub const SSIM_WINDOW: usize = 7;
 
 /// Mean structural similarity with a uniform 7x7 window, sample covariance (divided by 48) and the constants 0.01 and
 /// 0.03 of a range of 255, over every window that lies inside the image, averaged over the channels. `None` if the
-/// image is smaller than the window.
+/// image is smaller than the window, or a length is not `width * height * channel_count`. Which is the width, lengths
+/// do not tell.
 pub fn ssim(prediction: &[u8], truth: &[u8], width: usize, height: usize, channel_count: usize) -> Option<f64> {
-    debug_assert!(prediction.len() == truth.len() && truth.len() == width * height * channel_count);
-    if width < SSIM_WINDOW || height < SSIM_WINDOW || channel_count == 0 {
+    let len = width.checked_mul(height).and_then(|pixels| pixels.checked_mul(channel_count));
+    let fits = len == Some(truth.len()) && prediction.len() == truth.len();
+    if !fits || width < SSIM_WINDOW || height < SSIM_WINDOW || channel_count == 0 {
         return None;
     }
     let mut total = 0.0;

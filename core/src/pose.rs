@@ -40,10 +40,15 @@ pub enum PoseError {
     },
     /// The determinant is -1: an axis is mirrored.
     Mirrored,
+    /// [`Pose::look_at`] has no line of sight, or no upward direction beside it.
+    NoDirection,
 }
 
 /// Sine of the least angle between the line of sight and the upward direction of [`Pose::look_at`].
 const MIN_SINE: f32 = 1.0e-6;
+
+/// The same below which rounding has made what is across them oblique.
+const NEARLY_PARALLEL: f32 = 0.05;
 
 impl fmt::Display for PoseError {
     /// As a message, in which rows and columns count from 1.
@@ -60,6 +65,10 @@ impl fmt::Display for PoseError {
                 write!(f, "the 3x3 block is scaled or skewed: R^T R differs from the identity by {deviation:.4}")
             }
             PoseError::Mirrored => f.write_str("the determinant of the 3x3 block is -1: an axis is mirrored"),
+            PoseError::NoDirection => f.write_str(
+                "a camera and the point that it looks at coincide or are not finite, or the upward direction is parallel \
+                 to the line between them",
+            ),
         }
     }
 }
@@ -213,11 +222,11 @@ impl Pose {
     /// it can be.
     ///
     /// # Errors
-    /// [`PoseError::NotRigid`] if the two points coincide, `up_world` is parallel to the line between them (to a
+    /// [`PoseError::NoDirection`] if the two points coincide, `up_world` is parallel to the line between them (to a
     /// millionth), or a number is not finite or so large that a product overflows; [`PoseError::TooFar`] as of
     /// [`Pose::from_opencv`].
     pub fn look_at(centre_world: Vec3, point_world: Vec3, up_world: Vec3) -> Result<Pose, PoseError> {
-        let degenerate = PoseError::NotRigid { deviation: 1.0 };
+        let degenerate = PoseError::NoDirection;
         let forward = unit(point_world - centre_world).ok_or(degenerate)?;
         // Of parallel directions the cross product is noise, and as long as they are.
         let across = forward.cross(unit(up_world).ok_or(degenerate)?);
@@ -225,6 +234,11 @@ impl Pose {
             return Err(degenerate);
         }
         let right = unit(forward.cross(up_world)).ok_or(degenerate)?;
+        // Of nearly parallel directions it is not yet at a right angle to the line of sight.
+        let right = match across.length() < NEARLY_PARALLEL {
+            true => unit(right - forward * forward.dot(right)).ok_or(degenerate)?,
+            false => right,
+        };
         let down = forward.cross(right);
         let (c, r, d, f) = (centre_world, right, down, forward);
         Pose::from_opencv(&[[r.x, d.x, f.x, c.x], [r.y, d.y, f.y, c.y], [r.z, d.z, f.z, c.z], [0.0, 0.0, 0.0, 1.0]])
@@ -297,7 +311,8 @@ impl Pose {
     /// Angle between the principal axes of two cameras, in `[0, pi]`.
     ///
     /// `2 atan2(|a - b|, |a + b|)`: exact at 0 and accurate to a few ULP of the result at every angle from 1e-18
-    /// on, where the arc cosine of a dot product is quantised to 0.03 degrees near 0.
+    /// on, where the arc cosine of a dot product is quantised to 0.03 degrees near 0. Lengths that are off by
+    /// [`RIGID_TOLERANCE`] change it by 1e-6 of itself at most.
     #[inline]
     pub fn axis_angle(&self, other: &Pose) -> f32 {
         let (difference, sum) = self.axis_chords_squared(other);
@@ -305,11 +320,11 @@ impl Pose {
     }
 
     /// `|a - b|^2` and `|a + b|^2` of the principal axes `a`, `b` of two cameras: `4 sin^2` and `4 cos^2` of half the
-    /// angle between them.
+    /// angle between them, if they have length 1. What is parallel to the longer one of `a - b` and `a + b`, a
+    /// difference of the lengths, does not count in the other.
     #[inline]
     pub fn axis_chords_squared(&self, other: &Pose) -> (f32, f32) {
-        let (a, b) = (self.forward_world, other.forward_world);
-        ((a - b).length_squared(), (a + b).length_squared())
+        chords_squared(self.forward_world, other.forward_world)
     }
 
     /// Angle of the full relative rotation between two cameras (roll counts), in `[0, pi]`.
@@ -323,11 +338,15 @@ impl Pose {
             a.right_world.dot(b.right_world) + a.down_world.dot(b.down_world) + a.forward_world.dot(b.forward_world);
         let twice_cosine = trace - 1.0;
         if twice_cosine > 0.0 {
-            let chord = (a.right_world - b.right_world).length_squared()
-                + (a.down_world - b.down_world).length_squared()
-                + (a.forward_world - b.forward_world).length_squared();
-            // |R_a - R_b|_F^2 = 8 sin^2(angle / 2)
-            let sine_squared = chord / 8.0;
+            // |R_a - R_b|_F^2 = 8 sin^2(angle / 2), of axes of length 1.
+            let chord = |a: Vec3, b: Vec3| {
+                let (difference, sum) = chords_squared(a, b);
+                difference / (difference + sum)
+            };
+            let sine_squared = 0.5
+                * (chord(a.right_world, b.right_world)
+                    + chord(a.down_world, b.down_world)
+                    + chord(a.forward_world, b.forward_world));
             return 2.0 * angle_from_squares(sine_squared, max(1.0 - sine_squared, 0.0));
         }
         let antisymmetric = Vec3::new(
@@ -345,6 +364,17 @@ impl Pose {
         // `max` drops a NaN on its left: huge entries give infinity or NaN, both of which must fail.
         if deviation <= f32::MAX && r.dot(r) + d.dot(d) + f.dot(f) <= f32::MAX { deviation } else { f32::MAX }
     }
+}
+
+/// `|a - b|^2` and `|a + b|^2`, the shorter one without what is parallel to the longer one: the part of the difference
+/// of `a` and `b` that is one of their lengths, where these are nearly 1.
+#[inline]
+fn chords_squared(a: Vec3, b: Vec3) -> (f32, f32) {
+    let (difference, sum) = (a - b, a + b);
+    let (d, s) = (difference.length_squared(), sum.length_squared());
+    let along = difference.dot(sum);
+    let (of_difference, of_sum) = if d <= s { (along / s, 0.0) } else { (0.0, along / d) };
+    ((difference - sum * of_difference).length_squared(), (sum - difference * of_sum).length_squared())
 }
 
 /// The direction of a vector, or `None` for one that is zero or not finite.

@@ -15,7 +15,7 @@
 //! |---|---|---|
 //! | mean | 0 | 0.5 |
 //! | distance, power 1, 2, 3 | 5.5, 11, 16.5; 2 a power more where norms are scaled | 6.3, 8.9, 14.9 |
-//! | error | 21 (angle 16.5, its share 2.5, two additions) | 8.8 |
+//! | error | 23 (angle 18.5, its share 2.5, two additions); `2 l / e` more where lengths of axes differ by `l` | 8.8 |
 //! | L1 | 12 | 6.6 |
 //! | Frobenius | 7.5; 9.5 where norms are scaled | 7.3 |
 //! | relative Frobenius | `12 + (18 abs(c_t) + abs(c_s)) / e`, as its translation may cancel | 8.0; 34 on a ring of radius 800 |

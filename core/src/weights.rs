@@ -7,7 +7,7 @@ use crate::math::{exp, max, min};
 
 /// Weights of up to `S` source views. Values at and beyond [`Weights::count`] are 0.
 ///
-/// Invariant: every value is finite and at least 0, and the sum (in view order) is 1 to within `S * 2^-24`.
+/// Invariant: every value is finite and at least 0, and the sum (in view order) is 1 to within `2 S * 2^-24`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Weights<const S: usize> {

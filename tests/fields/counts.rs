@@ -183,7 +183,7 @@ fn pictures_of_gaussians_need_no_uploads() {
     let gaussians: Vec<Gaussian> = (0..500).map(gaussian).collect();
     let f_rest = (0..500 * 45).map(|index| 0.2 * (index as f32).sin()).collect();
     let scene = GaussianScene { gaussians, degree: 3, f_rest, is_antialiased: false };
-    let field = GivenGaussians { scene, notes: Vec::new() };
+    let field = GivenGaussians { scene, notes: Vec::new(), unit: 1.0 };
     let (renderer, options) = (On { device: &device, field: &field }, RenderOptions::default());
     let sources = Arc::new(photographs(4, 48));
     let mut stage = Stage::of_sources(sources, &renderer, &options, &Silent).expect("a field");

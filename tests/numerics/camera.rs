@@ -129,7 +129,25 @@ fn look_at_looks_at() {
         (Vec3::splat(f32::NAN), Vec3::X, Vec3::Z),
         (Vec3::ZERO, Vec3::splat(f32::INFINITY), Vec3::Z),
     ] {
-        assert!(Pose::look_at(centre, target, up).is_err(), "{centre} {target} {up}");
+        assert_eq!(Pose::look_at(centre, target, up), Err(PoseError::NoDirection), "{centre} {target} {up}");
+    }
+    // Nearly parallel: a camera, or no direction; never one that is skewed.
+    for _ in 0..20_000 {
+        let [ahead, aside] = [0, 1].map(|_| Vec3::from_array(random.vector().map(|c| c as f32)));
+        let up = ahead + aside * random.log_range(1.0e-7, 1.0e-1) as f32;
+        match Pose::look_at(Vec3::ZERO, ahead, up) {
+            Ok(pose) => {
+                let (right, forward) = (pose.right_world(), pose.forward_world());
+                assert!(right.dot(forward).abs() <= 3.0e-6, "{ahead} {up}");
+                assert!((right.length() - 1.0).abs() <= 2.0e-7, "{ahead} {up}");
+                assert!((pose.down_world().length() - 1.0).abs() <= 4.0e-7, "{ahead} {up}");
+            }
+            Err(error) => {
+                assert_eq!(error, PoseError::NoDirection);
+                let across = ahead.as_dvec3().normalize().cross(up.as_dvec3().normalize()).length();
+                assert!(across < 2.0e-6, "{ahead} {up}: {across}");
+            }
+        }
     }
     // Parallel up to rounding: what is across is noise.
     for _ in 0..20_000 {

@@ -196,3 +196,31 @@ fn points_of_strong_lenses_are_found() {
     }
     assert!(counts.into_iter().all(|count| count > 10 * LENSES), "{counts:?}");
 }
+
+/// A given point just before the fold, from which a step of Newton's method is too long for any of its shares to help:
+/// once more from nearer to the centre.
+#[test]
+fn points_beside_a_fold_are_found() {
+    let lenses = [
+        (
+            [
+                0.2774982654333612, 0.08537490069285678, -0.18263497878211146, 0.0, 0.0, 0.0, 0.0, 0.0,
+                -0.11205440654270529,
+            ],
+            [0.7982011759079441, 0.5986508819309581],
+        ),
+        (
+            [1.6237445832200468, -1.985635777745148, -0.12272469060047664, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            [0.6298486716112182, 0.47238650370841356],
+        ),
+        (
+            [-1.8129639014617083, 2.2825903795919533, -0.7559364281087335, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            [0.6133479677309066, 0.4600109757981799],
+        ),
+    ];
+    for (coefficients, point) in lenses {
+        let lens = Lens::new(Projection::Perspective, coefficients).expect("a lens");
+        let found = lens.undistort(point);
+        assert!(found.residual < 1.0e-13, "{coefficients:?}: {found:?}");
+    }
+}

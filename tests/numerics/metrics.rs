@@ -236,6 +236,11 @@ fn metrics_of_degenerate_pictures() {
     assert_eq!(ssim(&[0; 42], &[0; 42], 7, 6, 1), None);
     assert_eq!(ssim(&[], &[], 7, 7, 0), None);
     assert_eq!(ssim(&[9; 49], &[9; 49], 7, 7, 1), Some(1.0));
+    // Other lengths are no equal pictures.
+    assert!(psnr(&[1, 2, 3, 99], &[1, 2, 3]).is_nan() && psnr(&[1], &[1, 2]).is_nan());
+    assert!(mean_squared_error(&[], &[0]).is_nan());
+    assert_eq!([ssim(&[9; 49], &[9; 50], 7, 7, 1), ssim(&[9; 50], &[9; 50], 7, 7, 1)], [None; 2]);
+    assert_eq!(ssim(&[9; 49], &[9; 49], 7, usize::MAX, 7), None);
     let flat = ssim(&[0; 49], &[255; 49], 7, 7, 1).expect("one window");
     assert!((flat - 6.5025 / (65025.0 + 6.5025)).abs() < 1.0e-12);
 }

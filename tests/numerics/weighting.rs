@@ -191,6 +191,37 @@ fn angles_near_zero_a_right_angle_and_pi() {
     assert!(rotation_near <= 16.5 && rotation_far <= 1.0e-6);
 }
 
+/// Poses whose axes are as long as is allowed: their angles are those of the directions.
+#[test]
+fn lengths_of_axes_are_no_angles() {
+    let mut random = Random::new(15);
+    let mut worst = 0.0_f64;
+    for _ in 0..20_000 {
+        let base = random.rotation();
+        let turned = multiply(&rotation_about(random.vector(), random.log_range(1.0e-5, 1.5)), &base);
+        let scaled = |rotation: &Matrix, scale: f64| rotation.map(|row| row.map(|number| scale * number));
+        let scale = 1.0 + random.range(-4.0e-4, 4.0e-4);
+        let (a, b) = (pose_of(&scaled(&base, scale), [0.0; 3]), pose_of(&turned, [0.0; 3]));
+        let (wide_a, wide_b) = (WidePose::new(&a), WidePose::new(&b));
+        let unit = f64::from(f32::EPSILON) / 2.0;
+        let of_lengths = 6.0 * wide_a.length_difference(&wide_b);
+        for (found, exact) in
+            [(a.axis_angle(&b), wide_a.axis_angle(&wide_b)), (a.rotation_angle(&b), wide_a.rotation_angle(&wide_b))]
+        {
+            worst = worst.max((f64::from(found) - exact).abs() / unit / (18.5 * exact + of_lengths));
+        }
+    }
+    println!("largest share of the bound: {worst:.2}");
+    assert!(worst <= 1.0);
+    // A source that is only scaled looks where the target looks, another one does not.
+    let scaled = pose_of(&[[1.0004, 0.0, 0.0], [0.0, 1.0004, 0.0], [0.0, 0.0, 1.0004]], [0.0, 0.0, 1.0]);
+    let turned = pose_of(&rotation_about([0.0, 1.0, 0.0], 1.0e-3), [1.0, 0.0, 0.0]);
+    assert_eq!(scaled.axis_angle(&Pose::IDENTITY), 0.0);
+    let scheme = Scheme::error(1.0, AngleKind::PrincipalAxis).expect("a scheme");
+    let [straight, aside] = weights(scheme, &[scaled, turned], &Pose::IDENTITY)[..] else { panic!("two weights") };
+    assert!((straight - 0.9969).abs() < 1.0e-4 && (aside - 0.0031).abs() < 1.0e-4, "{straight} {aside}");
+}
+
 #[test]
 fn opposite_axes_are_pi_apart() {
     let a = Pose::IDENTITY;

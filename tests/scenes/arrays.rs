@@ -58,6 +58,15 @@ fn llff_with_the_model_that_it_was_made_from() {
     assert_eq!((scene.layout, scene.points.len(), scene.warnings.len()), ("llff", 2, 0));
     // By character, "b 10" stands before "b 2": image 11 is the first row.
     assert_eq!((scene.points[0].error, &scene.points[0].views[..]), (Some(0.25), &[0, 1][..]));
+    // Where photographs have the names of the model's images, they have their places, too.
+    folder.remove("images_8/a.png").remove("images_8/b.png");
+    folder.image("images_8/b 10.png", 16, 12).image("images_8/b 2.png", 16, 12);
+    assert_eq!(names(&open(&folder)), ["b 10", "b 2"]);
+    folder.remove("images_8/b 10.png").image("images_8/z.png", 16, 12);
+    let parts = ["row 0, of 'b 10' by the COLMAP model beside it, and the photograph 'b 2' in its place contradict"];
+    assert_refused(&folder, "poses_bounds.npy: ", &parts);
+    folder.remove("images_8/b 2.png").remove("images_8/z.png");
+    folder.image("images_8/a.png", 16, 12).image("images_8/b.png", 16, 12);
     // Another model, or a damaged one, costs the points and a warning.
     folder.write("sparse/0/images.bin", images_binary(&IMAGES[..1]));
     let other = open(&folder);
@@ -149,6 +158,23 @@ fn neus_by_position_and_without_a_sphere() {
     assert_pixel(&scene, 3, [12.5, 3.5]);
     folder.remove("image/102.png");
     assert_refused(&folder, "cameras_sphere.npz: found 4 matrices world_mat_N", &["instead of 3"]);
+}
+
+/// Photographs that are numbered from 1 and of which the last was removed have the matrix of the one before.
+#[test]
+fn neus_that_lacks_the_first_number_is_doubtful() {
+    let folder = neus();
+    let told = |folder: &Folder| {
+        let warnings = open(folder).warnings;
+        warnings.iter().any(|warning| warning.contains("where names count from 1, each photograph has the next one's"))
+    };
+    assert!(!told(&folder), "some of many");
+    let numbers = [2, 3, 4, 5];
+    folder.remove("image/003.png").remove("image/005.png");
+    numbers[1..].iter().for_each(|number| _ = folder.image(&format!("image/{number:03}.png"), 16, 12));
+    assert!(told(&folder));
+    folder.image("image/002.png", 16, 12);
+    assert!(!told(&folder), "each has its matrix");
 }
 
 /// The sphere is the object's: photographs without masks show more.

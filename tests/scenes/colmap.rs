@@ -50,6 +50,27 @@ fn a_model_may_stand_in_several_places() {
     }
 }
 
+/// What other layouts call rgb/ or pose/ is no SRN scene, and a rig's folders tell its views apart.
+#[test]
+fn photographs_may_lie_in_rgb_and_in_the_folders_of_rigs() {
+    let names_in = |names: [&'static str; 2], images: &str| {
+        let folder = Folder::new();
+        let images_of = [(11, 7, names[0]), (12, 7, names[1])];
+        folder
+            .write("sparse/0/cameras.bin", cameras_binary(&[pinhole()]))
+            .write("sparse/0/images.bin", images_binary(&images_of));
+        names.iter().for_each(|name| _ = folder.image(&format!("{images}/{name}"), 16, 12));
+        let scene = open(&folder);
+        (scene.layout, names_of(&scene))
+    };
+    fn names_of(scene: &Scene) -> Vec<String> {
+        scene.views.iter().map(|view| view.name.clone()).collect()
+    }
+    assert_eq!(names_in(["a.png", "b.png"], "rgb"), ("colmap", vec!["a".to_owned(), "b".to_owned()]));
+    let rigs = names_in(["rig1/camera1/1.png", "rig2/camera1/1.png"], "images");
+    assert_eq!(rigs.1, ["rig1_camera1_1", "rig2_camera1_1"]);
+}
+
 #[test]
 fn extensions_may_have_changed_and_points_may_be_missing() {
     let folder = colmap_binary();

@@ -116,6 +116,37 @@ fn a_file_that_is_not_read_is_named_by_its_kind() {
     }
 }
 
+/// Decoders make up what is missing, which looks like a photograph.
+#[test]
+fn a_jpeg_of_damaged_data_is_refused() {
+    let whole = tagged(320, 240, 1);
+    let (start, end) = (whole.len() / 2, whole.len() - 2);
+    let cut = [&whole[..start], &whole[end..]].concat();
+    let lacking = [&whole[..start], &whole[start + 200..]].concat();
+    let mut wild = whole.clone();
+    wild[start..start + 4].copy_from_slice(&[0xff, 0xd8, 0xff, 0xc0]);
+    for (what, bytes) in [("cut and ended", cut), ("a marker within", wild)] {
+        let read = open(&folder(None, &bytes)).photograph(0);
+        let error = read.map(|_| what).expect_err("a part of a picture").to_string();
+        assert!(error.contains("images/1.jpg: the file is damaged ("), "{what}: {error}");
+    }
+    // Where the data are a picture still, nobody can tell.
+    _ = open(&folder(None, &lacking)).photograph(0);
+    open(&folder(None, &whole)).photograph(0).expect("a photograph");
+    // All pixels are those of the usual decoder, also of the least data that a row can have, and in grey.
+    for width in [256, 257, 300] {
+        for grey in [false, true] {
+            let picture = image::RgbImage::from_pixel(width, 40, image::Rgb([90, 120, 150]));
+            let picture = image::DynamicImage::from(picture);
+            let picture = if grey { picture.to_luma8().into() } else { picture };
+            let mut bytes = Vec::new();
+            picture.write_to(&mut std::io::Cursor::new(&mut bytes), image::ImageFormat::Jpeg).expect("a JPEG");
+            let usual = image::load_from_memory(&bytes).expect("a picture").to_rgba8();
+            assert!(open(&folder(None, &bytes)).photograph(0).expect("a photograph").pixels == usual);
+        }
+    }
+}
+
 #[test]
 fn a_jpeg_that_ends_before_its_picture_is_refused() {
     let whole = tagged(32, 24, 1);

@@ -2,7 +2,7 @@
 //!
 //! The camera sees the point at (0.5, -0.25, 2): the pixel is `focal * (0.25, -0.125) + principal`.
 
-use super::made::{assert_pixel, names, open};
+use super::made::{assert_pixel, assert_refused, names, open};
 use serde_json::json;
 use viewfuse::scene::{ImageFault, Scene, SceneFault, Split};
 use viewfuse_tests::scenes::{self, Folder};
@@ -230,4 +230,25 @@ fn views_numbered_alike_in_two_folders_are_told_apart() {
     }
     let scene = open(&folder);
     assert_eq!(names(&scene), ["left_0001", "right_0001", "0002"]);
+}
+
+/// Photographs without poses beside something that has them.
+#[test]
+fn where_poses_are_is_said() {
+    let folder = Folder::new();
+    folder.image("1.png", 16, 12).image("2.png", 16, 12);
+    assert_refused(&folder, ": 2 photographs, and nothing that gives their poses", &[]);
+    for (file, said) in [
+        ("sfm_data.json", "sfm_data.json is OpenMVG's, which is not read"),
+        ("cams/00000000_cam.txt", "00000000_cam.txt is MVSNet's, which is not read"),
+        ("cameras.xml", "cameras.xml is Metashape's, which is not read"),
+    ] {
+        folder.write(file, "{}");
+        assert_refused(&folder, ": 2 photographs without poses; ", &[said, "as a COLMAP model (text or binary)"]);
+        folder.remove(file);
+    }
+    // Those of a scene's folder of photographs.
+    let scene = scenes::transforms_folder(&scenes::transforms());
+    let error = Scene::open(scene.path().join("images")).expect_err("no poses").to_string();
+    assert!(error.ends_with("is a scene: give that"), "{error}");
 }

@@ -193,6 +193,27 @@ fn grey_photographs_among_others_are_told() {
     assert_eq!(warnings(&scene, &[0, 2]), Vec::<String>::new());
 }
 
+/// Values of 12 bits in the place of 16 are a fiftieth of what they mean.
+#[test]
+fn nearly_black_photographs_are_told() {
+    let folder = called(&["0", "1"]);
+    let save = |name: &str, level: u16| {
+        let picture = image::ImageBuffer::from_fn(16, 12, |x, y| image::Rgb([level, level / 2, (x * y) as u16]));
+        picture.save(folder.file(&format!("rgb/{name}.png"))).expect("saved");
+    };
+    save("0", 16_000);
+    save("1", 4_095);
+    let scene = open(&folder);
+    let told = warnings(&scene, &[0, 1]);
+    assert!(
+        told.iter().any(|told| told.starts_with("no pixel of the photographs is brighter than 62 of 255")),
+        "{told:?}"
+    );
+    save("1", 30_000);
+    let told = warnings(&open(&folder), &[0, 1]);
+    assert!(told.iter().all(|told| !told.contains("no pixel")), "{told:?}");
+}
+
 #[test]
 fn exposures_far_apart_are_told() {
     let folder = called(&["0", "1", "2", "3"]);

@@ -131,6 +131,20 @@ fn photographs_may_be_smaller_and_paths_those_of_another_system() {
     assert_eq!(scene.views[1].image, Some(folder.join("images_4/2.png")));
 }
 
+/// COLMAP's mask of a photograph that is not there is no photograph; nor is instant-ngp's alpha channel.
+#[test]
+fn what_stands_beside_a_photograph_is_not_taken_for_it() {
+    let folder = with_frames(json!([frame("images/a.jpg"), frame("images/b.jpg")]), &["images/a.jpg"]);
+    folder.image("images/b.jpg.png", 16, 12);
+    let scene = open(&folder);
+    assert_eq!(names(&scene), ["a"]);
+    assert!(scene.warnings[0].contains("1 of 2 photographs are not there"), "{:?}", scene.warnings);
+    folder.image("images/a.alpha.png", 16, 12);
+    let told = open(&folder).warnings;
+    let alpha = "a.alpha.png: 1 file with alpha channels of photographs is not read";
+    assert!(told.iter().any(|warning| warning.contains(alpha)), "{told:?}");
+}
+
 #[test]
 fn masks_are_named_or_stand_beside() {
     let photographs = ["images/1.png", "images/2.png", "images/3.png", "images/4.png"];
@@ -176,6 +190,9 @@ fn masks_are_named_or_stand_beside() {
 fn lenses_are_told_by_model_and_flag() {
     let lens = |entries: &[(&str, Value)]| {
         let mut transforms = scenes::transforms();
+        let is_listed = entries.iter().any(|(key, _)| *key == "distortion_params");
+        let keys = ["k1", "k2", "k3", "k4", "p1", "p2"];
+        keys.iter().filter(|_| is_listed).for_each(|key| transforms[*key] = Value::Null);
         transforms["k1"] = json!(0.1);
         entries.iter().for_each(|(key, value)| transforms[*key] = value.clone());
         let scene = Scene::open(scenes::transforms_folder(&transforms).path()).expect("a scene");
@@ -193,6 +210,27 @@ fn lenses_are_told_by_model_and_flag() {
     let mut all: Vec<(&str, Value)> = all.map(|(key, value)| (key, json!(value))).into();
     all.push(("camera_model", json!("FULL_OPENCV")));
     assert_eq!(lens(&all), Some((Projection::Perspective, [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.0])));
+    // nerfstudio's list, at the top or in a frame, which may be short, and says the same as keys beside it.
+    let list = |numbers: Value| [("distortion_params", numbers)];
+    let whole = [0.1, 0.2, 0.3, 0.0, 0.0, 0.0, 0.7, 0.8, 0.4];
+    assert_eq!(lens(&list(json!([0.1, 0.2, 0.3, 0.4, 0.7, 0.8]))), Some((Projection::Perspective, whole)));
+    assert_eq!(lens(&list(json!([0.1, 0.2]))).map(|(_, all)| all[..2].to_vec()), Some(vec![0.1, 0.2]));
+    let mut fisheye_list = list(json!([0.1, -0.2, 0.3, 0.4, 0.0, 0.0])).to_vec();
+    fisheye_list.push(("camera_model", json!("OPENCV_FISHEYE")));
+    assert_eq!(lens(&fisheye_list), Some((Projection::Fisheye, [0.1, -0.2, 0.3, 0.4, 0.0, 0.0, 0.0, 0.0, 0.0])));
+    let mut frames = json!([frame("./images/0001.png")]);
+    frames[0]["distortion_params"] = json!([0.1, 0.25]);
+    assert_eq!(lens(&[("frames", frames)]).map(|(_, all)| all[1]), Some(0.25));
+    for (numbers, said) in [
+        (json!([0.3]), "distortion_params[0] 0.3 and k1 0.1 contradict each other"),
+        (json!([0.1, "x"]), "distortion_params: "),
+        (json!([0.1, 0, 0, 0, 0, 0, 0]), "(k1 k2 k3 k4 p1 p2) instead of 6"),
+        (json!(0.1), "distortion_params"),
+    ] {
+        let mut transforms = scenes::transforms();
+        (transforms["k1"], transforms["distortion_params"]) = (json!(0.1), numbers);
+        assert_refused(&scenes::transforms_folder(&transforms), "transforms.json: ", &[said]);
+    }
     // A frame's own lens wins.
     let mut frames = json!([frame("./images/0001.png")]);
     frames[0]["k1"] = json!(-0.25);
@@ -288,6 +326,9 @@ fn what_is_not_read_is_said() {
     );
     assert!(telling.contains("rolling_shutter, white_transparent change pictures and are not read"), "{telling}");
     assert!(moving.contains("different times (time): the scene moves"), "{moving}");
+    // The dark rim of a fisheye, which nerfstudio cuts off.
+    let rim = open(&changed(2, |transforms| transforms["fisheye_crop_radius"] = json!(5.0)));
+    assert!(rim.warnings.iter().any(|told| told.contains("counts as picture: give masks of it")), "{:?}", rim.warnings);
     // One time is a still scene.
     let still = changed(2, |transforms| (0..2).for_each(|index| transforms["frames"][index]["time"] = json!(0.5)));
     assert!(open(&still).warnings.is_empty());
@@ -298,7 +339,7 @@ fn photographs_that_no_frame_names_are_counted() {
     let folder = changed(2, |_| {});
     folder.image("images/3.png", 16, 12).image("images/10.png", 16, 12);
     // Pictures that belong to a photograph are none.
-    for name in ["1_depth_0001", "2_normal", "1.alpha", "mask_1"] {
+    for name in ["1_depth_0001", "2_normal", "1.depth", "mask_1"] {
         folder.image(&format!("images/{name}.png"), 16, 12);
     }
     let [warning] = &open(&folder).warnings[..] else { panic!("one warning") };

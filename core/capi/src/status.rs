@@ -40,7 +40,7 @@ impl From<PoseError> for Status {
             PoseError::NotFinite { .. } => Status::PoseNotFinite,
             PoseError::TooFar => Status::PoseTooFar,
             PoseError::LastRow => Status::PoseLastRow,
-            PoseError::NotRigid { .. } => Status::PoseNotRigid,
+            PoseError::NotRigid { .. } | PoseError::NoDirection => Status::PoseNotRigid,
             PoseError::Mirrored => Status::PoseMirrored,
         }
     }

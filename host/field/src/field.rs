@@ -53,6 +53,11 @@ pub trait Prepared {
         Encoding::Used
     }
 
+    /// What is behind everything that it renders, red, green, blue in `[0, 1]`; `None` for the sources' own background.
+    fn background(&self) -> Option<[f32; 3]> {
+        None
+    }
+
     /// Encodes a source view, which is not encoded yet.
     ///
     /// # Errors

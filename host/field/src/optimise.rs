@@ -354,7 +354,8 @@ impl<'a> SceneOptimisation<'a> {
         progress: &dyn Progress,
         work: impl FnOnce(&mut Stage<'_>) -> Result<T, RenderError>,
     ) -> Result<T, RenderError> {
-        let given = AnyField::new(GivenGaussians { scene: gaussians.clone(), notes: notes.to_vec() });
+        let unit = (1.0 / self.scene.frame.scale) as f32;
+        let given = AnyField::new(GivenGaussians { scene: gaussians.clone(), notes: notes.to_vec(), unit });
         let (renderer, images) = (given.on(device), images.clone());
         let (scene, sources, options) = (self.scene, &self.sources, &self.options);
         work(&mut Stage::of_images(scene, album, sources, images, renderer.as_ref(), options, progress)?)

@@ -203,7 +203,7 @@ impl RunWriter {
             self.has_begun = true;
         }
         self.size = frame.picture.dimensions().into();
-        self.background = sources.background;
+        self.background = frame.background;
         self.warnings.clone_from(&sources.warnings);
         if self.has_sheet(&frame) && self.source_pictures.is_empty() {
             self.source_pictures = (0..sources.images.len()).map(|source| Arc::new(sources.picture(source))).collect();

@@ -384,6 +384,7 @@ impl<'a> Album<'a> {
             ));
         }
         warnings.extend(exposure::warning(&images, views.iter().map(|&view| name(view))));
+        warnings.extend(exposure::dark_warning(&images));
         warnings.extend(exposure::grey_warning(&images, views.iter().map(|&view| name(view))));
         let (points, near_far) = self.space(views);
         // A sphere is the object's: photographs that are not cut out show more.

@@ -20,6 +20,7 @@ mod bytes;
 pub(crate) mod camera_models;
 pub(crate) mod check;
 mod colmap;
+mod elsewhere;
 mod error;
 mod fault;
 pub(crate) mod files;
@@ -246,6 +247,7 @@ impl Scene {
             }
             let Checked { mut views, points, mut warnings, conventions, mut unused, lists, frame } = checked;
             warnings.extend(unlisted::photographs(&views));
+            warnings.extend(unlisted::alphas(&views));
             warnings.extend(found_poses::warnings(path, &views));
             unused.extend(unlisted::files(&found, &views, &lists));
             let is_of_object = masks == MaskMeaning::Object && mask_choice != MaskChoice::None;
@@ -256,7 +258,10 @@ impl Scene {
         }
         Err(FilePlace::file(path).fault(match files::photograph_count(path) {
             0 => SceneFault::UnknownLayout(looked_for(readers)),
-            count => SceneFault::BarePhotographs(count),
+            count => match elsewhere::poses(path, readers) {
+                Some(place) => SceneFault::PosesElsewhere(count, place),
+                None => SceneFault::BarePhotographs(count),
+            },
         }))
     }
 
@@ -414,13 +419,24 @@ fn distinguish(views: &mut [View]) {
     for view in views.iter() {
         folders.entry(view.name.clone()).or_default().extend(folder_of(view));
     }
-    for view in views.iter_mut() {
+    let mut names: Vec<String> = views.iter().map(|view| view.name.clone()).collect();
+    for (view, name) in views.iter().zip(&mut names) {
         let all = &folders[&view.name];
         let differ = all.iter().collect::<HashSet<_>>().len() == all.len();
-        if let Some(folder) = folder_of(view).as_deref().and_then(Path::file_name).filter(|_| all.len() > 1 && differ) {
-            view.name = format!("{}_{}", files::exact(folder), view.name);
-        }
+        let Some(folder) = folder_of(view).filter(|_| all.len() > 1 && differ) else { continue };
+        // As few folders as tell them apart: rig1/camera1 and rig2/camera1 need two.
+        let ending = |folder: &Path, count: usize| -> Vec<String> {
+            let parts: Vec<String> = folder.components().map(|part| files::exact(part.as_os_str())).collect();
+            parts[parts.len().saturating_sub(count)..].to_vec()
+        };
+        let is_enough = |count: &usize| {
+            let endings: HashSet<Vec<String>> = all.iter().map(|other| ending(other, *count)).collect();
+            endings.len() == all.len()
+        };
+        let count = (1..=folder.components().count()).find(is_enough).unwrap_or(1);
+        *name = format!("{}_{}", ending(&folder, count).join("_"), view.name);
     }
+    views.iter_mut().zip(names).for_each(|(view, name)| view.name = name);
 }
 
 /// The digits that a name ends in, without leading zeros (empty for zero itself); `None` if it ends in no digit.

@@ -280,7 +280,7 @@ impl<'a> RenderLoop<'a> {
             let Viewer { viewed, device_name, .. } = self.viewer;
             let scheme = request.weighting.to_string();
             let chosen = self.choice.made(&scheme);
-            PictureRecord::of(frame, viewed, &self.coverage, device_name, scheme, chosen, self.images.background)
+            PictureRecord::of(frame, viewed, &self.coverage, device_name, scheme, chosen, frame.background)
         });
         let unit = self.viewer.viewed.scene.frame.scale;
         match answer::bytes(frame, &self.coverage, request.layer, unit, record) {

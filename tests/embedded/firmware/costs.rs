@@ -125,6 +125,31 @@ pub(super) fn what_the_calls_take(boards: &[Firmware]) -> Result<(), Failed> {
         let (_, speed) = costs(&boards[..1], for_speed, 2)?;
         the_results_say_so(&format!("| for speed | {}: instructions | stack |", processors[0]), &speed, is_small)?;
     }
+    the_readme_says_the_same()
+}
+
+/// The table of core's README has the results' numbers of the first processor.
+fn the_readme_says_the_same() -> Result<(), Failed> {
+    const HEADING: &str = "| call | instructions | stack | code |\n|---|---|---|---|\n";
+    let path = repository().join("core/README.md");
+    let (readme, results) = (std::fs::read_to_string(&path)?, std::fs::read_to_string(results())?);
+    let (_, measured) = results.split_once("| for size |").ok_or("no table for size")?;
+    let (before, behind) = readme.split_once(HEADING).ok_or("no table of calls")?;
+    let (rows, rest) = behind.split_once("\n\n").ok_or("the table does not end")?;
+    let row = |line: &str| -> Result<String, Failed> {
+        let title = line.trim_matches('|').split('|').next().unwrap_or_default().trim();
+        let plain = format!("| {} |", title.replace('`', ""));
+        let found =
+            measured.lines().find(|known| known.starts_with(&plain)).ok_or_else(|| format!("no row {title}"))?;
+        let numbers = found[plain.len()..].split('|').take(3).collect::<Vec<_>>().join("|");
+        Ok(format!("| {title} |{numbers}|"))
+    };
+    let table = rows.lines().map(row).collect::<Result<Vec<_>, _>>()?.join("\n");
+    if writes_tables() {
+        std::fs::write(&path, [before, HEADING, &table, "\n\n", rest].concat())?;
+    } else {
+        assert_eq!(rows, table, "core/README.md");
+    }
     Ok(())
 }
 

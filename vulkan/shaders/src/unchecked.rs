@@ -51,15 +51,16 @@ pub(crate) struct EndlessHalves<'a>(pub(crate) &'a [UVec2]);
 impl Fetch<f32> for EndlessHalves<'_> {
     #[inline(always)]
     fn fetch(&self, index: usize) -> f32 {
-        let UVec2 { x, y } = self.four_halves(index as u32);
-        f16_value(if index & 2 == 0 { x } else { y } >> (index as u32 % 2 * 16))
+        let [near, far] = self.four_halves(index as u32);
+        f16_value(if index & 2 == 0 { near } else { far } >> (index as u32 % 2 * 16))
     }
 }
 
 impl Fours for EndlessHalves<'_> {
     #[inline(always)]
-    fn four_halves(&self, index: u32) -> UVec2 {
-        Endless(self.0).fetch((index / 4) as usize)
+    fn four_halves(&self, index: u32) -> [u32; 2] {
+        let UVec2 { x, y } = Endless(self.0).fetch((index / 4) as usize);
+        [x, y]
     }
 }
 

@@ -5,7 +5,7 @@
 //! has rows.
 
 use super::linear::{rectified, rectified_four};
-use glam::{UVec2, Vec4};
+use glam::Vec4;
 use viewfuse_core::fetch::Fetch;
 use viewfuse_core::half_precision::f16_bits_or_nan;
 
@@ -34,15 +34,15 @@ pub trait Fours: Fetch<f32> + Copy {
 
     /// The same in half precision, two in a word, NaN for what is too large.
     #[inline(always)]
-    fn four_halves(&self, index: u32) -> UVec2 {
+    fn four_halves(&self, index: u32) -> [u32; 2] {
         halves_of(self.four(index))
     }
 }
 
 #[inline(always)]
-fn halves_of(four: Vec4) -> UVec2 {
+fn halves_of(four: Vec4) -> [u32; 2] {
     let pair = |lower: f32, upper: f32| f16_bits_or_nan(lower) | f16_bits_or_nan(upper) << 16;
-    UVec2::new(pair(four.x, four.y), pair(four.z, four.w))
+    [pair(four.x, four.y), pair(four.z, four.w)]
 }
 
 /// The left matrix of a product. What many numbers have in common may take divisions: a device computes it once.
@@ -105,7 +105,7 @@ pub trait Right: Copy {
 
     /// The same in half precision, two in a word, NaN for what is too large.
     #[inline(always)]
-    fn four_halves(self, inner: u32, column: u32) -> UVec2 {
+    fn four_halves(self, inner: u32, column: u32) -> [u32; 2] {
         halves_of(self.four(inner, column))
     }
 }
@@ -145,7 +145,7 @@ impl<A: Fours> Right for Weights<A> {
     }
 
     #[inline(always)]
-    fn four_halves(self, inner: u32, column: u32) -> UVec2 {
+    fn four_halves(self, inner: u32, column: u32) -> [u32; 2] {
         self.numbers.four_halves(inner * self.column_count + column)
     }
 }

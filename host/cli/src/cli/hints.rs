@@ -48,7 +48,9 @@ fn sentence(hint: Hint) -> Option<&'static str> {
         Hint::Targets => "give --targets NAMES, --orbit N, --between A B, --spiral N or --camera-path FILE",
         Hint::NoOrbit => "give --targets",
         Hint::NoSpiral => "give --orbit or --between",
-        Hint::Background => "set the colour with --background",
+        Hint::Background => {
+            "set the colour behind the object with --background, or --background none where photographs show no object"
+        }
         Hint::Masks => "say it with --masks object or --masks ignore; --masks none does without them",
         Hint::NoObject => "`viewfuse inspect` shows the poses; --background sets the background",
         Hint::PictureSize => "give another --size",

@@ -17,8 +17,9 @@ use viewfuse_device::Memory;
 use viewfuse_device::choice::{AnyDevice, Chosen};
 use viewfuse_field::gaussians::{MAX_COUNT, MAX_ITERATIONS, Quality, Recipe, RecipeOptions};
 use viewfuse_field::optimise::{EndedOptimisation, SceneOptimisation, TOWARDS};
-use viewfuse_job::files::{check_writable, remove_if_there};
+use viewfuse_job::files::{WriteError, check_writable, remove_if_there};
 use viewfuse_output::gaussian_page::{check_name, holds_harmonics, is_page, write_optimised};
+use viewfuse_scene::Scene;
 use viewfuse_scene::gaussians::{GaussianFile, GaussianScene};
 use viewfuse_weighting::{WeightingSpec, grammar};
 
@@ -121,6 +122,18 @@ fn beside(output: &Path) -> PathBuf {
     output.with_extension(format!("unfinished.{extension}"))
 }
 
+/// What cannot be written in a file's format is kept in a `.ply` beside it, and the error says where.
+fn rescued(written: &Path, scene: &Scene, ended: &EndedOptimisation, error: WriteError) -> anyhow::Error {
+    let ply = written.with_extension("ply");
+    let place = [beside(&ply), ply].into_iter().rfind(|place| !place.exists());
+    match place.filter(|place| ended.gaussians.write(place, &scene.frame).is_ok()) {
+        Some(place) => {
+            anyhow::Error::from(error).context(format!("the Gaussians are in {} in its place", place.display()))
+        }
+        None => error.into(),
+    }
+}
+
 /// A file of a format that is written.
 fn known_file(path: PathBuf) -> Result<PathBuf, &'static str> {
     check_name(&path).map(|()| path)
@@ -180,8 +193,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     drop(progress);
     let EndedOptimisation { gaussians, done, of, fit, .. } = &ended;
     let written = if done < of { &unfinished } else { output };
-    write_optimised(written, &scene, &optimisation.sources, &ended)?;
-    if written != &unfinished && is_kept {
+    if let Err(error) = write_optimised(written, &scene, &optimisation.sources, &ended) {
+        return Err(rescued(written, &scene, &ended, error));
+    }
+    if written != &unfinished && (is_kept || goes_on_from_it) {
         remove_if_there(&unfinished)?;
     }
     let count = gaussians.gaussians.len();

@@ -11,7 +11,9 @@ use viewfuse_job::shell::quoted;
 use viewfuse_output::video::VideoFormat;
 use viewfuse_scene::Scene;
 
-/// How files that viewfuse writes name it, and within how many bytes.
+/// How files that viewfuse writes name it, and within how many bytes: by their extensions, and all others.
+const MARKS: [(&str, &[u8]); 2] =
+    [("ply", b"\ncomment viewfuse\n"), ("html", b"name=\"generator\" content=\"viewfuse")];
 const MARK: &[u8] = b"viewfuse";
 const BEGINNING: u64 = 64 << 10;
 
@@ -94,7 +96,7 @@ pub fn refuse_extension(file: &Path, what: &str, extensions: &[&str]) -> anyhow:
 }
 
 /// Refuses to replace a file in whose beginning nothing says that viewfuse wrote it: a scan, or another program's
-/// Gaussians. Files without a header, as `.splat`, say nothing, and are replaced.
+/// Gaussians. Files without a header, as `.splat`, say nothing, and are not replaced.
 ///
 /// # Errors
 /// That of wrong arguments.
@@ -102,13 +104,24 @@ pub fn keep_others(output: &Path) -> anyhow::Result<()> {
     let mut beginning = Vec::new();
     // Whether it can be read or replaced is asked where it is written.
     let _ = File::open(output).and_then(|file| file.take(BEGINNING).read_to_end(&mut beginning));
-    let says_so = || beginning.windows(MARK.len()).any(|part| part.eq_ignore_ascii_case(MARK));
-    match beginning.is_empty()
-        || output.extension().is_some_and(|given| given.eq_ignore_ascii_case("splat"))
-        || says_so()
-    {
+    let has_extension = |known: &str| output.extension().is_some_and(|given| given.eq_ignore_ascii_case(known));
+    let mark = MARKS.iter().find(|(extension, _)| has_extension(extension)).map_or(MARK, |(_, mark)| mark);
+    let says_so = || beginning.windows(mark.len()).any(|part| part.eq_ignore_ascii_case(mark));
+    match beginning.is_empty() || !has_extension("splat") && says_so() {
         true => Ok(()),
+        false if has_extension("splat") => Err(foreign(output, "is there, a .splat does not say who wrote it")),
         false => Err(foreign(output, "was not written by viewfuse")),
+    }
+}
+
+/// Refuses to replace a file of other contents: for what takes no time to make again, and names nobody.
+pub(super) fn keep_other_contents(output: &Path, contents: &[u8]) -> anyhow::Result<()> {
+    let mut there = Vec::new();
+    let most = contents.len() as u64 + 1;
+    let _ = File::open(output).and_then(|file| file.take(most).read_to_end(&mut there));
+    match there.is_empty() || there == contents {
+        true => Ok(()),
+        false => Err(foreign(output, "holds something else")),
     }
 }
 

@@ -32,7 +32,8 @@ impl PoseOption {
 
 fn posed(scene: &Path) -> anyhow::Result<PathBuf> {
     // All other errors are those of the command itself.
-    let is_bare = |error: SceneError| matches!(*error.fault, SceneFault::BarePhotographs(_));
+    let is_bare =
+        |error: SceneError| matches!(*error.fault, SceneFault::BarePhotographs(_) | SceneFault::PosesElsewhere(..));
     if !Scene::open(scene).is_err_and(is_bare) {
         return Ok(scene.to_path_buf());
     }

@@ -1,7 +1,7 @@
 //! `viewfuse select`.
 
 use super::options::SourceOptions;
-use super::outputs::keep_file_apart;
+use super::outputs::{keep_file_apart, keep_other_contents};
 use super::parse::parse_count;
 use super::path::PathOptions;
 use super::printing::{say, warn_of};
@@ -82,6 +82,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     match &arguments.output {
         Some(path) => {
             keep_file_apart([&scene], path)?;
+            keep_other_contents(path, text.as_bytes())?;
             write_whole(path, text.as_bytes()).context("the selection")?;
             say(path.display())?;
         }

@@ -1,7 +1,7 @@
 //! `viewfuse weights`.
 
 use super::options::SourceOptions;
-use super::outputs::keep_file_apart;
+use super::outputs::{keep_file_apart, keep_other_contents};
 use super::path::PathOptions;
 use super::printing::{complain, say, warn_of};
 use super::table::table;
@@ -68,7 +68,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         say(csv_of(&weights)?.trim_end_matches('\n'))?;
     } else if let Some(path) = &arguments.npy {
         keep_file_apart([&scene], path)?;
-        write_whole(path, &weights.npy())?;
+        let numbers = weights.npy();
+        keep_other_contents(path, &numbers)?;
+        write_whole(path, &numbers)?;
         let axes = json!({
             "file": path, "shape": weights.shape(), "schemes": weights.schemes, "targets": weights.targets,
             "sources": weights.sources,

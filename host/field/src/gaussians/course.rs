@@ -118,7 +118,7 @@ pub(super) struct Plan {
 pub(super) struct Course {
     pub(super) recipe: Recipe,
     pub(super) extent: Extent,
-    /// Depth along the principal axis from which on Gaussians are seen, world units.
+    /// Depth along the principal axis from which on Gaussians are seen, world units ([`Extent::near`]).
     pub(super) near: f32,
     /// What is seen where nothing is: red, green, blue.
     pub(super) background: [f32; 3],
@@ -164,7 +164,7 @@ impl Course {
         let particles = start(points, images, &extent, &recipe).into_iter().map(Particle::new).collect();
         let source_count = images.images.len();
         Ok(Some(Course {
-            near: recipe.near * extent.depth,
+            near: extent.near(recipe.near),
             background: behind(images),
             recipe,
             extent,

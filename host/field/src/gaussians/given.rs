@@ -19,8 +19,12 @@ use viewfuse_scene::{Scene, SceneError};
 
 /// The field's name: sources play no part in its pictures.
 pub const GIVEN: &str = "gaussian-file";
-/// Depth from which on Gaussians are seen, relative to their median depth in the sources.
+/// Depth from which on Gaussians are seen, relative to what is the nearest in the sources...
 const NEAR: f32 = 0.1;
+/// ... and the greatest, in units of the file's world: that of the published rasteriser.
+const MAX_NEAR: f32 = 0.2;
+/// Share of what the sources see that is nearer than what counts as the nearest.
+const NEAREST: f64 = 0.01;
 /// Most Gaussians whose depths are looked at.
 const MAX_LOOKED_AT: usize = 4096;
 /// Opacity below which a pixel has no depth.
@@ -33,6 +37,8 @@ pub struct GivenGaussians {
     pub scene: GaussianScene,
     /// What their file says beyond them, told before the first picture.
     pub notes: Vec<String>,
+    /// A unit of the scene's files, in world units ([`viewfuse_scene::SceneFrame`]).
+    pub unit: f32,
 }
 
 /// The same for a scene's sources.
@@ -87,7 +93,7 @@ impl Field for GivenGaussians {
         sources: &SourceImages,
         progress: &dyn Progress,
     ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
-        let near = NEAR * self.median_depth(sources);
+        let near = (NEAR * self.nearest_depth(sources)).min(MAX_NEAR * self.unit);
         let background = behind(sources);
         let mut prepared = Prepare { device, scene: &self.scene, near, background, uploaded: None };
         self.notes.iter().for_each(|note| progress.warn(note));
@@ -102,12 +108,13 @@ impl GivenGaussians {
     /// # Errors
     /// As [`GaussianFile::open`].
     pub fn open(path: &Path, scene: &Scene) -> Result<GivenGaussians, SceneError> {
+        let unit = (1.0 / scene.frame.scale) as f32;
         let GaussianFile { scene, notes } = GaussianFile::open(path, scene)?;
-        Ok(GivenGaussians { scene, notes })
+        Ok(GivenGaussians { scene, notes, unit })
     }
 
-    /// The median depth of the Gaussians that the sources see; 1 if they see none.
-    fn median_depth(&self, sources: &SourceImages) -> f32 {
+    /// The depth that [`NEAREST`] of the Gaussians that the sources see are nearer than; infinite if they see none.
+    fn nearest_depth(&self, sources: &SourceImages) -> f32 {
         let count = self.scene.gaussians.len();
         let looked_at = (0..MAX_LOOKED_AT.min(count)).filter_map(|draw| {
             let drawn = if count > MAX_LOOKED_AT { (uniform(0, draw as u32, 0) * count as f32) as usize } else { draw };
@@ -120,7 +127,7 @@ impl GivenGaussians {
         });
         let mut depths: Vec<f32> = seen.filter(|seen| seen.in_image).map(|seen| seen.depth).collect();
         depths.sort_by(f32::total_cmp);
-        depths.get(depths.len() / 2).copied().unwrap_or(1.0)
+        depths.get((depths.len() as f64 * NEAREST) as usize).copied().unwrap_or(f32::INFINITY)
     }
 }
 
@@ -146,6 +153,10 @@ impl<D: Device> Prepare<'_, D> {
 impl<D: Device> Prepared for Prepare<'_, D> {
     fn encoding(&self) -> Encoding {
         Encoding::Used
+    }
+
+    fn background(&self) -> Option<[f32; 3]> {
+        Some(self.background)
     }
 
     fn encode(&mut self, _view: usize, _progress: &dyn Progress) -> Result<(), FieldError> {

@@ -89,7 +89,7 @@ pub(super) fn refined(
     while let Some((gaussian, splits)) = kept.pop() {
         let axis = longest_axis(&gaussian);
         let has_room = refined.len() + kept.len() + 1 < recipe.max_count;
-        let limit = recipe.split_scale * footprint * nearest(&gaussian, cameras, extent).max(0.3);
+        let limit = recipe.split_scale * footprint * nearest(&gaussian, cameras, extent, recipe.near);
         if splits < MAX_SPLITS && has_room && gaussian.log_scales[axis].exp() > limit {
             kept.extend(halves(&gaussian, axis).map(|half| (half, splits + 1)));
         } else {
@@ -99,12 +99,14 @@ pub(super) fn refined(
     refined
 }
 
-/// The least depth at which a source sees a Gaussian, relative to the median depth.
-fn nearest(gaussian: &GaussianBlock, cameras: &[CameraBlock], extent: &Extent) -> f32 {
+/// The least depth at which a source sees a Gaussian, relative to the median depth, 0.6 of where Gaussians begin to be
+/// seen at the least. Half of that is as far as no Gaussian has to be looked at.
+fn nearest(gaussian: &GaussianBlock, cameras: &[CameraBlock], extent: &Extent, near: f32) -> f32 {
     let position = Vec3::from_array(gaussian.position);
     let depths = cameras.iter().map(|camera| camera.pose.rotate_to_camera(position - camera.centre_world()).z);
-    let least = depths.filter(|depth| *depth > 0.25 * extent.depth).fold(f32::INFINITY, f32::min);
-    least.min(1.0e6 * extent.depth) / extent.depth
+    let begin = extent.near(near);
+    let least = depths.filter(|depth| *depth > 0.5 * begin).fold(f32::INFINITY, f32::min);
+    (least.min(1.0e6 * extent.depth) / extent.depth).max(0.6 * (begin / extent.depth))
 }
 
 /// The axis of the greatest standard deviation.

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::random::uniform;
+use viewfuse_device::parallel::map;
 use viewfuse_kernels::rows::GaussianBlock;
 use viewfuse_scene::photographs::{SourceImage, SourceImages};
 
@@ -14,6 +15,10 @@ use viewfuse_scene::photographs::{SourceImage, SourceImages};
 const MIN_POINTS: usize = 32;
 /// Percentile of the points' depths behind which the background is.
 const FARTHEST: f64 = 0.98;
+/// Share of the depths that are nearer than the near ones.
+const NEAREST: f64 = 0.01;
+/// Most halvings of a cube of near points.
+const MAX_HALVINGS: u32 = 8;
 /// Its least disparity, relative to that of the farthest points.
 const LEAST_DISPARITY: f32 = 0.1;
 
@@ -24,6 +29,8 @@ pub(super) struct Extent {
     pub(super) depth: f32,
     /// Size of a pixel of the finest level at that depth, world units.
     pub(super) footprint: f32,
+    /// Depth that [`NEAREST`] of the points are nearer than.
+    nearest: f32,
     /// Depth of the farthest points.
     far: f32,
 }
@@ -43,7 +50,19 @@ impl Extent {
         depths.sort_by(f32::total_cmp);
         let at = |share: f64| depths[((depths.len() - 1) as f64 * share).round() as usize];
         let depth = at(0.5);
-        Some(Extent { depth, footprint: depth / focal, far: at(FARTHEST) })
+        Some(Extent { depth, footprint: depth / focal, nearest: at(NEAREST), far: at(FARTHEST) })
+    }
+
+    /// Depth from which on Gaussians are seen: a share of the median depth, or where something is nearer than that, of
+    /// what is the nearest.
+    pub(super) fn near(&self, share: f32) -> f32 {
+        let usual = share * self.depth;
+        if self.has_nearer(share) { share * self.nearest } else { usual }
+    }
+
+    /// Whether there is something nearer than a share of the median depth.
+    fn has_nearer(&self, share: f32) -> bool {
+        self.nearest < share * self.depth
     }
 }
 
@@ -54,11 +73,11 @@ pub(super) fn start(
     extent: &Extent,
     recipe: &Recipe,
 ) -> Vec<GaussianBlock> {
-    let mut gaussians = evenly(of_points(points, extent, recipe), recipe.max_count);
+    let cameras: Vec<CameraBlock> = images.images.iter().map(|image| image.camera.block(0)).collect();
+    let mut gaussians = evenly(of_points(points, &cameras, extent, recipe), recipe.max_count);
     // What is behind a silhouette is known.
     let count = if images.has_silhouettes { 0 } else { recipe.background_count };
     let count = count.min((recipe.max_count - gaussians.len()) as u32);
-    let cameras: Vec<CameraBlock> = images.images.iter().map(|image| image.camera.block(0)).collect();
     gaussians.extend((0..count).filter_map(|draw| in_background(draw, images, &cameras, extent, recipe)));
     gaussians
 }
@@ -80,22 +99,38 @@ fn evenly(gaussians: Vec<GaussianBlock>, most: usize) -> Vec<GaussianBlock> {
     (0..most).map(|index| gaussians[index * gaussians.len() / most]).collect()
 }
 
-/// One Gaussian for each cube of points, in the order of the cubes.
-fn of_points(points: &[CloudPoint], extent: &Extent, recipe: &Recipe) -> Vec<GaussianBlock> {
-    let side = recipe.cell * extent.footprint;
-    let mut cells: BTreeMap<[i32; 3], Cell> = BTreeMap::new();
-    for point in points {
-        let key = (point.position / side).floor().to_array().map(|place| place as i32);
-        let cell = cells.entry(key).or_default();
+/// How often cubes are halved for a point: until they are as large in a picture as at the median depth or smaller, where
+/// it is nearer than [`Recipe::near`] of that to the nearest source that sees it.
+fn halvings(point: &CloudPoint, cameras: &[CameraBlock], extent: &Extent, recipe: &Recipe) -> u32 {
+    if !extent.has_nearer(recipe.near) {
+        return 0;
+    }
+    let seen = cameras.iter().map(|camera| camera.project(point.position)).filter(|seen| seen.in_image);
+    let mut depth = seen.map(|seen| seen.depth).fold(f32::INFINITY, f32::min);
+    let mut count = 0;
+    while depth < recipe.near * extent.depth && count < MAX_HALVINGS {
+        (depth, count) = (2.0 * depth, count + 1);
+    }
+    count
+}
+
+/// One Gaussian for each cube of points, in the order of the cubes, the largest first.
+fn of_points(points: &[CloudPoint], cameras: &[CameraBlock], extent: &Extent, recipe: &Recipe) -> Vec<GaussianBlock> {
+    let side = |halvings: u32| recipe.cell * extent.footprint / (1_u32 << halvings) as f32;
+    let halvings = map(points.len(), 1024, |point| halvings(&points[point], cameras, extent, recipe));
+    let mut cells: BTreeMap<(u32, [i32; 3]), Cell> = BTreeMap::new();
+    for (point, halvings) in points.iter().zip(halvings) {
+        let key = (point.position / side(halvings)).floor().to_array().map(|place| place as i32);
+        let cell = cells.entry((halvings, key)).or_default();
         cell.position += point.position;
         cell.normal += point.normal;
         cell.colour += Vec3::from_array(point.colour.map(|level| f32::from(level) / 255.0));
         cell.count += 1;
     }
-    let cells = cells.values().filter(|cell| cell.count >= recipe.least_points);
-    let gaussian = |cell: &Cell| {
+    let cells = cells.iter().filter(|(_, cell)| cell.count >= recipe.least_points);
+    let gaussian = |((halvings, _), cell): (&(u32, [i32; 3]), &Cell)| {
         let share = 1.0 / cell.count as f32;
-        let mut gaussian = ball(cell.position * share, 0.5 * side, recipe.opacities[0], cell.colour * share);
+        let mut gaussian = ball(cell.position * share, 0.5 * side(*halvings), recipe.opacities[0], cell.colour * share);
         if let Some(normal) = cell.normal.try_normalize().filter(|_| recipe.flatness < 1.0) {
             gaussian.log_scales[2] += recipe.flatness.ln();
             gaussian.rotation = towards(normal);

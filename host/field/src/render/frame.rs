@@ -36,6 +36,8 @@ pub struct Frame {
     pub shares: Vec<f32>,
     /// The ground truth at the same size and the scores, if there is a photograph.
     pub truth: Option<Truth>,
+    /// What the picture shows where nothing is: red, green, blue in `[0, 1]`.
+    pub background: [f32; 3],
     /// Time for this frame alone.
     pub time: Duration,
     /// The part of it for encoding sources that no earlier frame used.

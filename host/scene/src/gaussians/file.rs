@@ -106,7 +106,14 @@ fn read(path: &Path, frame: &SceneFrame, world: Option<&(ParserWorld, PathBuf)>)
             true => compressed::read(path, &bytes, &header, &place)?,
             false => ply::read(path, &bytes, &header, &place, &mut notes)?,
         };
-        GaussianScene { is_antialiased: said.is_antialiased, ..read }
+        if (read.is_antialiased || said.is_antialiased) && !said.is_by_viewfuse {
+            notes.push(
+                "splats are dilated by 0.3 square pixels: programs that dilate by 0.1 (mip-splatting, Brush) draw those \
+                 of less than a pixel sharper"
+                    .to_owned(),
+            );
+        }
+        GaussianScene { is_antialiased: said.is_antialiased || read.is_antialiased, ..read }
     };
     if scene.is_antialiased {
         notes.push("antialiased: each splat is fainter by as much as its dilation widens it".to_owned());

@@ -111,7 +111,8 @@ pub(super) fn read(
             f_rest.push(row.finite(column)? as f32);
         }
     }
-    Ok(GaussianScene { gaussians, degree, f_rest, is_antialiased: false })
+    // mip-splatting has a 2D filter, too, under which splats keep their integral.
+    Ok(GaussianScene { gaussians, degree, f_rest, is_antialiased: columns.filter.is_some() })
 }
 
 /// The columns without those of the greatest degrees that are 0 in all rows: strict readers want them to be there.

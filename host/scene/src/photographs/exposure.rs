@@ -1,4 +1,5 @@
-//! How bright and how coloured photographs are, and warnings where some are much darker than others, or grey.
+//! How bright and how coloured photographs are, and warnings where some are much darker than others, or grey, or all of
+//! them nearly black.
 
 use super::SourceImage;
 
@@ -9,6 +10,10 @@ const MAX_RATIO: f64 = 6.0;
 
 /// Most by which the channels of grey pixels differ: what a lossy file rounds.
 const MAX_GREY_SPREAD: f32 = 6.0 / 255.0;
+
+/// Greatest value of photographs that are all nearly black: 14 bits in the place of 16 reach it, and errors are as small
+/// as the values are, so that scores are too good.
+const MAX_DARK: f32 = 0.26;
 
 /// Brightness of a black photograph: half a step of 8 bits, in linear light.
 const BLACK: f64 = 1.0e-6;
@@ -58,6 +63,22 @@ pub(super) fn grey_warning<'a>(images: &[SourceImage], names: impl Iterator<Item
             grey.len(),
             images.len(),
             grey[0]
+        )
+    })
+}
+
+/// A warning where no photograph has a bright pixel.
+pub(super) fn dark_warning(images: &[SourceImage]) -> Option<String> {
+    let brightest = |image: &SourceImage| {
+        let colours = image.texels.iter().flat_map(|[red, green, blue, _]| [*red, *green, *blue]);
+        colours.fold(0.0, f32::max)
+    };
+    let greatest = images.iter().map(brightest).fold(0.0, f32::max);
+    (!images.is_empty() && greatest <= MAX_DARK).then(|| {
+        format!(
+            "no pixel of the photographs is brighter than {:.0} of 255: they are nearly black, and scores of their \
+             pictures too good; 16-bit files whose values have fewer bits are read so, develop them to the whole range",
+            255.0 * greatest
         )
     })
 }

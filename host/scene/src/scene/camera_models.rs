@@ -108,6 +108,9 @@ pub(crate) const KEYED_LENSES: [KeyedLens; 3] = [
 pub(super) const LENS_KEYS: &str = "k1 k2 k3 k4 k5 k6 p1 p2 p3 p4 s1 s2 s3 s4 tau_x tau_y b1 b2 \
                                     ftheta_p0 ftheta_p1 ftheta_p2 ftheta_p3 ftheta_p4 omega";
 
+/// nerfstudio's list of a lens's numbers, and the keys whose numbers it holds, in their order.
+pub(super) const LENS_LIST: (&str, [&str; 6]) = ("distortion_params", ["k1", "k2", "k3", "k4", "p1", "p2"]);
+
 /// Flags of projections that are not read (instant-ngp), with any numbers.
 pub(super) const REFUSED_FLAGS: [&str; 2] = ["equirectangular", "latlong"];
 

@@ -152,7 +152,9 @@ fn raw_points(points: Vec<ModelPoint>, view_of: &HashMap<u32, u32>) -> Vec<RawPo
 
 /// The data of a model used by layouts that were made from it.
 pub(super) struct Origin {
-    /// World-to-camera matrices of its images, which are in the order of their names by character.
+    /// The names of its images, in their order by character.
+    pub(super) names: Vec<String>,
+    /// World-to-camera matrices of these images.
     pub(super) cameras_from_world: Vec<[[f64; 4]; 4]>,
     /// Its points; their views are indices into these images.
     pub(super) points: Vec<RawPoint>,
@@ -211,7 +213,8 @@ pub(super) fn beside(root: &Path) -> Result<Option<Origin>, SceneError> {
     images.sort_by(|a, b| a.name.cmp(&b.name));
     let view_of = images.iter().enumerate().map(|(view, image)| (image.id, view as u32)).collect();
     let cameras_from_world = images.iter().map(camera_from_world).collect();
-    Ok(Some(Origin { cameras_from_world, points: raw_points(points, &view_of), points_path }))
+    let names = images.into_iter().map(|image| image.name).collect();
+    Ok(Some(Origin { names, cameras_from_world, points: raw_points(points, &view_of), points_path }))
 }
 
 impl Reader for Colmap {

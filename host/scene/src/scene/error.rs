@@ -45,6 +45,9 @@ pub enum SceneFault {
     /// So many photographs, and no layout that gives their poses.
     #[error("{0} photographs, and nothing that gives their poses")]
     BarePhotographs(usize),
+    /// So many photographs, and where their poses may be, in a sentence.
+    #[error("{0} photographs without poses; {1}")]
+    PosesElsewhere(usize, String),
     /// A file that is no camera path: what such files look like.
     #[error("no camera path; looked for {0}")]
     UnknownCameraPath(&'static str),

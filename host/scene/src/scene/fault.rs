@@ -103,6 +103,11 @@ pub enum ImageFault {
     /// A JPEG that ends before its picture does: decoders would fill the rest with grey.
     #[error("the file ends before the picture does")]
     CutShort,
+    /// A JPEG whose data are no picture from somewhere on, and what its decoder says.
+    #[error(
+        "the file is damaged ({0}): programs that show it make up the rest of the picture; copy it again, or exclude it"
+    )]
+    Damaged(String),
     /// Its header has too large a size.
     #[error("the image is {0} x {1}; at most {MAX_SIDE} pixels are allowed on a side")]
     TooLarge(u32, u32),

@@ -17,7 +17,7 @@ use viewfuse_job::panics::caught;
 use super::error::SceneError;
 use super::fault::{FilePlace, ImageFault};
 use super::files::unreadable;
-use super::jpeg::cut_short;
+use super::jpeg::{self, Strictly, cut_short};
 use super::{MAX_SIDE, Photograph};
 
 /// Most bytes of a decoded pixel: four channels of 16 bits.
@@ -228,6 +228,13 @@ pub(super) fn pixels(path: &Path) -> Result<(DynamicImage, Orientation), SceneEr
     if cut_short(path).map_err(|cause| unreadable(path, cause))? {
         return Err(FilePlace::file(path).fault(ImageFault::CutShort));
     }
+    // Of what it refuses or panics on, the usual decoder says why.
+    let strictly = caught(|| jpeg::strictly(path)).unwrap_or(Ok(Strictly::Other));
+    let damage = match strictly.map_err(|cause| unreadable(path, cause))? {
+        Strictly::Whole(picture) => return Ok((picture, orientation)),
+        Strictly::Damaged(reason) => Some(reason),
+        Strictly::Other => None,
+    };
     let mut limits = Limits::default();
     limits.max_image_width = Some(width);
     limits.max_image_height = Some(height);
@@ -240,7 +247,11 @@ pub(super) fn pixels(path: &Path) -> Result<(DynamicImage, Orientation), SceneEr
         decoder.set_limits(limits)?;
         DynamicImage::from_decoder(decoder)
     };
-    Ok((decoding(path, decode)?, orientation))
+    let picture = decoding(path, decode)?;
+    match damage {
+        Some(reason) => Err(FilePlace::file(path).fault(ImageFault::Damaged(reason))),
+        None => Ok((picture, orientation)),
+    }
 }
 
 /// What a decoder makes of a file; it may fail or panic.

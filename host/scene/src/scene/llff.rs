@@ -10,6 +10,7 @@
 //!
 //! The poses are made from a COLMAP model. If the model is in the same folder, its points are the scene's.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use super::check;
@@ -60,19 +61,47 @@ impl Reader for Llff {
         let views = rows.iter().enumerate().zip(images).map(|((row, numbers), image)| view(file, row, numbers, &image));
         let mut scene = RawScene::from(views.collect::<Result<Vec<_>, _>>()?);
         scene.warnings.extend(warning);
-        match points(file, &scene.views) {
-            Ok((points, path)) => (scene.points, scene.points_path) = (points, path),
-            Err(reason) => scene.warnings.push(format!("{reason}; the scene is read without its points")),
-        }
+        let reason = match colmap::beside(&file.with_file_name("")) {
+            Ok(None) => None,
+            Ok(Some(origin)) => match points(file, &scene.views, origin)? {
+                Ok((points, path)) => {
+                    (scene.points, scene.points_path) = (points, path);
+                    None
+                }
+                Err(reason) => Some(reason),
+            },
+            Err(error) => Some(error.to_string()),
+        };
+        scene.warnings.extend(reason.map(|reason| format!("{reason}; the scene is read without its points")));
         Ok(scene)
     }
 }
 
-/// The points of the COLMAP model that the poses were made from, if it is in the same folder, and their file.
-fn points(file: &Path, views: &[RawView]) -> Result<(Vec<RawPoint>, PathBuf), String> {
-    let root = file.with_file_name("");
-    let origin = colmap::beside(&root).map_err(|error| error.to_string())?;
-    let Some(Origin { cameras_from_world, points, points_path }) = origin else { return Ok(Default::default()) };
+/// Refuses photographs that stand at other rows than images of their names: where one was removed and another one added,
+/// each of those between them would have its neighbour's pose. Smaller photographs are often numbered anew; then no
+/// name is the same.
+fn check_names(file: &Path, views: &[RawView], names: &[String]) -> Result<(), SceneError> {
+    let stems = || names.iter().map(|name| files::stem(Path::new(name)));
+    let known: HashSet<String> = stems().collect();
+    if !views.iter().any(|view| known.contains(&view.name)) {
+        return Ok(());
+    }
+    match views.iter().zip(stems()).enumerate().find(|(_, (view, stem))| view.name != *stem) {
+        Some((row, (view, stem))) => {
+            let (row, view) = (format!("row {row}, of '{stem}' by the COLMAP model beside it,"), &view.name);
+            let photograph = format!("the photograph '{view}' in its place");
+            Err(FilePlace::file(file).fault(FileFault::Contradiction(row, photograph)))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Points and their file, or why they are not the scene's.
+type Points = Result<(Vec<RawPoint>, PathBuf), String>;
+
+/// The points of the COLMAP model that the poses were made from.
+fn points(file: &Path, views: &[RawView], origin: Origin) -> Result<Points, SceneError> {
+    let Origin { names, cameras_from_world, points, points_path } = origin;
     // Each centre, from `[R | t]` and from the row: -R^T t.
     let differs = |(m, view): (&[[f64; 4]; 4], &RawView)| {
         let c = &view.pose.matrix;
@@ -83,9 +112,10 @@ fn points(file: &Path, views: &[RawView]) -> Result<(Vec<RawPoint>, PathBuf), St
         !((0..3).all(|axis| offset(axis).abs() <= SAME_CENTRE * size))
     };
     if cameras_from_world.len() != views.len() || cameras_from_world.iter().zip(views).any(differs) {
-        return Err(format!("{}: its rows are not the images of the COLMAP model beside it", file.display()));
+        return Ok(Err(format!("{}: its rows are not the images of the COLMAP model beside it", file.display())));
     }
-    Ok((points, points_path))
+    check_names(file, views, &names)?;
+    Ok(Ok((points, points_path)))
 }
 
 /// The photographs in the order of their names (by character, as the authors' code sorts them), and a warning where a

@@ -102,7 +102,18 @@ impl Reader for Neus {
             view.mask = masks.get(&files::trailing_number(&files::stem(image)).unwrap_or(*number)).cloned();
             views.push(view);
         }
-        Ok(RawScene { views, warnings: missing.warning(file)?.into_iter().collect(), ..RawScene::default() })
+        let mut warnings: Vec<String> = missing.warning(file)?.into_iter().collect();
+        // Names that count from 1, of which the last is missing, are the numbers of matrices, too.
+        let lacks_first = worlds.keys().next().is_some_and(|first| !numbers.contains(first));
+        if lacks_first && numbers.len() + 1 == worlds.len() {
+            let (first, last) = (numbers.iter().min().unwrap_or(&0), numbers.iter().max().unwrap_or(&0));
+            warnings.push(format!(
+                "{}: photographs are numbered {first} to {last}, and the matrices begin before: where names count from 1, \
+                 each photograph has the next one's pose; give names the numbers of their matrices",
+                file.display()
+            ));
+        }
+        Ok(RawScene { views, warnings, ..RawScene::default() })
     }
 
     fn masks(&self) -> Option<MaskMeaning> {

@@ -19,9 +19,12 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use super::check;
+use super::colmap::Colmap;
 use super::error::{SceneError, SceneFault};
 use super::fault::{FaultLocation, FileFault, FilePlace, IntrinsicsFault};
 use super::files::{self, IMAGE_EXTENSIONS};
+use super::llff::Llff;
+use super::neus::Neus;
 use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawScene, RawView, Reader};
 use super::split::Split;
 
@@ -42,9 +45,18 @@ impl Reader for Srn {
     }
 
     fn recognise(&self, path: &Path) -> Result<Option<PathBuf>, SceneError> {
-        // One of the two folders is enough, so that the error names the other one if it is missing.
-        let is_there = path.join("rgb").is_dir() || path.join("pose").is_dir();
-        Ok(is_there.then(|| path.to_path_buf()))
+        // One of the two folders is enough, so that the error names the other one if it is missing; photographs of other
+        // layouts lie in rgb/, too.
+        let is_there = |name: &str| path.join(name).is_dir();
+        let others: [&dyn Reader; 3] = [&Neus, &Llff, &Colmap];
+        let mut is_other = false;
+        if is_there("rgb") && !is_there("pose") {
+            for reader in others {
+                is_other |= reader.recognise(path)?.is_some();
+            }
+        }
+        let is_here = is_there("rgb") || is_there("pose");
+        Ok((is_here && !is_other).then(|| path.to_path_buf()))
     }
 
     /// Photographs first, then target poses, each in natural order.

@@ -44,6 +44,26 @@ pub(super) fn photographs(views: &[View]) -> Option<String> {
     ))
 }
 
+/// A warning of alpha channels in files of their own, as instant-ngp reads them (`000.alpha.png` beside `000.png`).
+pub(super) fn alphas(views: &[View]) -> Option<String> {
+    let images = || views.iter().filter_map(|view| view.image.as_deref());
+    let alpha = |image: &Path| {
+        let mut candidates = IMAGE_EXTENSIONS.iter().map(|extension| {
+            let name = format!("{}.alpha.{extension}", files::stem(image));
+            image.with_file_name(name)
+        });
+        candidates.find(|candidate| candidate.is_file())
+    };
+    let found: Vec<PathBuf> = images().filter_map(alpha).collect();
+    let (first, count) = (found.first()?, found.len());
+    let (files, are) = if count == 1 { ("file", "is") } else { ("files", "are") };
+    Some(format!(
+        "{}: {count} {files} with alpha channels of photographs {are} not read (instant-ngp's): they are masks, put them \
+         into a folder masks/ under the photographs' names",
+        first.display()
+    ))
+}
+
 /// A line with the files and folders beside the lists of a scene, that hold neither a list that was read nor a picture.
 pub(super) fn files(found: &Path, views: &[View], lists: &BTreeSet<PathBuf>) -> Option<String> {
     let root = if found.is_dir() { found } else { found.parent()? };

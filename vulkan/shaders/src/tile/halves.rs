@@ -245,8 +245,8 @@ impl Columns for UVec4 {
     #[inline(always)]
     fn fetch(right: impl Right, inner: u32, first: u32, shape: Shape) -> UVec4 {
         let [near, far] = fours(first, shape);
-        let (near, far) = (right.four_halves(inner, near), right.four_halves(inner, far));
-        UVec4::new(near.x, near.y, far.x, far.y)
+        let ([a, b], [c, d]) = (right.four_halves(inner, near), right.four_halves(inner, far));
+        UVec4::new(a, b, c, d)
     }
 
     #[inline(always)]

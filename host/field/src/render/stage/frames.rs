@@ -152,6 +152,7 @@ impl Stage<'_> {
             _ => None,
         };
         let target = target.clone();
+        let background = self.session.prepared.background().unwrap_or(self.images.background);
         Ok(Frame {
             target,
             weights,
@@ -163,6 +164,7 @@ impl Stage<'_> {
             seen: None,
             shares: self.session.shares.clone(),
             truth,
+            background,
             time,
             encode,
             kept,

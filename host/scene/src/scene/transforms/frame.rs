@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 use viewfuse_core::lens::{Coefficients, Lens, Projection};
 
-use super::super::camera_models::{KEYED_LENSES, KeyedLens, LENS_KEYS, REFUSED_FLAGS, keyed_lens_names};
+use super::super::camera_models::{KEYED_LENSES, KeyedLens, LENS_KEYS, LENS_LIST, REFUSED_FLAGS, keyed_lens_names};
 use super::super::check;
 use super::super::error::{SceneError, SceneFault};
 use super::super::fault::{FileFault, FilePlace, IntrinsicsFault};
@@ -211,8 +211,11 @@ impl<'a> TransformsFrame<'a> {
             }
         }
         let mut coefficients = Coefficients::default();
+        let listed = self.listed_lens()?;
         for key in LENS_KEYS.split(' ') {
-            let Some((value, full)) = self.number(key)? else { continue };
+            let in_list = listed.iter().find(|(known, ..)| *known == key);
+            let stated = self.lens_number(key, in_list.map(|(_, value, full)| (*value, full.as_str())))?;
+            let Some((value, full)) = stated else { continue };
             match keyed.keys.iter().find(|(known, _)| *known == key) {
                 Some((_, index)) => coefficients[*index] = value,
                 None if value != 0.0 => return refuse(full, value.to_string()),
@@ -222,6 +225,46 @@ impl<'a> TransformsFrame<'a> {
         let lens = Lens::new(keyed.projection, coefficients);
         let lens = lens.map_err(|reason| place.clone().fault(IntrinsicsFault::Lens(reason)))?;
         Ok((!lens.is_pinhole()).then_some(lens))
+    }
+
+    /// A lens's number by its key or from the list: what a frame states goes before what stands at the top of the file.
+    fn lens_number(&self, key: &str, in_list: Option<(f64, &str)>) -> Result<Option<(f64, String)>, SceneError> {
+        let [frame, _] = &self.scopes;
+        let Some((value, list)) = in_list else { return self.number(key) };
+        let stated = match frame.get(LENS_LIST.0) {
+            Some(_) => frame.number(key)?.map(|other| (other, frame.full(key))),
+            None => self.number(key)?,
+        };
+        match stated {
+            Some((other, full)) if other != value => {
+                let (list, full) = (format!("{list} {value}"), format!("{full} {other}"));
+                Err(FilePlace::file(self.path).fault(FileFault::Contradiction(list, full)))
+            }
+            _ => Ok(Some((value, list.to_owned()))),
+        }
+    }
+
+    /// The numbers of nerfstudio's list of them, with their keys and the full names of their places.
+    fn listed_lens(&self) -> Result<Vec<(&'static str, f64, String)>, SceneError> {
+        let (list, keys) = LENS_LIST;
+        let Some(scope) = self.scopes.iter().find(|scope| scope.get(list).is_some()) else { return Ok(Vec::new()) };
+        let full = scope.full(list);
+        let wrong = |found: usize| {
+            let fault = FileFault::WrongCount { of: "numbers (k1 k2 k3 k4 p1 p2)", expected: keys.len(), found };
+            FilePlace::key(self.path, full.clone()).fault(fault)
+        };
+        let values = scope.array(list)?;
+        let numbers: Vec<f64> = values.iter().filter_map(Value::as_f64).collect();
+        // Those that are missing are 0.
+        if numbers.len() != values.len() || numbers.len() > keys.len() {
+            return Err(wrong(values.len()));
+        }
+        Ok(keys
+            .into_iter()
+            .zip(numbers)
+            .enumerate()
+            .map(|(at, (key, number))| (key, number, format!("{full}[{at}]")))
+            .collect())
     }
 
     /// A value and the full name of its key, from the frame or the top of the file.
@@ -246,11 +289,11 @@ impl<'a> TransformsFrame<'a> {
     }
 }
 
-/// The photograph of a path, with the extension that the Blender flavour omits.
+/// The photograph of a path, with the extension that the Blender flavour omits. `000.jpg.png` is the mask of `000.jpg`.
 fn photograph(given: &Path) -> Option<PathBuf> {
-    let with_extension = |extension: &&str| files::appended(given, extension);
-    let mut candidates = std::iter::once(given.to_path_buf()).chain(IMAGE_EXTENSIONS.iter().map(with_extension));
-    candidates.find(|candidate| candidate.is_file())
+    let lacking: &[&str] = if files::has_extension(given, &IMAGE_EXTENSIONS) { &[] } else { &IMAGE_EXTENSIONS };
+    let with_extension = lacking.iter().map(|extension| files::appended(given, extension));
+    std::iter::once(given.to_path_buf()).chain(with_extension).find(|candidate| candidate.is_file())
 }
 
 /// How many times smaller a photograph is than the one that was given, as the name of its folder says.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::super::camera_models::{LENS_KEYS, REFUSED_FLAGS};
+use super::super::camera_models::{LENS_KEYS, LENS_LIST, REFUSED_FLAGS};
 use super::super::json::Object;
 
 /// Keys of intrinsics, beside those of lenses.
@@ -15,9 +15,10 @@ const INTRINSICS: &str = "fl_x fl_y cx cy w h camera_angle_x camera_angle_y x_fo
 const READ: &str = "frames file_path transform_matrix mask_path depth_file_path time train_filenames val_filenames \
                     test_filenames applied_transform applied_scale fps";
 
-/// Keys that are not read and change which pictures a program makes that reads them (instant-ngp).
+/// Keys that are not read and change which pictures a program makes that reads them (instant-ngp, nerfstudio).
 const TELLING: &str = "rolling_shutter transform_matrix_start transform_matrix_end white_transparent \
-                       black_transparent n_frames sharpness_discard_threshold normal_mts_args";
+                       black_transparent n_frames sharpness_discard_threshold normal_mts_args \
+                       fisheye_crop_radius";
 
 /// Whether a key is one of those that a text lists.
 fn is_in(keys: &str, key: &str) -> bool {
@@ -59,7 +60,7 @@ impl<'a> Keys<'a> {
     pub(super) fn add(&mut self, frame: &Object<'a>) {
         self.frame_count += 1;
         let differs = |(key, value): &(&str, &Value)| {
-            let is_camera = is_in(INTRINSICS, key) || is_in(LENS_KEYS, key);
+            let is_camera = is_in(INTRINSICS, key) || is_in(LENS_KEYS, key) || *key == LENS_LIST.0;
             // `1` and `1.0` are one number.
             let same = |top: &Value| top == *value || top.as_f64().is_some_and(|top| value.as_f64() == Some(top));
             is_camera && self.top.get(key).is_some_and(|top| !same(top))
@@ -93,6 +94,12 @@ impl<'a> Keys<'a> {
         let mut lines = Vec::new();
         if !self.telling.is_empty() {
             lines.push(format!("{path}: {} change pictures and are not read", list(&self.telling)));
+            if self.telling.contains("fisheye_crop_radius") {
+                lines.push(format!(
+                    "{path}: what is outside of the circle of fisheye_crop_radius counts as picture: give masks of it \
+                     (mask_path, 0 outside)"
+                ));
+            }
         }
         if self.is_moving {
             lines.push(format!(
@@ -117,7 +124,9 @@ fn list(keys: &BTreeSet<&str>) -> String {
 }
 
 fn is_read(key: &str) -> bool {
-    [INTRINSICS, READ, LENS_KEYS].into_iter().any(|keys| is_in(keys, key)) || REFUSED_FLAGS.contains(&key)
+    [INTRINSICS, READ, LENS_KEYS].into_iter().any(|keys| is_in(keys, key))
+        || REFUSED_FLAGS.contains(&key)
+        || key == LENS_LIST.0
 }
 
 /// Whether a key that changes pictures has a value that says something.
