@@ -36,7 +36,7 @@ fn assert_wrong(arguments: &str, parts: &[&str]) {
 
 fn no_scene() {
     toy_refused("render nowhere --orbit 3 -o out", &["nowhere: no such file or folder"]);
-    toy_refused("inspect toy/rgb -o map.png", &["toy/rgb: 24 photographs, and nothing that gives their poses"]);
+    toy_refused("inspect toy/rgb -o map.png", &["toy/rgb: 24 photographs without poses; toy is a scene: give that"]);
 }
 
 fn nothing_but_background() {

@@ -92,6 +92,17 @@ fn the_few_sources_of_a_target() {
         fs::read_to_string(folder.join("views.txt")).expect("a list"),
         format!("000020 {}\n", expected.join(" "))
     );
+    // The same again changes nothing; a file that holds something else stays.
+    done(&folder, "select toy --count 3 --targets 20 --lines -o views.txt");
+    folder.write("notes.txt", "notes").write("array.npy", "an array");
+    for command in [
+        "select toy --count 2 --targets 20 --lines -o views.txt",
+        "select toy --count 3 --targets 20 -o notes.txt",
+        "weights toy --targets 20 --npy array.npy",
+    ] {
+        assert_wrong_arguments(&folder, command, &["holds something else, and would be replaced"]);
+    }
+    assert_eq!(fs::read_to_string(folder.join("notes.txt")).expect("notes"), "notes");
     let index = json(&done(&folder, "select toy -k 3 --targets 20,21 --index"));
     assert_eq!((numbers(&index["toy"]["target"]), numbers(&index["toy"]["context"]).len()), (vec![20.0, 21.0], 3));
     assert_wrong_arguments(&folder, "select toy -k 2 --orbit 3 --index", &["--index needs targets"]);

@@ -171,7 +171,12 @@ fn after_a_kill_it_goes_on_from_the_file() {
     assert!(fs::read(folder.join("a.ply")).expect("a file") == first.1, "a finished file has changed");
     assert!(gaussians(&unfinished).gaussians.len() > 30);
     assert_refused(&folder, &again, &["a.unfinished.ply: is of an optimisation that was stopped", "--resume"]);
+    let kept = fs::read(&unfinished).expect("what there is so far");
     done(&folder, &format!("{OPTIMISE} --left-out 20 --resume a.unfinished.ply -o a.ply"));
+    assert!(!unfinished.exists(), "what is finished takes its place");
+    // Also of a few iterations, within which nothing is written on the way.
+    folder.write("a.unfinished.ply", kept);
+    done(&folder, &format!("{OPTIMISE} --resume a.unfinished.ply --iterations 2 -o a.ply"));
     assert!(!unfinished.exists(), "what is finished takes its place");
     let wrong = format!("{OPTIMISE} --resume a.ply --count 20 -o b.ply");
     assert_wrong_arguments(&folder, &wrong, &["--count 20", "none are removed"]);
@@ -233,9 +238,20 @@ fn what_it_refuses() {
     }
     assert_wrong_arguments(&folder, "points toy -o scan.ply", &["scan.ply: was not written by viewfuse"]);
     for name in ["again.ply", "again.spz", "again.SPLAT", "again.html"] {
-        for _ in 0..2 {
-            assert_eq!(run(&folder, &format!("{OPTIMISE} --iterations 1 -o {name}")).code, Some(0), "{name}");
+        let command = format!("{OPTIMISE} --iterations 1 -o {name}");
+        assert_eq!(run(&folder, &command).code, Some(0), "{name}");
+        match name {
+            // Nothing in it says whose it is.
+            "again.SPLAT" => assert_wrong_arguments(&folder, &command, &["a .splat does not say who wrote it"]),
+            _ => assert_eq!(run(&folder, &command).code, Some(0), "{name} again"),
         }
+    }
+    // A name in the text is no mark.
+    folder.write("other.ply", "ply\nformat ascii 1.0\ncomment exported from /home/me/viewfuse/a.ply\nend_header\n");
+    folder.write("other.html", "<!doctype html><title>My viewfuse notes</title>");
+    for name in ["other.ply", "other.html"] {
+        let parts = [name, "was not written by viewfuse"];
+        assert_wrong_arguments(&folder, &format!("{OPTIMISE} --iterations 1 -o {name}"), &parts);
     }
     // What makes pictures without a field has none of its options.
     scene(&folder.join("a.ply"));

@@ -188,6 +188,14 @@ fn a_scene_on_which_copies_are_better_is_told() -> Result<(), Box<dyn Error>> {
     chosen(&wrong, &[0, 1, 2, 3, 4], &TrainingFree::default(), &options(), &listener)?;
     let warnings = listener.warnings();
     assert!(warnings.iter().any(|warning| warning.contains("pictures may be worse than a copy")), "{warnings:?}");
+    // Each camera has the photograph of the next one.
+    for view in 0..5 {
+        wrong.views[view].image.clone_from(&scene.views[(view + 1) % 5].image);
+    }
+    let listener = Listener::default();
+    chosen(&wrong, &[0, 1, 2, 3, 4], &TrainingFree::default(), &options(), &listener)?;
+    let warnings = listener.warnings();
+    assert!(warnings.iter().any(|warning| warning.contains("camera poses")), "{warnings:?}");
     Ok(())
 }
 

@@ -1,16 +1,22 @@
 //! The field of Gaussians alone and as a part of other pictures, on the CPU.
 
+use std::sync::Arc;
 use viewfuse::device::choice::AnyDevice;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::auto;
 use viewfuse::field::budget::Bound;
-use viewfuse::field::gaussians::Recipe;
+use viewfuse::field::gaussians::{GivenGaussians, Recipe};
 use viewfuse::field::render::{Frame, RenderOptions, Stage};
 use viewfuse::field::training_free::{Gaussians, TrainingFree};
 use viewfuse::field::{AnyField, Renderer};
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::few_shot::FewShot;
+use viewfuse::scene::gaussians::{Gaussian, GaussianScene};
+use viewfuse::scene::photographs::{SourceImage, SourceImages};
 use viewfuse::weighting::Weighting;
+use viewfuse_core::Vec3;
+use viewfuse_core::camera::{Camera, Pinhole};
+use viewfuse_core::pose::Pose;
 use viewfuse_tests::fields::{job, on_scene, rms, sample};
 
 const DEVICE: AnyDevice = AnyDevice::Cpu(Cpu);
@@ -108,4 +114,74 @@ fn the_hull_is_mixed_with_gaussians_where_held_out_sources_gain() {
         assert_eq!(mixture(sources, Recipe::default()).as_deref(), Some(carved), "large ones fall behind: {sources}");
         assert_eq!(mixture(sources, hasty), None, "the source nearest to the others loses: {sources}");
     }
+}
+
+/// Cameras in a row that look along z, with opaque photographs: a dark one and bright ones.
+fn row_of_cameras() -> SourceImages {
+    let pinhole = Pinhole::new([32.0; 2], [16.0; 2], 32, 32).expect("a pinhole");
+    let image = |index: u32| {
+        let centre = Vec3::new(0.05 * index as f32, 0.0, 0.0);
+        let camera = Camera { pose: Pose::look_at(centre, centre + Vec3::Z, -Vec3::Y).expect("a pose"), pinhole };
+        let level = if index == 0 { 0.0 } else { 0.75 };
+        // The border is darker than the rest.
+        let texel = |pixel: u32| [if pixel < 64 { 0.5 * level } else { level }, level, level, 1.0];
+        SourceImage { camera, texels: (0..32 * 32).map(texel).collect() }
+    };
+    SourceImages {
+        images: (0..4).map(image).collect(),
+        background: [0.25; 3],
+        has_silhouettes: false,
+        points: Vec::new(),
+        near_far: None,
+        warnings: Vec::new(),
+    }
+}
+
+fn ball(position: [f32; 3], size: f32, f_dc: [f32; 3]) -> Gaussian {
+    Gaussian { position, log_scales: [size.ln(); 3], rotation: [1.0, 0.0, 0.0, 0.0], opacity: 6.0, f_dc }
+}
+
+/// Most of a scene is far away, some of it near: a file's Gaussians are drawn wherever a camera sees them, up to 0.2 in
+/// front of it.
+#[test]
+fn given_gaussians_are_drawn_where_they_are_near() {
+    let hill = (0..400).map(|index| {
+        let [x, y] = [index % 20, index / 20].map(|place| 4.0 * (place as f32 - 9.5));
+        ball([x, y, 60.0], 3.0, [-1.0, -1.0, 1.0])
+    });
+    let object = (0..20).map(|index| ball([0.01 * index as f32, 0.0, 3.0], 0.3, [1.5, -1.5, -1.5]));
+    let scene = GaussianScene { gaussians: hill.chain(object).collect(), ..GaussianScene::default() };
+    let field = AnyField::new(GivenGaussians { scene, notes: Vec::new(), unit: 1.0 });
+    let (renderer, options) = (field.on(&DEVICE), RenderOptions::default());
+    let sources = row_of_cameras();
+    let camera = sources.images[1].camera;
+    let mut stage = Stage::of_sources(Arc::new(sources), renderer.as_ref(), &options, &Silent).expect("a field");
+    let weighting = Weighting::open("mean").expect("a scheme");
+    for (ahead, what) in [(0.0, "a twentieth of the median depth"), (2.7, "0.3 in front of the camera")] {
+        let centre = camera.pose.centre_world() + ahead * Vec3::Z;
+        let pose = Pose::look_at(centre, centre + Vec3::Z, -Vec3::Y).expect("a pose");
+        let frame = stage.frame_of_size(&weighting, &Camera { pose, ..camera }, [32, 32], &Silent).expect("a frame");
+        let [red, _, blue, alpha] = frame.colours[16 * 32 + 16];
+        assert!(alpha > 0.9 && red > 0.8 && blue < 0.2, "{what}: {:?}", frame.colours[16 * 32 + 16]);
+    }
+}
+
+/// What is behind given Gaussians is what their frame says: of opaque photographs their mean, not what a background of
+/// theirs would be.
+#[test]
+fn a_frame_says_what_is_behind_given_gaussians() {
+    let scene = GaussianScene { gaussians: vec![ball([0.0, 0.0, 3.0], 0.1, [1.0; 3])], ..GaussianScene::default() };
+    let field = AnyField::new(GivenGaussians { scene, notes: Vec::new(), unit: 1.0 });
+    let (renderer, options) = (field.on(&DEVICE), RenderOptions::default());
+    let sources = Arc::new(row_of_cameras());
+    let camera = sources.images[1].camera;
+    let mut stage = Stage::of_sources(sources, renderer.as_ref(), &options, &Silent).expect("a field");
+    let weighting = Weighting::open("mean").expect("a scheme");
+    let frame = stage.frame_of_size(&weighting, &camera, [32, 32], &Silent).expect("a frame");
+    let [red, green, blue, alpha] = frame.colours[0];
+    assert!(alpha < 1.0e-3, "a corner shows nothing");
+    for (seen, said) in [red, green, blue].into_iter().zip(frame.background) {
+        assert!((seen - said).abs() < 1.0e-3, "{:?} over {:?}", frame.colours[0], frame.background);
+    }
+    assert!((green - 0.75 * 0.75).abs() < 1.0e-3, "the mean of four photographs");
 }

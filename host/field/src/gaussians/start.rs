@@ -191,6 +191,7 @@ fn colour_at(image: &SourceImage, camera: &CameraBlock, position: Vec3) -> Optio
 
 #[cfg(test)]
 mod tests {
+    use super::super::particles::{Particle, refined};
     use super::*;
     use viewfuse_core::camera::{Camera, Pinhole};
     use viewfuse_core::pose::Pose;
@@ -240,6 +241,37 @@ mod tests {
         assert_eq!(start(&points, &images, &extent, &few).len(), few.max_count);
         images.has_silhouettes = true;
         assert_eq!(start(&points, &images, &extent, &recipe).len(), front.len());
+    }
+
+    /// An object at an eighth of the median depth: it is seen, and its Gaussians are about as small in a picture as those
+    /// of the wall behind it, at the beginning of a level, too.
+    #[test]
+    fn what_is_near_is_seen_as_finely() {
+        let (images, mut points) = wall();
+        let recipe = Recipe { least_points: 1, background_count: 0, ..Recipe::default() };
+        let usual = Extent::of(&points, &images, 16.0).expect("points");
+        assert_eq!(usual.near(recipe.near), 2.0);
+        let object = |index: usize| {
+            let [x, y] = [index % 4, index / 4].map(|place| 0.02 * (place as f32 - 1.5));
+            CloudPoint { position: Vec3::new(x, y, 0.5), normal: -Vec3::Z, colour: [10; 3], view_count: 2 }
+        };
+        let wall_alone = start(&points, &images, &usual, &recipe);
+        points.extend((0..16).map(object));
+        let extent = Extent::of(&points, &images, 16.0).expect("points");
+        assert_eq!((extent.depth, extent.near(recipe.near)), (4.0, 0.25));
+        let begun = start(&points, &images, &extent, &recipe);
+        let (near, far): (Vec<GaussianBlock>, Vec<GaussianBlock>) =
+            begun.iter().partition(|gaussian| gaussian.position[2] < 1.0);
+        assert_eq!(far, wall_alone);
+        let size = |gaussian: &GaussianBlock| gaussian.log_scales[0].exp() / gaussian.position[2];
+        let most = 2.01 * size(&far[0]);
+        assert!(!near.is_empty() && near.iter().all(|gaussian| size(gaussian) <= most), "{near:?}");
+        // Refined at a level whose pixels are as large as those Gaussians at their depth, by an eighth.
+        let cameras: Vec<CameraBlock> = images.images.iter().map(|image| image.camera.block(0)).collect();
+        let particles: Vec<Particle> = near.iter().copied().map(Particle::new).collect();
+        let footprint = extent.footprint / 8.0;
+        let refined = refined(&particles, &cameras, &extent, footprint, &recipe);
+        assert!(refined.len() > 2 * particles.len(), "{} of {}", refined.len(), particles.len());
     }
 
     #[test]

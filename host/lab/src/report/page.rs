@@ -29,6 +29,7 @@ pub fn page(report: &Report) -> Result<String, ReportError> {
                 meta http-equiv="Content-Security-Policy" content=(POLICY);
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
+                meta name="generator" content="viewfuse";
                 title { (title) }
                 link rel="icon" href="data:,";
                 style { (PreEscaped(include_str!("style.css"))) }
