@@ -50,6 +50,19 @@ fn a_model_may_stand_in_several_places() {
     }
 }
 
+#[test]
+fn an_error_of_a_point_that_is_no_number_is_not_known() {
+    let folder = colmap_text();
+    let text = points_text();
+    for error in ["nan", "inf", "-inf"] {
+        folder.write("sparse/0/points3D.txt", text.replacen(" 0.25 ", &format!(" {error} "), 1));
+        let scene = open(&folder);
+        assert_eq!((scene.points.len(), scene.points[0].error), (2, None), "{error}");
+    }
+    folder.write("sparse/0/points3D.txt", text.replacen(" 0.25 ", " x ", 1));
+    assert_refused(&folder, "points3D.txt: line 2", &["x"]);
+}
+
 /// What other layouts call rgb/ or pose/ is no SRN scene, and a rig's folders tell its views apart.
 #[test]
 fn photographs_may_lie_in_rgb_and_in_the_folders_of_rigs() {

@@ -134,7 +134,10 @@ fn properties_and_comments_mean_what_their_writers_mean() {
     rows[12..16].copy_from_slice(&0.05_f32.to_le_bytes());
     let renamed = header.replacen("float nx", "float filter_3D", 1);
     std::fs::write(&path, [renamed.as_bytes(), &rows].concat()).expect("a file");
-    let (new, old) = (read(&path).expect("a file").scene.gaussians[0], scene.gaussians[0]);
+    let filtered = read(&path).expect("a file");
+    assert!(filtered.scene.is_antialiased, "its splats keep their integral");
+    assert!(filtered.notes.iter().any(|note| note.contains("dilate by 0.1 (mip-splatting")), "{:?}", filtered.notes);
+    let (new, old) = (filtered.scene.gaussians[0], scene.gaussians[0]);
     let mut share = 1.0;
     for (new, old) in new.log_scales.iter().zip(old.log_scales) {
         let (before, after) = (old.exp(), (old.exp().powi(2) + 0.05 * 0.05).sqrt());

@@ -38,6 +38,12 @@ fn parts_in_files_are_one_scene() {
     assert_pixel(&scene, 2, [13.0, 3.5]);
     let chosen = |list: &str| view_list(&scene, list).expect("views");
     assert_eq!((chosen("test"), chosen("train,val/2"), chosen("all")), (vec![2], vec![0, 1], vec![0, 1, 2]));
+    // A part whose photographs are not there costs the others nothing.
+    folder.remove("test/r_0.png");
+    let without = open(&folder);
+    assert_eq!(names(&without), ["train_r_0", "val_r_0"]);
+    assert!(without.warnings[0].ends_with("none of its photographs is there: 'test' has no views"));
+    folder.image("test/r_0.png", 16, 12);
     // One of the files by its name is that part alone.
     let test = Scene::open(folder.join("transforms_test.json")).expect("a part");
     assert_eq!((names(&test), test.views[0].split), (vec!["r_0"], Some(Split::Test)));

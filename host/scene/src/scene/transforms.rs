@@ -75,16 +75,34 @@ impl Reader for Transforms {
             return read(found, split);
         }
         let mut scene = RawScene::default();
+        let mut empty = None;
         for (file, split) in parts(found) {
-            let part = read(&file, Some(split))?;
+            let part = match read(&file, Some(split)) {
+                // The test photographs of a benchmark are often not kept.
+                Err(error) if is_without_photographs(&error) => {
+                    let file = file.display();
+                    scene.warnings.push(format!("{file}: none of its photographs is there: '{split}' has no views"));
+                    empty.get_or_insert(error);
+                    continue;
+                }
+                part => part?,
+            };
             let named = |view: RawView| RawView { name: format!("{split}_{}", view.name), ..view };
             scene.views.extend(part.views.into_iter().map(named));
             scene.warnings.extend(part.warnings);
             scene.conventions.extend(part.conventions);
             scene.unused.extend(part.unused);
         }
-        Ok(scene)
+        match empty {
+            Some(error) if scene.views.is_empty() => Err(error),
+            _ => Ok(scene),
+        }
     }
+}
+
+/// Whether all photographs of a file are missing.
+fn is_without_photographs(error: &SceneError) -> bool {
+    matches!(*error.fault, SceneFault::PoseWithoutImage(_) | SceneFault::PoseWithImageElsewhere(..))
 }
 
 /// The existing files of a scene's splits.

@@ -114,7 +114,12 @@ pub(super) fn points(path: &Path) -> Result<Vec<ModelPoint>, SceneError> {
             *level = whole(path, line, word)?.min(255) as u8;
         }
         let images = track.iter().step_by(2).map(|word| whole(path, line, word)).collect::<Result<Vec<_>, _>>()?;
-        let (error, location) = (number(path, line, error)?, FaultLocation::Line(line));
+        // One that is not finite is not known, as in binary files.
+        let error = match error.parse::<f64>() {
+            Ok(value) if !value.is_finite() => -1.0,
+            _ => number(path, line, error)?,
+        };
+        let location = FaultLocation::Line(line);
         all.push(ModelPoint { position, colour, error, images, location });
     }
     Ok(all)
