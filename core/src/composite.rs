@@ -2,9 +2,9 @@
 //!
 //! Source: NeRF, equation 3, in transmittance form. With the optical depth `o_i = density_i * length_i` of sample `i`,
 //! the transmittance in front of it is `T_i = exp(-(o_0 + ... + o_(i-1)))` and its weight is `T_i - T_(i+1)`. The
-//! optical depth is summed before the exponential, so thin samples are not lost one by one (a single one of 1e-6 is off by
-//! 1.3 % in `f32`, a thousand of them together by less than 0.01 %), and the weights telescope to `1 - T_end`. Exclusive: a sample does not shade itself (in
-//! published GeNVS it does).
+//! optical depth is summed before the exponential, so thin samples are not lost one by one (a single one of 1e-6 is off
+//! by 1.3 % in `f32`, a thousand of them together by less than 0.01 %), and the weights telescope to `1 - T_end`.
+//! Exclusive: a sample does not shade itself (in published GeNVS it does).
 
 use crate::fetch::Fetch;
 use crate::math::{exp, max};

@@ -323,12 +323,13 @@ fn radial_slope(is_fisheye: bool, coefficients: &Coefficients<f64>, radius: f64)
 
 /// The ideal point that appears at a point of the photograph: Newton's method, each step halved until it reduces the
 /// residual, from the point itself, and beyond a radius of 1 from where the lens, seen from the centre, is about to reach
-/// it; where that ends far from the point, once more from half of it. It ends if no step helps, after 24 steps at most. Total: if no ideal point maps to the given one, or it is not
-/// finite, the residual is large or not finite.
+/// it; where that ends far from the point, once more from half of it. It ends if no step helps, after 24 steps at most.
+/// Total: if no ideal point maps to the given one, or it is not finite, the residual is large or not finite.
 ///
 /// Inside [`Lens::reach`] the residual is a few units in the last place of the point (below 1e-14 of its length or of 1
 /// in `f64`, below 2e-6 of it in `f32`), but close to a fold, where the inverse has no slope, to a pole of a rational
-/// factor, and at ideal radii above 3 of lenses that grow with the eighth power. A small residual does not say that the point is inside: beyond a fold other ones map to the same.
+/// factor, and at ideal radii above 3 of lenses that grow with the eighth power. A small residual does not say that the
+/// point is inside: beyond a fold other ones map to the same.
 #[inline]
 pub fn undistort<T: Real>(is_fisheye: bool, coefficients: &Coefficients<T>, point: [T; 2]) -> Undistorted<T> {
     let guess = if is_fisheye { unbent(coefficients, point) } else { straightened(coefficients, point) };

@@ -174,8 +174,8 @@ impl Gpu {
 }
 
 /// A product that shows whether a form is right: sizes that no tile divides, several steps, numbers of both signs and
-/// of all magnitudes, small ones and zeros among them, and three that are too large, one of them a weight. Outputs are rectified, which must
-/// not hide NaN.
+/// of all magnitudes, small ones and zeros among them, and three that are too large, one of them a weight. Outputs are
+/// rectified, which must not hide NaN.
 struct Probe {
     kernel: Kernel,
     parameters: Vec<u8>,

@@ -67,8 +67,8 @@ macro_rules! for_each_kernel {
                 read numbers: f32,
                 write words: u32,
             }
-            /// Factors in half precision, two in a word, the first in the lower half: NaN for what is larger than 65,504.
-            /// An element is a word.
+            /// Factors in half precision, two in a word, the first in the lower half: NaN for what is larger than
+            /// 65,504. An element is a word.
             PackFactors pack_factors(number_count: u32) for word in [0..word_count(*number_count); 4096 a core] {
                 read numbers: f32,
                 write words: u32,

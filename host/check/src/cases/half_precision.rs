@@ -1,5 +1,5 @@
-//! [`Kernel::PackF16`] and [`Kernel::PackFactors`]: numbers from far below to far above the range of half precision, odd
-//! and even counts of them. An independent implementation packs and reads half precision here.
+//! [`Kernel::PackF16`] and [`Kernel::PackFactors`]: numbers from far below to far above the range of half precision,
+//! odd and even counts of them. An independent implementation packs and reads half precision here.
 
 use super::*;
 use crate::half::{from_half, nearest};

@@ -99,8 +99,8 @@ fn evenly(gaussians: Vec<GaussianBlock>, most: usize) -> Vec<GaussianBlock> {
     (0..most).map(|index| gaussians[index * gaussians.len() / most]).collect()
 }
 
-/// How often cubes are halved for a point: until they are as large in a picture as at the median depth or smaller, where
-/// it is nearer than [`Recipe::near`] of that to the nearest source that sees it.
+/// How often cubes are halved for a point: until they are as large in a picture as at the median depth or smaller,
+/// where it is nearer than [`Recipe::near`] of that to the nearest source that sees it.
 fn halvings(point: &CloudPoint, cameras: &[CameraBlock], extent: &Extent, recipe: &Recipe) -> u32 {
     if !extent.has_nearer(recipe.near) {
         return 0;
@@ -243,8 +243,8 @@ mod tests {
         assert_eq!(start(&points, &images, &extent, &recipe).len(), front.len());
     }
 
-    /// An object at an eighth of the median depth: it is seen, and its Gaussians are about as small in a picture as those
-    /// of the wall behind it, at the beginning of a level, too.
+    /// An object at an eighth of the median depth: it is seen, and its Gaussians are about as small in a picture as
+    /// those of the wall behind it, at the beginning of a level, too.
     #[test]
     fn what_is_near_is_seen_as_finely() {
         let (images, mut points) = wall();

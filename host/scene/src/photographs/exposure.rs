@@ -11,8 +11,8 @@ const MAX_RATIO: f64 = 6.0;
 /// Most by which the channels of grey pixels differ: what a lossy file rounds.
 const MAX_GREY_SPREAD: f32 = 6.0 / 255.0;
 
-/// Greatest value of photographs that are all nearly black: 14 bits in the place of 16 reach it, and errors are as small
-/// as the values are, so that scores are too good.
+/// Greatest value of photographs that are all nearly black: 14 bits in the place of 16 reach it, and errors are as
+/// small as the values are, so that scores are too good.
 const MAX_DARK: f32 = 0.26;
 
 /// Brightness of a black photograph: half a step of 8 bits, in linear light.

@@ -21,9 +21,9 @@ pub(super) enum Strictly {
 
 /// The pixels of a JPEG file by the decoder that `image` has, which says here where it would make up the rest.
 ///
-/// It takes the mark of the end for the end of the picture, and what is missing before it for zeros. Without that mark it
-/// tells that there are too few bytes, at the next row of blocks; a few bytes that it has read ahead must not be the whole
-/// last row, so that only wide pictures are looked at so.
+/// It takes the mark of the end for the end of the picture, and what is missing before it for zeros. Without that mark
+/// it tells that there are too few bytes, at the next row of blocks; a few bytes that it has read ahead must not be the
+/// whole last row, so that only wide pictures are looked at so.
 pub(super) fn strictly(path: &Path) -> io::Result<Strictly> {
     let mut start = [0; 2];
     let is_jpeg = File::open(path)?.read_exact(&mut start).is_ok() && start == [0xff, 0xd8];

@@ -77,9 +77,9 @@ impl Reader for Llff {
     }
 }
 
-/// Refuses photographs that stand at other rows than images of their names: where one was removed and another one added,
-/// each of those between them would have its neighbour's pose. Smaller photographs are often numbered anew; then no
-/// name is the same.
+/// Refuses photographs that stand at other rows than images of their names: where one was removed and another one
+/// added, each of those between them would have its neighbour's pose. Smaller photographs are often numbered anew; then
+/// no name is the same.
 fn check_names(file: &Path, views: &[RawView], names: &[String]) -> Result<(), SceneError> {
     let stems = || names.iter().map(|name| files::stem(Path::new(name)));
     let known: HashSet<String> = stems().collect();

@@ -45,8 +45,8 @@ impl Reader for Srn {
     }
 
     fn recognise(&self, path: &Path) -> Result<Option<PathBuf>, SceneError> {
-        // One of the two folders is enough, so that the error names the other one if it is missing; photographs of other
-        // layouts lie in rgb/, too.
+        // One of the two folders is enough, so that the error names the other one if it is missing; photographs of
+        // other layouts lie in rgb/, too.
         let is_there = |name: &str| path.join(name).is_dir();
         let others: [&dyn Reader; 3] = [&Neus, &Llff, &Colmap];
         let mut is_other = false;
