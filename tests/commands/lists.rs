@@ -92,17 +92,30 @@ fn the_few_sources_of_a_target() {
         fs::read_to_string(folder.join("views.txt")).expect("a list"),
         format!("000020 {}\n", expected.join(" "))
     );
-    // The same again changes nothing; a file that holds something else stays.
-    done(&folder, "select toy --count 3 --targets 20 --lines -o views.txt");
-    folder.write("notes.txt", "notes").write("array.npy", "an array");
+    // Another selection and other weights take the place of the first ones; a file that holds something else stays.
+    for form in ["--lines", "--json", "--index", ""] {
+        for more in ["--count 3 --targets 20", "--count 2 --targets 20,21"] {
+            done(&folder, &format!("select toy {more} {form} -o again{form}"));
+        }
+    }
+    for more in ["--targets 20", "--targets 20,21 --weights mean --sources 0..5"] {
+        done(&folder, &format!("weights toy {more} --npy again.npy"));
+    }
+    folder
+        .write("notes.txt", "notes of 3 things\n")
+        .write("array.npy", [b"\x93NUMPY\x01\0v\0".to_vec(), vec![b' '; 200]].concat());
+    folder.write("toy.json", "{\n  \"scene\": \"toy\"\n}\n");
     for command in [
-        "select toy --count 2 --targets 20 --lines -o views.txt",
+        "select toy --count 2 --targets 20 --lines -o notes.txt",
+        "select toy --count 2 --targets 20 --json -o notes.txt",
         "select toy --count 3 --targets 20 -o notes.txt",
+        "select toy --count 3 --targets 20 -o again--json",
+        "select toy --count 3 --targets 20 --json -o toy.json",
         "weights toy --targets 20 --npy array.npy",
     ] {
         assert_wrong_arguments(&folder, command, &["holds something else, and would be replaced"]);
     }
-    assert_eq!(fs::read_to_string(folder.join("notes.txt")).expect("notes"), "notes");
+    assert_eq!(fs::read_to_string(folder.join("notes.txt")).expect("notes"), "notes of 3 things\n");
     let index = json(&done(&folder, "select toy -k 3 --targets 20,21 --index"));
     assert_eq!((numbers(&index["toy"]["target"]), numbers(&index["toy"]["context"]).len()), (vec![20.0, 21.0], 3));
     assert_wrong_arguments(&folder, "select toy -k 2 --orbit 3 --index", &["--index needs targets"]);

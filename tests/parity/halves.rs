@@ -118,7 +118,7 @@ fn is_within_its_bound(
             left[5 * inners] = 60_000.0;
             left[5 * inners + 1] = 3e-6;
             // One that every row of its column multiplies, and those that f16 has just.
-            weights[2 * columns + 1] = if form.needs_matrices() { 65_510.0 } else { 1e9 };
+            weights[2 * columns + 1] = if form.needs_matrices() { 70_000.0 } else { 1e9 };
             weights[2] = -65_504.0;
             weights[columns + 2] = 3e-6;
         }

@@ -66,6 +66,13 @@ fn llff_with_the_model_that_it_was_made_from() {
     let parts = ["row 0, of 'b 10' by the COLMAP model beside it, and the photograph 'b 2' in its place contradict"];
     assert_refused(&folder, "poses_bounds.npy: ", &parts);
     folder.remove("images_8/b 2.png").remove("images_8/z.png");
+    // Numbered anew, all by the same number.
+    let one = [(11, 7, "1.png"), (12, 7, "2.png")];
+    folder.write("sparse/0/images.bin", images_binary(&one));
+    folder.image("images_8/0.png", 16, 12).image("images_8/1.png", 16, 12);
+    assert_eq!(names(&open(&folder)), ["0", "1"]);
+    folder.write("sparse/0/images.bin", images_binary(&IMAGES));
+    folder.remove("images_8/0.png").remove("images_8/1.png");
     folder.image("images_8/a.png", 16, 12).image("images_8/b.png", 16, 12);
     // Another model, or a damaged one, costs the points and a warning.
     folder.write("sparse/0/images.bin", images_binary(&IMAGES[..1]));

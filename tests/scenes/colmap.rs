@@ -60,7 +60,7 @@ fn an_error_of_a_point_that_is_no_number_is_not_known() {
         assert_eq!((scene.points.len(), scene.points[0].error), (2, None), "{error}");
     }
     folder.write("sparse/0/points3D.txt", text.replacen(" 0.25 ", " x ", 1));
-    assert_refused(&folder, "points3D.txt: line 2", &["x"]);
+    assert_refused(&folder, "sparse/0/points3D.txt:2: ", &["\"x\" is not a number"]);
 }
 
 /// What other layouts call rgb/ or pose/ is no SRN scene, and a rig's folders tell its views apart.

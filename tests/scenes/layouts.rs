@@ -241,12 +241,22 @@ fn where_poses_are_is_said() {
     for (file, said) in [
         ("sfm_data.json", "sfm_data.json is OpenMVG's, which is not read"),
         ("cams/00000000_cam.txt", "00000000_cam.txt is MVSNet's, which is not read"),
+        ("Barn_COLMAP_SfM.log", "Barn_COLMAP_SfM.log is Tanks and Temples's, which is not read"),
         ("cameras.xml", "cameras.xml is Metashape's, which is not read"),
     ] {
         folder.write(file, "{}");
         assert_refused(&folder, ": 2 photographs without poses; ", &[said, "as a COLMAP model (text or binary)"]);
         folder.remove(file);
     }
+    for other in ["cameras_old.json", "bundle_adjustment.out", "IMG_cam.txt", "pose.log", "1.xmp"] {
+        folder.write(other, "{}");
+        assert_refused(&folder, ": 2 photographs, and nothing that gives their poses", &[]);
+    }
+    // A folder rgb alone makes no scene of the one above.
+    let bare = Folder::new();
+    bare.image("rgb/1.png", 16, 12);
+    let error = Scene::open(bare.path().join("rgb")).expect_err("no poses").to_string();
+    assert!(error.ends_with("1 photographs, and nothing that gives their poses"), "{error}");
     // Those of a scene's folder of photographs.
     let scene = scenes::transforms_folder(&scenes::transforms());
     let error = Scene::open(scene.path().join("images")).expect_err("no poses").to_string();

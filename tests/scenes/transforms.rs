@@ -44,6 +44,10 @@ fn parts_in_files_are_one_scene() {
     assert_eq!(names(&without), ["train_r_0", "val_r_0"]);
     assert!(without.warnings[0].ends_with("none of its photographs is there: 'test' has no views"));
     folder.image("test/r_0.png", 16, 12);
+    // That for training is the scene, and what is only elsewhere is not missing.
+    folder.remove("train/r_0.png");
+    assert_refused(&folder, "transforms_train.json", &["train/r_0"]);
+    folder.image("train/r_0.png", 16, 12);
     // One of the files by its name is that part alone.
     let test = Scene::open(folder.join("transforms_test.json")).expect("a part");
     assert_eq!((names(&test), test.views[0].split), (vec!["r_0"], Some(Split::Test)));

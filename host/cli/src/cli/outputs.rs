@@ -16,6 +16,8 @@ const MARKS: [(&str, &[u8]); 2] =
     [("ply", b"\ncomment viewfuse\n"), ("html", b"name=\"generator\" content=\"viewfuse")];
 const MARK: &[u8] = b"viewfuse";
 const BEGINNING: u64 = 64 << 10;
+/// Most bytes of a file that is compared with what takes its place.
+const MAX_COMPARED: u64 = 64 << 20;
 
 /// The options that name what a command writes, by identifier. All others may name what it reads.
 const WRITTEN: [&str; 3] = ["output", "npy", "matches"];
@@ -114,12 +116,16 @@ pub fn keep_others(output: &Path) -> anyhow::Result<()> {
     }
 }
 
-/// Refuses to replace a file of other contents: for what takes no time to make again, and names nobody.
-pub(super) fn keep_other_contents(output: &Path, contents: &[u8]) -> anyhow::Result<()> {
+/// Refuses to replace a file that is not of the kind of `contents`, for what names nobody: `is_alike` says of two files
+/// of this kind that they are.
+pub(super) fn keep_unlike(
+    output: &Path,
+    contents: &[u8],
+    is_alike: impl Fn(&[u8], &[u8]) -> bool,
+) -> anyhow::Result<()> {
     let mut there = Vec::new();
-    let most = contents.len() as u64 + 1;
-    let _ = File::open(output).and_then(|file| file.take(most).read_to_end(&mut there));
-    match there.is_empty() || there == contents {
+    let _ = File::open(output).and_then(|file| file.take(MAX_COMPARED).read_to_end(&mut there));
+    match there.is_empty() || is_alike(&there, contents) {
         true => Ok(()),
         false => Err(foreign(output, "holds something else")),
     }

@@ -1,7 +1,7 @@
 //! `viewfuse select`.
 
 use super::options::SourceOptions;
-use super::outputs::{keep_file_apart, keep_other_contents};
+use super::outputs::{keep_file_apart, keep_unlike};
 use super::parse::parse_count;
 use super::path::PathOptions;
 use super::printing::{say, warn_of};
@@ -82,13 +82,44 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     match &arguments.output {
         Some(path) => {
             keep_file_apart([&scene], path)?;
-            keep_other_contents(path, text.as_bytes())?;
+            keep_unlike(path, text.as_bytes(), is_selection)?;
             write_whole(path, text.as_bytes()).context("the selection")?;
             say(path.display())?;
         }
         None => say(text.trim_end_matches('\n'))?,
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Whether a file is a selection in the form of another one: by the keys of JSON, the lines of a list, the first line of a
+/// table without its numbers.
+fn is_selection(there: &[u8], new: &[u8]) -> bool {
+    let keys = |text: &[u8]| -> Option<Vec<String>> {
+        let whole: serde_json::Map<String, serde_json::Value> = serde_json::from_slice(text).ok()?;
+        // An index has one key, the scene's name.
+        let inner = whole.values().next().and_then(serde_json::Value::as_object).filter(|_| whole.len() == 1);
+        Some(whole.keys().chain(inner.into_iter().flat_map(|inner| inner.keys())).cloned().collect())
+    };
+    if let Some(new) = keys(new) {
+        return keys(there) == Some(new);
+    }
+    let first = |text: &[u8]| -> String {
+        let line = text.split(|byte| *byte == b'\n').next().unwrap_or_default();
+        let letters = |byte: &u8| !byte.is_ascii_digit() && !byte.is_ascii_whitespace();
+        String::from_utf8_lossy(line).bytes().filter(letters).map(char::from).collect()
+    };
+    let is_list = |text: &[u8]| {
+        let text = String::from_utf8_lossy(text);
+        let is_line = |line: &str| {
+            let mut indices = line.split_whitespace().skip(1).peekable();
+            indices.peek().is_some() && indices.all(|index| index.bytes().all(|byte| byte.is_ascii_digit()))
+        };
+        text.lines().all(is_line)
+    };
+    match is_list(new) {
+        true => is_list(there),
+        false => first(there) == first(new),
+    }
 }
 
 /// For a person.

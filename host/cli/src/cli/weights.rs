@@ -1,7 +1,7 @@
 //! `viewfuse weights`.
 
 use super::options::SourceOptions;
-use super::outputs::{keep_file_apart, keep_other_contents};
+use super::outputs::{keep_file_apart, keep_unlike};
 use super::path::PathOptions;
 use super::printing::{complain, say, warn_of};
 use super::table::table;
@@ -69,7 +69,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     } else if let Some(path) = &arguments.npy {
         keep_file_apart([&scene], path)?;
         let numbers = weights.npy();
-        keep_other_contents(path, &numbers)?;
+        keep_unlike(path, &numbers, is_weights)?;
         write_whole(path, &numbers)?;
         let axes = json!({
             "file": path, "shape": weights.shape(), "schemes": weights.schemes, "targets": weights.targets,
@@ -90,6 +90,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Whether an array is one of weights, as another one: its header without the sizes.
+fn is_weights(there: &[u8], new: &[u8]) -> bool {
+    let kind = |bytes: &[u8]| -> Vec<u8> {
+        let header = bytes.get(10..128).unwrap_or_default();
+        header.iter().copied().filter(|byte| !byte.is_ascii_digit() && *byte != b' ').collect()
+    };
+    there.get(..10) == new.get(..10) && kind(there) == kind(new)
 }
 
 /// A line for each scheme, target and source.

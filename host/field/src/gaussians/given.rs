@@ -19,10 +19,12 @@ use viewfuse_scene::{Scene, SceneError};
 
 /// The field's name: sources play no part in its pictures.
 pub const GIVEN: &str = "gaussian-file";
-/// Depth from which on Gaussians are seen, relative to what is the nearest in the sources...
-const NEAR: f32 = 0.1;
-/// ... and the greatest, in units of the file's world: that of the published rasteriser.
-const MAX_NEAR: f32 = 0.2;
+/// Depth from which on Gaussians are seen, in units of the scene's files: that of the published rasteriser, which is
+/// what those of other programs were trained with...
+const NEAR: f32 = 0.2;
+/// ... where what is the nearest in the sources is so many times as far away; otherwise this share of that.
+const MIN_FAR: f32 = 2.0;
+const NEAR_SHARE: f32 = 0.1;
 /// Share of what the sources see that is nearer than what counts as the nearest.
 const NEAREST: f64 = 0.01;
 /// Most Gaussians whose depths are looked at.
@@ -93,7 +95,8 @@ impl Field for GivenGaussians {
         sources: &SourceImages,
         progress: &dyn Progress,
     ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
-        let near = (NEAR * self.nearest_depth(sources)).min(MAX_NEAR * self.unit);
+        let (usual, nearest) = (NEAR * self.unit, self.nearest_depth(sources));
+        let near = if nearest >= MIN_FAR * usual { usual } else { NEAR_SHARE * nearest };
         let background = behind(sources);
         let mut prepared = Prepare { device, scene: &self.scene, near, background, uploaded: None };
         self.notes.iter().for_each(|note| progress.warn(note));

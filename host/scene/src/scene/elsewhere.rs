@@ -6,19 +6,20 @@ use std::path::{Path, PathBuf};
 use super::files::{self, IMAGE_FOLDERS};
 use super::reader::Reader;
 
-/// Files of other programs with poses, and whose they are; beginnings and ends of names.
-const FILES: [(&str, &str, &str); 11] = [
-    ("sfm_data", ".json", "OpenMVG"),
-    ("reconstruction", ".json", "OpenSfM"),
-    ("cameras", ".xml", "Metashape"),
-    ("cameras", ".sfm", "Meshroom"),
-    ("bundle", ".out", "Bundler"),
-    ("", ".nvm", "VisualSFM"),
-    ("cameras", ".json", "3D Gaussian Splatting"),
-    ("meta_data", ".json", "SDFStudio"),
-    ("", "_sfm.log", "Tanks and Temples"),
-    ("", "_cam.txt", "MVSNet"),
-    ("groundtruth", ".txt", "TUM"),
+/// Files of other programs with poses, and whose they are: names, of which some begin with anything.
+const FILES: [(&str, &str); 12] = [
+    ("sfm_data.json", "OpenMVG"),
+    ("reconstruction.json", "OpenSfM"),
+    ("cameras.xml", "Metashape"),
+    ("cameras.sfm", "Meshroom"),
+    ("bundle.out", "Bundler"),
+    ("bundle.rd.out", "Bundler"),
+    ("*.nvm", "VisualSFM"),
+    ("cameras.json", "3D Gaussian Splatting"),
+    ("meta_data.json", "SDFStudio"),
+    ("*_SfM.log", "Tanks and Temples"),
+    ("00000000_cam.txt", "MVSNet"),
+    ("groundtruth.txt", "TUM"),
 ];
 
 /// Folders in which such files lie, beside the scene's own.
@@ -29,7 +30,11 @@ const MODELS: [&str; 5] = ["colmap", "0", "sparse/aligned", "distorted/sparse/0"
 
 /// In a sentence, where the poses of the photographs in a folder may be; `None` if nothing is found.
 pub(super) fn poses(root: &Path, readers: &[&dyn Reader]) -> Option<String> {
-    let is_scene = |path: &Path| readers.iter().any(|reader| matches!(reader.recognise(path), Ok(Some(_))));
+    // A folder that a reader recognises may lack what it needs.
+    let is_scene = |path: &Path| {
+        let found = readers.iter().find_map(|reader| Some((reader, reader.recognise(path).ok()??)));
+        found.is_some_and(|(reader, found)| reader.read(&found).is_ok())
+    };
     if let Some(model) = MODELS.iter().map(|place| root.join(place)).find(|place| is_scene(place)) {
         return Some(format!("{} is a scene: give that", model.display()));
     }
@@ -51,8 +56,12 @@ pub(super) fn poses(root: &Path, readers: &[&dyn Reader]) -> Option<String> {
 fn file_of(folder: &Path) -> Option<(PathBuf, &'static str)> {
     let all = files::list(folder, |_| true).ok()?;
     all.into_iter().find_map(|path| {
-        let name = path.file_name()?.to_string_lossy().to_lowercase();
-        let of = FILES.iter().find(|(begin, end, _)| name.starts_with(begin) && name.ends_with(end))?;
-        Some((path, of.2))
+        let name = path.file_name()?.to_string_lossy().into_owned();
+        let is_it = |pattern: &str| match pattern.strip_prefix('*') {
+            Some(end) => name.ends_with(end),
+            None => name.eq_ignore_ascii_case(pattern),
+        };
+        let (_, program) = FILES.iter().find(|(pattern, _)| is_it(pattern))?;
+        Some((path, *program))
     })
 }

@@ -140,7 +140,7 @@ pub enum SceneFault {
 impl Hinted for SceneError {
     fn hint(&self) -> Option<Hint> {
         match &*self.fault {
-            SceneFault::BarePhotographs(_) => Some(Hint::Poses),
+            SceneFault::BarePhotographs(_) | SceneFault::PosesElsewhere(..) => Some(Hint::Poses),
             SceneFault::UnclearMasks(_) => Some(Hint::Masks),
             SceneFault::Image(ImageFault::Unreadable(cause)) => match &**cause {
                 ImageError::Unsupported(problem)

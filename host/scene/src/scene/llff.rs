@@ -86,6 +86,13 @@ fn check_names(file: &Path, views: &[RawView], names: &[String]) -> Result<(), S
     if !views.iter().any(|view| known.contains(&view.name)) {
         return Ok(());
     }
+    // Photographs that are numbered anew, from 0 in the place of 1: all names differ by the same number.
+    let number = |name: &str| files::trailing_number(name).map(|number| number as i64);
+    let shift = |view: &RawView, stem: &str| Some(number(&view.name)? - number(stem)?);
+    let shifts: HashSet<Option<i64>> = views.iter().zip(stems()).map(|(view, stem)| shift(view, &stem)).collect();
+    if shifts.len() == 1 && !shifts.contains(&None) {
+        return Ok(());
+    }
     match views.iter().zip(stems()).enumerate().find(|(_, (view, stem))| view.name != *stem) {
         Some((row, (view, stem))) => {
             let (row, view) = (format!("row {row}, of '{stem}' by the COLMAP model beside it,"), &view.name);

@@ -78,8 +78,8 @@ impl Reader for Transforms {
         let mut empty = None;
         for (file, split) in parts(found) {
             let part = match read(&file, Some(split)) {
-                // The test photographs of a benchmark are often not kept.
-                Err(error) if is_without_photographs(&error) => {
+                // A benchmark's photographs for validation and tests are often not kept.
+                Err(error) if split != Split::Train && is_without_photographs(&error) => {
                     let file = file.display();
                     scene.warnings.push(format!("{file}: none of its photographs is there: '{split}' has no views"));
                     empty.get_or_insert(error);
@@ -100,9 +100,9 @@ impl Reader for Transforms {
     }
 }
 
-/// Whether all photographs of a file are missing.
+/// Whether all photographs of a file are missing, and none of its names is found at another place.
 fn is_without_photographs(error: &SceneError) -> bool {
-    matches!(*error.fault, SceneFault::PoseWithoutImage(_) | SceneFault::PoseWithImageElsewhere(..))
+    matches!(*error.fault, SceneFault::PoseWithoutImage(_))
 }
 
 /// The existing files of a scene's splits.

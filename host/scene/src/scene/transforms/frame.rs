@@ -16,6 +16,9 @@ use super::super::json::Object;
 use super::super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawView};
 use super::super::split::Split;
 
+/// Share of a number by which the same one may differ in two places.
+const SAME_NUMBER: f64 = 1.0e-6;
+
 /// Lists of photographs at the top of nerfstudio's files.
 const LISTS: [(&str, Split); 3] =
     [("train_filenames", Split::Train), ("val_filenames", Split::Validation), ("test_filenames", Split::Test)];
@@ -227,7 +230,8 @@ impl<'a> TransformsFrame<'a> {
         Ok((!lens.is_pinhole()).then_some(lens))
     }
 
-    /// A lens's number by its key or from the list: what a frame states goes before what stands at the top of the file.
+    /// A lens's number by its key or from the list, which must say the same; a frame's list goes before keys at the top of
+    /// the file.
     fn lens_number(&self, key: &str, in_list: Option<(f64, &str)>) -> Result<Option<(f64, String)>, SceneError> {
         let [frame, _] = &self.scopes;
         let Some((value, list)) = in_list else { return self.number(key) };
@@ -236,7 +240,8 @@ impl<'a> TransformsFrame<'a> {
             None => self.number(key)?,
         };
         match stated {
-            Some((other, full)) if other != value => {
+            // One of them may have been saved in single precision.
+            Some((other, full)) if (other - value).abs() > SAME_NUMBER * value.abs() => {
                 let (list, full) = (format!("{list} {value}"), format!("{full} {other}"));
                 Err(FilePlace::file(self.path).fault(FileFault::Contradiction(list, full)))
             }
