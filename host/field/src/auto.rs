@@ -153,8 +153,8 @@ impl Chosen {
                 "pictures may be worse than a copy; take photographs nearer to one another, and check the camera poses"
             }
             ..MIN_GAIN_ON_COPIES => {
-                "either the camera poses are not those of these photographs (mirrored, inverted, of another order), or \
-                 the photographs are too far from one another"
+                "the camera poses are not those of these photographs (mirrored, inverted, of another order), or the \
+                 photographs are too far from one another, or many of them are there twice"
             }
             _ => return None,
         };
