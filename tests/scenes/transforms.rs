@@ -225,6 +225,8 @@ fn lenses_are_told_by_model_and_flag() {
     let whole = [0.1, 0.2, 0.3, 0.0, 0.0, 0.0, 0.7, 0.8, 0.4];
     assert_eq!(lens(&list(json!([0.1, 0.2, 0.3, 0.4, 0.7, 0.8]))), Some((Projection::Perspective, whole)));
     assert_eq!(lens(&list(json!([0.1, 0.2]))).map(|(_, all)| all[..2].to_vec()), Some(vec![0.1, 0.2]));
+    // The same number, saved in single precision in one of the places.
+    assert!(lens(&list(json!([f64::from(0.1_f32)]))).is_some());
     let mut fisheye_list = list(json!([0.1, -0.2, 0.3, 0.4, 0.0, 0.0])).to_vec();
     fisheye_list.push(("camera_model", json!("OPENCV_FISHEYE")));
     assert_eq!(lens(&fisheye_list), Some((Projection::Fisheye, [0.1, -0.2, 0.3, 0.4, 0.0, 0.0, 0.0, 0.0, 0.0])));
