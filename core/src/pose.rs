@@ -312,7 +312,7 @@ impl Pose {
     ///
     /// `2 atan2(|a - b|, |a + b|)`: exact at 0 and accurate to a few ULP of the result at every angle from 1e-18
     /// on, where the arc cosine of a dot product is quantised to 0.03 degrees near 0. Lengths that are off by
-    /// [`RIGID_TOLERANCE`] change it by 1e-6 of itself at most.
+    /// [`RIGID_TOLERANCE`] change it by 1e-6 of itself and 4e-10 rad at most.
     #[inline]
     pub fn axis_angle(&self, other: &Pose) -> f32 {
         let (difference, sum) = self.axis_chords_squared(other);
