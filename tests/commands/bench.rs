@@ -17,6 +17,7 @@ fn the_cpu_beside_its_limits() {
     for key in ["copy_giga_bytes", "multiply_add_giga_operations", "giga_look_ups"] {
         assert!(number(device, key) > 0.0, "{key}: {device}");
     }
+    assert_eq!(device["matrix_unit_giga_operations"], Value::Null, "a processor's");
     let kernels = list_of(&device["kernels"]);
     for name in ["census_cost", "compare_views", "composite", "convolve", "gather_latents", "linear", "matrix_product"]
     {

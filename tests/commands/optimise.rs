@@ -67,6 +67,9 @@ fn held_out_views_are_scored_on_the_way() {
     let count = gaussians(&folder.join("a.ply")).gaussians.len();
     assert!(text.contains(&format!("a.ply: {count} Gaussians after 340 of 340 iterations\n")), "{text}");
     // The last score is that of `render` with the file, from the same sources.
+    // Its pictures need no sources.
+    done(&folder, "render toy --gaussians a.ply --targets all --size 16x16 --device cpu -o all");
+    assert!(folder.join("all/run.json").is_file() && folder.join("all/000020.png").is_file());
     let rendered = done(&folder, "render toy --gaussians a.ply --targets 20,21 --size 48x48 --device cpu -o out");
     let psnr = |line: &str| line.split("PSNR ").nth(1)?.split(" dB").next()?.parse::<f64>().ok();
     let again: Vec<f64> = rendered.lines().filter_map(psnr).collect();

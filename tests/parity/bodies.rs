@@ -91,7 +91,7 @@ impl Tiles for Whole {
             for column in 0..shape.column_count {
                 let number = |inner| left.number(left.row(row), left.inner(inner));
                 let products = (0..shape.inner_count).map(|inner| number(inner) * right.number(inner, column));
-                outputs.put(row, column, products.sum());
+                outputs.put(row, column, products.fold(0.0, |sum, product| sum + product));
             }
         }
     }

@@ -7,6 +7,7 @@ use libtest_mimic::{Failed, Trial};
 use std::sync::Arc;
 use viewfuse::device::vulkan::Vulkan;
 use viewfuse::device::{Device, Layer, LayerShape, Memory, Precision};
+use viewfuse_kernels::limits::{REPEATED, RepeatedBlock};
 use viewfuse_kernels::network::convolve::{ConvolveBlock, patch_value};
 use viewfuse_kernels::network::linear::LinearBlock;
 use viewfuse_tests::devices::{exchanged_stand_ins, stand_ins, takes_stand_ins};
@@ -36,6 +37,7 @@ pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> 
             }));
         }
     }
+    trials.push(trial_on(instance, adapter, "a_product_is_repeated_by_units", repeated_by_units));
     trials.push(trial_on(instance, adapter, "rounded_forms_are_trusted_after_a_probe", trusted_after_a_probe));
     trials.push(trial_on(instance, adapter, "written_weights_are_rounded_again", written_weights_are_rounded_again));
     trials.push(trial_on(instance, adapter, "without_memory_for_f16_products_are_exact", without_memory_for_f16));
@@ -165,6 +167,42 @@ fn is_within_its_bound(
         let left = patches.map(|(pixel, inner)| patch_value(&image[..], &block, pixel, inner)).collect();
         let first = (0..pixels as usize * columns).map(|element| bias[element % columns]).collect();
         compare(form, &Product { left, weights, first, columns }, &device.download(&outputs)?)?;
+    }
+    Ok(())
+}
+
+/// What measures matrix units computes what it says: products within a tile, beyond it and of none of their rounds. It
+/// does nothing where columns are not whole fours, or there are no units.
+fn repeated_by_units(instance: &Arc<Instance>, adapter: &Adapter) -> Result<(), Failed> {
+    let open = |stand_ins| Vulkan::open(instance, adapter, &GpuOptions { stand_ins, ..GpuOptions::default() });
+    let device = open(Some(stand_ins()))?;
+    let inner = REPEATED as usize;
+    for (rows, columns, rounds) in [(1, 4, 1), (131, 196, 3), (128, 128, 40), (5, 8, 0)] {
+        let (mut left, right) = (numbers(rows * inner, 1), numbers(inner * columns, 2));
+        if rows == 131 {
+            left[3 * inner] = 70_000.0;
+        }
+        let block = RepeatedBlock { row_count: rows as u32, column_count: columns as u32, round_count: rounds as u32 };
+        let (inputs, weights) = (device.upload(&left)?, device.upload(&right)?);
+        let mut sums = device.upload(&vec![f32::INFINITY; rows * columns])?;
+        assert!(device.repeat_product_by_units(&block, &inputs, &weights, &mut sums)?, "a device with units");
+        if rounds == 0 {
+            assert_eq!(device.download(&sums)?, vec![0.0; rows * columns]);
+            continue;
+        }
+        let left = left.chunks(inner).flat_map(|row| row.repeat(rounds)).collect();
+        let product = Product { left, weights: right.repeat(rounds), first: vec![0.0; rows * columns], columns };
+        compare(Form::Half, &product, &device.download(&sums)?)?;
+    }
+    let block = RepeatedBlock { row_count: 2, column_count: 6, round_count: 1 };
+    let (left, right, mut sums) = (device.zeros(32)?, device.zeros(96)?, device.upload(&[1.0; 12])?);
+    assert!(!device.repeat_product_by_units(&block, &left, &right, &mut sums)?, "columns in no fours");
+    assert_eq!(device.download(&sums)?, [1.0; 12]);
+    if !adapter.has_matrices {
+        let without = open(None)?;
+        let block = RepeatedBlock { column_count: 4, ..block };
+        let (left, right, mut sums) = (without.zeros(32)?, without.zeros(64)?, without.zeros(8)?);
+        assert!(!without.repeat_product_by_units(&block, &left, &right, &mut sums)?, "a device without units");
     }
     Ok(())
 }

@@ -70,6 +70,12 @@ fn a_pose_is_one_source() {
     assert_eq!(sources("b", None), [0, 3]);
     assert_eq!(sources("b", Some("a,c")), [0, 2]);
     assert_eq!(sources("a", Some("b,c")), [1, 2]);
+    // Of a field that shows no sources, targets are some where nothing else is left.
+    let shared = |targets: &str| {
+        let selection = Selection { targets: Some(targets.to_owned()), may_share: true, ..Selection::default() };
+        selection.resolve(&scene, 1).expect("a job").sources
+    };
+    assert_eq!((shared("a"), shared("all")), (vec![1, 3], vec![0, 1, 3]));
     // Nearly the same pose is the same.
     let near = called(&["a", "b", "c", "d"]);
     near.write("pose/b.txt", moved(1.0e-5));

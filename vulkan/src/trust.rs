@@ -57,6 +57,26 @@ impl Gpu {
         }
     }
 
+    /// As [`Gpu::dispatch`] in a form of rounded factors, whatever the size of the product; `false`, and nothing is done,
+    /// where the device is [not trusted](Gpu::trusts) with it. The arrays lie in fours.
+    ///
+    /// # Errors
+    /// Those of [`Gpu::dispatch`].
+    pub fn dispatch_by_units(
+        &self,
+        kernel: Kernel,
+        form: Form,
+        parameters: &[u8],
+        elements: Range<u32>,
+        arrays: &[Bound<'_>],
+    ) -> Result<bool, VulkanError> {
+        if !form.needs_matrices() || !self.trusts(kernel, form)? {
+            return Ok(false);
+        }
+        self.dispatch_in(kernel, Some(form), parameters, elements, arrays)?;
+        Ok(true)
+    }
+
     /// The largest of a form's [sizes](Form::sizes) for which the device's workgroups have room: whether it is
     /// [trusted](Gpu::trusts) decides for all.
     pub fn largest(&self, form: Form) -> Form {
@@ -96,7 +116,12 @@ impl Gpu {
         }
         // A driver that does not compile it is only not trusted.
         let is_compiled = self.pipelines.get((kernel, form, 0)).is_ok();
-        let is_right = is_compiled && Probe::new(kernel).is_kept_by(self, form)?;
+        let is_right = is_compiled
+            && match kernel {
+                // It only measures the units, which a linear layer shows to be right.
+                Kernel::RepeatProduct => self.trusts(Kernel::Linear, form)?,
+                _ => Probe::new(kernel).is_kept_by(self, form)?,
+            };
         let is_any_gain_enough = !form.may_fuse() || self.min_fused_gain <= 0.0;
         let is_trusted = is_right && (is_any_gain_enough || self.gain(kernel, form)? >= self.min_fused_gain);
         self.lock().verdicts.set(kernel, form, is_trusted);

@@ -1,5 +1,5 @@
-//! What a device can do at most: kernels that only copy, that only multiply and add, and that only look texels up.
-//! Rates of other kernels are compared with theirs.
+//! What a device can do at most: kernels that only copy, that only multiply and add, numbers or matrices, and that only
+//! look texels up. Rates of other kernels are compared with theirs.
 //!
 //! A chain is a number that is multiplied and added to again and again, `x = x * factor + summand`: each step needs the
 //! one before, and nothing is read or written in between. An element has [`CHAINS`] of them, so that a device always
@@ -14,6 +14,9 @@ use viewfuse_core::lookup::bilinear_from;
 pub const CHAINS: u32 = 12;
 /// Steps of each chain in a round: the loop around them then takes no time.
 pub const ROUND_STEPS: u32 = 8;
+
+/// Inner indices of a product that is repeated: those of one matrix of a device's units.
+pub const REPEATED: u32 = 16;
 
 /// Look-ups of an element.
 pub const LOOK_UPS: u32 = 16;
@@ -41,6 +44,32 @@ pub struct ChainBlock {
     pub summand: f32,
     /// Rounds of [`ROUND_STEPS`] steps.
     pub round_count: u32,
+}
+
+/// The product of two matrices, added to the sums again and again, as plain data: `sums[row][column]` are
+/// `left[row][inner]` times `right[inner][column]` of [`REPEATED`] inner indices, of all of them in their order and then
+/// from the first one again.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct RepeatedBlock {
+    /// Rows of the left matrix and of the sums.
+    pub row_count: u32,
+    /// Columns of the right matrix and of the sums.
+    pub column_count: u32,
+    /// How often the product is added.
+    pub round_count: u32,
+}
+
+impl RepeatedBlock {
+    /// Inner indices in all.
+    pub const fn inner_count(&self) -> u32 {
+        self.round_count * REPEATED
+    }
+
+    /// Whether the arrays lie in fours, as matrix units need them: all but the left matrix, which always does.
+    pub const fn is_in_fours(&self) -> bool {
+        self.column_count.is_multiple_of(4)
+    }
 }
 
 /// The sum of an element's chains. Chain `i` starts at `start + i`; chains 0, 4, 8 are summed first, then those behind

@@ -68,7 +68,7 @@ pub use crate::gaussians::steps::{GainStepBlock, HarmonicTerm, ParticleBlock, Pa
 pub use crate::gaussians::windows::{GainBlock, LossBlock, SHARE_RUN};
 pub use crate::gaussians::{SplatBlock, TileBlock};
 pub use crate::genvs::{DenoiserInputBlock, FeatureBlock, VolumeBlock};
-pub use crate::limits::{ChainBlock, LookUpBlock};
+pub use crate::limits::{ChainBlock, LookUpBlock, RepeatedBlock};
 pub use crate::network::attend::MatrixBlock;
 pub use crate::network::convolve::ConvolveBlock;
 pub use crate::network::depthwise::DepthwiseBlock;

@@ -1,7 +1,7 @@
 //! Rates of the kernels that take the time, beside what the device can do at most, both measured in the same run.
 //!
-//! Three limits are measured: how fast a kernel copies, how fast one multiplies and adds in registers, and how fast one
-//! looks texels up, bilinear, of four channels. A kernel that must move so many bytes and needs so many operations or
+//! Three limits are measured of each device: how fast a kernel copies, how fast one multiplies and adds in registers, and
+//! how fast one looks texels up, bilinear, of four channels. A kernel that must move so many bytes and needs so many operations or
 //! look-ups takes at least the longest of the times that these limits allow; its *share* is that time over the time
 //! that it took. Limits and kernels are measured in turns, because what else a machine does, and how fast its clock may
 //! run, changes from second to second: a share is the median of the shares of all rounds.
@@ -13,9 +13,9 @@
 //! look-ups. Other kernels are compared with the copy only.
 //!
 //! Where a device has matrix units, linear layers and convolutions are measured in their forms of rounded factors as
-//! well. Their limit is that of multiply-adds in registers, since no kernel here measures the units alone: a share
-//! above 1 is what the units gain over the best that exact products could reach. Where it has none and gains by fusing,
-//! they are measured in fused forms: one operation takes the place of two there, so their limit is twice as high.
+//! well, and so are the units alone, on factors that stay in registers: their limit, of which two parts, which take three
+//! products each, have a third. Where it has none and gains by fusing, they are measured in fused forms: one operation
+//! takes the place of two there, so their limit is twice as high.
 
 mod limits;
 mod networks;
@@ -46,6 +46,8 @@ pub enum Limit {
     Copy,
     /// Multiply-adds in registers.
     MultiplyAdd,
+    /// Products of f16 by matrix units, in registers.
+    MatrixUnits,
     /// Bilinear look-ups of four channels.
     LookUp,
 }
@@ -84,6 +86,8 @@ pub struct DeviceRates {
     pub copy_giga_bytes: f64,
     /// Billions of operations a second in registers.
     pub multiply_add_giga_operations: f64,
+    /// Billions of operations a second by matrix units, factors in f16, in registers; null without such units.
+    pub matrix_unit_giga_operations: Option<f64>,
     /// Billions of bilinear look-ups of four channels a second.
     pub giga_look_ups: f64,
     /// The forms that are not exact that it has: products by matrix units or fused ones, tried and found within their
@@ -162,12 +166,13 @@ pub fn measure_rates<D: Device>(device: &D, rounds: u32, progress: &dyn Progress
     let making =
         |kernel: &'static str| move |source: DeviceError| CheckError::Device { kernel, source: Box::new(source) };
     let is_long = |work: &mut Work<'_>| Ok(once(device, work)? >= LEAST_OF_LIMITS.as_secs_f64());
-    let limits::Works { mut copy, mut chains, mut look_ups } = limits::Works::new(device, is_long)?;
+    let limits::Works { mut copy, mut chains, mut look_ups, mut units } = limits::Works::new(device, is_long)?;
     let mut works = sweeps::works(device).map_err(making("compare_views"))?;
     works.extend(networks::works(device).map_err(making("linear"))?);
     let copies = repeats(device, &mut copy)?;
     let rounds_of_chains = repeats(device, &mut chains)?;
     let rounds_of_look_ups = repeats(device, &mut look_ups)?;
+    let rounds_of_units = units.as_mut().map(|units| repeats(device, units)).transpose()?.unwrap_or(1);
     let mut limits = Vec::new();
     let mut times = vec![Vec::new(); works.len()];
     let mut shares = vec![Vec::new(); works.len()];
@@ -180,6 +185,7 @@ pub fn measure_rates<D: Device>(device: &D, rounds: u32, progress: &dyn Progress
                 bytes: rate(device, &mut copy, copies)?,
                 operations: rate(device, &mut chains, rounds_of_chains)?,
                 look_ups: rate(device, &mut look_ups, rounds_of_look_ups)?,
+                units: units.as_mut().map(|units| rate(device, units, rounds_of_units)).transpose()?,
             };
             let count = repeats(device, work)?;
             let time = seconds(device, work, count)?;
@@ -194,6 +200,7 @@ pub fn measure_rates<D: Device>(device: &D, rounds: u32, progress: &dyn Progress
         bytes: median(limits.iter().map(|limit| limit.bytes).collect()),
         operations: median(limits.iter().map(|limit| limit.operations).collect()),
         look_ups: median(limits.iter().map(|limit| limit.look_ups).collect()),
+        units: limits.iter().map(|limit| limit.units).collect::<Option<Vec<f64>>>().map(median),
     };
     let kernel = |((work, times), shares): ((&Work<'_>, Vec<f64>), Vec<f64>)| {
         let time = median(times);
@@ -214,6 +221,7 @@ pub fn measure_rates<D: Device>(device: &D, rounds: u32, progress: &dyn Progress
         rounds,
         copy_giga_bytes: of_limits(|limit| limit.bytes),
         multiply_add_giga_operations: of_limits(|limit| limit.operations),
+        matrix_unit_giga_operations: typical.units.map(|rate| rate / 1.0e9),
         giga_look_ups: of_limits(|limit| limit.look_ups),
         faults: device.faults(),
         rounded_forms: device.precisions().into_iter().filter_map(Precision::form).map(Form::name).collect(),
@@ -226,14 +234,20 @@ struct Limits {
     bytes: f64,
     operations: f64,
     look_ups: f64,
+    /// Operations of matrix units, where there are some.
+    units: Option<f64>,
 }
 
 impl Limits {
     /// The least time for some work, and what takes it.
     fn seconds(&self, work: &Work<'_>) -> (f64, Limit) {
         let copying = work.bytes / self.bytes;
+        let units = work.form.filter(|form| form.needs_matrices()).zip(self.units);
         let (computing, limit) = match work.work {
             Operations::Uncounted => (0.0, Limit::Copy),
+            Operations::Fused(count) if let Some((form, rate)) = units => {
+                (f64::from(form.part_products()) * count / rate, Limit::MatrixUnits)
+            }
             Operations::Fused(count) if work.form.is_some_and(Form::may_fuse) => {
                 (count / (2.0 * self.operations), Limit::MultiplyAdd)
             }

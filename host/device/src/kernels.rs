@@ -120,6 +120,21 @@ macro_rules! device {
                 self.convolve(block, inputs, weights, bias, residual, outputs)
             }
 
+            /// As [`Device::repeat_product`], by matrix units; `false`, and nothing is done, where there are none that
+            /// the device [rounds](Device::rounds) by, or the columns are not whole fours.
+            ///
+            /// # Errors
+            /// If the device is lost.
+            fn repeat_product_by_units(
+                &self,
+                _block: &RepeatedBlock,
+                _left: &Self::Buffer<f32>,
+                _right: &Self::Buffer<f32>,
+                _sums: &mut Self::Buffer<f32>,
+            ) -> Result<bool, DeviceError> {
+                Ok(false)
+            }
+
             $(
                 $($doc)*
                 ///

@@ -342,6 +342,20 @@ macro_rules! dispatches {
                 self.layer(Kernel::Convolve, form, bytes_of(&block), elements, given, residual, outputs)
             }
 
+            fn repeat_product_by_units(
+                &self,
+                block: &RepeatedBlock,
+                left: &Buffer<f32>,
+                right: &Buffer<f32>,
+                sums: &mut Buffer<f32>,
+            ) -> Result<bool, DeviceError> {
+                let elements = 0..tile_elements(block.row_count, block.column_count);
+                let arrays = [left.bind(), right.bind(), sums.bind()];
+                let (kernel, form) = (Kernel::RepeatProduct, Form::Half);
+                Ok(block.is_in_fours()
+                    && self.gpu.dispatch_by_units(kernel, form, bytes_of(block), elements, &arrays)?)
+            }
+
             $(
                 fn $method(
                     &self,

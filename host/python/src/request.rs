@@ -176,7 +176,7 @@ pub(crate) fn held_out(
     views: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Selection> {
     let view_count = views.map(|views| count("views", views)).transpose()?;
-    Ok(Selection { targets, path: None, sources, view_count })
+    Ok(Selection { targets, sources, view_count, ..Selection::default() })
 }
 
 /// A list of views.

@@ -171,6 +171,9 @@ pub struct Selection {
     pub sources: Option<String>,
     /// `--views`: at most this many of the sources, spread as far apart as possible.
     pub view_count: Option<usize>,
+    /// Whether targets are sources, too, where nothing else is left of the views: of a field whose pictures show no
+    /// sources.
+    pub may_share: bool,
 }
 
 impl Selection {
@@ -223,7 +226,11 @@ impl Selection {
                 }
                 sources
             }
-            None => scene.same_poses().sources(0..scene.views.len(), targets),
+            None => {
+                let poses = scene.same_poses();
+                let others = poses.sources(0..scene.views.len(), targets);
+                if others.is_empty() && self.may_share { poses.sources(0..scene.views.len(), &[]) } else { others }
+            }
         };
         if let Some(count) = self.view_count {
             let centres: Vec<_> = sources.iter().map(|&view| scene.views[view].camera.pose.centre_world()).collect();

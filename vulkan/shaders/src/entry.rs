@@ -304,6 +304,57 @@ macro_rules! entries_in_fours {
             }
         })+
     };
+    // What measures the units has their form alone.
+    (repeated $method:ident, $Block:ty, $block:ident [$row_count:expr, $inner_count:expr, $column_count:expr]) => {
+        /// The form of a kernel that measures matrix units.
+        pub mod $method {
+            use super::super::*;
+
+            entries_in_fours! {
+                of_two $method, $Block, $block [$row_count, $inner_count, $column_count],
+                [
+                    /// By matrix units, in f16.
+                    #[cfg(target_arch = "spirv")]
+                ]
+                half [
+                    #[spirv(subgroup_id)] subgroup: u32,
+                    #[spirv(subgroup_local_invocation_id)] lane: u32,
+                ] shared
+                id { Repeated { units: PhantomData::<Matrices>, shared, subgroup, lane } }
+            }
+            entries_in_fours! {
+                of_two $method, $Block, $block [$row_count, $inner_count, $column_count],
+                [
+                    /// By plain arithmetic in the place of matrix units.
+                ]
+                half_stand_in [] shared
+                id { Repeated { units: PhantomData::<StandIns>, shared, subgroup: id.x % 128 / 32, lane: id.x % 32 } }
+            }
+        }
+    };
+    (
+        of_two $method:ident, $Block:ty, $block:ident [$row_count:expr, $inner_count:expr, $column_count:expr],
+        [$(#[$mark:meta])*] $form:ident [$($before:tt)*] $shared:ident $id:ident { $($tiles:tt)* }
+    ) => {
+        $(#[$mark])*
+        #[spirv(compute(threads(128)))]
+        #[allow(clippy::too_many_arguments)]
+        pub fn $form(
+            #[spirv(global_invocation_id)] $id: UVec3,
+            $($before)*
+            #[spirv(push_constant)] push: &Push<$Block>,
+            #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] left: &[Vec4],
+            #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] right: &[Vec4],
+            #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] sums: &mut [Vec4],
+            #[spirv(workgroup)] $shared: &mut SharedOfRepeated,
+        ) {
+            let $block = &push.parameters;
+            let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
+            let (left, right, sums) = (EndlessFours(left), EndlessFours(right), UncheckedFours(sums));
+            let (tiles, invocation) = ($($tiles)*, push.piece.first + $id.x);
+            bodies::$method($block, shape, left, right, sums, tiles, invocation);
+        }
+    };
     // How the weights lie, and how the body gets them.
     (
         one $method:ident, $Block:ty, $block:ident [$row_count:expr, $inner_count:expr, $column_count:expr],

@@ -27,6 +27,7 @@ use spirv_std::spirv;
 use tile::Matrices;
 use tile::{Half, HalfSmall, HalfTiny, StandIns, TwoHalves, TwoHalvesSmall, TwoHalvesTiny};
 use tile::{InFours, Large, Least, SharedOfSingle, Small, Staged, Subgroup, Tiny, shared};
+use tile::{Repeated, SharedOfRepeated};
 use tile::{SharedOfHalf, SharedOfHalfSmall, SharedOfHalfTiny};
 use tile::{SharedOfTwoHalves, SharedOfTwoHalvesSmall, SharedOfTwoHalvesTiny};
 use unchecked::{Endless, EndlessFours, EndlessHalves, Together, Unchecked, UncheckedFours};
@@ -55,5 +56,8 @@ pub mod in_fours {
     }
     entries_in_fours! {
         convolve, ConvolveBlock, block [block.pixel_count(), block.patch_len(), block.out_channels]
+    }
+    entries_in_fours! {
+        repeated repeat_product, RepeatedBlock, block [block.row_count, block.inner_count(), block.column_count]
     }
 }

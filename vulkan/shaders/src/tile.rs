@@ -18,6 +18,7 @@ pub(crate) use fours::{InFours, Large, Least, Small, Tiny, shared};
 #[cfg(target_arch = "spirv")]
 pub(crate) use halves::Matrices;
 pub(crate) use halves::{Half, HalfSmall, HalfTiny, StandIns, TwoHalves, TwoHalvesSmall, TwoHalvesTiny};
+pub(crate) use halves::{Repeated, SharedOfRepeated};
 pub(crate) use halves::{SharedOfHalf, SharedOfHalfSmall, SharedOfHalfTiny};
 pub(crate) use halves::{SharedOfTwoHalves, SharedOfTwoHalvesSmall, SharedOfTwoHalvesTiny};
 pub(crate) use subgroup::Subgroup;

@@ -3,10 +3,11 @@
 //! Arrays come by value: references to them would be references to references, which a module with logical addressing
 //! cannot hold.
 
+use crate::limits::{REPEATED, RepeatedBlock};
 use crate::network::attend::MatrixBlock;
 use crate::network::convolve::{ConvolveBlock, Patches, convolved, convolved_four};
 use crate::network::linear::{LinearBlock, first_of_sum, first_of_sums, rectified, rectified_four};
-use crate::network::tile::{Fours, Matrix, Outputs, Right, Shape, Tiles, Weights};
+use crate::network::tile::{Fours, Left, Loaded, Matrix, Outputs, Right, Shape, Tiles, Weights};
 use crate::network::transpose::TransposedBlock;
 use crate::store::{Store, StoreFours};
 use glam::Vec4;
@@ -162,5 +163,92 @@ impl<O: Store<f32>> Outputs for Scaled<'_, O> {
     #[inline(always)]
     fn put(&mut self, row: u32, column: u32, sum: f32) {
         self.outputs.store((row * self.block.column_count + column) as usize, sum * self.block.scale);
+    }
+}
+
+/// A product that is added again and again.
+#[inline(always)]
+pub fn repeat_product<A: Fours>(
+    block: &RepeatedBlock,
+    shape: Shape,
+    left: A,
+    right: A,
+    sums: impl StoreFours,
+    tiles: impl Tiles,
+    invocation: u32,
+) {
+    let right = RepeatedRight(Weights { numbers: right, column_count: shape.column_count });
+    tiles.multiply(invocation, shape, RepeatedLeft(left), right, Sums { block, sums });
+}
+
+/// A matrix of which inner indices begin again.
+#[derive(Clone, Copy)]
+struct RepeatedLeft<A>(A);
+
+impl<A: Fours> Left for RepeatedLeft<A> {
+    /// The first number.
+    type Row = u32;
+    type Inner = u32;
+
+    #[inline(always)]
+    fn row(self, row: u32) -> u32 {
+        row * REPEATED
+    }
+
+    #[inline(always)]
+    fn inner(self, inner: u32) -> u32 {
+        inner
+    }
+
+    #[inline(always)]
+    fn moved(self, inner: u32, by: u32) -> u32 {
+        inner + by
+    }
+
+    #[inline(always)]
+    fn number(self, first: u32, inner: u32) -> f32 {
+        self.0.fetch((first + inner % REPEATED) as usize)
+    }
+
+    #[inline(always)]
+    fn four(self, first: u32, inner: u32) -> Loaded {
+        Loaded { numbers: self.0.four(first + inner % REPEATED), is_inside: true }
+    }
+
+    #[inline(always)]
+    fn finished(self, loaded: Loaded) -> Vec4 {
+        loaded.or_zero()
+    }
+}
+
+#[derive(Clone, Copy)]
+struct RepeatedRight<A>(Weights<A>);
+
+impl<A: Fours> Right for RepeatedRight<A> {
+    #[inline(always)]
+    fn number(self, inner: u32, column: u32) -> f32 {
+        self.0.number(inner % REPEATED, column)
+    }
+
+    #[inline(always)]
+    fn four(self, inner: u32, column: u32) -> Vec4 {
+        self.0.four(inner % REPEATED, column)
+    }
+}
+
+struct Sums<'a, O> {
+    block: &'a RepeatedBlock,
+    sums: O,
+}
+
+impl<O: StoreFours> Outputs for Sums<'_, O> {
+    #[inline(always)]
+    fn put(&mut self, row: u32, column: u32, sum: f32) {
+        self.sums.store((row * self.block.column_count + column) as usize, sum);
+    }
+
+    #[inline(always)]
+    fn put_four(&mut self, row: u32, column: u32, sums: Vec4) {
+        self.sums.store_four((row * self.block.column_count + column) as usize, sums);
     }
 }

@@ -167,6 +167,14 @@ impl Form {
         )
     }
 
+    /// Products of parts of factors that it takes for one product: three of factors in two parts.
+    pub const fn part_products(self) -> u32 {
+        match self {
+            Form::TwoHalves | Form::TwoHalvesSmall | Form::TwoHalvesTiny => 3,
+            _ => 1,
+        }
+    }
+
     /// Whether it reads weights as f16, two in a word ([`Kernel::PackFactors`]).
     pub const fn has_f16_weights(self) -> bool {
         matches!(self, Form::Half | Form::HalfSmall | Form::HalfTiny)
@@ -465,13 +473,18 @@ impl Kernel {
     pub const fn rounded_forms(self) -> &'static [Form] {
         match self {
             Kernel::Linear | Kernel::Convolve => &Form::ROUNDED,
+            Kernel::RepeatProduct => &[Form::Half],
             _ => &[],
         }
     }
 
     /// Whether it has a form, which is not [exact](Form::is_exact).
     pub const fn has_inexact(self, form: Form) -> bool {
-        !form.is_exact() && matches!(self, Kernel::Linear | Kernel::Convolve)
+        match self {
+            Kernel::Linear | Kernel::Convolve => !form.is_exact(),
+            Kernel::RepeatProduct => matches!(form, Form::Half),
+            _ => false,
+        }
     }
 
     /// How many numbers of each array a kernel with these parameters uses, if its arrays can lie in fours, as

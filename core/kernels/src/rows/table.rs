@@ -625,6 +625,14 @@ macro_rules! for_each_kernel {
                 read starts: f32,
                 write ends: f32,
             }
+            /// A product of two matrices that is added again and again, to measure how fast a device's matrix units are.
+            /// An element is an 8x8 part of a tile of `TILE` rows and columns.
+            RepeatProduct repeat_product(block: RepeatedBlock)
+            tiles [block.row_count, block.inner_count(), block.column_count], twin, measured {
+                filled left: f32,
+                filled right: f32,
+                write sums: f32,
+            }
             /// Texels looked up, to measure how fast a device does that: `sums[element]`. An element is several
             /// look-ups.
             LookUpTexels look_up_texels(block: LookUpBlock; element_count)

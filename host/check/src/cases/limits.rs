@@ -1,10 +1,10 @@
-//! [`Kernel::CopyNumbers`], [`Kernel::MultiplyAdd`] and [`Kernel::LookUpTexels`]: numbers of all sizes; chains that
-//! tend to one number and chains that tend to 0, also without a round; images of one row, of one column and larger
-//! ones.
+//! [`Kernel::CopyNumbers`], [`Kernel::MultiplyAdd`], [`Kernel::RepeatProduct`] and [`Kernel::LookUpTexels`]: numbers of
+//! all sizes; chains that tend to one number and chains that tend to 0, also without a round; products within a tile,
+//! of one and beyond it, once, often and not at all; images of one row, of one column and larger ones.
 
 use super::*;
 use crate::camera_oracle::{bilinear, tents};
-use viewfuse_kernels::limits::{CHAINS, LOOK_UP_STEP, LOOK_UPS, ROUND_STEPS};
+use viewfuse_kernels::limits::{CHAINS, LOOK_UP_STEP, LOOK_UPS, REPEATED, ROUND_STEPS};
 
 impl Case for CopyNumbers {
     const SEED_COUNT: u64 = 2;
@@ -54,6 +54,41 @@ impl Case for MultiplyAdd {
             (0..CHAINS).map(chain).fold(Bounded::ZERO, |sum, chain| sum + chain)
         };
         decided(self.starts.iter().map(sum), 1)
+    }
+}
+
+impl Case for RepeatProduct {
+    const SEED_COUNT: u64 = 2;
+    const HAS_REAL_PARAMETERS: bool = false;
+    const LIMITS: Limits = Limits { tolerance: 5.0e-3, least: 1.0e-2 };
+    const REASON: &'static str = "n units (2^-24) of the sum of magnitudes of n products, in whatever order they are \
+        summed";
+    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] =
+        &[("left", |case| increase(&mut case.left)), ("right", |case| increase(&mut case.right))];
+
+    fn inputs(seed: u64, size: u32) -> Vec<RepeatProduct> {
+        let random = &mut random(63, seed, size);
+        let awkward = 1 + random.below(100) as u32;
+        let dispatch = |[row_count, column_count, round_count]: [u32; 3]| {
+            let mut matrix = |count: u32| numbers((count * REPEATED) as usize, || random.normal());
+            let (left, right) = (matrix(row_count), matrix(column_count));
+            let sums = Output::Zeros((row_count * column_count) as usize + 1);
+            RepeatProduct { block: RepeatedBlock { row_count, column_count, round_count }, left, right, sums }
+        };
+        [[1, 1, 1], [65, 7, 3], [64, 64, 2], [size.div_ceil(5), awkward, 1], [3, 130, 9], [5, 4, 0]]
+            .map(dispatch)
+            .to_vec()
+    }
+
+    fn expected(&self) -> Vec<Option<Bounded>> {
+        let RepeatProduct { block: RepeatedBlock { row_count, column_count, round_count }, left, right, .. } = self;
+        let (columns, inner) = (*column_count as usize, REPEATED as usize);
+        let sum = |element: usize| {
+            let (row, column) = (&left[element / columns * inner..][..inner], element % columns);
+            let round = || row.iter().zip(right.iter().skip(column).step_by(columns));
+            Bounded::sum((0..*round_count).flat_map(|_| round()).map(|(a, b)| f64::from(*a) * f64::from(*b)))
+        };
+        decided(map(*row_count as usize * columns, 16, sum), 1)
     }
 }
 

@@ -77,6 +77,9 @@ fn print_device(rates: &DeviceRates) -> std::io::Result<()> {
         "{}: copies {:.1} GB/s, multiplies and adds {:.1} GFLOP/s in registers, looks up {:.3} G texels/s",
         rates.device, rates.copy_giga_bytes, rates.multiply_add_giga_operations, rates.giga_look_ups
     ))?;
+    if let Some(rate) = rates.matrix_unit_giga_operations {
+        say(format_args!("its matrix units multiply f16 at {rate:.1} GFLOP/s in registers"))?;
+    }
     let header = ["kernel", "size", "ms", "GFLOP/s", "GB/s", "limit", "share of it"];
     let mut rows = table(header.map(str::to_owned));
     for kernel in &rates.kernels {
@@ -94,6 +97,7 @@ fn row(kernel: &KernelRate) -> [String; 7] {
     let limit = match kernel.limit {
         Limit::Copy => "copy",
         Limit::MultiplyAdd => "multiply-add",
+        Limit::MatrixUnits => "matrix units",
         Limit::LookUp => "look-up",
     };
     [

@@ -155,7 +155,8 @@ pub(crate) struct SourceOptions {
 
 impl SourceOptions {
     pub(crate) fn to_selection(&self, targets: Option<&str>, path: Option<PathChoice>) -> Selection {
-        Selection { targets: targets.map(str::to_owned), path, sources: self.sources.clone(), view_count: self.views }
+        let (targets, sources) = (targets.map(str::to_owned), self.sources.clone());
+        Selection { targets, path, sources, view_count: self.views, may_share: false }
     }
 }
 

@@ -1,9 +1,9 @@
 //! What the CPU can do at most: copies, and chains in the widest vectors of the machine with fused steps, as its matrix
-//! products compute.
+//! products compute. Its repeated products measure nothing: it has no matrix units.
 
 use crate::parallel::{for_each_part, for_each_rows};
 use pulp::{Arch, Simd, WithSimd};
-use viewfuse_kernels::limits::{CHAINS, ChainBlock, ROUND_STEPS};
+use viewfuse_kernels::limits::{CHAINS, ChainBlock, REPEATED, ROUND_STEPS, RepeatedBlock};
 
 /// Fours of a part, 1 MiB.
 const PART: usize = 1 << 16;
@@ -21,6 +21,19 @@ pub(super) fn multiply_add(block: &ChainBlock, element_count: u32, starts: &[f32
     for_each_part(&mut ends[..element_count as usize], ELEMENTS, &|part, ends| {
         let starts = &starts[part * ELEMENTS..][..ends.len()];
         Arch::new().dispatch(Chains { block, starts, ends });
+    });
+}
+
+pub(super) fn repeat_product(block: &RepeatedBlock, left: &[f32], right: &[f32], sums: &mut [f32]) {
+    let (columns, inner) = (block.column_count as usize, REPEATED as usize);
+    let sums = &mut sums[..block.row_count as usize * columns];
+    for_each_part(sums, columns.max(1), &|row, sums| {
+        sums.fill(0.0);
+        for _ in 0..block.round_count {
+            for (factor, right) in left[row * inner..][..inner].iter().zip(right.chunks_exact(columns)) {
+                sums.iter_mut().zip(right).for_each(|(sum, number)| *sum += factor * number);
+            }
+        }
     });
 }
 

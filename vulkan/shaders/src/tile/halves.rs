@@ -16,12 +16,19 @@
 //! f16 ends at 65,504. A factor beyond that is infinite, and so is no sum of others: a sum that is not finite is NaN,
 //! which no rectifier hides. Results are never wrong silently.
 
+/// Blocks once for each number, with the number as a constant: only so an array stays in registers.
+macro_rules! unroll {
+    ($i:ident in [$($n:literal)*] $body:block) => { $({ const $i: usize = $n; $body })* };
+}
+
 #[cfg(target_arch = "spirv")]
 mod matrices;
+mod repeated;
 mod stand_ins;
 
 #[cfg(target_arch = "spirv")]
 pub(crate) use matrices::Matrices;
+pub(crate) use repeated::{Repeated, SharedOfRepeated};
 pub(crate) use stand_ins::StandIns;
 
 use super::wait_for_all;
@@ -253,11 +260,6 @@ impl Columns for UVec4 {
     fn put<U: Units, const N: usize>(self, shared: &mut [UVec4; N], place: u32, _: u32) {
         write(shared, place, self);
     }
-}
-
-/// Blocks once for each number, with the number as a constant: only so an array stays in registers.
-macro_rules! unroll {
-    ($i:ident in [$($n:literal)*] $body:block) => { $({ const $i: usize = $n; $body })* };
 }
 
 /// A form: its shared memory, its parts, its subgroups, inner indices of a step and what a subgroup multiplies of them,

@@ -19,7 +19,7 @@ use viewfuse_output::record::{FrameRecord, RECORD, view_names};
 use viewfuse_output::video::VideoFormat;
 use viewfuse_scene::Scene;
 use viewfuse_scene::coverage::Coverage;
-use viewfuse_scene::few_shot::{FewShot, Target};
+use viewfuse_scene::few_shot::{FewShot, Selection, Target};
 use viewfuse_weighting::Weighting;
 
 /// The inputs of a run, opened and checked.
@@ -86,6 +86,7 @@ impl Prepared {
         let about = field.about();
         arguments.outputs.check(&about)?;
         let selection = arguments.sources.to_selection(arguments.targets.as_deref(), arguments.path.choice());
+        let selection = Selection { may_share: arguments.gaussians.is_some(), ..selection };
         let job = selection.resolve(&scene, about.least_sources)?;
         let options =
             arguments.omissions.omitting(arguments.picture.to_render_options(), arguments.model.exact, &about)?;
