@@ -100,14 +100,19 @@ fn what_is_assumed_of_a_network_is_told() {
         let mut tensors = Tensors::of(architecture);
         tensors.metadata = metadata.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
         let checkpoint = tensors.checkpoint();
-        Architecture::of(&checkpoint).expect("a network").assumption(&checkpoint)
+        Architecture::of(&checkpoint).expect("a network").assumptions(&checkpoint)
     };
-    let said = assumed(&Architecture::small(), &[]).expect("what its denoiser begins with");
+    let said = assumed(&Architecture::small(), &[]).concat();
     assert!(said.starts_with("it: ") && said.contains("write viewfuse.estimate = published"), "{said}");
-    assert_eq!(assumed(&Architecture::published(), &[]), None);
+    let nothing: [String; 0] = [];
+    assert_eq!(assumed(&Architecture::published(), &[]), nothing);
     for estimate in ["published", "colours"] {
-        assert_eq!(assumed(&Architecture::small(), &[("viewfuse.estimate", estimate)]), None, "{estimate}");
+        assert_eq!(assumed(&Architecture::small(), &[("viewfuse.estimate", estimate)]), nothing, "{estimate}");
     }
+    let without = Architecture { denoiser: None, ..Architecture::published() };
+    let said = assumed(&without, &[]).concat();
+    assert!(said.contains("images of 128 pixels on a side") && said.contains("write viewfuse.image_side"), "{said}");
+    assert_eq!(assumed(&without, &[("viewfuse.image_side", "128")]), nothing);
     let made = Tensors::small().metadata;
     assert_eq!(made.get("viewfuse.estimate").map(String::as_str), Some("published"), "it says so itself");
 }
@@ -191,7 +196,13 @@ fn what_real_checkpoints_have_besides_is_accepted() {
         .with("pixel_nerf_net.cam_weighter.positional_encoder._freqs", &[1, 12, 1])
         .with("pixel_nerf_net.encoder.encoder.bn1.num_batches_tracked", &[])
         .checkpoint();
-    assert_eq!(Architecture::of(&checkpoint).expect("a member of the family"), Architecture::small());
+    let found = Architecture::of(&checkpoint).expect("a member of the family");
+    assert_eq!(found, Architecture::small());
+    let unused = "it: the weighting of views that it learned, pixel_nerf_net.cam_weighter.*, is not used";
+    assert_eq!(found.assumptions(&checkpoint), [unused]);
+    Tensors::small()
+        .saying("viewfuse.image_side", "32")
+        .refused("its metadata says viewfuse.image_side = 32, and its denoiser has images of 64 pixels");
     let other = format!("is no GeNVS: {FILTER}, of shape [1, 1, 4, 4], is not the mean of 2x2 pixels");
     Tensors::small().filled(FILTER, &[1, 1, 4, 4], 0.0625).refused(&other);
     Tensors::small().filled(FILTER, &[1, 1, 2, 2], 0.5).refused("of shape [1, 1, 2, 2], is not the mean of 2x2 pixels");

@@ -48,8 +48,10 @@ fn the_folder_of_the_authors_archive_says_what_tensors_do_not() {
     for place in ["sn64/pixel_nerf_latest", "sn64_unseen/pixel_nerf_latest", "sn64/pixel_nerf_backup"] {
         assert_eq!(opened(place, &[]), (false, 64, [false; 2]), "{place}");
     }
-    for place in ["srn_car/pixel_nerf_latest", "srn_chair/pixel_nerf_backup", "dtu/pixel_nerf_latest"] {
-        assert_eq!(opened(place, &[]), (true, 128, [false; 2]), "{place}");
+    for (place, side) in
+        [("srn_car/pixel_nerf_latest", 128), ("srn_chair/pixel_nerf_backup", 128), ("dtu/pixel_nerf_latest", 400)]
+    {
+        assert_eq!(opened(place, &[]), (true, side, [false; 2]), "{place}");
     }
     // What a file says of itself goes before what its folder is called.
     for place in ["sn64/pixel_nerf_latest", "anywhere/network.pth"] {
@@ -81,11 +83,16 @@ fn what_is_assumed_of_a_network_that_nothing_is_known_of_is_told() {
             assert!(said.contains(part), "{said}");
         }
     }
-    let said = assumed("network.pth", &[("viewfuse.source_side", "64")]).expect("the pool is not known");
-    assert!(said.contains("sources of 64 pixels"), "{said}");
-    for key in ["viewfuse.first_pool", "viewfuse.pixel_centre"] {
-        assert_eq!(assumed("network.pth", &[(key, "0")]), None, "{key}");
-    }
+    // What it says is not assumed, and all the rest is.
+    let [pool, centre, side] = ["viewfuse.first_pool", "viewfuse.pixel_centre", "viewfuse.source_side"];
+    let said = assumed("network.pth", &[(side, "64")]).expect("the pool is not known");
+    assert!(said.contains("a max pool") && said.contains("centres at 0") && !said.contains("128 pixels"), "{said}");
+    let said = assumed("network.pth", &[(pool, "1")]).expect("the side is not known");
+    assert!(said.contains(&format!("into it: {side}, {centre}")) && !said.contains("a max pool"), "{said}");
+    // The laboratory's older networks have a pool and do not say so.
+    let said = assumed("network.pth", &[(centre, "0.5")]).expect("the side is not known");
+    assert!(said.ends_with(&format!("into it: {side}")), "{said}");
+    assert_eq!(assumed("network.pth", &[(centre, "0"), (side, "64")]), None);
     let included = |name: &str| Checkpoint::open(&repository().join("host/models").join(name)).expect(name);
     for name in ["pixelnerf_cars.safetensors", "genvs_cars.safetensors"] {
         assert_eq!(Architecture::assumption(&included(name)), None, "{name}");
@@ -132,4 +139,41 @@ fn the_side_of_sources_is_read_and_one_without_sense_refused() {
         let said = side(value).expect_err(value);
         assert!(said.contains(part) && said.contains("it: ") && said.lines().count() == 1, "{value}: {said}");
     }
+}
+
+/// Tables of octaves and phases, and more octaves than any network that was published has.
+#[test]
+fn what_contradicts_itself_is_refused() {
+    let of = |octaves: usize, tables: &[(&str, &[f32])], metadata: &[(&str, &str)]| {
+        let mut architecture = Architecture::small(16);
+        architecture.frequency_count = octaves;
+        let shape = |(name, values): &(&str, &[f32])| viewfuse::nn::checkpoint::TensorShape {
+            name: (*name).to_owned(),
+            shape: vec![1, values.len(), 1],
+        };
+        let shapes: Vec<_> = architecture.tensors().into_iter().chain(tables.iter().map(shape)).collect();
+        let tables: Vec<(String, Vec<f32>)> =
+            tables.iter().map(|(name, values)| ((*name).to_owned(), values.to_vec())).collect();
+        let metadata = metadata.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+        let checkpoint = Checkpoint::computed("it", shapes, metadata, move |tensor| {
+            let table = tables.iter().find(|(name, _)| *name == tensor.name).map(|(_, values)| values.clone());
+            table.unwrap_or_else(|| initialisation::tensor(&tensor.name, &tensor.shape))
+        });
+        Architecture::of(&checkpoint).map(|found| found.frequency).map_err(|error| error.to_string())
+    };
+    let (frequencies, phases) = (("code._freqs", [3.0, 3.0, 6.0, 6.0]), ("code._phases", [0.0, 1.5708, 0.0, 1.5708]));
+    let tables: [(&str, &[f32]); 2] = [(frequencies.0, &frequencies.1), (phases.0, &phases.1)];
+    assert_eq!(of(2, &tables, &[]), Ok(3.0));
+    assert_eq!(of(2, &tables, &[("viewfuse.frequency", "3")]), Ok(3.0));
+    let said = of(2, &tables, &[("viewfuse.frequency", "1.5")]).expect_err("another frequency");
+    assert!(said.contains("viewfuse.frequency = 1.5, and code._freqs begins with 3"), "{said}");
+    for wrong in [&[1.5708, 0.0, 1.5708, 0.0][..], &[0.0, 1.5708]] {
+        let said = of(2, &[tables[0], (phases.0, wrong)], &[]).expect_err("other phases");
+        assert!(said.contains("code._phases does not hold 0 and pi/2 in turns for 2 octaves"), "{said}");
+    }
+    // Six octaves of points and of directions have as many inputs.
+    let said = of(12, &[], &[]).expect_err("directions, perhaps");
+    assert!(said.contains("78 numbers a point") && said.contains("use_code_viewdirs"), "{said}");
+    assert_eq!(of(12, &[], &[("viewfuse.frequency", "1.5")]), Ok(1.5));
+    assert_eq!(of(6, &[], &[]), Ok(1.5));
 }

@@ -72,11 +72,19 @@ fn every_place_of_the_state_dict() {
         assert_eq!(checkpoint.origin(), format!("PyTorch, zip; under '{place}'"));
         assert_eq!(checkpoint.shapes().len(), 2);
     }
-    // The first that holds tensors is taken.
-    let root = Pickle::new().raw(b"}(").text("ema").state_dict(&pair()[..1]).text("model").state_dict(&pair());
-    let root = root.text("state_dict").raw(b"}u").end();
-    let (_folder, path) = file(&archive(&root, &pair()));
-    assert_eq!(Checkpoint::open(&path).expect("a file").origin(), "PyTorch, zip; under 'model'");
+    // One without tensors does not count. Of two it is not clear which is meant, nor beside a moving average.
+    let both = |other: &str| {
+        let root = Pickle::new().raw(b"}(").text(other).state_dict(&pair()[..1]).text("model").state_dict(&pair());
+        let root = root.text("state_dict").raw(b"}u").end();
+        let (_folder, path) = file(&archive(&root, &pair()));
+        Checkpoint::open(&path).map(|file| file.origin().to_owned()).map_err(|error| error.to_string())
+    };
+    assert_eq!(both("best").expect("a file"), "PyTorch, zip; under 'model'");
+    for other in ["net", "ema", "model_ema"] {
+        let error = both(other).expect_err(other);
+        assert!(error.contains("holds tensors under 'model' and others under") || other == "net", "{error}");
+        assert!(error.contains(&format!("'{other}'")) && error.contains("not clear which are meant"), "{error}");
+    }
 }
 
 #[test]

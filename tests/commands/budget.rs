@@ -98,7 +98,7 @@ fn a_network_keeps_45_decibels_unless_options_say_what_is_omitted() {
         assert!(kept.is_null(), "{kept}");
         let (picture, kept, printed) = render(model);
         assert!((number_of(&kept["most_error"]) - 10.0_f64.powf(-2.25)).abs() < 1.0e-6, "{kept}");
-        assert!(kept["is_kept"] == true && printed.contains(" dB from exact (at least "), "{kept}: {printed}");
+        assert!(kept["is_kept"] == true && printed.contains(" dB from exact (likely at least "), "{kept}: {printed}");
         assert!(printed.contains(text_of(&kept["effort"])), "{kept}: {printed}");
         let psnr = psnr_of_seen(&picture, &exact, None);
         assert!(psnr > 44.5, "{model}: {psnr} dB from exact");

@@ -9,6 +9,7 @@ use viewfuse_tests::scenes::{Folder, middlebury};
 viewfuse_tests::trials![
     pictures_do_not_replace_photographs,
     files_do_not_replace_lists,
+    tables_do_not_replace_those_of_others,
     an_evaluation_keeps_its_record,
     names_that_meet_in_a_file,
     inputs_are_not_replaced,
@@ -78,6 +79,22 @@ fn files_do_not_replace_lists() {
     }
     for _ in 0..2 {
         done(&folder, "inspect toy -o toy/cameras.png");
+    }
+}
+
+fn tables_do_not_replace_those_of_others() {
+    let folder = toy();
+    let pareto = "pareto toy --targets 20 --views 3 --size 16x16 --repeat 1 --only exact --device cpu";
+    let evaluate = "evaluate toy --protocol random --weights mean --size 16x16 --device cpu";
+    let files = [("pareto.csv", pareto), ("pareto.svg", pareto), ("pareto.json", pareto), ("scores.csv", evaluate)];
+    for (place, (name, command)) in files.into_iter().enumerate() {
+        folder.write(&format!("{place}/{name}"), "precious");
+        let parts = [name, "was not written by viewfuse"];
+        assert_kept(&folder, &format!("{command} -o {place}"), &parts);
+        // Their own they replace.
+        for _ in 0..2 {
+            done(&folder, &format!("{command} -o own{place}"));
+        }
     }
 }
 

@@ -133,6 +133,7 @@ fn row_of_cameras() -> SourceImages {
         has_silhouettes: false,
         points: Vec::new(),
         near_far: None,
+        focus: None,
         warnings: Vec::new(),
     }
 }

@@ -58,6 +58,7 @@ fn sources(images: Vec<SourceImage>) -> SourceImages {
         has_silhouettes: false,
         points: Vec::new(),
         near_far: Some([1.5, 8.0]),
+        focus: None,
         warnings: Vec::new(),
     }
 }

@@ -30,13 +30,12 @@ pub use feature_image::{LAST_LENGTH, cast_block, ray_length};
 pub(crate) use open::ROW;
 pub use options::{GenvsOptions, Omissions, Rays};
 
-use super::learned::{NoDepths, default_near_far};
+use super::learned::{Distance, NoDepths, usual_near_far};
 use super::rounding::Overflow;
 use super::{About, AnyOptions, Field, FieldError, Prepared, SourceSide};
 use encoder::SIDE_STEP;
 use parts::Parts;
 use std::sync::Arc;
-use viewfuse_core::camera::Camera;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 use viewfuse_kernels::rows::Kernel;
@@ -92,8 +91,7 @@ impl Genvs {
 
     /// Takes photographs and parameters to a device.
     fn views<'a, D: Device>(&'a self, device: &'a D, sources: &SourceImages) -> Result<Views<'a, D>, FieldError> {
-        let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
-        let usual_near_far = default_near_far(&cameras);
+        let usual_near_far = usual_near_far(Distance::of(sources).length);
         // A volume of no depth has no nodes to look up.
         NoDepths::check(self.options.rays.near_far.unwrap_or(usual_near_far)).map_err(FieldError::unsuitable)?;
         let images: Vec<SourceView> = sources.images.iter().map(padded).collect();
@@ -160,7 +158,10 @@ impl Field for Genvs {
         sources: &SourceImages,
         progress: &dyn Progress,
     ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
-        self.architecture.assumption(&self.checkpoint).iter().for_each(|assumption| progress.warn(assumption));
+        self.architecture.assumptions(&self.checkpoint).iter().for_each(|assumption| progress.warn(assumption));
+        if self.options.rays.near_far.is_none() {
+            Distance::of(sources).warn_of_guess(progress);
+        }
         if sources.background != [1.0; 3] {
             progress.warn("this network renders over white; a ground truth over another background differs by that");
         }

@@ -151,6 +151,7 @@ impl<'a> Photographs<'a> {
                 has_silhouettes: images.has_silhouettes,
                 points: surfaces.points.clone(),
                 near_far: surfaces.near_far,
+                focus: images.focus,
                 warnings: Vec::new(),
             })
         };

@@ -1,6 +1,7 @@
 //! Common parts of learned fields: the form of their input images, near and far bounds, and the unit of length.
 
 use super::options::list;
+use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
@@ -27,29 +28,106 @@ const NEAR_FAR_SHARES: [f32; 2] = [8.0 / 13.0, 18.0 / 13.0];
 /// Default near and far bounds, from the mean distance of the cameras to the point that they look at. A single camera
 /// does not define that point: then it is the world's origin, where SRN's objects are.
 pub fn default_near_far(cameras: &[Camera]) -> [f32; 2] {
-    let distance = match cameras {
+    usual_near_far(distance_of(cameras))
+}
+
+fn distance_of(cameras: &[Camera]) -> f32 {
+    match cameras {
         [camera] => camera.pose.centre_world().length(),
         cameras => Rig::of(cameras).distance,
-    };
+    }
+}
+
+/// Default bounds for cameras at this distance from what they look at.
+pub(super) fn usual_near_far(distance: f32) -> [f32; 2] {
     NEAR_FAR_SHARES.map(|share| share * if distance > 0.0 { distance } else { 1.0 })
 }
 
-/// The unit in which a network measures lengths, and the cameras of its sources in it.
-pub(super) fn in_network_unit(sources: &SourceImages) -> (RigUnit, Vec<Camera>) {
-    let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
-    let unit = RigUnit::of_network(&cameras);
-    let cameras = cameras.iter().map(|camera| unit.camera(camera)).collect();
-    (unit, cameras)
+/// How far sources are from what they look at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Distance {
+    /// The mean, in world units.
+    pub(super) length: f32,
+    /// Whether nothing says so: neither the sources nor all photographs of the scene look at one point.
+    pub(super) is_guess: bool,
+}
+
+impl Distance {
+    /// That from the point where the sources' principal axes meet, or from the world's origin for a single one. Where
+    /// the photographs of the scene look at another point, or the sources alone at none, it is that from the former:
+    /// two neighbouring sources say little of how far away what they look at is. Where the photographs look at none, it
+    /// is that from the origin if it is in the sources' pictures.
+    pub(super) fn of(sources: &SourceImages) -> Distance {
+        let cameras = cameras_of(sources);
+        let from = |point: Vec3| {
+            let sum: f32 = cameras.iter().map(|camera| camera.pose.centre_world().distance(point)).sum();
+            sum / cameras.len().max(1) as f32
+        };
+        let own = distance_of(&cameras);
+        let is_own = cameras.len() < 2 || Rig::meeting_point(&cameras).is_some();
+        let sees_origin = || cameras.iter().all(|camera| camera.block(0).project(Vec3::ZERO).in_image);
+        match sources.focus.map(from) {
+            Some(all) if !is_own || (own / all - 1.0).abs() > SAME_DISTANCE => {
+                Distance { length: all, is_guess: false }
+            }
+            Some(_) => Distance { length: own, is_guess: false },
+            None if is_own => Distance { length: own, is_guess: cameras.len() < 2 && !sees_origin() },
+            None if sees_origin() => Distance { length: from(Vec3::ZERO), is_guess: true },
+            None => Distance { length: own, is_guess: true },
+        }
+    }
+
+    /// The unit in which a network measures lengths: the world's own for a single camera whose scene has no others.
+    pub(super) fn unit(self, sources: &SourceImages) -> RigUnit {
+        let cameras = cameras_of(sources);
+        match sources.focus.is_none() && RigUnit::of(&cameras).is_world() {
+            true => RigUnit::WORLD,
+            false => RigUnit::of_distance(self.length).unless_trained(),
+        }
+    }
+
+    /// Says that near and far bounds, which nobody gave, rest on a guess.
+    pub(super) fn warn_of_guess(self, progress: &dyn Progress) {
+        let [near, far] = usual_near_far(self.length);
+        if self.is_guess {
+            progress.warn(&format!(
+                "the cameras look at no common point, so that their distance from what they show, {:.3} units, and with \
+                 it the near and far bounds of rays, {near:.3} and {far:.3}, are guesses: give the bounds",
+                self.length
+            ));
+        }
+    }
+}
+
+fn cameras_of(sources: &SourceImages) -> Vec<Camera> {
+    sources.images.iter().map(|image| image.camera).collect()
 }
 
 /// Relative difference from [`SRN_DISTANCE`] up to which cameras count as being at it.
 const SAME_DISTANCE: f32 = 0.1;
 
+/// Share of the cameras' distance by which what they look at may be beside the world's origin.
+const MAX_OFFSET: f32 = 0.05;
+
+/// Says that a network takes points as they lie in the world, where what the cameras look at is not at its origin, as
+/// objects are that networks learn from.
+pub(super) fn warn_of_place(distance: Distance, sources: &SourceImages, progress: &dyn Progress) {
+    let focus = sources.focus.or_else(|| Rig::meeting_point(&cameras_of(sources)));
+    let offset = focus.map_or(0.0, |focus| focus.length() / distance.length);
+    if offset > MAX_OFFSET {
+        progress.warn(&format!(
+            "what the cameras look at is {:.0} % of their distance away from the world's origin, and the network takes \
+             points from there: one that learned from objects at the origin draws something else; move the scene to \
+             where it was when the network learned",
+            100.0 * offset
+        ));
+    }
+}
+
 /// Says that a network measures in another unit than the world's, if it does; or that it measures in the world's, where
 /// its cameras may have been nearer or farther while it learned.
-pub(super) fn warn_of_unit(unit: RigUnit, sources: &SourceImages, progress: &dyn Progress) {
-    let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
-    let distance = SRN_DISTANCE * RigUnit::of(&cameras).length();
+pub(super) fn warn_of_unit(unit: RigUnit, distance: Distance, progress: &dyn Progress) {
+    let distance = distance.length;
     if unit.is_world() && (distance / SRN_DISTANCE - 1.0).abs() > SAME_DISTANCE {
         progress.warn(&format!(
             "the cameras are {distance:.2} units from what they look at, and the network takes lengths as they are: a \
@@ -91,4 +169,71 @@ impl NoDepths {
 /// A texel (colour times opacity, opacity) over white: red, green, blue in `[-1, 1]`.
 pub(super) fn over_white([red, green, blue, alpha]: [f32; 4]) -> [f32; 3] {
     [red, green, blue].map(|colour| 2.0 * (colour + 1.0 - alpha) - 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use viewfuse_core::camera::Pinhole;
+    use viewfuse_core::pose::Pose;
+    use viewfuse_scene::photographs::SourceImage;
+
+    /// Cameras at these places that look at others, of a scene whose photographs look at `focus`.
+    fn sources(places: &[[Vec3; 2]], focus: Option<Vec3>) -> SourceImages {
+        let pinhole = Pinhole::new([16.0; 2], [8.0; 2], 16, 16).expect("a pinhole");
+        let camera =
+            |[from, to]: &[Vec3; 2]| Camera { pose: Pose::look_at(*from, *to, Vec3::Y).expect("a pose"), pinhole };
+        let image = |place| SourceImage { camera: camera(place), texels: vec![[0.5, 0.5, 0.5, 1.0]; 256] };
+        SourceImages {
+            images: places.iter().map(image).collect(),
+            background: [1.0; 3],
+            has_silhouettes: true,
+            points: Vec::new(),
+            near_far: None,
+            focus,
+            warnings: Vec::new(),
+        }
+    }
+
+    /// One at a distance of 1.3 from the origin, another beside it, which look at points so far ahead.
+    fn pair(depth: f32, focus: Option<Vec3>) -> SourceImages {
+        let at = |x: f32| Vec3::new(x, 0.0, 1.3);
+        sources(&[[at(-0.1), Vec3::new(0.0, 0.0, 1.3 - depth)], [at(0.1), Vec3::new(0.0, 0.0, 1.3 - depth)]], focus)
+    }
+
+    #[test]
+    fn the_distance_is_that_from_where_axes_meet() {
+        let of = |sources: &SourceImages| Distance::of(sources);
+        let is_near = |found: Distance, length: f32, is_guess: bool| {
+            assert!((found.length - length).abs() < 0.02 * length && found.is_guess == is_guess, "{found:?}");
+        };
+        is_near(of(&pair(1.3, None)), 1.3, false);
+        // Its photographs look at a nearer point than these two do.
+        is_near(of(&pair(3.0, Some(Vec3::ZERO))), 1.3, false);
+        is_near(of(&pair(3.0, None)), 3.0, false);
+        // Axes that are parallel, and that part.
+        let parallel = [-0.1, 0.1].map(|x| [Vec3::new(x, 0.0, 1.3), Vec3::new(x, 0.0, 0.0)]);
+        let parting = [-0.1, 0.1].map(|x| [Vec3::new(x, 0.0, 1.3), Vec3::new(3.0 * x, 0.0, 0.0)]);
+        for places in [parallel, parting] {
+            is_near(of(&sources(&places, Some(Vec3::ZERO))), 1.3, false);
+            is_near(of(&sources(&places, None)), 1.3, true);
+        }
+        // The origin is behind them.
+        let moved = parallel.map(|place| place.map(|point| point - Vec3::new(0.0, 0.0, 9.0)));
+        assert!(of(&sources(&moved, None)).is_guess);
+        // A single one looks at the origin, or at what the others look at.
+        is_near(of(&sources(&parallel[..1], None)), 1.3, false);
+        is_near(of(&sources(&moved[..1], Some(Vec3::new(0.0, 0.0, -9.0)))), 1.3, false);
+        assert!(of(&sources(&moved[..1], None)).is_guess);
+    }
+
+    #[test]
+    fn a_unit_is_that_of_the_distance() {
+        let unit = |sources: &SourceImages| Distance::of(sources).unit(sources);
+        assert!(unit(&pair(1.3, None)).is_world() && unit(&pair(4.0, None)).is_world());
+        assert!((unit(&pair(13.0, None)).length() - 10.0).abs() < 0.01);
+        let single = sources(&[[Vec3::new(0.0, 0.0, 13.0), Vec3::ZERO]], None);
+        assert!(unit(&single).is_world(), "nothing says what it is far from");
+        assert!((unit(&SourceImages { focus: Some(Vec3::ZERO), ..single }).length() - 10.0).abs() < 0.01);
+    }
 }

@@ -26,7 +26,7 @@ pub use architecture::{Architecture, KEYS, Level, Pass};
 pub(crate) use open::ROW;
 pub use options::{MIN_OPACITY, MIN_SHARE, Omissions, PixelNerfOptions, Sampling};
 
-use super::learned::{default_near_far, in_network_unit, over_white, warn_of_unit};
+use super::learned::{Distance, over_white, usual_near_far, warn_of_place, warn_of_unit};
 use super::rounding::Overflow;
 use super::variant::erased;
 use super::{
@@ -47,7 +47,7 @@ use viewfuse_job::progress::Progress;
 use viewfuse_kernels::rows::Kernel;
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
 use viewfuse_nn::image::{Image, Size};
-use viewfuse_scene::photographs::{SourceImage, SourceImages};
+use viewfuse_scene::photographs::{SourceImage, SourceImages, longest_side};
 use viewfuse_scene::unit::RigUnit;
 use visibility::Visibility;
 
@@ -90,6 +90,8 @@ struct Views<'a, D: Device> {
     images: Vec<Image<D>>,
     /// The network's unit; cameras and bounds are in it.
     unit: RigUnit,
+    /// Of the sources from what they look at.
+    distance: Distance,
     cameras: Vec<CameraBlock>,
     /// `[view]`: none before it is encoded.
     latents: Vec<Option<ViewLatents<D>>>,
@@ -158,7 +160,9 @@ impl PixelNerf {
 
     /// Takes photographs and parameters to a device.
     fn views<'a, D: Device>(&'a self, device: &'a D, sources: &SourceImages) -> Result<Views<'a, D>, DeviceError> {
-        let (unit, cameras) = in_network_unit(sources);
+        let distance = Distance::of(sources);
+        let unit = distance.unit(sources);
+        let cameras: Vec<_> = sources.images.iter().map(|image| unit.camera(&image.camera)).collect();
         Ok(Views {
             field: self,
             device,
@@ -166,7 +170,8 @@ impl PixelNerf {
             images: sources.images.iter().map(|image| upload_image(device, image)).collect::<Result<_, _>>()?,
             cameras: cameras.iter().map(|camera| camera.block(0)).collect(),
             latents: cameras.iter().map(|_| None).collect(),
-            usual_near_far: default_near_far(&cameras),
+            usual_near_far: usual_near_far(distance.length / unit.length()),
+            distance,
             unit,
             background: sources.background,
             counts: Counts::default(),
@@ -195,7 +200,17 @@ impl Field for PixelNerf {
     ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
         let views = self.views(device, sources)?;
         self.assumption.iter().for_each(|assumption| progress.warn(assumption));
-        warn_of_unit(views.unit, sources, progress);
+        warn_of_unit(views.unit, views.distance, progress);
+        warn_of_place(views.distance, sources, progress);
+        if self.options.sampling.near_far.is_none() {
+            views.distance.warn_of_guess(progress);
+        }
+        let trained = self.architecture.source_side;
+        if sources.images.iter().any(|image| longest_side(&image.camera) < trained) {
+            progress.warn(&format!(
+                "the network was trained on images of {trained} pixels on their longest side; these are smaller"
+            ));
+        }
         Ok(Box::new(views))
     }
 }

@@ -24,7 +24,13 @@ pub fn row_of(checkpoint: &Checkpoint) -> Result<&'static Row, CheckpointError> 
     ROWS.into_iter().find(|row| row.prefix().is_some_and(holds)).ok_or_else(|| {
         let prefixes = ROWS.iter().filter_map(|row| Some(format!("'{}' ({})", row.prefix()?, row.title)));
         let prefixes = prefixes.collect::<Vec<_>>().join(" or ");
-        let detail = format!("holds no supported network: no tensor's name begins with {prefixes}");
+        let behind = |name: &str| {
+            let at = |prefix: &str| name.find(&format!(".{prefix}")).map(|at| name[..=at].to_owned());
+            ROWS.into_iter().filter_map(Row::prefix).find_map(at)
+        };
+        let more = checkpoint.shapes().keys().find_map(|name| behind(name));
+        let more = more.map_or_else(String::new, |front| format!(", but behind '{front}': save it without that"));
+        let detail = format!("holds no supported network: no tensor's name begins with {prefixes}{more}");
         CheckpointError::Tensors(checkpoint.path().to_path_buf(), detail)
     })
 }
@@ -57,6 +63,7 @@ mod tests {
     use crate::variant::EXACT;
     use std::collections::BTreeMap;
     use viewfuse_device::Precision;
+    use viewfuse_nn::checkpoint::TensorShape;
 
     #[test]
     fn told_by_names() {
@@ -75,6 +82,10 @@ mod tests {
         let expected = "other: holds no supported network: no tensor's name begins with 'encoder.model.' (PixelNeRF) \
              or 'pixel_nerf_net.' (GeNVS)";
         assert_eq!(message, expected);
+        let tensor = TensorShape { name: "_orig_mod.encoder.model.conv1.weight".to_owned(), shape: vec![1] };
+        let behind = Checkpoint::in_memory("other", [(tensor, vec![1.0])], BTreeMap::new());
+        let message = row_of(&behind).err().expect("nothing").to_string();
+        assert_eq!(message, format!("{expected}, but behind '_orig_mod.': save it without that"));
     }
 
     /// Opens a row's field with these options: a learned one is its first test network.

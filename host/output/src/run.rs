@@ -146,9 +146,11 @@ impl RunWriter {
         self.videos = Videos::new(formats, rate, files);
     }
 
-    /// Adds a warning to the record.
+    /// Adds a warning to the record, unless it is there: what is told of the sources has the scene in front.
     pub fn warn(&mut self, warning: String) {
-        self.given.push(warning);
+        if !self.given.iter().chain(&self.warnings).any(|known| warning.ends_with(known.as_str())) {
+            self.given.push(warning);
+        }
     }
 
     /// Lets no other process write to the folder, as soon as it is there.

@@ -10,6 +10,7 @@ mod resample;
 pub use ground_truth::{GroundTruth, read_over};
 pub use matte::BackgroundChoice;
 
+use crate::rig::Rig;
 use crate::scene::neus;
 use crate::{MaskChoice, MaskMeaning, Photograph, Scene, SceneError, View};
 use image::RgbImage;
@@ -97,6 +98,8 @@ pub struct SourceImages {
     pub points: Vec<Vec3>,
     /// Near and far bound of the sources, where the scene's files state them.
     pub near_far: Option<[f32; 2]>,
+    /// What all photographs of the scene look at, whichever are sources ([`Rig::meeting_point`]).
+    pub focus: Option<Vec3>,
     /// Warnings about the background and the exposures.
     pub warnings: Vec<String>,
 }
@@ -390,7 +393,9 @@ impl<'a> Album<'a> {
         // A sphere is the object's: photographs that are not cut out show more.
         let is_of_object = self.scene.layout == neus::NAME;
         let near_far = near_far.filter(|_| has_silhouettes || !is_of_object);
-        Ok(SourceImages { images, background, has_silhouettes, points, near_far, warnings })
+        let photographs = self.scene.views.iter().filter(|view| view.image.is_some());
+        let focus = Rig::meeting_point(&photographs.map(|view| view.camera).collect::<Vec<_>>());
+        Ok(SourceImages { images, background, has_silhouettes, points, near_far, focus, warnings })
     }
 
     /// Points that at least two of these views saw, and the depth bounds over all of them.

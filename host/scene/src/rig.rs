@@ -50,6 +50,25 @@ impl Rig {
         }
     }
 
+    /// The point that the cameras look at: in the sense of least squares where their principal axes meet, which is in
+    /// front of all of them and in their pictures, or beyond these by no more than half their sides. `None` for a single
+    /// camera, and for axes that are nearly parallel or part from one another: nothing says then how far away it is.
+    pub fn meeting_point(cameras: &[Camera]) -> Option<Vec3> {
+        let axes = || cameras.iter().map(|camera| camera.pose.forward_world());
+        let angle = |a: Vec3| axes().map(|b| a.dot(b).clamp(-1.0, 1.0).acos()).fold(0.0, f32::max);
+        if axes().map(angle).fold(0.0, f32::max) < MIN_MEETING_ANGLE {
+            return None;
+        }
+        let focus = Rig::of(cameras).focus;
+        let is_seen = |camera: &Camera| {
+            let to = focus - camera.pose.centre_world();
+            let depth = to.dot(camera.pose.forward_world());
+            let slope = (to - camera.pose.forward_world() * depth).length() / depth;
+            depth > 0.0 && slope <= 2.0 * half_diagonal_slope(&camera.pinhole)
+        };
+        cameras.iter().all(is_seen).then_some(focus)
+    }
+
     /// The angle between a camera and the nearest other one, seen from the focus, in degrees: of all cameras,
     /// ascending; none of fewer than two.
     pub fn gaps(&self, cameras: &[Camera]) -> Vec<f32> {
@@ -75,6 +94,10 @@ impl Rig {
         gaps.get(gaps.len() / 2).copied()
     }
 }
+
+/// Greatest angle between two principal axes, radians, below which they are taken for parallel: poses that were found
+/// from photographs are off by some tenths of a degree.
+const MIN_MEETING_ANGLE: f32 = 0.03;
 
 /// Angle between neighbouring views, seen from what they look at, beyond which depths are no longer found in whole
 /// photographs.

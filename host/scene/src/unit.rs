@@ -34,7 +34,12 @@ impl RigUnit {
         if !cameras.iter().any(apart) {
             return RigUnit::WORLD;
         }
-        let length = Rig::of(cameras).distance / SRN_DISTANCE;
+        RigUnit::of_distance(Rig::of(cameras).distance)
+    }
+
+    /// The unit in which this distance is [`SRN_DISTANCE`]; the world's own for one that is no distance.
+    pub fn of_distance(distance: f32) -> RigUnit {
+        let length = distance / SRN_DISTANCE;
         if length.is_normal() && (length - 1.0).abs() > MAX_DEVIATION { RigUnit { length } } else { RigUnit::WORLD }
     }
 
@@ -46,9 +51,13 @@ impl RigUnit {
 
     /// The unit of networks for these sources: the world's own where networks are trained, [`RigUnit::of`] elsewhere.
     pub fn of_network(sources: &[Camera]) -> RigUnit {
-        let unit = RigUnit::of(sources);
+        RigUnit::of(sources).unless_trained()
+    }
+
+    /// The world's own where networks are trained in world units, this one elsewhere.
+    pub fn unless_trained(self) -> RigUnit {
         let usual = 1.0 / MAX_TRAINED_FACTOR..=MAX_TRAINED_FACTOR;
-        if usual.contains(&unit.length) { RigUnit::WORLD } else { unit }
+        if usual.contains(&self.length) { RigUnit::WORLD } else { self }
     }
 
     /// Its length in world units.

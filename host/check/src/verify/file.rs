@@ -134,6 +134,7 @@ impl File<'_> {
             has_silhouettes: true,
             points: Vec::new(),
             near_far: None,
+            focus: None,
             warnings: Vec::new(),
         })
     }

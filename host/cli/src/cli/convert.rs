@@ -149,7 +149,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let progress = Terminal::new("converting");
     pixelnerf::Architecture::assumption(&checkpoint).iter().for_each(|assumption| progress.warn(assumption));
     let of_genvs = genvs::Architecture::of(&checkpoint).ok();
-    of_genvs.and_then(|genvs| genvs.assumption(&checkpoint)).iter().for_each(|assumption| progress.warn(assumption));
+    of_genvs
+        .map(|genvs| genvs.assumptions(&checkpoint))
+        .iter()
+        .flatten()
+        .for_each(|assumption| progress.warn(assumption));
     let precision = if arguments.half { Precision::Half } else { Precision::Kept };
     let written = checkpoint.write_safetensors(output, precision, &progress)?;
     drop(progress);

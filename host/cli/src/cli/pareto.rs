@@ -3,7 +3,7 @@
 use super::environment::device_options;
 use super::model::NetworkOptions;
 use super::options::{OmissionOptions, PictureOptions, SourceOptions};
-use super::outputs::keep_folder_apart;
+use super::outputs::{keep_folder_apart, keep_others, keep_others_than};
 use super::parse::parse_seconds;
 use super::printing::{complain, say, warn_of};
 use super::table::table;
@@ -31,6 +31,10 @@ use viewfuse_weighting::WeightingSpec;
 
 /// How many times as long as reading the photographs a device is taken to need.
 const READINGS: usize = 20;
+
+/// How its table and its picture begin, which do not say who wrote them.
+const CSV_BEGIN: &str = "device,setting,best,";
+const SVG_BEGIN: &str = "<svg width=\"1100\" height=\"720\"";
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
@@ -107,6 +111,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     keep_folder_apart([&scene], &arguments.output)?;
     let [csv, svg, json] = ["pareto.csv", "pareto.svg", "pareto.json"].map(|name| arguments.output.join(name));
     [&csv, &svg, &json].into_iter().try_for_each(|path| check_writable(path))?;
+    keep_others(&json)?;
+    [(&csv, CSV_BEGIN), (&svg, SVG_BEGIN)].into_iter().try_for_each(|(path, begin)| keep_others_than(path, begin))?;
     let Several { devices, notes, failures } = open_several(&arguments.device, &device_options(GpuOptions::default()))?;
 
     let (progress, count) = (Terminal::new("measuring"), devices.len());

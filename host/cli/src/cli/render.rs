@@ -114,11 +114,11 @@ impl Arguments {
 pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> anyhow::Result<ExitCode> {
     let prepared = Prepared::open(arguments, values)?;
     let progress = Terminal::new("rendering");
-    let leaving = prepared.leaving(arguments, &progress);
+    prepared.warn_of_leaving(arguments, &progress);
     if arguments.is_stream() {
         stream::to_stdout(arguments, &prepared, &progress)?;
     } else {
-        write::to_folder(arguments, prepared, leaving, progress)?;
+        write::to_folder(arguments, prepared, progress)?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -76,6 +76,11 @@ impl Terminal {
         Terminal { display: Arc::new(ProgressDisplay::hidden()), clock: None, told: Mutex::default() }
     }
 
+    /// The warnings that were shown, in their order.
+    pub(crate) fn told(&self) -> Vec<String> {
+        self.told.lock().map(|told| told.clone()).unwrap_or_default()
+    }
+
     /// Runs what prints while the work goes on.
     pub(crate) fn aside<T>(&self, print: impl FnOnce() -> T) -> T {
         self.display.aside(print)

@@ -255,8 +255,8 @@ impl Source<'_> {
 
 /// All that is known of the sources, as bytes.
 fn bytes(images: &SourceImages) -> Vec<u8> {
-    let SourceImages { images, background, has_silhouettes, points, near_far, warnings: _ } = images;
-    let mut bytes = format!("{background:?} {has_silhouettes} {points:?} {near_far:?}").into_bytes();
+    let SourceImages { images, background, has_silhouettes, points, near_far, focus, warnings: _ } = images;
+    let mut bytes = format!("{background:?} {has_silhouettes} {points:?} {near_far:?} {focus:?}").into_bytes();
     for image in images {
         bytes.extend(bytes_of(&image.camera.block(0)));
         bytes.extend(cast_slice::<_, u8>(&image.texels));

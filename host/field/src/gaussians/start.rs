@@ -210,6 +210,7 @@ mod tests {
             has_silhouettes: false,
             points: Vec::new(),
             near_far: None,
+            focus: None,
             warnings: Vec::new(),
         };
         let point = |index: usize| {

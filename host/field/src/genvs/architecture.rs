@@ -25,6 +25,8 @@ pub const COLOUR_CHANNELS: usize = 3;
 
 /// The metadata key of the images' side in a network without denoiser.
 pub(super) const IMAGE_SIDE: &str = "viewfuse.image_side";
+/// The prefix of the tensors of a learned weighting.
+const WEIGHTING: &str = "pixel_nerf_net.cam_weighter.";
 /// All keys of a checkpoint's metadata that are looked at.
 pub const KEYS: [&str; 2] = [denoiser::ESTIMATE, IMAGE_SIDE];
 /// The sides of an image are multiples of this, the encoder's output stride.
@@ -85,19 +87,31 @@ impl Architecture {
         }
     }
 
-    /// What is assumed of a network whose tensors and metadata leave open what its denoiser starts from, as a warning.
-    /// `None` for the published sizes, and for a network that says it or has no denoiser.
-    pub fn assumption(&self, checkpoint: &Checkpoint) -> Option<String> {
-        let says = checkpoint.metadata().contains_key(denoiser::ESTIMATE);
-        (self.denoiser.is_some() && !says && *self != Architecture::published()).then(|| {
-            format!(
-                "{}: what its tensors do not tell is assumed to be as in the published GeNVS, whose denoiser does not \
-                 begin with the features' colours; have `viewfuse convert` write {} = published into it, or colours, \
-                 as the laboratory's networks have it",
-                checkpoint.path().display(),
+    /// What is assumed of a network whose tensors and metadata leave something open, as warnings: what its denoiser starts
+    /// from, but of the published sizes, and without a denoiser the side of its images. And what of it is not used: a
+    /// learned weighting.
+    pub fn assumptions(&self, checkpoint: &Checkpoint) -> Vec<String> {
+        let (path, says) = (checkpoint.path().display(), |key: &str| checkpoint.metadata().contains_key(key));
+        let mut assumptions = Vec::new();
+        if self.denoiser.is_some() && !says(denoiser::ESTIMATE) && *self != Architecture::published() {
+            assumptions.push(format!(
+                "{path}: what its tensors do not tell is assumed to be as in the published GeNVS, whose denoiser does \
+                 not begin with the features' colours; have `viewfuse convert` write {} = published into it, or \
+                 colours, as the laboratory's networks have it",
                 denoiser::ESTIMATE
-            )
-        })
+            ));
+        }
+        if self.denoiser.is_none() && !says(IMAGE_SIDE) {
+            assumptions.push(format!(
+                "{path}: what its tensors do not tell is assumed to be as in the published GeNVS, which has images of {} \
+                 pixels on a side; have `viewfuse convert` write {IMAGE_SIDE} into it",
+                self.image_side
+            ));
+        }
+        if checkpoint.shapes().keys().any(|name| name.starts_with(WEIGHTING)) {
+            assumptions.push(format!("{path}: the weighting of views that it learned, {WEIGHTING}*, is not used"));
+        }
+        assumptions
     }
 
     /// Reads the sizes from a checkpoint's tensors, and checks that it has every tensor of the architecture and no
@@ -133,9 +147,16 @@ impl Architecture {
             }
             _ => {}
         }
+        let told = image_side(&sizes)?;
         let image_side = match &denoiser {
+            Some(Denoiser { image_side, .. }) if told.is_some_and(|told| told != *image_side) => {
+                return Err(sizes.refuse(format!(
+                    "its metadata says {IMAGE_SIDE} = {}, and its denoiser has images of {image_side} pixels",
+                    told.unwrap_or_default()
+                )));
+            }
             Some(denoiser) => denoiser.image_side,
-            None => image_side(&sizes)?,
+            None => told.unwrap_or(Architecture::published().image_side),
         };
         if image_side % ENCODER_STRIDE != 0 {
             return Err(sizes.refuse(format!(
@@ -180,7 +201,7 @@ impl Architecture {
         name.ends_with(".num_batches_tracked")
             || self.is_filter(name)
             || self.denoiser.is_some() && name == "denoiser.model.map_augment.weight"
-            || name.starts_with("pixel_nerf_net.cam_weighter.")
+            || name.starts_with(WEIGHTING)
     }
 
     fn is_filter(&self, name: &str) -> bool {
@@ -208,13 +229,11 @@ impl Architecture {
     }
 }
 
-/// The side of the images of a network without denoiser.
-fn image_side(sizes: &Sizes<'_>) -> Result<usize, CheckpointError> {
-    let Some(text) = sizes.checkpoint().metadata().get(IMAGE_SIDE) else {
-        return Ok(Architecture::published().image_side);
-    };
+/// The side of the images that the metadata says.
+fn image_side(sizes: &Sizes<'_>) -> Result<Option<usize>, CheckpointError> {
+    let Some(text) = sizes.checkpoint().metadata().get(IMAGE_SIDE) else { return Ok(None) };
     match text.parse() {
-        Ok(side @ 1..=4096) => Ok(side),
+        Ok(side @ 1..=4096) => Ok(Some(side)),
         _ => {
             Err(sizes
                 .refuse(format!("its metadata says {IMAGE_SIDE} = '{text}', which is not a number from 1 to 4096")))

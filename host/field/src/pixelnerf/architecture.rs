@@ -48,6 +48,8 @@ const SOURCE_SIDE: u32 = 128;
 const MAX_SIDE: f32 = 65536.0;
 /// The largest frequency.
 const MAX_FREQUENCY: f32 = 1000.0;
+/// Radians by which a phase may be off: pi/2 in half precision.
+const MAX_PHASE_ERROR: f32 = 1.0e-3;
 
 const FIRST_POOL: &str = "viewfuse.first_pool";
 const FREQUENCY: &str = "viewfuse.frequency";
@@ -209,19 +211,27 @@ impl Architecture {
         Ok(architecture)
     }
 
-    /// What is assumed of a network whose tensors and metadata leave open whether there is a max pool, as a warning.
-    /// `None` for a network that says it, and for one of another family.
+    /// What is assumed of a network whose tensors and metadata leave something open, as a warning: whether there is a max
+    /// pool, the size of its sources, where a pixel's centre is. `None` for a network that says all, and for one of
+    /// another family.
     pub fn assumption(checkpoint: &Checkpoint) -> Option<String> {
         let is_of_family = checkpoint.shapes().contains_key("encoder.model.conv1.weight");
-        // The laboratory's networks, all with a pool, told where a pixel's centre is before they told this.
-        let says = [FIRST_POOL, PIXEL_CENTRE].iter().any(|key| checkpoint.metadata().contains_key(*key));
-        let side = checkpoint.metadata().get(SIDE).cloned().unwrap_or_else(|| SOURCE_SIDE.to_string());
-        (is_of_family && !says).then(|| {
+        let says = |key: &str| checkpoint.metadata().contains_key(key);
+        let side = format!("sources of {SOURCE_SIDE} pixels");
+        let open = [
+            // The laboratory's networks, all with a pool, told where a pixel's centre is before they told this.
+            (!says(FIRST_POOL) && !says(PIXEL_CENTRE), FIRST_POOL, "a max pool in the trunk"),
+            (!says(SIDE), SIDE, side.as_str()),
+            (!says(PIXEL_CENTRE), PIXEL_CENTRE, "pixel centres at 0 (0.5 in the laboratory's networks)"),
+        ];
+        let open = || open.into_iter().filter(|(is_open, ..)| *is_open);
+        (is_of_family && open().next().is_some()).then(|| {
+            let assumed = open().map(|(_, _, what)| what).collect::<Vec<_>>().join(", ");
+            let keys = open().map(|(_, key, _)| key).collect::<Vec<_>>().join(", ");
             format!(
-                "{}: what its tensors do not tell is assumed to be as in the authors' srn_car: a max pool in the \
-                 trunk, sources of {side} pixels (their sn64 has no pool, and 64 pixels); keep the file as \
-                 EXPERIMENT/pixel_nerf_latest, as their archive has it, or have `viewfuse convert` write {FIRST_POOL} \
-                 and {SIDE} into it, and {PIXEL_CENTRE} if it is not 0 (0.5 in the laboratory's networks)",
+                "{}: what its tensors do not tell is assumed to be as in the authors' srn_car: {assumed} (their sn64 \
+                 has no pool, and 64 pixels); keep the file as EXPERIMENT/pixel_nerf_latest, as their archive has it, \
+                 or have `viewfuse convert` write what is right into it: {keys}",
                 checkpoint.path().display()
             )
         })
@@ -295,23 +305,55 @@ fn has_pool(sizes: &Sizes<'_>) -> Result<bool, CheckpointError> {
     Ok(sizes.number_that(FIRST_POOL, 1.0, |pool| pool == 0.0 || pool == 1.0, "0 or 1")? == 1.0)
 }
 
-/// The lowest frequency: from the checkpoint's table if it has one, otherwise the published one.
+/// The lowest frequency: from the checkpoint's table if it has one, which its metadata may not contradict, otherwise from
+/// these or the published one.
 fn frequency(sizes: &Sizes<'_>, octaves: usize) -> Result<f32, CheckpointError> {
     const TABLE: &str = "code._freqs";
-    let published = Architecture::published().frequency;
-    let Some(shape) = sizes.shape(TABLE) else {
+    let published = Architecture::published();
+    let told = |otherwise: f32| {
         let fits = |frequency: f32| frequency > 0.0 && frequency <= MAX_FREQUENCY;
-        return sizes.number_that(FREQUENCY, published, fits, "above 0 and at most 1000");
+        sizes.number_that(FREQUENCY, otherwise, fits, "above 0 and at most 1000")
+    };
+    check_phases(sizes, octaves)?;
+    let Some(shape) = sizes.shape(TABLE) else {
+        // The same number of inputs has a network that takes sines of directions, too.
+        if octaves > published.frequency_count && !sizes.checkpoint().metadata().contains_key(FREQUENCY) {
+            return Err(sizes.refuse(format!(
+                "mlp_coarse.lin_in.weight takes {} numbers a point: {octaves} octaves, or fewer and those of \
+                 directions (use_code_viewdirs), which is not supported; with the tensor {TABLE} or the metadata \
+                 {FREQUENCY} they are octaves",
+                6 + 6 * octaves
+            )));
+        }
+        return told(published.frequency);
     };
     // Each frequency stands twice, for sine and cosine.
     if shape.iter().try_fold(1_usize, |count, side| count.checked_mul(*side)) != Some(2 * octaves) {
         return Err(sizes.refuse(format!("{TABLE} has the shape {shape:?} instead of 2 x {octaves} numbers")));
     }
     let table = sizes.checkpoint().tensor(TABLE)?;
-    let lowest = table.first().copied().unwrap_or(published);
+    let lowest = table.first().copied().unwrap_or(published.frequency);
     let is_octaves = table.iter().zip(0..).all(|(value, index)| *value == lowest * 2_f32.powi(index / 2));
     if !is_octaves || !(lowest > 0.0) {
         return Err(sizes.refuse(format!("{TABLE} does not hold octaves of one frequency")));
     }
+    let told = told(lowest)?;
+    if told != lowest {
+        return Err(sizes.refuse(format!("its metadata says {FREQUENCY} = {told}, and {TABLE} begins with {lowest}")));
+    }
     Ok(lowest)
+}
+
+/// Rejects a table of phases other than those of sine and cosine, in turns.
+fn check_phases(sizes: &Sizes<'_>, octaves: usize) -> Result<(), CheckpointError> {
+    const TABLE: &str = "code._phases";
+    let Some(shape) = sizes.shape(TABLE) else { return Ok(()) };
+    let holds_octaves = shape.iter().try_fold(1_usize, |count, side| count.checked_mul(*side)) == Some(2 * octaves);
+    let phase = |index: usize| if index % 2 == 0 { 0.0 } else { std::f32::consts::FRAC_PI_2 };
+    let is_usual =
+        |table: &[f32]| table.iter().enumerate().all(|(at, value)| (value - phase(at)).abs() < MAX_PHASE_ERROR);
+    if !holds_octaves || !is_usual(&sizes.checkpoint().tensor(TABLE)?) {
+        return Err(sizes.refuse(format!("{TABLE} does not hold 0 and pi/2 in turns for {octaves} octaves")));
+    }
+    Ok(())
 }

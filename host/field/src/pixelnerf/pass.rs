@@ -45,6 +45,8 @@ pub(super) struct Probes<D: Device> {
     pub(super) part_count: u32,
     pub(super) columns: u32,
     pub(super) rows: u32,
+    /// Pixels from a probe to the next.
+    pub(super) step: u32,
     /// A part is empty if its opacity is below this.
     pub(super) least_share: f32,
 }
@@ -153,7 +155,7 @@ impl<D: Device> Renderer<'_, D> {
                 // Samples that are hidden on the probes' rays may be visible on a ray beside their surfaces.
                 termination: -1.0,
                 least_opacity: 0.0,
-                step: self.omissions.empty_space,
+                step: probes.step,
                 seen_columns: probes.columns,
                 seen_rows: probes.rows,
                 width: self.cast.camera.width,

@@ -12,30 +12,39 @@ use viewfuse_device::Device;
 const SHARES: [f32; 5] = [1.0 / 16.0, 1.0 / 32.0, 1.0 / 64.0, 1.0 / 128.0, 1.0 / 256.0];
 
 impl<D: Device> Renderer<'_, D> {
-    /// The probes of a picture whose omissions need some. Their samples are no part of the picture's.
+    /// The probes of a picture whose omissions need some. Their samples are no part of the picture's. Where none of them
+    /// meets anything, there are twice as many a side, down to every second pixel: between the first ones a whole object
+    /// may stand.
     pub(super) fn probes(
         &self,
         workspace: &mut Workspace<D>,
         evaluated: &mut Evaluated,
     ) -> Result<Option<Probes<D>>, FieldError> {
-        let step = self.omissions.empty_space;
+        let mut step = self.omissions.empty_space;
         if step <= 1 || self.omissions.nodes > 0 {
             return Ok(None);
         }
         let mut work = Evaluated::default();
-        let probes = self.probe(workspace, step, &mut work)?;
+        let probes = loop {
+            let (probes, meets) = self.probe(workspace, step, &mut work)?;
+            if meets || step <= 2 {
+                break probes;
+            }
+            step /= 2;
+        };
         evaluated.evaluated += work.evaluated;
         evaluated.unseen += work.unseen;
         Ok(Some(probes))
     }
 
-    /// Runs the first pass along one ray in every square of `step` pixels, and along those of the last row and column.
+    /// Runs the first pass along one ray in every square of `step` pixels, and along those of the last row and column;
+    /// and whether one of them meets something, which counts as so where no threshold is looked for.
     fn probe(
         &self,
         workspace: &mut Workspace<D>,
         step: u32,
         evaluated: &mut Evaluated,
-    ) -> Result<Probes<D>, FieldError> {
+    ) -> Result<(Probes<D>, bool), FieldError> {
         let (width, height) = (self.cast.camera.width, self.cast.camera.height);
         let [columns, rows] = [width, height].map(|side| (side - 1).div_ceil(step) + 1);
         let place = |index: u32, side: u32| (index * step).min(side - 1);
@@ -44,7 +53,7 @@ impl<D: Device> Renderer<'_, D> {
         let count = self.sampling.coarse_count;
         let mut values = self.zeros(pixels.len() * count as usize)?;
         let mut first_ray = 0;
-        let mut changes = [0.0; SHARES.len()];
+        let (mut changes, mut meets) = ([0.0; SHARES.len()], self.omissions.probe_error <= 0.0);
         for some in pixels.chunks(rays_at_once(self.device, &self.sampling)) {
             let rays = self.rays(some)?;
             self.progress.expect(pieces(workspace, rays.count * count));
@@ -54,6 +63,8 @@ impl<D: Device> Renderer<'_, D> {
             if self.omissions.probe_error > 0.0 {
                 // The one choice that is made from whole samples on the host, in f64: once a picture, of few rays.
                 let samples = self.device.download(&samples.values)?;
+                let opacity = |sample: &[f32; 4]| -(-sample[3]).exp_m1();
+                meets |= samples.iter().any(|sample| opacity(sample) >= MIN_SHARE);
                 for ray in samples.chunks(count as usize) {
                     let changed = SHARES.map(|share| change(ray, share, &self.background));
                     changes.iter_mut().zip(changed).for_each(|(sum, change)| *sum += change);
@@ -63,7 +74,7 @@ impl<D: Device> Renderer<'_, D> {
         let most = f64::from(self.omissions.probe_error).powi(2) * pixels.len() as f64;
         let harmless = changes.iter().position(|change| *change < most);
         let least_share = harmless.map_or(MIN_SHARE, |index| SHARES[index]);
-        Ok(Probes { values, part_count: count, columns, rows, least_share })
+        Ok((Probes { values, part_count: count, columns, rows, step, least_share }, meets))
     }
 }
 

@@ -53,6 +53,7 @@ pub fn sources(object: &Object, cameras: &[Camera]) -> SourceImages {
         has_silhouettes: true,
         points: Vec::new(),
         near_far: None,
+        focus: None,
         warnings: Vec::new(),
     }
 }

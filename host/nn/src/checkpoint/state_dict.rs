@@ -11,8 +11,10 @@ use super::modules;
 use super::pickle::{Id, Pickle, Value};
 use std::collections::{BTreeMap, HashSet};
 
-/// Keys under which training scripts put the `state_dict`, in the order in which they are tried.
+/// Keys under which training scripts put the `state_dict`.
 pub const PLACES: [&str; 5] = ["state_dict", "model", "model_state_dict", "net", "ema"];
+/// What names of a moving average contain.
+const AVERAGED: &str = "ema";
 /// The prefix that `DataParallel` adds to every name.
 const PARALLEL_PREFIX: &str = "module.";
 /// The most tensors of a checkpoint.
@@ -83,11 +85,23 @@ pub(super) fn find(pickle: &Pickle, storage_of: &StorageOf<'_>) -> Result<StateD
             || modules::is_module(pickle, id)
     };
     let table = entries(pickle, root).unwrap_or_default();
-    let inner = PLACES.iter().find_map(|&place| {
-        // Python takes the last of several values of one key.
-        let (_, value) = table.iter().rev().find(|&&(key, _)| pickle.text(key) == Some(place))?;
-        holds_tensors(*value).then_some((place, *value))
+    // Python takes the last of several values of one key.
+    let at =
+        |place: &str| table.iter().rev().find(|&&(key, _)| pickle.text(key) == Some(place)).map(|(_, value)| *value);
+    let mut places = PLACES.iter().filter_map(|&place| Some((place, at(place).filter(|value| holds_tensors(*value))?)));
+    let inner = places.next();
+    // The same table may stand under two keys.
+    let other = inner.and_then(|(first, found)| {
+        let averaged = table.iter().filter_map(|(key, _)| pickle.text(*key)).filter(|key| key.contains(AVERAGED));
+        let others = PLACES.into_iter().chain(averaged).filter(|place| *place != first);
+        others.filter(|place| at(place).is_some_and(|value| value != found && holds_tensors(value))).next()
     });
+    if let (Some((first, _)), Some(other)) = (inner, other) {
+        return Err(format!(
+            "holds tensors under '{first}' and others under '{}', so it is not clear which are meant; {RESAVE}",
+            shortened(other)
+        ));
+    }
     let (place, found) = match (holds_tensors(root), inner) {
         (true, Some((place, _))) => {
             return Err(format!(

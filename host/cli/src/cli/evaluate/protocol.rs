@@ -5,7 +5,7 @@ use super::files::{csv_of, json_of};
 use super::jobs::Jobs;
 use super::tables::{print_published, print_table};
 use super::{Arguments, refuse_same_photographs};
-use crate::cli::outputs::keep_folder_apart;
+use crate::cli::outputs::{keep_folder_apart, keep_others_than};
 use crate::cli::printing::{counted, say, warn_of};
 use crate::cli::threads::on_threads;
 use crate::cli::wrong::wrong;
@@ -31,6 +31,9 @@ use viewfuse_weighting::OpenedChoice;
 
 const PROTOCOLS: &str = "Options of protocols";
 const DEFAULT_TARGETS: u16 = 4;
+/// The table of all scores, and how it begins.
+const SCORES: &str = "scores.csv";
+const SCORES_BEGIN: &str = "job,scene,trial,";
 /// Options that change no number, or that the settings hold in another form.
 const NO_SETTINGS: &str =
     "output shard threads device cache pictures time-limit weights protocol targets json latex verbose";
@@ -88,6 +91,7 @@ pub(super) fn run(
     refuse_same_photographs(&scenes)?;
     scenes.iter().for_each(warn_of);
     folder.map_or(Ok(()), |folder| keep_folder_apart(&scenes, folder))?;
+    folder.map_or(Ok(()), |folder| keep_others_than(&folder.join(SCORES), SCORES_BEGIN))?;
     let draws = Draws {
         seed: arguments.seed,
         trial_count: arguments.protocol.trials,
@@ -228,7 +232,7 @@ fn write_scores(folder: &Path, finished: &BTreeMap<usize, Finished>) -> anyhow::
     let first = |job: &Finished| vec![job.job.to_string(), job.scene_name.clone(), job.trial.to_string()];
     let lines = finished.values().flat_map(|job| job.scores.iter().map(move |score| (first(job), score)));
     let csv = csv_of(&["job", "scene", "trial"], &lines.collect::<Vec<_>>())?;
-    Ok(write_whole(&folder.join("scores.csv"), &csv)?)
+    Ok(write_whole(&folder.join(SCORES), &csv)?)
 }
 
 /// What there is to tell.

@@ -146,7 +146,7 @@ impl Prepared {
 
     /// Says where an orbit ends, and warns if cameras without a photograph leave what the sources show. Not with a
     /// network, which is there to guess what they do not.
-    pub(super) fn leaving(&self, arguments: &Arguments, progress: &Terminal) -> Option<String> {
+    pub(super) fn warn_of_leaving(&self, arguments: &Arguments, progress: &Terminal) {
         let cameras = self.job.source_cameras(&self.scene);
         progress.aside(|| arguments.path.tell_arc(&cameras));
         let new = self.job.targets.iter().filter(|target| target.truth.is_none());
@@ -154,6 +154,5 @@ impl Prepared {
         let is_learned = arguments.model.network.label().is_some();
         let warning = if is_learned { None } else { Coverage::of(&cameras).warning(pictures) };
         warning.iter().for_each(|warning| progress.warn(warning));
-        warning
     }
 }

@@ -145,7 +145,7 @@ fn kept(kept: &Kept) -> String {
     let error = match kept.error {
         Some(Estimate { value: 0.0, .. }) | None => String::new(),
         Some(Estimate { value, upper, .. }) => {
-            format!(", about {:.1} dB from exact (at least {:.1})", decibels(value), decibels(upper))
+            format!(", about {:.1} dB from exact (likely at least {:.1})", decibels(value), decibels(upper))
         }
     };
     let missed = match (kept.is_kept, kept.most_seconds) {

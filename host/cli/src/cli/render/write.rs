@@ -9,26 +9,19 @@ use crate::cli::terminal::Terminal;
 use crate::cli::threads::on_threads;
 use viewfuse_field::auto::{self, Chosen};
 use viewfuse_field::render::Frame;
-use viewfuse_job::progress::{Part, Progress};
+use viewfuse_job::progress::Part;
 use viewfuse_output::record::RunRecord;
 use viewfuse_output::run::{Circumstances, RunWriter};
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_weighting::Weighting;
 
-/// `warning` is of the whole run.
-pub(super) fn to_folder(
-    arguments: &Arguments,
-    mut prepared: Prepared,
-    warning: Option<String>,
-    progress: Terminal,
-) -> anyhow::Result<()> {
+pub(super) fn to_folder(arguments: &Arguments, mut prepared: Prepared, progress: Terminal) -> anyhow::Result<()> {
     let before = prepared.weighting.clone().unwrap_or_else(Weighting::default_scheme);
     let label = prepared.folder.display().to_string();
     let mut writer = RunWriter::new(&arguments.output, &prepared.scene, label, &prepared.job, &before);
     writer.lock()?;
     writer.outputs = arguments.outputs.outputs();
     writer.make_videos(&prepared.videos, prepared.rate);
-    warning.into_iter().for_each(|warning| writer.warn(warning));
     writer.earlier = std::mem::take(&mut prepared.earlier);
     if let Some(settings) = &prepared.settings {
         let finished = writer.resume(&run_identity(settings, &prepared.job.targets)?)?;
@@ -47,7 +40,7 @@ fn written(
     arguments: &Arguments,
     prepared: &Prepared,
     mut writer: RunWriter,
-    progress: &dyn Progress,
+    progress: &Terminal,
 ) -> anyhow::Result<(RunRecord, Vec<String>)> {
     let renderer = prepared.field.on(&prepared.device.device);
     // Of videos only their end is left after the last frame.
@@ -62,6 +55,7 @@ fn written(
     let (finished, _) = auto::render(&run, prepared.weighting.as_ref(), write)?;
     let videos = writer.finish_videos(&Part::begin(progress, "", frames..parts, parts))?;
     let videos = videos.iter().map(|path| path.display().to_string()).collect();
+    progress.told().into_iter().for_each(|warning| writer.warn(warning));
     let circumstances = Circumstances {
         program: env!("CARGO_PKG_VERSION"),
         device_reason: prepared.device.reason.clone(),
