@@ -1,4 +1,4 @@
-//! No test is hidden from its binary, and no path leads out of the repository.
+//! No test is hidden from its binary, tests that a document names exist, and no path leads out of the repository.
 
 use super::{list, packages, text};
 use std::path::{Path, PathBuf};
@@ -53,6 +53,26 @@ fn every_test_is_run() {
     }
     let a_room = repository().join("tests/packages/main.rs");
     assert!(!is_declared(&a_room.with_file_name("forgotten.rs"), &a_room));
+}
+
+/// The last column of the tables of conventions names tests, by `folder: NAME` or by the name alone, and their files.
+#[test]
+fn tests_that_the_conventions_name_exist() {
+    let sources = ["core", "host", "tests"].map(|folder| files(&repository().join(folder), "rs"));
+    let read = |path: &PathBuf| std::fs::read_to_string(path).expect("a file");
+    let code: String = sources.iter().flatten().map(read).collect();
+    let exists = |name: &str| match name.ends_with(".rs") {
+        true => repository().join("tests").join(name).is_file(),
+        // A name without an underscore is a module's.
+        false => !name.contains('_') || code.contains(&format!("fn {name}(")),
+    };
+    let page = read(&repository().join("host/scene/CONVENTIONS.md"));
+    let cells = page.lines().filter_map(|line| line.strip_prefix("| ")?.strip_suffix(" |")?.rsplit(" | ").next());
+    let spans = cells.flat_map(|cell| cell.split('`').skip(1).step_by(2));
+    let names: Vec<&str> = spans.filter_map(|span| span.rsplit([' ', ':']).next()).collect();
+    let missing: Vec<&&str> = names.iter().filter(|name| !exists(name)).collect();
+    assert!(names.len() > 50 && missing.is_empty(), "{} names, not there: {missing:?}", names.len());
+    assert!(!exists("a_test_that_nobody_wrote") && !exists("scenes/nothing.rs"));
 }
 
 /// The repository tests itself: what it is built and tested with comes from the system or through environment

@@ -26,6 +26,7 @@ use super::report::CheckError;
 use serde::Serialize;
 use std::time::{Duration, Instant};
 use viewfuse_device::{Device, DeviceError, Precision};
+use viewfuse_job::medians;
 use viewfuse_job::progress::Progress;
 use viewfuse_vulkan::kernel::{Form, Kernel};
 
@@ -289,11 +290,7 @@ fn seconds<D: Device>(device: &D, work: &mut Work<'_>, repeats: u32) -> Result<f
     Ok(start.elapsed().as_secs_f64().max(1.0e-9) / f64::from(repeats))
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    match values.len() % 2 {
-        0 => 0.5 * (values[middle - 1] + values[middle]),
-        _ => values[middle],
-    }
+/// The median over rounds, of which there is one at least.
+fn median(values: Vec<f64>) -> f64 {
+    medians::median(values).expect("a round")
 }

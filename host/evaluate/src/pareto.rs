@@ -21,6 +21,7 @@ use viewfuse_device::choice::AnyDevice;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, working_side};
 use viewfuse_field::row::Drawn;
 use viewfuse_field::{Record, Renderer};
+use viewfuse_job::medians::median;
 use viewfuse_job::progress::{Progress, Quiet};
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{FewShot, Target};
@@ -222,14 +223,14 @@ impl First {
     /// `times[round]`: in total and for encoding.
     fn point(self, label: &str, times: &[[f64; 2]]) -> Point {
         let First { difference, truth_psnr, record, is_repeatable, .. } = self;
-        let all = sorted(times.iter().map(|[all, _]| *all));
-        let encode = sorted(times.iter().map(|[_, encode]| *encode));
-        let end = |time: Option<&f64>| time.copied().unwrap_or(f64::NAN);
+        let all = || times.iter().map(|[all, _]| *all);
+        let encode = times.iter().map(|[_, encode]| *encode);
+        let known = |time: Option<f64>| time.unwrap_or(f64::NAN);
         Point {
             setting: label.to_owned(),
-            seconds: median(&all),
-            seconds_range: [end(all.first()), end(all.last())],
-            encode_seconds: median(&encode),
+            seconds: known(median(all())),
+            seconds_range: [known(all().min_by(f64::total_cmp)), known(all().max_by(f64::total_cmp))],
+            encode_seconds: known(median(encode)),
             difference,
             truth_psnr,
             record,
@@ -245,32 +246,4 @@ fn fingerprint(frames: &[Frame]) -> u64 {
         bytemuck::cast_slice::<[f32; 4], u32>(&frame.colours).hash(&mut hasher);
     }
     hasher.finish()
-}
-
-fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values
-}
-
-/// The middle of sorted values, or the mean of the two middle ones; NaN without values.
-fn median(sorted: &[f64]) -> f64 {
-    match (sorted.len(), sorted.len() / 2) {
-        (0, _) => f64::NAN,
-        (count, middle) if count % 2 == 1 => sorted[middle],
-        (_, middle) => 0.5 * (sorted[middle - 1] + sorted[middle]),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn medians() {
-        assert!(median(&[]).is_nan());
-        assert_eq!(median(&[3.0]), 3.0);
-        assert_eq!(median(&sorted([9.0, 1.0, 2.0].into_iter())), 2.0);
-        assert_eq!(median(&sorted([4.0, 1.0, 9.0, 2.0].into_iter())), 3.0);
-    }
 }

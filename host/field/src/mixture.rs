@@ -19,6 +19,7 @@ use crate::{AnyOptions, Rendered};
 pub use near::NearTargets;
 use serde::Serialize;
 use viewfuse_core::pose::Pose;
+use viewfuse_job::medians::upper_median;
 
 /// Confidences count from here (`K`).
 const USUAL_CONFIDENCE: f32 = 0.3;
@@ -147,7 +148,7 @@ pub(crate) fn terms(parts: &[Rendered]) -> Vec<f32> {
     }
     let disparity = |depth: f32| if depth > 0.0 { depth.recip() } else { 0.0 };
     let first: Vec<f32> = parts[0].depths.iter().copied().map(disparity).collect();
-    let usual = DISPARITY_SHARE * median(&mut first.clone());
+    let usual = DISPARITY_SHARE * upper_median(first.iter().copied(), f32::total_cmp).unwrap_or(0.0);
     for (index, part) in parts.iter().enumerate().skip(1) {
         if usual > 0.0 && part.depths.len() == first.len() {
             let difference = |(depth, first): (&f32, &f32)| {
@@ -159,12 +160,6 @@ pub(crate) fn terms(parts: &[Rendered]) -> Vec<f32> {
         }
     }
     terms
-}
-
-/// The median; 0 of nothing.
-fn median(values: &mut [f32]) -> f32 {
-    let middle = values.len() / 2;
-    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f32::total_cmp).1 }
 }
 
 /// Means over square windows, taken twice; at the border over the pixels in the picture.

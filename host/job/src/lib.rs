@@ -1,5 +1,5 @@
 //! Common parts of long jobs: progress and cancellation through one trait, output files that are written completely or
-//! not at all, panics of other libraries as errors, digests of inputs.
+//! not at all, panics of other libraries as errors, digests of inputs, medians.
 //!
 //! The modules are listed in the order of the data; a module uses only modules listed above it:
 //!
@@ -12,12 +12,14 @@
 //! files      output files, completely or not at all           write_whole, WholeFile, WholeFolder
 //! process    processes that end with their owner              Process
 //! digest     SHA-256 of inputs
+//! medians    the median, by two conventions                  median, upper_median
 //! ```
 #![forbid(unsafe_code)]
 
 pub mod digest;
 pub mod files;
 pub mod hint;
+pub mod medians;
 pub mod panics;
 pub mod process;
 pub mod progress;

@@ -3,6 +3,7 @@
 
 use crate::solution::Solution;
 use glam::DMat3;
+use viewfuse_job::medians;
 
 /// For each of these photographs, which both solutions must have registered, the median over the others of the angle in
 /// degrees between the two solutions' relative rotations; 0 for a photograph without others.
@@ -15,7 +16,7 @@ pub(crate) fn differences(a: &Solution, b: &Solution, photos: &[usize]) -> Vec<f
         let others = (0..photos.len()).filter(|other| *other != first);
         // (A_first A_other^T) (B_first B_other^T)^T
         let angles = others.map(|other| degrees(a[first] * a[other].transpose() * b[other] * b[first].transpose()));
-        median(angles.collect())
+        median(angles)
     };
     (0..photos.len()).map(difference).collect()
 }
@@ -34,13 +35,8 @@ pub(crate) fn degrees(rotation: DMat3) -> f64 {
 }
 
 /// The median; of an even number the mean of the middle two; 0 of none.
-pub(crate) fn median(mut numbers: Vec<f64>) -> f64 {
-    numbers.sort_by(f64::total_cmp);
-    match numbers.len() {
-        0 => 0.0,
-        count if count % 2 == 1 => numbers[count / 2],
-        count => 0.5 * (numbers[count / 2 - 1] + numbers[count / 2]),
-    }
+pub(crate) fn median(numbers: impl IntoIterator<Item = f64>) -> f64 {
+    medians::median(numbers).unwrap_or(0.0)
 }
 
 #[cfg(test)]

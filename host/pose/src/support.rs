@@ -42,9 +42,9 @@ impl Support {
 /// than three median distances: single points far away do not count.
 fn thickness(solution: &Solution) -> f64 {
     let points: Vec<DVec3> = solution.points.iter().map(|point| DVec3::from_array(point.position)).collect();
-    let median_of = |axis: usize| median(points.iter().map(|point| point[axis]).collect());
+    let median_of = |axis: usize| median(points.iter().map(|point| point[axis]));
     let middle = DVec3::new(median_of(0), median_of(1), median_of(2));
-    let reach = 3.0 * median(points.iter().map(|point| point.distance(middle)).collect());
+    let reach = 3.0 * median(points.iter().map(|point| point.distance(middle)));
     let near: Vec<DVec3> = points.into_iter().filter(|point| point.distance(middle) <= reach).collect();
     let mean = near.iter().sum::<DVec3>() / near.len().max(1) as f64;
     let mut covariance = DMat3::ZERO;

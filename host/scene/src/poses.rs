@@ -5,6 +5,7 @@ use crate::{Scene, View};
 use std::collections::HashSet;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, Pinhole};
+use viewfuse_job::medians::upper_median;
 
 /// Cameras nearer to one another than this share of their distance from what they look at show no depth: half a pixel
 /// at a focal length of 500. Nor is that more than this share of their median distance from their middle: where axes
@@ -82,9 +83,7 @@ fn off_middle(pinhole: &Pinhole) -> f32 {
 
 /// The upper one of the middle values; 0 of none.
 fn median(values: impl Iterator<Item = f32>) -> f32 {
-    let mut sorted: Vec<f32> = values.collect();
-    sorted.sort_by(f32::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+    upper_median(values, f32::total_cmp).unwrap_or(0.0)
 }
 
 impl Scene {

@@ -1,5 +1,5 @@
 //! What a crate outside of viewfuse adds to it, one file each: a field, a layout of scenes, a weighting. Only the
-//! public interface is used; `tests/render.rs` renders with all three.
+//! public interface is used; `tests/packages/outside.rs` renders with all three.
 #![forbid(unsafe_code)]
 
 mod lines;

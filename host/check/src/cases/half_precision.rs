@@ -44,6 +44,14 @@ fn of_all_magnitudes(random: &mut Random, number_count: u32) -> Vec<f32> {
     numbers
 }
 
+/// An even and an odd count of numbers, with the numbers and space for their words and one more.
+fn inputs(random: &mut Random, size: u32) -> [(u32, Vec<f32>, Output<u32>); 2] {
+    [2 * size, 2 * size - 1].map(|number_count| {
+        let words = Output::Zeros(word_count(number_count) as usize + 1);
+        (number_count, of_all_magnitudes(random, number_count), words)
+    })
+}
+
 /// Both numbers of each word that a device wrote.
 fn read_words<D: Device>(device: &D, words: Option<&D::Buffer<u32>>) -> Result<Vec<f32>, DeviceError> {
     words.map_or(Ok(Vec::new()), |words| Ok(unpacked(&device.download(words)?)))
@@ -57,13 +65,8 @@ impl Case for PackF16 {
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("numbers", |case| increase(&mut case.numbers))];
 
     fn inputs(seed: u64, size: u32) -> Vec<PackF16> {
-        let random = &mut random(41, seed, size);
-        let dispatch = |number_count: u32| PackF16 {
-            number_count,
-            numbers: of_all_magnitudes(random, number_count),
-            words: Output::Zeros(word_count(number_count) as usize + 1),
-        };
-        [2 * size, 2 * size - 1].map(dispatch).to_vec()
+        let dispatch = |(number_count, numbers, words)| PackF16 { number_count, numbers, words };
+        inputs(&mut random(41, seed, size), size).map(dispatch).into()
     }
 
     fn read_one<D: Device>(device: &D, (_, words): &Self::Loaded<D>, index: usize) -> Result<Vec<f32>, DeviceError> {
@@ -85,13 +88,8 @@ impl Case for PackFactors {
     const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[("numbers", |case| increase(&mut case.numbers))];
 
     fn inputs(seed: u64, size: u32) -> Vec<PackFactors> {
-        let random = &mut random(64, seed, size);
-        let dispatch = |number_count: u32| PackFactors {
-            number_count,
-            numbers: of_all_magnitudes(random, number_count),
-            words: Output::Zeros(word_count(number_count) as usize + 1),
-        };
-        [2 * size, 2 * size - 1].map(dispatch).to_vec()
+        let dispatch = |(number_count, numbers, words)| PackFactors { number_count, numbers, words };
+        inputs(&mut random(64, seed, size), size).map(dispatch).into()
     }
 
     fn read_one<D: Device>(device: &D, (_, words): &Self::Loaded<D>, index: usize) -> Result<Vec<f32>, DeviceError> {

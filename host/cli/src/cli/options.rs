@@ -70,7 +70,7 @@ pub(crate) struct OmissionOptions {
     leave_out: f32,
     /// Early termination: leave out samples behind the point where a ray's transmittance falls below this; not with a
     /// GeNVS [default: 1/256]
-    #[arg(long, alias = "settled", value_name = "SHARE", value_parser = parse_share, help_heading = EFFORTS)]
+    #[arg(long, value_name = "SHARE", value_parser = parse_share, help_heading = EFFORTS)]
     early_termination: Option<f32>,
 }
 

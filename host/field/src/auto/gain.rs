@@ -2,6 +2,7 @@
 
 use super::held_out::Outcome;
 use super::{MAX_LOSS, MIN_GAIN};
+use viewfuse_job::medians::median;
 
 /// Whether more than half of the sources gain too little for [`is_better`]'s median, by the first ones' results.
 pub(super) fn is_lost(first: &[Outcome], replaced: &[Outcome]) -> bool {
@@ -28,14 +29,7 @@ pub(super) fn is_better(candidate: &[Outcome], best: &[Outcome], replaced: &[Out
 
 /// The median of the gains at the sources that both have, decibels; 0 without one.
 pub(super) fn median_gain(candidate: &[Outcome], replaced: &[Outcome]) -> f64 {
-    let mut gains: Vec<f64> = candidate.iter().zip(replaced).map(|(new, replaced)| new.psnr - replaced.psnr).collect();
-    gains.sort_by(f64::total_cmp);
-    let middle = gains.len() / 2;
-    match gains.len() {
-        0 => 0.0,
-        count if count % 2 == 1 => gains[middle],
-        _ => 0.5 * (gains[middle - 1] + gains[middle]),
-    }
+    median(candidate.iter().zip(replaced).map(|(new, replaced)| new.psnr - replaced.psnr)).unwrap_or(0.0)
 }
 
 /// What the held-out source that is nearest to the others gains, decibels; the same number of both. Targets are nearer

@@ -1,7 +1,7 @@
 //! Diffusion sampling: the driver of the samplers in [`viewfuse_core::sampler`], for any device and any denoiser.
 //!
 //! A denoiser is a function from a noisy picture and its level to an estimate of the picture; its calls take nearly all
-//! the time. The state is in `f32` (`tests/numerics/sampler.rs` measures the error against `f64`).
+//! the time. The state is in `f32` (`tests/numerics/sampler/errors.rs` measures the error against `f64`).
 //!
 //! ```text
 //! plan    sampler, noise levels, noise, seed             Plan, Steps

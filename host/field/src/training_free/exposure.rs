@@ -2,6 +2,7 @@
 
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::parallel::map;
+use viewfuse_job::medians::upper_median;
 
 /// Confidence from which on a pixel's disparity counts.
 const MIN_CONFIDENCE: f32 = 0.6;
@@ -119,10 +120,10 @@ fn ratios_of(
     for (second, mut channels) in logarithms.into_iter().enumerate() {
         let count = channels.iter().map(Vec::len).min().unwrap_or(0);
         if count >= MIN_POINTS {
-            let medians = [0, 1, 2].map(|channel| median(&mut channels[channel]));
+            let medians = [0, 1, 2].map(|channel| median(&channels[channel]));
             let spreads = [0, 1, 2].map(|channel| {
                 channels[channel].iter_mut().for_each(|value| *value = (*value - medians[channel]).abs());
-                median(&mut channels[channel])
+                median(&channels[channel])
             });
             // Exposure changes all surfaces alike; light that depends on the direction does not.
             if spreads.iter().any(|spread| *spread > MAX_SPREAD) {
@@ -141,7 +142,7 @@ fn grid(camera: &CameraBlock) -> impl Iterator<Item = (u32, u32)> {
     rows.flat_map(move |row| (2..width.saturating_sub(2)).step_by(STRIDE as usize).map(move |column| (row, column)))
 }
 
-fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+/// The median of at least one value.
+fn median(values: &[f64]) -> f64 {
+    upper_median(values.iter().copied(), f64::total_cmp).expect("points")
 }

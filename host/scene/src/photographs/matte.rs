@@ -9,6 +9,7 @@ use crate::Photograph;
 use crate::scene::masks::meaning::flood;
 use std::fmt;
 use std::str::FromStr;
+use viewfuse_job::medians::upper_median;
 
 /// Least and greatest threshold on the distance from the background colour, and its ratio to the border's noise.
 const THRESHOLD: (f32, f32) = (0.03, 0.12);
@@ -112,14 +113,13 @@ impl Backdrop {
     /// proportional to the median noise.
     pub(super) fn of<'a>(borders: impl Iterator<Item = &'a Border>, choice: BackgroundChoice) -> Backdrop {
         let borders: Vec<&Border> = borders.collect();
-        let median_colour =
-            || [0, 1, 2].map(|channel| median(borders.iter().map(|border| border.colour[channel]).collect()));
+        let median_colour = || [0, 1, 2].map(|channel| median(borders.iter().map(|border| border.colour[channel])));
         let (colour, from_border) = match choice {
             BackgroundChoice::Colour(colour) => (colour, false),
             _ if borders.is_empty() => ([1.0; 3], false),
             BackgroundChoice::Auto | BackgroundChoice::None => (median_colour(), true),
         };
-        let noise = median(borders.iter().map(|border| border.noise).collect());
+        let noise = median(borders.iter().map(|border| border.noise));
         Backdrop { colour, threshold: (NOISE_FACTOR * noise).clamp(THRESHOLD.0, THRESHOLD.1), from_border, noise }
     }
 
@@ -184,8 +184,7 @@ fn look_at_border(photograph: &Photograph, given: Option<[f32; 3]>) -> Border {
         .filter(|(x, y, _)| at_border(*x, *y))
         .map(|(_, _, pixel)| colour_of(pixel))
         .collect();
-    let colour =
-        given.unwrap_or_else(|| [0, 1, 2].map(|channel| median(pixels.iter().map(|pixel| pixel[channel]).collect())));
+    let colour = given.unwrap_or_else(|| [0, 1, 2].map(|channel| median(pixels.iter().map(|pixel| pixel[channel]))));
     let mut distances: Vec<f32> = pixels.iter().map(|pixel| distance(*pixel, colour)).collect();
     distances.sort_by(f32::total_cmp);
     let noise = distances[((distances.len() as f64 * NOISE_SHARE) as usize).min(distances.len() - 1)];
@@ -262,7 +261,6 @@ fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
 }
 
 /// The upper median; 0 of nothing.
-fn median(mut values: Vec<f32>) -> f32 {
-    values.sort_by(f32::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
+fn median(values: impl Iterator<Item = f32>) -> f32 {
+    upper_median(values, f32::total_cmp).unwrap_or(0.0)
 }
