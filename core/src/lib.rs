@@ -16,7 +16,7 @@
 //! attention         pose -> weight, by (learned) attention         CrossAttention, PoseSelfAttention, ...
 //! random            random draws for (seed, pixel, sample)         uniform, normal
 //! rays, depths      target rays and samples along them             TargetRay, RayPoint, stratified_depth, inverse_cdf
-//! lookup            interpolation in grids                         bilinear, trilinear
+//! lookup            interpolation in grids                         bilinear
 //! fuse              weighted sums of the views' latents            fuse_views, fuse_visible, fuse_readings
 //! composite         compositing of the samples along a ray         Compositor<C>
 //! gaussian          Gaussians in the world, and projected          GaussianBlock, ProjectedGaussian, project, composite_row

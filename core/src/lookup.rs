@@ -1,9 +1,8 @@
 //! Interpolation in grids of `C` channels.
 //!
-//! Grids are `[row][column]` or `[slice][row][column]`, flat, row-major, one `[f32; C]` a node. Coordinates are
-//! continuous with node centres at halves (the image convention of [`crate::camera`]). Outside the outermost centres
-//! the border node's value is used; a NaN coordinate counts as 0. An axis has at
-//! most 2^24 nodes. Grids shorter than the stated size are not allowed.
+//! Grids are `[row][column]`, flat, row-major, one `[f32; C]` a node. Coordinates are continuous with node centres at
+//! halves (the image convention of [`crate::camera`]). Outside the outermost centres the border node's value is used; a
+//! NaN coordinate counts as 0. An axis has at most 2^24 nodes. Grids shorter than the stated size are not allowed.
 
 use crate::fetch::Fetch;
 use crate::math::clamp;
@@ -82,23 +81,4 @@ pub fn bilinear_channel_from<const C: usize>(
     let lower = grid.fetch(bottom + left)[channel]
         + (grid.fetch(bottom + right)[channel] - grid.fetch(bottom + left)[channel]) * share_x;
     upper + (lower - upper) * share_y
-}
-
-/// Trilinear look-up in `grid[slice][row][column]`, `size` = `[columns, rows, slices]`, all at least 1. Columns are
-/// mixed first, then rows, then slices.
-#[inline]
-pub fn trilinear<const C: usize>(
-    grid: &(impl Fetch<[f32; C]> + ?Sized),
-    size: [u32; 3],
-    x: f32,
-    y: f32,
-    z: f32,
-) -> [f32; C] {
-    let (front, back, share_z) = split(z, size[2]);
-    let slice = size[0] as usize * size[1] as usize;
-    mix(
-        &bilinear_from(grid, front * slice, size[0], size[1], x, y),
-        &bilinear_from(grid, back * slice, size[0], size[1], x, y),
-        share_z,
-    )
 }

@@ -86,13 +86,6 @@ pub fn clamp(x: f32, low: f32, high: f32) -> f32 {
     min(max(x, low), high)
 }
 
-/// Hermite step: 0 at or below `low`, 1 at or above `high`, `3t² - 2t³` between. `low < high`.
-#[inline]
-pub fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
-    let t = clamp((x - low) / (high - low), 0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
-}
-
 /// `e^x`: error at most 1.1 ULP for `x` in `[-87.3, 88.7]`; 0 below (no subnormals: devices may flush them),
 /// saturated at `e^88.7` above. NaN gives 0.
 #[inline]

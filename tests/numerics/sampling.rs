@@ -2,7 +2,7 @@
 
 use viewfuse::check::poses::Random;
 use viewfuse_core::depths::{inverse_cdf, stratified_depth};
-use viewfuse_core::lookup::{bilinear, trilinear};
+use viewfuse_core::lookup::bilinear;
 use viewfuse_core::random::{threefry_2x32, uniform};
 
 #[test]
@@ -74,35 +74,28 @@ fn degenerate_distributions() {
     assert_eq!(inverse_cdf(1.0, 3.0, &[0.7], 0.5), 2.0);
 }
 
-const SIZE: [usize; 3] = [7, 5, 4];
-
-fn grid(random: &mut Random) -> Vec<[f32; 2]> {
-    (0..SIZE.iter().product::<usize>()).map(|_| [random.normal() as f32, random.normal() as f32]).collect()
-}
+const SIZE: [usize; 2] = [7, 5];
 
 #[test]
 fn lookups_at_nodes_borders_and_nan() {
-    let grid = grid(&mut Random::new(24));
-    let size = SIZE.map(|count| count as u32);
-    let node = |x: usize, y: usize, z: usize| grid[(z * SIZE[1] + y) * SIZE[0] + x];
-    for z in 0..SIZE[2] {
-        for y in 0..SIZE[1] {
-            for x in 0..SIZE[0] {
-                let at = [x, y, z].map(|i| i as f32 + 0.5);
-                assert_eq!(trilinear(&grid[..], size, at[0], at[1], at[2]), node(x, y, z));
-                assert_eq!(bilinear(&grid[..], size[0], size[1], at[0], at[1]), node(x, y, 0));
-            }
+    let random = &mut Random::new(24);
+    let grid: Vec<[f32; 2]> =
+        (0..SIZE[0] * SIZE[1]).map(|_| [random.normal() as f32, random.normal() as f32]).collect();
+    let [width, height] = SIZE.map(|count| count as u32);
+    let node = |x: usize, y: usize| grid[y * SIZE[0] + x];
+    for y in 0..SIZE[1] {
+        for x in 0..SIZE[0] {
+            assert_eq!(bilinear(&grid[..], width, height, x as f32 + 0.5, y as f32 + 0.5), node(x, y));
         }
     }
     for far in [7.0, 6.5, 1.0e9, f32::INFINITY] {
-        assert_eq!(bilinear(&grid[..], size[0], size[1], far, 2.5), node(6, 2, 0));
+        assert_eq!(bilinear(&grid[..], width, height, far, 2.5), node(6, 2));
     }
     for low in [0.5, 0.0, -3.0, -1.0e30, f32::NEG_INFINITY, f32::NAN] {
-        assert_eq!(bilinear(&grid[..], size[0], size[1], low, 2.5), node(0, 2, 0));
-        assert_eq!(trilinear(&grid[..], size, low, low, low), node(0, 0, 0));
+        assert_eq!(bilinear(&grid[..], width, height, low, 2.5), node(0, 2));
+        assert_eq!(bilinear(&grid[..], width, height, low, low), node(0, 0));
     }
     for coordinate in [-1.0, 0.5, 0.7, 9.0, f32::NAN] {
-        assert_eq!(bilinear(&grid[..], 1, 1, coordinate, coordinate), node(0, 0, 0));
-        assert_eq!(trilinear(&grid[..], [1, 1, 1], coordinate, coordinate, coordinate), node(0, 0, 0));
+        assert_eq!(bilinear(&grid[..], 1, 1, coordinate, coordinate), node(0, 0));
     }
 }
