@@ -7,12 +7,13 @@ use libtest_mimic::{Failed, Trial};
 use std::sync::Arc;
 use viewfuse::device::vulkan::Vulkan;
 use viewfuse::device::{Device, Layer, LayerShape, Memory, Precision};
+use viewfuse_core::sampler::Mix;
 use viewfuse_kernels::limits::{REPEATED, RepeatedBlock};
 use viewfuse_kernels::network::convolve::{ConvolveBlock, patch_value};
 use viewfuse_kernels::network::linear::LinearBlock;
 use viewfuse_tests::devices::{exchanged_stand_ins, stand_ins, takes_stand_ins};
 use viewfuse_vulkan::kernel::{Form, Kernel};
-use viewfuse_vulkan::{Adapter, AdapterKind, Gpu, GpuOptions, Instance, Limits};
+use viewfuse_vulkan::{Adapter, AdapterKind, Buffer, Gpu, GpuOptions, Instance, Limits};
 
 /// The trials of a device.
 pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> {
@@ -252,7 +253,7 @@ fn block(sizes: [u32; 3]) -> LinearBlock {
     LinearBlock { row_count, inner_count, column_count, ..LinearBlock::default() }
 }
 
-/// The device keeps weights as f16: not those from before a kernel wrote others.
+/// The device keeps weights as f16: not those from before a kernel wrote others, also one that was recorded.
 fn written_weights_are_rounded_again(instance: &Arc<Instance>, adapter: &Adapter) -> Result<(), Failed> {
     let device =
         Vulkan::open(instance, adapter, &GpuOptions { stand_ins: Some(stand_ins()), ..GpuOptions::default() })?;
@@ -278,6 +279,17 @@ fn written_weights_are_rounded_again(instance: &Arc<Instance>, adapter: &Adapter
     let after = product(&weights)?;
     assert_ne!(after, before, "the weights from before");
     assert_eq!(after, product(&device.upload(&expected)?)?);
+    let copy = |from: &Buffer<f32>, to: &mut Buffer<f32>| {
+        let mix = Mix { state: 1.0, results: [0.0; 4] };
+        device.mix_pictures(&mix, (SIDE * SIDE) as u32, from, from, from, from, from, to)
+    };
+    let (mut source, others) = (device.upload(&first)?, device.upload(&expected)?);
+    let ((), writing) = device.recorded(|| copy(&source, &mut weights))?;
+    let writing = writing.ok_or("it is not recorded")?;
+    assert_eq!(product(&weights)?, before);
+    copy(&others, &mut source)?;
+    writing.again()?;
+    assert_eq!(product(&weights)?, after, "the weights from before the recording was submitted again");
     Ok(())
 }
 

@@ -6,6 +6,7 @@ use viewfuse::job::progress::Silent;
 use viewfuse::output::depth::{DepthFormat, write_depth};
 use viewfuse::output::rate::FrameRate;
 use viewfuse::output::video::{VideoError, VideoFormat, VideoWriter};
+use viewfuse::output::webp::stated_size;
 use viewfuse::scene::Scene;
 use viewfuse::scene::photographs::{Album, BackgroundChoice};
 use viewfuse_core::Vec3;
@@ -243,6 +244,18 @@ fn depths_are_one_a_pixel() {
         }
         write_depth(&path, *format, &[1.0; 16], [4, 4]).expect("one a pixel");
         std::fs::remove_file(&path).expect("it was written");
+    }
+}
+
+/// Sizes in a WebP file have 32 bits.
+#[test]
+fn a_webp_of_four_gib_is_none() {
+    const HEAD: u64 = 36;
+    let stated = |frame_bytes: u64| stated_size(frame_bytes).ok();
+    let most = (1 << 32) - 10 - HEAD;
+    assert_eq!((stated(0), stated(most)), (Some(36), Some(u32::MAX - 9)));
+    for frame_bytes in [most + 1, most + 10, 1 << 33, u64::MAX] {
+        assert_eq!(stated(frame_bytes), None, "{frame_bytes}");
     }
 }
 

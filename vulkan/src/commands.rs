@@ -3,7 +3,7 @@
 use crate::buffer::Array;
 use crate::error::VulkanError;
 use crate::handle::Handle;
-use crate::kernel::Kernel;
+use crate::kernel::{Access, Kernel};
 use ash::vk;
 use std::sync::{Arc, Weak};
 use std::time::Duration;
@@ -31,7 +31,7 @@ pub(crate) struct Commands {
     pub(crate) descriptors: vk::DescriptorPool,
     pub(crate) queries: vk::QueryPool,
     pub(crate) fence: vk::Fence,
-    held: Vec<Arc<Array>>,
+    held: Vec<(Arc<Array>, Access)>,
     held_bytes: u64,
     /// The kernels that are dispatched, and for how many elements.
     pub(crate) dispatched: Vec<(Kernel, u64)>,
@@ -104,11 +104,17 @@ impl Commands {
         }
     }
 
-    /// Keeps an array alive until they are done.
-    pub(crate) fn hold(&mut self, array: &Arc<Array>) {
+    /// Keeps an array, which they read or write, alive until they are done.
+    pub(crate) fn hold(&mut self, array: &Arc<Array>, access: Access) {
         self.held_bytes += (array.len * array.stride) as u64;
-        self.held.push(array.clone());
+        self.held.push((array.clone(), access));
         self.is_used = true;
+    }
+
+    /// They are submitted again, and write their arrays: what was kept of the numbers in these is out of date.
+    pub(crate) fn outdate_written(&self) {
+        let written = self.held.iter().filter(|(_, access)| *access == Access::Write);
+        written.for_each(|(array, _)| array.halves.outdate());
     }
 
     /// Forgets what they did.

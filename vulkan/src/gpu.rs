@@ -364,7 +364,7 @@ impl Gpu {
             *stretch += 1;
         }
         for (array, access) in uses {
-            open.hold(array);
+            open.hold(array, *access);
             match access {
                 Access::Read => array.read_in.set(*stretch),
                 Access::Write => {

@@ -58,8 +58,8 @@ impl Gpu {
     }
 
     /// Submits the dispatches of a recording again, behind all earlier work: they read what their arrays contain by
-    /// then, but for weights that a form reads as f16, which are those of the recording's time. What a recording writes
-    /// must not be weights of such a form. It waits only if they are still in flight.
+    /// then, but for weights that a form reads as f16, which are those of the recording's time. Weights that they write
+    /// are made into f16 again by the next dispatch that reads them so. It waits only if they are still in flight.
     ///
     /// # Errors
     /// [`VulkanError::OtherDevice`], and others if the device fails, or failed before.

@@ -271,6 +271,7 @@ impl Submissions {
                 self.kept.extend([part].into_iter().chain(parts));
                 return Err(error);
             }
+            part.outdate_written();
             self.queued.push(part);
         }
         Ok(is_there)

@@ -43,6 +43,51 @@ impl Running {
         }
     }
 
+    /// Whether it has ended, told without reaping it: until then its number is nobody else's. `None` where the system
+    /// does not tell.
+    #[cfg(any(target_os = "android", target_os = "freebsd", all(target_os = "linux", not(target_env = "uclibc"))))]
+    fn has_exited(&self) -> Option<bool> {
+        use nix::{errno::Errno, sys::wait, unistd::Pid};
+        let number = Pid::from_raw(i32::try_from(self.child.id()).ok()?);
+        let look = wait::WaitPidFlag::WEXITED | wait::WaitPidFlag::WNOHANG | wait::WaitPidFlag::WNOWAIT;
+        match wait::waitid(wait::Id::Pid(number), look) {
+            Ok(status) => Some(status != wait::WaitStatus::StillAlive),
+            // It was ended by a signal that has no name.
+            Err(Errno::EINVAL) => Some(true),
+            Err(_) => None,
+        }
+    }
+
+    #[cfg(not(any(
+        target_os = "android",
+        target_os = "freebsd",
+        all(target_os = "linux", not(target_env = "uclibc"))
+    )))]
+    fn has_exited(&self) -> Option<bool> {
+        None
+    }
+
+    fn try_wait(&mut self) -> io::Result<Option<ExitStatus>> {
+        if self.has_ended {
+            return self.child.try_wait();
+        }
+        let has_exited = self.has_exited();
+        match has_exited {
+            Some(true) => self.end_descendants(),
+            Some(false) => return Ok(None),
+            None => {}
+        }
+        let status = self.child.try_wait()?;
+        if status.is_some() {
+            // Where only reaping tells that it has ended, its number has been free for a moment.
+            if has_exited.is_none() {
+                self.end_descendants();
+            }
+            self.has_ended = true;
+        }
+        Ok(status)
+    }
+
     fn end(&mut self) {
         if !self.has_ended {
             self.end_descendants();
@@ -84,13 +129,7 @@ impl Process {
     /// # Errors
     /// What the system says.
     pub fn try_wait(&self) -> io::Result<Option<ExitStatus>> {
-        let mut running = lock(&self.0);
-        let status = running.child.try_wait()?;
-        if status.is_some() && !running.has_ended {
-            running.end_descendants();
-            running.has_ended = true;
-        }
-        Ok(status)
+        lock(&self.0).try_wait()
     }
 
     /// How it ended, once it has; what it started ends then.
@@ -122,6 +161,8 @@ impl Drop for Process {
 #[cfg(all(test, unix))]
 mod tests {
     use super::Process;
+    #[cfg(target_os = "linux")]
+    use super::{LOOK, lock};
     use std::io::{BufRead, BufReader, Read};
     use std::process::{Command, Stdio};
 
@@ -138,5 +179,19 @@ mod tests {
         // The pipe has an end only once nobody holds it.
         said.read_to_string(&mut line).expect("the end");
         assert_eq!((line.as_str(), status.code()), ("started\n", Some(3)));
+    }
+
+    /// What it started is ended by its number, which must be its own until then.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn an_end_is_known_before_the_number_is_free() {
+        let process = Process::start(Command::new("sh").args(["-c", "exit 3"])).expect("a shell");
+        while lock(&process.0).has_exited() == Some(false) {
+            std::thread::sleep(LOOK);
+        }
+        let number = lock(&process.0).child.id();
+        let status = std::fs::read_to_string(format!("/proc/{number}/stat")).expect("a process that is not reaped");
+        assert!(status.contains(") Z "), "{status}");
+        assert_eq!(process.wait().expect("a process").code(), Some(3));
     }
 }

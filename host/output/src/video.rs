@@ -202,7 +202,9 @@ impl VideoWriter {
     fn write_oldest(&mut self) -> Result<(), VideoError> {
         let Some(frame) = self.frames.next_result() else { return Ok(()) };
         match (&mut self.output, frame?) {
-            (Output::Webp(animation), Encoded::Webp(frame)) => animation.add(&frame),
+            (Output::Webp(animation), Encoded::Webp(frame)) => {
+                animation.add(&frame).map_err(|cause| encode_error(&self.path, cause))?;
+            }
             (Output::Gif(animation), Encoded::Gif(frame)) => {
                 animation.add(frame).map_err(|cause| encode_error(&self.path, cause))?;
             }
@@ -232,7 +234,10 @@ impl VideoWriter {
         }
         let VideoWriter { path, output, .. } = self;
         match output {
-            Output::Webp(animation) => write_whole(&path, &animation.finish())?,
+            Output::Webp(animation) => {
+                let file = animation.finish().map_err(|cause| encode_error(&path, cause))?;
+                write_whole(&path, &file)?;
+            }
             Output::Gif(animation) => {
                 animation.finish().map_err(|cause| encode_error(&path, cause))?.0.finish()?;
             }

@@ -103,22 +103,99 @@ pub fn find(
     }
     let part = Part::begin(progress, "", after..after + 1, 10);
     let mut found = verdict(folder, photos, &cameras, &mut made, &part)?;
-    let accepted = |found: &Result<Verdict, Refusal>| found.as_ref().map_or(Vec::new(), |found| found.photos.clone());
+    let accepted = found.as_ref().map_or(Vec::new(), |found| found.photos.clone());
     // With unknown focal lengths more attempts were not seen to be as safe.
-    if cameras.are_known() && Matches::of(photos, &made).tie_more_than(&accepted(&found)) {
+    if cameras.are_known() && Matches::of(photos, &made).tie_more_than(&accepted) {
         let part = Part::begin(progress, "finer features", 5..8, 10);
         if let Some(finer) = intake.finer(&part)? {
+            let before = made.iter().map(|attempt| attempt.tried.refused.clone()).collect();
             made.extend(attempts(solvers, (photos, &finer), &cameras, options.seed, &part)?);
             let part = Part::begin(progress, "", 8..9, 10);
             let second = verdict(folder, photos, &cameras, &mut made, &part)?;
-            if found.is_err() || accepted(&second).len() > accepted(&found).len() {
-                found = second;
-            }
-            if let Ok(found) = &found {
-                made[found.attempt].tried.refused = None;
-            }
+            found = taken(found, second, &mut made, before);
         }
     }
     let matches = Matches::of(photos, &made);
     Ok(Found { intake, cameras, attempts: made, matches, verdict: found })
+}
+
+/// Of two verdicts, the second one beside more attempts, that which accepts more photographs; the first one if both
+/// accept as many. `before` is why the first one refused its attempts: if it is taken, they say that again. The others
+/// keep what the second one says.
+fn taken(
+    first: Result<Verdict, Refusal>,
+    second: Result<Verdict, Refusal>,
+    attempts: &mut [Attempt],
+    before: Vec<Option<String>>,
+) -> Result<Verdict, Refusal> {
+    let count = |verdict: &Result<Verdict, Refusal>| verdict.as_ref().map_or(0, |accepted| accepted.photos.len());
+    if first.is_err() || count(&second) > count(&first) {
+        return second;
+    }
+    for (attempt, refused) in attempts.iter_mut().zip(before) {
+        attempt.tried.refused = refused;
+    }
+    first
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::attempt::Tried;
+    use crate::solution::{Features, Solution};
+    use viewfuse_scene::{Scene, SceneFrame};
+
+    fn attempt(refused: &str) -> Attempt {
+        let tried = Tried {
+            solver: "a".to_owned(),
+            features: Features::Sift,
+            side: 100,
+            seed: 0,
+            focal_guess: None,
+            registered: 3,
+            focal: Vec::new(),
+            reprojection_error: 0.0,
+            loss_apart: None,
+            points: 0,
+            support: None,
+            seconds: 0.0,
+            refused: Some(refused.to_owned()),
+        };
+        Attempt { tried, solution: None }
+    }
+
+    /// A verdict that accepts so many photographs; 0 for none.
+    fn accepting(count: usize) -> Result<Verdict, Refusal> {
+        let scene = Scene {
+            path: "bare".into(),
+            layout: "posed",
+            views: Vec::new(),
+            points: Vec::new(),
+            warnings: Vec::new(),
+            conventions: Vec::new(),
+            masks: Default::default(),
+            mask_choice: Default::default(),
+            unused: Vec::new(),
+            frame: SceneFrame::FILE,
+        };
+        let (solution, photos) = (Solution::default(), (0..count).collect());
+        let verdict = Verdict { attempt: 0, scene, solution, photos, verified: Vec::new(), taken_out: Vec::new() };
+        if count > 0 { Ok(verdict) } else { Err(Refusal { reasons: Vec::new() }) }
+    }
+
+    #[test]
+    fn attempts_say_what_the_verdict_says_that_is_taken() {
+        for (first, second, expected) in [(4, 4, "first"), (4, 3, "first"), (4, 0, "first"), (3, 4, "second")] {
+            let mut attempts = ["second"; 3].map(attempt);
+            let before = vec![None, Some("first".to_owned())];
+            let found = taken(accepting(first), accepting(second), &mut attempts, before);
+            assert_eq!(found.expect("a verdict").photos.len(), 4, "{first}, {second}");
+            let reasons = attempts.map(|attempt| attempt.tried.refused);
+            let of_old = if expected == "first" { None } else { Some("second") };
+            assert_eq!(reasons.each_ref().map(Option::as_deref), [of_old, Some(expected), Some("second")]);
+        }
+        let mut attempts = ["second"; 3].map(attempt);
+        assert!(taken(accepting(0), accepting(0), &mut attempts, vec![Some("first".to_owned()); 2]).is_err());
+        assert!(attempts.iter().all(|attempt| attempt.tried.refused.as_deref() == Some("second")));
+    }
 }

@@ -19,6 +19,9 @@ const MAX_PROGRESS: usize = 1 << 18;
 /// Lines that are read ahead.
 const MAX_WAITING: usize = 16;
 
+/// Most bytes of its standard error that are kept.
+const MAX_COMPLAINT: u64 = 1 << 16;
+
 /// Most characters of a stage's name and of a reason.
 const MAX_WORDS: usize = 200;
 
@@ -133,13 +136,15 @@ fn lines_of(said: ChildStdout) -> Receiver<io::Result<String>> {
     lines
 }
 
-/// What stands at the beginning of a process's standard error, once that has ended.
-fn beginning_of(complained: ChildStderr) -> Receiver<String> {
+/// What stands at the beginning of a process's standard error, once that has ended or is longer. All of it is read: a
+/// process ends that writes where nobody reads any more.
+fn beginning_of(mut complained: ChildStderr) -> Receiver<String> {
     let (to_here, text) = channel();
     thread::spawn(move || {
         let mut bytes = Vec::new();
-        let _ = complained.take(1 << 16).read_to_end(&mut bytes);
+        let _ = complained.by_ref().take(MAX_COMPLAINT).read_to_end(&mut bytes);
         let _ = to_here.send(String::from_utf8_lossy(&bytes).into_owned());
+        let _ = io::copy(&mut complained, &mut io::sink());
     });
     text
 }

@@ -34,6 +34,24 @@ impl Watched {
     fn course(&self) -> MutexGuard<'_, Course> {
         self.course.lock().unwrap_or_else(PoisonError::into_inner)
     }
+
+    fn warnings(&self) -> MutexGuard<'_, Vec<String>> {
+        self.warnings.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Makes the warnings Python's, each once.
+    ///
+    /// # Errors
+    /// What a warnings filter raised, after which no others come.
+    fn warn_python(&self, py: Python<'_>) -> PyResult<()> {
+        // Not while the lock is held: what Python calls for a warning may take its time.
+        let warnings = std::mem::take(&mut *self.warnings());
+        for warning in warnings {
+            let warning = CString::new(warning.replace('\0', " "))?;
+            PyErr::warn(py, &py.get_type::<PyUserWarning>(), &warning, 1)?;
+        }
+        Ok(())
+    }
 }
 
 impl Progress for Watched {
@@ -50,7 +68,7 @@ impl Progress for Watched {
     }
 
     fn warn(&self, warning: &str) {
-        let mut warnings = self.warnings.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut warnings = self.warnings();
         if !warnings.iter().any(|known| known == warning) {
             warnings.push(warning.to_owned());
         }
@@ -168,15 +186,15 @@ fn reported<T: Send>(
     if let Some(signal) = signal {
         return Err(signal);
     }
-    let result = outcome.unwrap_or_else(|panic| resume_unwind(panic))?;
+    let outcome = outcome.unwrap_or_else(|panic| resume_unwind(panic));
+    // Also those of work that failed, whose own error goes before one that a filter raised.
+    let warned = watched.warn_python(py);
+    let result = outcome?;
+    warned?;
     if let Some(reporter) = reporter {
         let mut course = watched.course().clone();
         course.share = 1.0;
         reporter.report(py, &course)?;
-    }
-    for warning in watched.warnings.into_inner().unwrap_or_else(PoisonError::into_inner) {
-        let warning = CString::new(warning.replace('\0', " "))?;
-        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &warning, 1)?;
     }
     Ok(result)
 }

@@ -738,6 +738,22 @@ with multiprocessing.get_context("fork").Pool(1) as pool:
             warnings.simplefilter("error")
             scene.render("mean", targets="5", sources="0,10", size=SMALL)
 
+    def test_work_that_fails_warns_too(self):
+        scene, calls = viewfuse.Scene(ROOM), []
+
+        def fails_later(sources, target):
+            calls.append(target)
+            if len(calls) > 1:
+                raise ArithmeticError("later")
+            return np.ones(len(sources))
+
+        for action, expected in [("always", [UserWarning]), ("error", [])]:
+            calls.clear()
+            with warnings.catch_warnings(record=True) as caught, self.assertRaisesRegex(ArithmeticError, "later"):
+                warnings.simplefilter(action)
+                scene.render(fails_later, targets="5", sources="0,10", size=SMALL)
+            self.assertEqual([warning.category for warning in caught], expected)
+
     def test_ctrl_c(self):
         scene = viewfuse.Scene(ROOM)
         threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT)).start()

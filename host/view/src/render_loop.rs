@@ -16,12 +16,13 @@ use crate::record::PictureRecord;
 use crate::request::{COARSE_SIDE, Layer, Request};
 use crate::response::Answer;
 use crate::status::Status;
-use crate::video::{Order, Studio};
+use crate::video::{Film, Studio};
 use crate::{Viewed, Viewer};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::Camera;
+use viewfuse_core::pose::Pose;
 use viewfuse_field::render::{Frame, RenderError, Stage, open_album, working_side};
 use viewfuse_field::{AnyOptions, FieldError, Mixture, Renderer, auto};
 use viewfuse_job::progress::Progress;
@@ -32,6 +33,9 @@ use viewfuse_weighting::Weighting;
 
 /// So long the loop waits for a request before it looks whether it should end.
 const PATIENCE: Duration = Duration::from_millis(50);
+
+/// So long it waits for one before it looks whether a video can take its next frame.
+const LOOK: Duration = Duration::from_millis(5);
 
 /// What the render loop and the server share.
 pub(crate) struct Shared {
@@ -163,8 +167,8 @@ struct RenderLoop<'a> {
     /// Time of the last full picture.
     full_time: Option<Duration>,
     choice: Choice,
-    /// The video that is made, and how many of its frames are there.
-    film: Option<(Order, usize)>,
+    /// The video that is made.
+    film: Option<Film>,
 }
 
 /// Renders until the progress says that it is cancelled.
@@ -242,8 +246,12 @@ impl<'a> RenderLoop<'a> {
     fn serve(&mut self) -> Result<(), RenderError> {
         while !self.outer.is_cancelled() {
             self.shared.status.begin("");
-            let films = self.film.is_some() || self.shared.studio.is_waiting();
-            let Some(job) = self.shared.mailbox.take(if films { Duration::ZERO } else { PATIENCE }) else {
+            let patience = match &self.film {
+                Some(film) if film.is_waiting() => LOOK,
+                None if !self.shared.studio.is_waiting() => PATIENCE,
+                _ => Duration::ZERO,
+            };
+            let Some(job) = self.shared.mailbox.take(patience) else {
                 self.choose()?;
                 self.film()?;
                 continue;
@@ -314,38 +322,42 @@ impl<'a> RenderLoop<'a> {
     /// The next frame of a video, if one is wanted. Makes way for every request; then it is begun again later. A scheme
     /// that is to be chosen for the scene is chosen first, so that all frames have the same.
     fn film(&mut self) -> Result<(), RenderError> {
-        let Some((order, done)) = self.film.take().or_else(|| Some((self.shared.studio.take()?, 0))) else {
+        let Some(mut film) = self.film.take().or_else(|| self.shared.studio.take().map(Film::new)) else {
             return Ok(());
         };
+        if let Some(pose) = film.next_pose() {
+            match self.film_frame(pose, film.weighting()) {
+                Ok(Some(frame)) => film.add(frame.picture),
+                Ok(None) => {}
+                Err(error) if is_interruption(&error) => {}
+                Err(error) => {
+                    film.refuse(refusal(&error));
+                    return if error.is_of_device() { Err(error) } else { Ok(()) };
+                }
+            }
+        }
+        self.film = film.handed_over();
+        Ok(())
+    }
+
+    /// A frame of a video, under the scheme that is chosen for the scene if it has no other; `None` before that is
+    /// chosen, or full pictures are prepared.
+    fn film_frame(&mut self, pose: Pose, weighting: Option<&Weighting>) -> Result<Option<Frame>, RenderError> {
         let watch = Watch { shared: self.shared, outer: self.outer, makes_way: MakesWay::ToAll };
         let chosen = self.choice.weighting().unwrap_or(self.viewer.viewed.weighting);
         let request = Request {
             tab: String::new(),
-            pose: order.poses[done],
-            weighting: order.weighting.as_ref().unwrap_or(chosen).clone(),
+            pose,
+            weighting: weighting.unwrap_or(chosen).clone(),
             layer: Layer::None,
             is_moving: false,
             most_side: COARSE_SIDE,
         };
-        let frame = match (&self.full, &self.choice) {
+        match (&self.full, &self.choice) {
             (None, _) => self.prepare(&watch).map(|()| None),
             (_, Choice::Due) => Ok(None),
             _ => self.full_frame(&request, &watch).map(Some),
-        };
-        match frame {
-            Ok(None) => self.film = Some((order, done)),
-            Err(error) if is_interruption(&error) => self.film = Some((order, done)),
-            Ok(Some(frame)) => {
-                // To nobody, if the client is gone: then the film ends.
-                let is_wanted = order.frames.send(Ok(frame.picture)).is_ok();
-                self.film = Some((order, done + 1)).filter(|(order, done)| is_wanted && *done < order.poses.len());
-            }
-            Err(error) => {
-                order.frames.send(Err(refusal(&error))).ok();
-                return if error.is_of_device() { Err(error) } else { Ok(()) };
-            }
         }
-        Ok(())
     }
 
     /// A picture at once: as fine as time allows. And whether it is a full one.

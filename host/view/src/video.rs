@@ -7,7 +7,7 @@ use crate::status::Status;
 use image::{DynamicImage, RgbImage};
 use serde::Serialize;
 use std::fmt::Display;
-use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::mpsc::{RecvTimeoutError, Sender, SyncSender, TrySendError, channel, sync_channel};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use viewfuse_core::pose::Pose;
@@ -46,11 +46,69 @@ impl Videos {
 
 /// A path whose frames are to be rendered.
 pub(crate) struct Order {
-    pub(crate) poses: Vec<Pose>,
+    poses: Vec<Pose>,
     /// `None` for the one that is chosen for the scene.
-    pub(crate) weighting: Option<Weighting>,
-    /// To the connection that waits: the frames in their order, or why there are none. Closed once nobody waits.
-    pub(crate) frames: SyncSender<Result<RgbImage, Answer>>,
+    weighting: Option<Weighting>,
+    /// To the connection that waits: the frames in their order. Closed once nobody waits.
+    frames: SyncSender<RgbImage>,
+    /// To the same: why there are no more frames.
+    refusal: Sender<Answer>,
+}
+
+/// An order at work.
+pub(crate) struct Film {
+    order: Order,
+    /// Frames that were handed over.
+    count: usize,
+    /// The next frame, until the connection can take it.
+    rendered: Option<RgbImage>,
+}
+
+impl Film {
+    pub(crate) fn new(order: Order) -> Film {
+        Film { order, count: 0, rendered: None }
+    }
+
+    /// The weighting of all frames; `None` for the one that is chosen for the scene.
+    pub(crate) fn weighting(&self) -> Option<&Weighting> {
+        self.order.weighting.as_ref()
+    }
+
+    /// Whether a rendered frame waits until the connection can take it.
+    pub(crate) fn is_waiting(&self) -> bool {
+        self.rendered.is_some()
+    }
+
+    /// The pose of the next frame that is to be rendered; `None` while a rendered one waits.
+    pub(crate) fn next_pose(&self) -> Option<Pose> {
+        let pose = self.order.poses.get(self.count).copied();
+        pose.filter(|_| !self.is_waiting())
+    }
+
+    /// Takes the next frame.
+    pub(crate) fn add(&mut self, frame: RgbImage) {
+        self.rendered = Some(frame);
+    }
+
+    /// Ends it, and tells who waits why.
+    pub(crate) fn refuse(self, refusal: Answer) {
+        // To nobody, if the client is gone.
+        self.order.refusal.send(refusal).ok();
+    }
+
+    /// Hands over the frame that waits, if the connection can take one: while it encodes others, everybody else gets
+    /// pictures. `None` once it has all frames, or nobody waits for it.
+    pub(crate) fn handed_over(mut self) -> Option<Film> {
+        if let Some(frame) = self.rendered.take() {
+            match self.order.frames.try_send(frame) {
+                Ok(()) => self.count += 1,
+                Err(TrySendError::Full(frame)) => self.rendered = Some(frame),
+                Err(TrySendError::Disconnected(_)) => return None,
+            }
+        }
+        let is_whole = self.count >= self.order.poses.len();
+        (!is_whole).then_some(self)
+    }
 }
 
 /// Where orders wait for the render loop.
@@ -130,9 +188,10 @@ impl Turn<'_> {
         let VideoRequest { poses, weighting } = request;
         let of = poses.len();
         let (sender, frames) = sync_channel(1);
+        let (refusal, refused) = channel();
         let mut state = self.studio.state();
         if !state.is_closed {
-            state.order = Some(Order { poses, weighting, frames: sender });
+            state.order = Some(Order { poses, weighting, frames: sender, refusal });
         }
         drop(state);
         let failed = |error: &dyn Display| Some(Answer::error(503, &format!("the video cannot be written: {error}")));
@@ -150,7 +209,7 @@ impl Turn<'_> {
                 return None;
             }
             match frame {
-                Ok(Ok(picture)) => {
+                Ok(picture) => {
                     let size = picture.dimensions().into();
                     let begin = || VideoWriter::begin(&file, format, size, rate, [0; 3]);
                     let mut writer = match video.take().map_or_else(begin, Ok) {
@@ -163,9 +222,9 @@ impl Turn<'_> {
                     video = Some(writer);
                     count += 1;
                 }
-                Ok(Err(answer)) => return Some(answer),
                 Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => return None,
+                // With the reason, if it was refused.
+                Err(RecvTimeoutError::Disconnected) => return refused.try_recv().ok(),
             }
         }
         match video?.finish(&Wanted(is_gone)) {

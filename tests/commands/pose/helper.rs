@@ -55,6 +55,9 @@ fn one_that_says_too_much_is_ended() {
     assert_ended(&format!("exec yes '{line}'"), "openmvg: says its progress without end");
     let reason = "x".repeat(60_000);
     assert_ended(&format!("echo '{reason}' >&2; exit 1"), &format!("(exit status: 1): {}", &reason[..200]));
+    // A long log is read to its end, or what writes it would not get there.
+    let log = "head -c 300000 /dev/zero | tr '\\0' x >&2 && exit 3\nexit 4";
+    assert_ended(log, &format!("(exit status: 3): {}", "x".repeat(200)));
     // A point that was seen a hundred thousand times, which has five thousand million pairs of directions.
     let camera = r#"{"focal":300,"principal":[160,120],"k1":0}"#;
     let photograph = |x: f64| format!(r#"{{"camera_from_world":[[1,0,0,{x}],[0,1,0,0],[0,0,1,0]],"reason":null}}"#);

@@ -27,6 +27,7 @@ viewfuse_tests::trials![
     a_video_has_the_pictures_of_its_path,
     one_video_at_a_time_for_who_waits,
     a_video_is_mp4_where_ffmpeg_is,
+    an_encoder_that_waits_keeps_no_picture_from_anybody,
     ctrl_c_ends_it_and_nothing_is_written,
     a_taken_port_is_an_error,
     learned_fields_are_shown,
@@ -89,7 +90,8 @@ fn filming(programs: &Path) -> Program {
         data("room").display()
     );
     let mut viewer = command(&repository(), &arguments);
-    viewer.env("PATH", programs).env("TMPDIR", programs);
+    // As many frames wait to be encoded as there are threads.
+    viewer.env("PATH", programs).env("TMPDIR", programs).env("RAYON_NUM_THREADS", "2");
     Program::of(viewer)
 }
 
@@ -197,6 +199,35 @@ fn a_video_is_mp4_where_ffmpeg_is() {
         "{said}"
     );
     assert_eq!(names_in(&folder), ["ffmpeg"]);
+}
+
+/// Pictures come while the program that encodes takes no frame, and none of the frames is lost.
+fn an_encoder_that_waits_keeps_no_picture_from_anybody() {
+    const FRAMES: usize = 24;
+    let folder = Folder::new();
+    let waits = "while [ ! -e \"${0%/*}/go\" ] && [ -e \"$0\" ]; do /bin/sleep 0.05; done";
+    let script = format!("[ \"$1\" = -version ] && exit\n{waits}\nfor last; do :; done\nexec /bin/cat > \"$last\"\n");
+    folder.script("ffmpeg", &script);
+    let program = filming(&folder);
+    let start = program.scene()["start"].clone();
+    let mut waiting = program.connect();
+    send_video(&mut waiting, &program, &path(&start, FRAMES));
+    let mut before = 0;
+    // The pipe holds some frames, and fewer than the video has.
+    wait_until("frames are taken without end", || {
+        std::thread::sleep(Duration::from_millis(500));
+        let now = program.get("status").json()["video"][0].as_u64().unwrap_or(0);
+        now > 0 && now == std::mem::replace(&mut before, now)
+    });
+    assert!(before < FRAMES as u64, "no frame waits");
+    for is_moving in [true, false] {
+        program.connect().picture(&request("a", &start, is_moving)).unpacked();
+    }
+    folder.write("go", "");
+    let answer = waiting.receive();
+    assert_eq!(answer.status, 200, "{}", String::from_utf8_lossy(&answer.body));
+    let head = answer.body.iter().position(|byte| *byte == b'\n').expect("a line") + 1;
+    assert_eq!(answer.body.len() - head, FRAMES * ("FRAME\n".len() + 3 * 64 * 48));
 }
 
 /// The ring around the subject, and a picture from its other side.

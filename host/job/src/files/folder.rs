@@ -41,16 +41,52 @@ impl WholeFolder {
     /// Renames it into place; an empty folder is replaced.
     ///
     /// # Errors
-    /// If the system reports an error; then nothing remains.
+    /// If the system reports an error; then nothing of it remains, and an empty folder in its place does.
     pub fn finish(self) -> io::Result<()> {
         let from = self.path();
         let WholeFolder { path, temporary, unfinished } = self;
         unfinished.finish(|| {
-            if path.is_dir() {
-                fs::remove_dir(&path)?;
+            let renamed = fs::rename(&from, &path);
+            if renamed.is_ok() || !path.is_dir() || !from.is_dir() {
+                return renamed;
             }
-            fs::rename(from, &path)
+            // Not every system renames over an empty folder.
+            fs::remove_dir(&path)?;
+            fs::rename(&from, &path).inspect_err(|_| {
+                let _ = fs::create_dir(&path);
+            })
         })?;
         temporary.close()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_empty_folder_is_replaced_or_left_alone() {
+        let scratch = tempfile::tempdir().expect("a folder");
+        let names = |folder: &Path| -> Vec<String> {
+            let entries = fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").file_name());
+            entries.map(|name| name.to_string_lossy().into_owned()).collect()
+        };
+        let path = scratch.path().join("out");
+        fs::create_dir(&path).expect("a folder");
+        // A rename that fails: somebody has removed what is to be renamed.
+        let folder = WholeFolder::create(&path).expect("a folder");
+        fs::remove_dir(folder.path()).expect("an empty folder");
+        assert!(folder.finish().is_err());
+        assert_eq!(names(scratch.path()), ["out"]);
+        assert_eq!(names(&path), [""; 0]);
+        let folder = WholeFolder::create(&path).expect("a folder");
+        fs::write(folder.path().join("a.txt"), "a").expect("a file");
+        folder.finish().expect("a rename");
+        assert_eq!(names(&path), ["a.txt"]);
+        // What is in a folder stays.
+        let folder = WholeFolder::create(&path).expect("a folder");
+        assert!(folder.finish().is_err());
+        assert_eq!(names(scratch.path()), ["out"]);
+        assert_eq!(names(&path), ["a.txt"]);
     }
 }
