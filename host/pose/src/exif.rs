@@ -6,6 +6,8 @@
 //! focal plane   FocalLength in millimetres by FocalPlaneXResolution, for a photograph that still has its size
 //! 35 mm         FocalLengthIn35mmFilm by the diagonal: 43.27 mm for the picture's diagonal in pixels (CIPA DCG-001)
 //! ```
+//!
+//! With a digital zoom (DigitalZoomRatio) none counts: some cameras state the lens's focal length all the same.
 
 use exif::{In, Reader, Tag, Value};
 use std::fs::File;
@@ -22,6 +24,9 @@ const PLAUSIBLE: std::ops::RangeInclusive<f64> = 0.15..=20.0;
 /// resolution is that of another size of the picture.
 const MAX_DIFFERENCE: f64 = 0.1;
 
+/// A zoom below this is rounding.
+const MIN_DIGITAL_ZOOM: f64 = 1.02;
+
 /// What a photograph states of its camera.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Exif {
@@ -33,6 +38,8 @@ pub struct Exif {
     pub millimetres: Option<f64>,
     /// Width and height that it had when it was taken, or when a program last wrote them.
     pub size: Option<[f64; 2]>,
+    /// How many times a digital zoom enlarged it, above 1.
+    pub digital_zoom: Option<f64>,
 }
 
 impl Exif {
@@ -52,11 +59,14 @@ impl Exif {
             unit: if number(Tag::FocalPlaneResolutionUnit) == Some(3.0) { 10.0 } else { 25.4 },
             resolution: number(Tag::FocalPlaneXResolution).filter(|_| has_its_size),
         };
+        let digital_zoom = number(Tag::DigitalZoomRatio).filter(|ratio| *ratio > MIN_DIGITAL_ZOOM);
+        let focal = focal(&plane, number(Tag::FocalLengthIn35mmFilm), size);
         Exif {
-            focal: focal(&plane, number(Tag::FocalLengthIn35mmFilm), size),
+            focal: focal.filter(|_| digital_zoom.is_none()),
             camera: (!names.is_empty()).then(|| names.join(" ")),
             millimetres,
             size: stored[0].zip(stored[1]).map(|(width, height)| [width, height]),
+            digital_zoom,
         }
     }
 }

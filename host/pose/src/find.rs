@@ -95,9 +95,23 @@ pub fn find(
     let part = Part::begin(progress, "", 1..4, 10);
     let mut made = attempts(solvers, (photos, photos), &cameras, options.seed, &part)?;
     let mut after = 4;
+    let solved =
+        made.iter().filter_map(|attempt| Some((attempt.solution.as_ref()?.apart.as_ref(), &attempt.tried.focal[..])));
+    if cameras.groups.iter().any(|group| group.focal.is_some())
+        && cameras.are_contradicted(&cameras.guesses(photos, 1.0), &solved.collect::<Vec<_>>())
+    {
+        progress.warn(
+            "the focal lengths that were given, or that the photographs state (EXIF), are not what they show, as with \
+             a digital zoom or after a crop: they do not count",
+        );
+        cameras = Cameras::of_unknown(photos);
+        let part = Part::begin(progress, "focal lengths", 4..6, 10);
+        made = attempts(solvers, (photos, photos), &cameras, options.seed, &part)?;
+        after = 6;
+    }
     let apart = made.iter().filter_map(|attempt| attempt.solution.as_ref()?.apart.as_ref());
     if let Some(by_zoom) = cameras.by_zoom(apart) {
-        let part = Part::begin(progress, "several focal lengths", 4..8, 10);
+        let part = Part::begin(progress, "several focal lengths", after..8, 10);
         made = attempts(solvers, (photos, photos), &by_zoom, options.seed, &part)?;
         (cameras, after) = (by_zoom, 8);
     }

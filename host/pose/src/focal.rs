@@ -54,18 +54,28 @@ impl Cameras {
     /// Photographs of one size are of one camera; with focal lengths by EXIF, of one size, camera and zoom. `given` is
     /// a focal length in pixels of photographs as large as the first: of others it is scaled with the longest side.
     pub fn of(photos: &[Photo], given: Option<f64>) -> Cameras {
-        let longest = |size: [u32; 2]| f64::from(size[0].max(size[1]));
+        Cameras::by(photos, |photo| match (given, photo.exif.focal) {
+            (Some(given), _) => {
+                let focal = given * longest(photo.size) / longest(photos[0].size);
+                (Some(focal), FocalSource::Given, String::new())
+            }
+            (None, Some(focal)) => (Some(focal), FocalSource::Exif, camera_of(&photo.exif, focal)),
+            (None, None) => unknown(photo),
+        })
+    }
+
+    /// The cameras where what is known of focal lengths does not count: photographs of one size, and of one digital
+    /// zoom, are of one camera.
+    pub(crate) fn of_unknown(photos: &[Photo]) -> Cameras {
+        Cameras::by(photos, unknown)
+    }
+
+    /// `about` has a photograph's focal length, where it comes from, and what tells its camera from others.
+    fn by(photos: &[Photo], about: impl Fn(&Photo) -> (Option<f64>, FocalSource, String)) -> Cameras {
         let mut groups: Vec<(String, CameraGroup)> = Vec::new();
         let mut of_photo = Vec::with_capacity(photos.len());
         for (index, photo) in photos.iter().enumerate() {
-            let (focal, source, key) = match (given, photo.exif.focal) {
-                (Some(given), _) => {
-                    let focal = given * longest(photo.size) / longest(photos[0].size);
-                    (Some(focal), FocalSource::Given, String::new())
-                }
-                (None, Some(focal)) => (Some(focal), FocalSource::Exif, camera_of(&photo.exif, focal)),
-                (None, None) => (None, FocalSource::Unknown, "unknown".to_owned()),
-            };
+            let (focal, source, key) = about(photo);
             let key = format!("{:?} {key}", photo.size);
             let place = groups.iter().position(|(known, _)| *known == key).unwrap_or(groups.len());
             if place == groups.len() {
@@ -96,6 +106,25 @@ impl Cameras {
         Some(Cameras { groups, of_photo })
     }
 
+    /// Whether what is known of focal lengths is not what photographs show, as with a digital zoom or after a crop: with
+    /// a focal length for each the loss is far less, and those lie a zoom apart, as shares of what is known; or all
+    /// solutions have another one. `guesses` are those of the jobs; of each solution what the photographs say with a focal
+    /// length each, and the cameras' focal lengths in pixels of the photographs.
+    pub(crate) fn are_contradicted(&self, guesses: &[CameraGuess], solved: &[(Option<&SolvedApart>, &[f64])]) -> bool {
+        let is_apart = |apart: &SolvedApart| {
+            let share = |(photo, focal): (usize, &Option<f64>)| {
+                let guess = guesses[self.of_photo[photo]];
+                focal.filter(|_| !guess.is_guess).map(|focal| focal / guess.focal)
+            };
+            let mut shares: Vec<f64> = apart.focal.iter().enumerate().filter_map(share).collect();
+            shares.sort_by(f64::total_cmp);
+            apart.loss < MAX_SHARED_LOSS && shares.windows(2).any(|two| two[1] >= MIN_ZOOM * two[0])
+        };
+        let is_changed = |focal: &[f64]| self.changed_focal(focal).is_some();
+        solved.iter().filter_map(|(apart, _)| *apart).any(is_apart)
+            || !solved.is_empty() && solved.iter().all(|(_, focal)| is_changed(focal))
+    }
+
     /// Of the focal lengths that were found the first that is another one than is known: it, and the known one.
     pub fn changed_focal(&self, found: &[f64]) -> Option<[f64; 2]> {
         let mut known = found.iter().zip(&self.groups).filter_map(|(found, group)| Some([*found, group.focal?]));
@@ -112,9 +141,8 @@ impl Cameras {
         let guessed = |group: &CameraGroup| {
             let working = group.photos.first().map_or([1, 1], |photo| photos[*photo].working_size);
             let scale = f64::from(working[0]) / f64::from(group.size[0]);
-            let longest = f64::from(group.size[0].max(group.size[1]));
             CameraGuess {
-                focal: scale * group.focal.unwrap_or(guess * group.zoom * longest),
+                focal: scale * group.focal.unwrap_or(guess * group.zoom * longest(group.size)),
                 is_guess: group.focal.is_none(),
             }
         };
@@ -149,6 +177,15 @@ fn zooms(group: &CameraGroup, focal: &[Option<f64>]) -> Vec<CameraGroup> {
     parts.into_iter().zip(zooms).map(of_part).collect()
 }
 
+fn longest(size: [u32; 2]) -> f64 {
+    f64::from(size[0].max(size[1]))
+}
+
+fn unknown(photo: &Photo) -> (Option<f64>, FocalSource, String) {
+    let zoom = photo.exif.digital_zoom.map_or_else(String::new, |zoom| format!("{zoom:.2}"));
+    (None, FocalSource::Unknown, format!("unknown {zoom}"))
+}
+
 /// The camera that photographs state, with a focal length in pixels: a digital zoom changes this, but not the lens.
 fn camera_of(Exif { camera, millimetres, .. }: &Exif, focal: f64) -> String {
     format!("{camera:?} {millimetres:?} {focal:.0}")
@@ -160,8 +197,12 @@ mod tests {
 
     #[test]
     fn a_digital_zoom_is_another_camera() {
-        let phone =
-            |focal| Exif { focal: Some(focal), camera: Some("phone".to_owned()), millimetres: Some(6.8), size: None };
+        let phone = |focal| Exif {
+            focal: Some(focal),
+            camera: Some("phone".to_owned()),
+            millimetres: Some(6.8),
+            ..Exif::default()
+        };
         let camera = |focal| camera_of(&phone(focal), focal);
         assert_eq!(camera(427.0), camera(427.2));
         assert_ne!(camera(427.0), camera(480.0));
@@ -191,6 +232,36 @@ mod tests {
         assert_eq!(cameras.by_zoom([apart(0.6, [871.0, 880.0, 903.0, 960.0])].iter()), None, "no zoom lies between");
         let stated = Cameras { groups: vec![group(FocalSource::Exif, &[0, 1, 2, 3, 4])], ..cameras };
         assert_eq!(stated.by_zoom(found.iter()), None);
+    }
+
+    #[test]
+    fn what_is_stated_is_contradicted_by_several_focal_lengths() {
+        let group = CameraGroup {
+            focal: Some(1000.0),
+            source: FocalSource::Exif,
+            size: [4, 3],
+            photos: vec![0, 1, 2, 3],
+            zoom: 1.0,
+        };
+        let cameras = Cameras { groups: vec![group.clone()], of_photo: vec![0; 4] };
+        let apart = |loss, focal: [f64; 4]| SolvedApart { loss, focal: focal.map(Some).to_vec() };
+        let guesses = |cameras: &Cameras| {
+            let is_guess = !cameras.are_known();
+            [CameraGuess { focal: 1000.0, is_guess }]
+        };
+        let is_contradicted = |cameras: &Cameras, apart: &SolvedApart, focal: f64| {
+            cameras.are_contradicted(&guesses(cameras), &[(Some(apart), &[focal])])
+        };
+        let zoomed = [1009.0, 1434.0, 1022.0, 1404.0];
+        assert!(is_contradicted(&cameras, &apart(0.55, zoomed), 1000.0));
+        assert!(!is_contradicted(&cameras, &apart(0.9, zoomed), 1000.0), "the loss is nearly the same");
+        assert!(!is_contradicted(&cameras, &apart(0.55, [1009.0, 1022.0, 1100.0, 1150.0]), 1000.0), "no zoom apart");
+        assert!(is_contradicted(&cameras, &apart(0.99, [1300.0; 4]), 1300.0), "another focal length was found");
+        let one_of_two: [(Option<&SolvedApart>, &[f64]); 2] = [(None, &[1300.0]), (None, &[1010.0])];
+        assert!(!cameras.are_contradicted(&guesses(&cameras), &one_of_two), "one has the known one");
+        assert!(!cameras.are_contradicted(&guesses(&cameras), &[]));
+        let unknown = Cameras { groups: vec![CameraGroup { focal: None, ..group }], ..cameras };
+        assert!(!is_contradicted(&unknown, &apart(0.55, zoomed), 1000.0));
     }
 
     #[test]

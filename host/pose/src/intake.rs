@@ -12,7 +12,7 @@ use image::imageops;
 use image::metadata::Orientation;
 use image::{DynamicImage, RgbImage};
 use rayon::prelude::*;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use viewfuse_job::files::Scratch;
@@ -111,9 +111,9 @@ pub enum IntakeError {
     /// A photograph whose name the layouts of scenes do not hold, and why.
     #[error("{0}: {1}; rename it")]
     Name(PathBuf, String),
-    /// In a folder, two files of one name.
-    #[error("{0}: two photographs have the name {1}; rename one")]
-    Names(PathBuf, String),
+    /// In a folder, two files of one name, and which.
+    #[error("{0}: two photographs have the name {1}: {2}; rename one")]
+    Names(PathBuf, String, String),
     /// The operating system reported an error for a file or folder.
     #[error("{0}: {1}")]
     Io(PathBuf, std::io::Error),
@@ -307,7 +307,7 @@ fn files(folder: &Path, every: usize) -> Result<Listed, IntakeError> {
         let (count, step) = (files.len(), every.max(1) * files.len().div_ceil(MAX_PHOTOGRAPHS));
         return Err(IntakeError::Many(folder.to_path_buf(), count, step));
     }
-    let mut names = HashSet::new();
+    let mut names: HashMap<String, &Path> = HashMap::new();
     for path in &files {
         let name = name_in(&root, path);
         // Those of every layout that a scene is written in.
@@ -317,8 +317,9 @@ fn files(folder: &Path, every: usize) -> Result<Listed, IntakeError> {
         if name.contains(['\n', '\r']) {
             return Err(IntakeError::Name(path.clone(), format!("the name {name:?} has a line break in it")));
         }
-        if !names.insert(name.clone()) {
-            return Err(IntakeError::Names(folder.to_path_buf(), name));
+        if let Some(other) = names.insert(name.clone(), path) {
+            let [one, other] = [path, other].map(|path| path.strip_prefix(&root).unwrap_or(path).display());
+            return Err(IntakeError::Names(folder.to_path_buf(), name, format!("{other} and {one}")));
         }
     }
     Ok(Listed { root, files, passed_over })
@@ -458,7 +459,8 @@ mod tests {
         assert_eq!(names(scratch.path()), expected(&[("left_1", "left/1.png"), ("right_1", "right/1.png")]));
         // Two places of one name.
         put_all(scratch.path(), &["images/a_b/c.png", "images/a/b_c.png"]);
-        assert!(matches!(Intake::read(scratch.path(), 1, &Silent), Err(IntakeError::Names { .. })));
+        let error = Intake::read(scratch.path(), 1, &Silent).err().expect("two of a name").to_string();
+        assert!(error.ends_with("two photographs have the name a_b_c: a/b_c.png and a_b/c.png; rename one"), "{error}");
     }
 
     #[test]

@@ -66,6 +66,14 @@ impl Matches {
         partners
     }
 
+    /// Whether two photographs have as many matches as tie them.
+    pub(crate) fn are_tied(&self, a: usize, b: usize) -> bool {
+        let is_it = |(one, other, count): &(usize, usize, usize)| {
+            (*one, *other) == (a.min(b), a.max(b)) && *count >= Matches::MIN_TIE
+        };
+        self.pairs.iter().any(is_it)
+    }
+
     /// Whether a photograph that is not one of these is tied to another one.
     pub(crate) fn tie_more_than(&self, photos: &[usize]) -> bool {
         let is_more = |photo: &usize| !photos.contains(photo);
@@ -102,7 +110,10 @@ impl Matches {
         let groups = self.groups();
         let steps = "neighbouring views not more than 15 degrees apart and the camera moved, not only turned";
         if self.pairs.is_empty() {
-            return format!("no two photographs match: photograph with textured surfaces in view, {steps}");
+            return format!(
+                "no two photographs match by surfaces at several depths: they have too little in common, or show one \
+                 flat surface, or the camera only turned; photograph with textured surfaces in view, {steps}"
+            );
         }
         if let [_] = groups[..] {
             return format!("all photographs are tied by matches: photograph more of them, {steps}");

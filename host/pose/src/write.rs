@@ -90,7 +90,10 @@ impl Found {
             }
             let taken_out =
                 verdict.taken_out.iter().find(|(photo, _)| *photo == index).map(|(_, reason)| reason.clone());
-            let matched = || format!("matches too little of the other photographs ({})", self.matches.told(index));
+            let is_tied = verdict.photos.iter().any(|accepted| self.matches.are_tied(index, *accepted));
+            let what = if is_tied { "too little of" } else { "none of" };
+            let matched =
+                || format!("matches {what} the accepted photographs enough for a pose ({})", self.matches.told(index));
             let reason = taken_out.unwrap_or_else(matched);
             all.push((photo.file.clone(), reason));
         }

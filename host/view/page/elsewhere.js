@@ -1,10 +1,10 @@
 // What is taken elsewhere: the picture with its record, the view as a pose, and the command line that renders it.
 
-import { said, saveFile, saveJson, transforms } from './files.js';
+import { nameOf, said, saveFile, saveJson, transforms } from './files.js';
 import { matrixOf } from './poses.js';
 import { element, state } from './state.js';
 
-const FILE = 'view.json';
+const fileOf = (pose) => nameOf('view', '.json', matrixOf(pose));
 
 // A command line that renders a target. Words for a shell come from the program; a scheme of the menu has none that needs
 // quotes. `isFirst`: with the scheme that the command line began with, or with what was chosen for the scene.
@@ -17,7 +17,7 @@ export function commandOf(target, isFirst = state.scheme === state.first) {
 function command(isFirst) {
   const matrix = JSON.stringify(matrixOf(state.pose));
   const own = state.scene.others.find((other) => JSON.stringify(matrixOf(other.pose)) === matrix);
-  return commandOf(own ? `--targets ${own.word}` : `--camera-path ${FILE}`, isFirst);
+  return commandOf(own ? `--targets ${own.word}` : `--camera-path ${fileOf(state.pose)}`, isFirst);
 }
 
 export function tellCommand() {
@@ -25,8 +25,8 @@ export function tellCommand() {
 }
 
 export function savePose() {
-  saveJson(FILE, transforms([['view', state.pose]]));
-  said(`Saved as ${FILE}.`);
+  saveJson(fileOf(state.pose), transforms([['view', state.pose]]));
+  said(`Saved as ${fileOf(state.pose)}.`);
 }
 
 let isPictureWanted = false;
@@ -42,17 +42,20 @@ export function saveWantedPicture() {
   const own = state.shown;
   if (!isPictureWanted || !own || !own.full || own.pose !== state.pose || own.scheme !== state.scheme) return;
   isPictureWanted = false;
-  saveFile('view.png', own.file, 'image/png');
+  const [picture, record] = [['view', '.png'], ['run', '.json']]
+    .map(([stem, end]) => nameOf(stem, end, [matrixOf(own.pose), own.scheme]));
+  saveFile(picture, own.file, 'image/png');
   // A picture of before the choice has its scheme, perhaps, but not what was chosen along with it.
   const isFirst = state.scene.chooses ? own.record.chosen !== null : undefined;
-  saveJson('run.json', { command: command(isFirst), ...own.record });
-  said('Saved as view.png, with its record run.json.');
+  saveJson(record, { command: command(isFirst), ...own.record });
+  said(`Saved as ${picture}, with its record ${record}.`);
 }
 
 export async function copy() {
   try {
     await navigator.clipboard.writeText(command());
-    said(command().includes(FILE) ? `Copied. It reads ${FILE}: save the view as well.` : 'Copied.');
+    const file = fileOf(state.pose);
+    said(command().includes(file) ? `Copied. It reads ${file}: save the view as well.` : 'Copied.');
   } catch {
     getSelection().selectAllChildren(element('command'));
     said('The browser does not allow copying: the line is selected.');

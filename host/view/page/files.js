@@ -7,6 +7,14 @@ export function said(text) {
   element('said').textContent = text;
 }
 
+// A name by what is saved: a second file of one name would get another from the browser, and a command that names it would
+// read the first.
+export function nameOf(stem, end, content) {
+  let mark = 0x811c9dc5;
+  for (const letter of JSON.stringify(content)) mark = Math.imul(mark ^ letter.codePointAt(0), 0x01000193);
+  return `${stem}-${(mark >>> 0).toString(16).padStart(8, '0')}${end}`;
+}
+
 export function saveFile(name, content, type) {
   const link = document.createElement('a');
   link.href = URL.createObjectURL(new Blob([content], { type }));

@@ -1,12 +1,11 @@
 // The keyframes of a camera path: added, removed, played, saved.
 
 import { commandOf } from './elsewhere.js';
-import { said, saveJson, transforms } from './files.js';
+import { nameOf, said, saveJson, transforms } from './files.js';
 import { RATE, poseAt, posesOf } from './path.js';
 import { element, state } from './state.js';
 import { clamp } from './vectors.js';
 
-const FILE = 'path.json';
 const MAX_FRAMES = 2000;
 
 let playing = 0;             // the animation frame that is due; 0 while nothing is played
@@ -45,8 +44,11 @@ export function tellPath() {
   element('duration').textContent = `${(frames() / RATE).toFixed(1)} s`;
   const isShown = state.keyframes.length > 1 && state.scene.commands.render !== '';
   element('path-command').hidden = !isShown;
-  if (isShown) element('path-command').textContent = `${commandOf(`--camera-path ${FILE}`)} --video webp`;
+  if (isShown) element('path-command').textContent = `${commandOf(`--camera-path ${fileOfPath()}`)} --video webp`;
 }
+
+// By what decides its frames.
+const fileOfPath = () => nameOf('path', '.json', [state.keyframes, frames()]);
 
 // Ends what is played.
 export function stop() {
@@ -74,8 +76,8 @@ function play(go) {
 function save() {
   const width = String(frames()).length;
   const named = posesOf(state.keyframes, frames()).map((pose, i) => [`view_${String(i).padStart(width, '0')}`, pose]);
-  saveJson(FILE, transforms(named, { fps: RATE }));
-  said(`Saved as ${FILE}: ${named.length} frames.`);
+  saveJson(fileOfPath(), transforms(named, { fps: RATE }));
+  said(`Saved as ${fileOfPath()}: ${named.length} frames.`);
 }
 
 export function listenToKeyframes(go) {

@@ -303,8 +303,13 @@ fn a_view_is_taken_elsewhere() {
     }
     let folder = Folder::new();
     click(&tab, "save");
-    let saved = files.join("view.json");
-    wait_until("nothing is saved", || saved.exists() && names_in(&files).len() == 1);
+    let named = |stem: &str, end: &str| {
+        let is_it = |name: &String| name.starts_with(stem) && name.ends_with(end);
+        names_in(&files).into_iter().filter(is_it).collect::<Vec<String>>()
+    };
+    wait_until("nothing is saved", || named("view-", ".json").len() == 1 && names_in(&files).len() == 1);
+    let name = named("view-", ".json").remove(0);
+    let saved = files.join(&name);
     // With a photograph beside it, it is a scene of one view.
     fs::copy(&saved, folder.file("transforms.json")).expect("a copy");
     RgbImage::new(96, 72).save(folder.file("view.png")).expect("a picture");
@@ -319,10 +324,11 @@ fn a_view_is_taken_elsewhere() {
     tab.wait_for("document.getElementById('said').textContent.startsWith('Copied')");
     let line = tab.text("navigator.clipboard.readText()");
     assert_eq!(line, text_in(&tab, "command"));
-    let start = "viewfuse render tests/data/room --camera-path view.json --sources 003,004,005,006,007 --size 96x72";
-    assert!(line.starts_with(start) && line.ends_with(" --weights error:alpha=1 -o out"), "{line}");
+    let start =
+        format!("viewfuse render tests/data/room --camera-path {name} --sources 003,004,005,006,007 --size 96x72");
+    assert!(line.starts_with(&start) && line.ends_with(" --weights error:alpha=1 -o out"), "{line}");
     // The line renders what is shown.
-    fs::copy(&saved, folder.file("view.json")).expect("a copy");
+    fs::copy(&saved, folder.file(&name)).expect("a copy");
     done_by_line(&folder, &line);
     let rendered = image::open(folder.join("out/view.png")).expect("a picture").to_rgb8();
     let (_, picture) =
@@ -330,10 +336,10 @@ fn a_view_is_taken_elsewhere() {
     assert!(rendered == picture, "the command line renders another picture");
     // The picture is saved with the values that the run recorded.
     click(&tab, "save-picture");
-    wait_until("no picture is saved", || names_in(&files).len() == 3 && files.join("run.json").exists());
-    let of_page = image::open(files.join("view.png")).expect("a picture").to_rgb8();
+    wait_until("no picture is saved", || names_in(&files).len() == 3 && named("run-", ".json").len() == 1);
+    let of_page = image::open(files.join(named("view-", ".png").concat())).expect("a picture").to_rgb8();
     assert!(of_page == rendered, "another picture is saved");
-    let (saved, run) = (read_json(files.join("run.json")), read_json(folder.join("out/run.json")));
+    let (saved, run) = (read_json(files.join(named("run-", ".json").concat())), read_json(folder.join("out/run.json")));
     for key in ["viewfuse", "device", "field", "weighting", "chosen", "size", "background", "sources", "depth_units"] {
         assert_eq!(saved[key], run[key], "{key}");
     }
@@ -405,11 +411,14 @@ fn a_path_goes_through_keyframes() {
     }
     fs::remove_file(film).expect("a file");
     click(&tab, "save-path");
-    let saved = files.join("path.json");
-    wait_until("no path is saved", || saved.exists() && names_in(&files).len() == 1);
+    let is_saved = |name: &String| name.starts_with("path-") && name.ends_with(".json");
+    wait_until("no path is saved", || matches!(&names_in(&files)[..], [name] if is_saved(name)));
+    let name = names_in(&files).concat();
+    let saved = files.join(&name);
     let folder = Folder::new();
-    fs::copy(&saved, folder.file("path.json")).expect("a copy");
+    fs::copy(&saved, folder.file(&name)).expect("a copy");
     let line = text_in(&tab, "path-command");
+    assert!(line.contains(&format!("--camera-path {name}")), "{line}");
     done_by_line(&folder, &line);
     let written = names_in(&folder.join("out"));
     for name in ["view_0.png", "view_1.png", "view_2.png", "video.webp"] {
@@ -452,9 +461,12 @@ fn the_scheme_becomes_that_of_render() {
         click(&tab, "save-picture");
         // The browser makes an empty file first.
         let is_whole = |text: Vec<u8>| serde_json::from_slice::<Value>(&text).is_ok();
-        wait_until("nothing is saved", || fs::read(files.join("run.json")).is_ok_and(is_whole));
-        let command = read_json(files.join("run.json"))["command"].to_string();
-        fs::remove_file(files.join("run.json")).expect("a record");
+        let record = || names_in(&files).into_iter().find(|name| name.starts_with("run-") && name.ends_with(".json"));
+        let record = || record().map(|name| files.join(name));
+        wait_until("nothing is saved", || record().is_some_and(|path| fs::read(path).is_ok_and(is_whole)));
+        let saved = record().expect("a record");
+        let command = read_json(&saved)["command"].to_string();
+        fs::remove_file(saved).expect("a record");
         command
     };
     assert!(command().contains("--weights auto"));

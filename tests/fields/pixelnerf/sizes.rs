@@ -76,7 +76,8 @@ fn what_official_checkpoints_have_besides_is_accepted() {
         let frequencies = (0..12).map(|index| 1.5 * 2.0_f32.powi(index / 2)).collect();
         let shape = TensorShape { name: "code._freqs".to_owned(), shape: vec![1, 12, 1] };
         tensors.push((shape, frequencies));
-        tensors.push(tensor("code._phases", &[1, 12, 1]));
+        let phases = (0..12).map(|index| std::f32::consts::FRAC_PI_2 * (index % 2) as f32).collect();
+        tensors.push((TensorShape { name: "code._phases".to_owned(), shape: vec![1, 12, 1] }, phases));
     });
     assert!(PixelNerf::new(&checkpoint, exact()).is_ok());
 }

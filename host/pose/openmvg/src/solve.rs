@@ -53,11 +53,10 @@ pub(crate) fn solve(job: &PoseJob) -> Result<Solution> {
     })
 }
 
-/// Of given focal lengths nothing is asked.
 fn apart(job: &PoseJob, found: &Reconstruction) -> Option<Apart> {
     let sizes: Vec<_> = job.photographs.iter().map(|photograph| photograph.size).collect();
     let cameras: Vec<_> = job.photographs.iter().map(|photograph| photograph.camera).collect();
-    job.cameras.iter().any(|camera| camera.is_guess).then(|| Apart::of(found, &sizes, &cameras))?
+    Apart::of(found, &sizes, &cameras)
 }
 
 /// What is known without a pose: which photographs match.
