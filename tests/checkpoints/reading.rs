@@ -79,7 +79,9 @@ fn every_place_of_the_state_dict() {
         let (_folder, path) = file(&archive(&root, &pair()));
         Checkpoint::open(&path).map(|file| file.origin().to_owned()).map_err(|error| error.to_string())
     };
-    assert_eq!(both("best").expect("a file"), "PyTorch, zip; under 'model'");
+    for other in ["best", "schema"] {
+        assert_eq!(both(other).expect("a file"), "PyTorch, zip; under 'model'");
+    }
     for other in ["net", "ema", "model_ema"] {
         let error = both(other).expect_err(other);
         assert!(error.contains("holds tensors under 'model' and others under") || other == "net", "{error}");

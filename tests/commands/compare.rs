@@ -202,7 +202,7 @@ fn what_cannot_be_compared() {
         assert_wrong_arguments(&folder, &format!("compare {one} {arguments}"), parts);
     };
     wrong("--lpips alexnet.pth", &["alex=alexnet.pth"]);
-    wrong("--lpips resnet=a.pth", &["alex, vgg and squeeze", "'resnet'"]);
+    wrong("--lpips resnet=a.pth", &["'resnet' is not a network of LPIPS: alex, vgg or squeeze"]);
     wrong("--dists vgg16.pth,heads=", &["vgg16.pth,heads=weights.pt"]);
-    wrong("--metrics-as genvs", &["plain, pixelnerf and viewattention"]);
+    wrong("--metrics-as genvs", &["'genvs' is not a convention of scores: plain, pixelnerf or viewattention"]);
 }

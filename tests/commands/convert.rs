@@ -1,6 +1,7 @@
 //! `viewfuse convert`: what it prints, and what it refuses.
 
-use super::{assert_refused, assert_wrong_arguments, done, run};
+use super::{assert_refused, assert_wrong_arguments, done, list_of, read_json, run};
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 use viewfuse::field::pixelnerf::test_networks::deterministic_of_width as formula_of_width;
@@ -115,7 +116,12 @@ fn an_unknown_max_pool_is_told() {
             stderr.matches("viewfuse: warning: a.safetensors: what its tensors do not tell is assumed").count();
         assert_eq!((code, is_told), (Some(0), 1), "{arguments}\n{stderr}");
     }
-    let printed = words(&folder, "convert a.safetensors b.safetensors --set viewfuse.first_pool=0");
+    // As the run was told, its record says.
+    let record = read_json(folder.join("a.safetensors.out/run.json"));
+    let told = list_of(&record["warnings"]).iter().filter_map(Value::as_str);
+    assert_eq!(told.filter(|warning| warning.contains("do not tell is assumed")).count(), 1, "{record}");
+    let rest = "--set viewfuse.source_side=128 --set viewfuse.pixel_centre=0";
+    let printed = words(&folder, &format!("convert a.safetensors b.safetensors --set viewfuse.first_pool=0 {rest}"));
     assert!(printed.contains("kept viewfuse.first_pool = 0"), "{printed}");
     for arguments in loading("b.safetensors") {
         let Outcome { code, stderr, .. } = run(&folder, &arguments);

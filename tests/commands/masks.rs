@@ -100,7 +100,7 @@ fn what_is_unclear_is_asked() {
     let printed = done(folder.path(), "inspect room");
     assert!(printed.contains("read as    masks: unclear whether"), "{printed}");
     let wrong = "render room --targets 5 -o out --masks person";
-    assert_wrong_arguments(folder.path(), wrong, &["unknown meaning of masks 'person'", "auto, object, ignore"]);
+    assert_wrong_arguments(folder.path(), wrong, &["'person' is not a meaning of masks: auto, object, ignore or none"]);
 }
 
 /// A failed segmentation: a mask that is black takes part in no score, which would be perfect.

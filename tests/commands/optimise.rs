@@ -67,15 +67,15 @@ fn held_out_views_are_scored_on_the_way() {
     let count = gaussians(&folder.join("a.ply")).gaussians.len();
     assert!(text.contains(&format!("a.ply: {count} Gaussians after 340 of 340 iterations\n")), "{text}");
     // The last score is that of `render` with the file, from the same sources.
-    // Its pictures need no sources.
-    done(&folder, "render toy --gaussians a.ply --targets all --size 16x16 --device cpu -o all");
-    assert!(folder.join("all/run.json").is_file() && folder.join("all/000020.png").is_file());
     let rendered = done(&folder, "render toy --gaussians a.ply --targets 20,21 --size 48x48 --device cpu -o out");
     let psnr = |line: &str| line.split("PSNR ").nth(1)?.split(" dB").next()?.parse::<f64>().ok();
     let again: Vec<f64> = rendered.lines().filter_map(psnr).collect();
     assert!(again.len() == 2 && (again.iter().sum::<f64>() / 2.0 - scores[8].1).abs() < 0.02, "{rendered}\n{text}");
     assert!(rendered.contains("\n2 views of the file's Gaussians on cpu"), "{rendered}");
     assert!(rendered.contains("\nthe file does not say which photographs it was made from: "), "{rendered}");
+    // Its pictures need no sources.
+    done(&folder, "render toy --gaussians a.ply --targets all --size 16x16 --device cpu -o all");
+    assert!(folder.join("all/run.json").is_file() && folder.join("all/000020.png").is_file());
     // The same seed, any number of threads.
     done(&folder, &format!("{OPTIMISE} --left-out 20,21 --threads 1 -o b.ply"));
     let read = |name: &str| fs::read(folder.join(name)).expect("a file");
@@ -339,9 +339,10 @@ fn few_photographs_and_a_short_time_have_fewer_iterations() {
     assert!(short.contains(" is used\n"), "a trial or none is told: {short}");
     let wrong = format!("{OPTIMISE} --max-time 10m -o a.ply");
     assert_wrong_arguments(&folder, &wrong, &["--max-time is for --quality standard and high"]);
-    for (options, words) in
-        [("--quality best", "best is no quality"), ("--quality high --max-time soon", "soon is no time")]
-    {
+    for (options, words) in [
+        ("--quality best", "'best' is not a quality: fast, standard or high"),
+        ("--quality high --max-time soon", "soon is no time"),
+    ] {
         assert_wrong_arguments(&folder, &format!("{OPTIMISE} {options} -o a.ply"), &[words]);
     }
 }

@@ -158,7 +158,8 @@ fn ctrl_c_leaves_what_was_there() {
     use viewfuse_tests::patience::{end, send};
     let folder = toy();
     fs::create_dir(folder.join("out")).expect("a folder");
-    fs::write(folder.join("out/pareto.csv"), "older").expect("an older result");
+    const OLDER: &[u8] = b"device,setting,best,older";
+    fs::write(folder.join("out/pareto.csv"), OLDER).expect("an older result");
     let arguments = NETWORK.replace("--repeat 2", "--repeat 1000");
     let mut run = command(&folder, &format!("{arguments} -o out"));
     let run = run.env("VIEWFUSE_PROGRESS", "0").stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -172,5 +173,5 @@ fn ctrl_c_leaves_what_was_there() {
     let said = rest.join().expect("what it said");
     assert_eq!(said.as_deref(), Some("viewfuse: interrupted; nothing half-written is left behind"));
     assert_eq!(names_in(&folder.join("out")), ["pareto.csv"]);
-    assert_eq!(fs::read(folder.join("out/pareto.csv")).expect("a file"), b"older");
+    assert_eq!(fs::read(folder.join("out/pareto.csv")).expect("a file"), OLDER);
 }

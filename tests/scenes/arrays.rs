@@ -239,10 +239,10 @@ fn depths_are_one_a_pixel() {
     for format in DepthFormat::ALL {
         let path = folder.join("depth");
         for count in [0, 15, 100] {
-            let error = write_depth(&path, *format, &vec![1.0; count], [4, 4]).expect_err("not 16").to_string();
+            let error = write_depth(&path, format, &vec![1.0; count], [4, 4]).expect_err("not 16").to_string();
             assert!(error.contains(&format!("{count} depths for 4x4 pixels")) && !path.exists(), "{error}");
         }
-        write_depth(&path, *format, &[1.0; 16], [4, 4]).expect("one a pixel");
+        write_depth(&path, format, &[1.0; 16], [4, 4]).expect("one a pixel");
         std::fs::remove_file(&path).expect("it was written");
     }
 }

@@ -61,6 +61,27 @@ fn an_orbit_is_the_arc_from_photograph_to_photograph() {
     assert!(full.is_full() && full.width == TAU);
 }
 
+/// Cameras that look at a point, which all have in sight, and cameras that do not.
+#[test]
+fn a_point_that_cameras_look_at_is_no_chance() {
+    let circle = cameras(&[0.0, 90.0, 180.0, 270.0]);
+    let focus = Rig::meeting_point(&circle).expect("the middle");
+    assert!(focus.distance(Rig::of(&circle).focus) < 1.0e-5);
+    assert!(Rig::meeting_point(&circle[..1]).is_none(), "one");
+    let turned = |to: fn(Vec3) -> Vec3| -> Vec<Camera> {
+        let look = |camera: &Camera| {
+            let centre = camera.pose.centre_world();
+            Camera { pose: Pose::look_at(centre, to(centre), Vec3::Z).expect("a pose"), ..*camera }
+        };
+        circle.iter().map(look).collect()
+    };
+    assert!(Rig::meeting_point(&turned(|centre| 2.0 * centre)).is_none(), "outwards");
+    assert!(Rig::meeting_point(&turned(|centre| centre - Vec3::Y)).is_none(), "all alike");
+    // Axes that pass one another by as much as lies between the cameras.
+    let beside = turned(|centre| 2.0 * centre.cross(Vec3::Z).normalize() + 0.2 * centre);
+    assert!(Rig::meeting_point(&beside).is_none(), "beside one another");
+}
+
 /// Cameras that were turned on their sides, or over, do not tilt what the others call up.
 #[test]
 fn a_few_rolled_cameras_tilt_nothing() {

@@ -95,14 +95,3 @@ fn what_is_no_data_set_is_told_with_what_was_looked_for() {
         assert!(message.contains(&format!("{path}_train")) && message.contains("*_train inside"), "{message}");
     }
 }
-
-#[test]
-fn names_of_splits_are_read_as_they_are_written() {
-    for split in [Split::Train, Split::Validation, Split::Test] {
-        assert_eq!(split.to_string().parse(), Ok(split));
-    }
-    assert_eq!(
-        "all".parse::<Split>().expect_err("none").to_string(),
-        "'all' is not a split of a data set: train, val or test"
-    );
-}

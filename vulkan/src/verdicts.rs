@@ -19,9 +19,10 @@ impl Verdicts {
         self.has_new |= self.forms.insert((kernel, form), is_trusted) != Some(is_trusted);
     }
 
-    /// Without those of [`Form::FUSED`], which most devices have no use for.
+    /// Without those of [`Form::FUSED`], which most devices have no use for, and without what only measures.
     pub(crate) fn distrusted(&self) -> Vec<(Kernel, Form)> {
-        let distrusted = self.forms.iter().filter(|((_, form), is_trusted)| !form.may_fuse() && !**is_trusted);
+        let is_used = |(kernel, form): &(Kernel, Form)| !form.may_fuse() && *kernel != Kernel::RepeatProduct;
+        let distrusted = self.forms.iter().filter(|(form, is_trusted)| is_used(form) && !**is_trusted);
         distrusted.map(|(form, _)| *form).collect()
     }
 

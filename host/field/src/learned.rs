@@ -56,7 +56,7 @@ impl Distance {
     /// That from the point where the sources' principal axes meet, or from the world's origin for a single one. Where
     /// the photographs of the scene look at another point, or the sources alone at none, it is that from the former:
     /// two neighbouring sources say little of how far away what they look at is. Where the photographs look at none, it
-    /// is that from the origin if it is in the sources' pictures.
+    /// is the middle of the depths that the scene's files state, or that from the origin if it is in the sources' pictures.
     pub(super) fn of(sources: &SourceImages) -> Distance {
         let cameras = cameras_of(sources);
         let from = |point: Vec3| {
@@ -65,13 +65,16 @@ impl Distance {
         };
         let own = distance_of(&cameras);
         let is_own = cameras.len() < 2 || Rig::meeting_point(&cameras).is_some();
+        let stated = sources.near_far.map(|[near, far]| 0.5 * (near + far)).filter(|middle| middle.is_normal());
         let sees_origin = || cameras.iter().all(|camera| camera.block(0).project(Vec3::ZERO).in_image);
         match sources.focus.map(from) {
             Some(all) if !is_own || (own / all - 1.0).abs() > SAME_DISTANCE => {
                 Distance { length: all, is_guess: false }
             }
             Some(_) => Distance { length: own, is_guess: false },
-            None if is_own => Distance { length: own, is_guess: cameras.len() < 2 && !sees_origin() },
+            None if is_own && cameras.len() > 1 => Distance { length: own, is_guess: false },
+            None if stated.is_some() => Distance { length: stated.unwrap_or(own), is_guess: false },
+            None if is_own => Distance { length: own, is_guess: !sees_origin() },
             None if sees_origin() => Distance { length: from(Vec3::ZERO), is_guess: true },
             None => Distance { length: own, is_guess: true },
         }
@@ -91,9 +94,8 @@ impl Distance {
         let [near, far] = usual_near_far(self.length);
         if self.is_guess {
             progress.warn(&format!(
-                "the cameras look at no common point, so that their distance from what they show, {:.3} units, and with \
-                 it the near and far bounds of rays, {near:.3} and {far:.3}, are guesses: give the bounds",
-                self.length
+                "the photographs look at no common point, so that nothing says how far away is what they show: the near \
+                 and far bounds of rays, {near:.3} and {far:.3}, are guesses; give the bounds"
             ));
         }
     }
@@ -127,8 +129,8 @@ pub(super) fn warn_of_place(distance: Distance, sources: &SourceImages, progress
 /// Says that a network measures in another unit than the world's, if it does; or that it measures in the world's, where
 /// its cameras may have been nearer or farther while it learned.
 pub(super) fn warn_of_unit(unit: RigUnit, distance: Distance, progress: &dyn Progress) {
-    let distance = distance.length;
-    if unit.is_world() && (distance / SRN_DISTANCE - 1.0).abs() > SAME_DISTANCE {
+    let Distance { length: distance, is_guess } = distance;
+    if unit.is_world() && !is_guess && (distance / SRN_DISTANCE - 1.0).abs() > SAME_DISTANCE {
         progress.warn(&format!(
             "the cameras are {distance:.2} units from what they look at, and the network takes lengths as they are: a \
              network that learned from cameras at another distance ({SRN_DISTANCE} in SRN's cars) draws something \

@@ -219,11 +219,11 @@ impl<'a> SceneOptimisation<'a> {
         let mut scores = Vec::new();
         let is_timed = is_sharp && recipe.grows;
         let timed = is_timed.then_some(&mut clock);
-        self.advance(optimisation.as_mut(), photographed, progress, timed, &mut keep, &mut scores)?;
+        self.advance(&mut optimisation, photographed, progress, timed, &mut keep, &mut scores)?;
         if more > 0 && !progress.is_cancelled() {
             optimisation.extend(more);
             optimisation.weigh(&self.weights()?);
-            self.advance(optimisation.as_mut(), photographed, progress, None, &mut keep, &mut scores)?;
+            self.advance(&mut optimisation, photographed, progress, None, &mut keep, &mut scores)?;
         }
         let gaussians = optimisation.optimised().map_err(RenderError::from)?.scene();
         let sources = &self.sources[..self.sources.len().min(FIT_SOURCES)];
@@ -246,7 +246,7 @@ impl<'a> SceneOptimisation<'a> {
         images: &SourceImages,
         points: &[CloudPoint],
         recipe: Recipe,
-    ) -> Result<Box<dyn Optimisation + 'd>, OptimiseError> {
+    ) -> Result<Optimisation<'d>, OptimiseError> {
         let begun = match device {
             AnyDevice::Cpu(device) => optimisation(device, images, points, recipe),
             AnyDevice::Vulkan(device) => optimisation(device.as_ref(), images, points, recipe),
@@ -259,7 +259,7 @@ impl<'a> SceneOptimisation<'a> {
     /// told that they will take, and they are as many as fit.
     fn advance(
         &self,
-        optimisation: &mut dyn Optimisation,
+        optimisation: &mut Optimisation<'_>,
         photographed: &Photographed<'_>,
         progress: &dyn Progress,
         mut clock: Option<&mut Clock>,

@@ -5,6 +5,7 @@
 //!
 //! ```text
 //! text       text of files, in messages                    in_line
+//! named      the values of an enum by their names          named!, UnknownName
 //! shell      words as a shell takes them                  quoted
 //! hint       what helps on from an error, as a code       Hint, Hinted
 //! progress   progress reports and cancellation                Progress, Silent, Interrupted
@@ -20,6 +21,7 @@ pub mod digest;
 pub mod files;
 pub mod hint;
 pub mod medians;
+pub mod named;
 pub mod panics;
 pub mod process;
 pub mod progress;

@@ -7,9 +7,7 @@
 use crate::png::write_png;
 use crate::record::depth_step;
 use image::{DynamicImage, ImageBuffer, Luma};
-use std::fmt;
 use std::path::Path;
-use std::str::FromStr;
 use viewfuse_job::files::{WriteError, write_whole};
 use viewfuse_scene::numpy::npy;
 
@@ -25,40 +23,13 @@ pub enum DepthFormat {
     Npy,
 }
 
-impl DepthFormat {
-    /// All of them that this build writes.
-    pub const ALL: &[DepthFormat] = &[
-        DepthFormat::Png,
+viewfuse_job::named! {
+    // The extensions of their files.
+    pub DepthFormat: "a format of depth maps" {
+        Png => "png",
         #[cfg(feature = "exr")]
-        DepthFormat::Exr,
-        DepthFormat::Npy,
-    ];
-}
-
-impl fmt::Display for DepthFormat {
-    /// The extension of its files.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            DepthFormat::Png => "png",
-            #[cfg(feature = "exr")]
-            DepthFormat::Exr => "exr",
-            DepthFormat::Npy => "npy",
-        })
-    }
-}
-
-/// The name is not that of a format of depth maps.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{0}' is not a format of depth maps: {all}",
-    all = DepthFormat::ALL.iter().map(|one| one.to_string()).collect::<Vec<_>>().join(", "))]
-pub struct UnknownDepthFormat(String);
-
-impl FromStr for DepthFormat {
-    type Err = UnknownDepthFormat;
-
-    fn from_str(name: &str) -> Result<DepthFormat, UnknownDepthFormat> {
-        let found = DepthFormat::ALL.iter().find(|format| format.to_string() == name);
-        found.copied().ok_or_else(|| UnknownDepthFormat(name.to_owned()))
+        Exr => "exr",
+        Npy => "npy",
     }
 }
 

@@ -23,7 +23,7 @@ const BEGINNING: &[u8] = b"{\"run\":\"";
 /// The names of a target's files, whether they are there or not.
 pub(crate) fn files_of(target: &str) -> Vec<String> {
     let pictures = SUFFIXES.iter().map(|suffix| format!("{target}{suffix}.png"));
-    let depths = DepthFormat::ALL.iter().map(|format| format!("{target}_depth.{format}"));
+    let depths = DepthFormat::ALL.map(|format| format!("{target}_depth.{format}"));
     pictures.chain(depths).collect()
 }
 

@@ -249,9 +249,9 @@ impl RunWriter {
             let (shown, space) = (Arc::clone(frame), self.space);
             let depth: Writing = Box::new(move |path| {
                 let depths: Vec<f32> = shown.depths.iter().map(|depth| space.file_length(*depth)).collect();
-                write_depth(path, *format, &depths, size)
+                write_depth(path, format, &depths, size)
             });
-            let is_written = !frame.depths.is_empty() && self.outputs.depths.contains(format);
+            let is_written = !frame.depths.is_empty() && self.outputs.depths.contains(&format);
             add(format!("{target}_depth.{format}"), is_written.then_some(depth))?;
         }
         let shown = Arc::clone(frame);
@@ -336,7 +336,7 @@ impl RunWriter {
             background: background_record(options, self.background),
             leave_out: options.leave_out,
             early_termination: options.early_termination,
-            warnings: self.given.into_iter().chain(self.warnings).chain(record.notes).collect(),
+            warnings: once_each(self.given.into_iter().chain(self.warnings).chain(record.notes)),
             conventions: self.conventions,
             sources: self.source_names,
             memory_estimate: record.memory_estimate,
@@ -406,4 +406,14 @@ pub fn confidence_map(frame: &Frame) -> Option<ImageBuffer<Luma<u8>, Vec<u8>>> {
     let (width, height) = frame.picture.dimensions();
     let confidence = |x: u32, y: u32| Luma([(frame.confidences[(y * width + x) as usize] * 255.0).round() as u8]);
     Some(ImageBuffer::from_fn(width, height, confidence))
+}
+
+/// Texts without those that another one before them ends with: what is told of a scene has its path in front.
+fn once_each(texts: impl Iterator<Item = String>) -> Vec<String> {
+    texts.fold(Vec::new(), |mut kept, text| {
+        if !kept.iter().any(|known: &String| known.ends_with(&text)) {
+            kept.push(text);
+        }
+        kept
+    })
 }

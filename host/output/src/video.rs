@@ -9,11 +9,9 @@ use crate::webp::{self, Animation, EncodedFrame};
 use crate::y4m::Y4m;
 use image::{DynamicImage, Rgb, RgbImage};
 use std::error::Error;
-use std::fmt;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::str::FromStr;
 use viewfuse_device::queue::{Queue, width};
 use viewfuse_job::files::{WholeFile, WriteError, write_whole};
 use viewfuse_job::progress::{Interrupted, Progress};
@@ -32,42 +30,22 @@ pub enum VideoFormat {
     Mp4,
 }
 
-impl VideoFormat {
-    /// All of them.
-    pub const ALL: &[VideoFormat] = &[VideoFormat::Webp, VideoFormat::Gif, VideoFormat::Y4m, VideoFormat::Mp4];
+viewfuse_job::named! {
+    // The extensions of their files.
+    pub VideoFormat: "a format of moving pictures" {
+        Webp => "webp",
+        Gif => "gif",
+        Y4m => "y4m",
+        Mp4 => "mp4",
+    }
+}
 
+impl VideoFormat {
     /// Whether this machine can write it: MP4 needs an `ffmpeg` on the path.
     pub fn is_possible(self) -> bool {
         let starts =
             || Command::new(FFMPEG).arg("-version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok();
         self != VideoFormat::Mp4 || starts()
-    }
-}
-
-impl fmt::Display for VideoFormat {
-    /// The extension of its files.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            VideoFormat::Webp => "webp",
-            VideoFormat::Gif => "gif",
-            VideoFormat::Y4m => "y4m",
-            VideoFormat::Mp4 => "mp4",
-        })
-    }
-}
-
-/// The name is not that of a format of moving pictures.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{0}' is not a format of moving pictures: {all}",
-    all = VideoFormat::ALL.iter().map(|one| one.to_string()).collect::<Vec<_>>().join(", "))]
-pub struct UnknownVideoFormat(String);
-
-impl FromStr for VideoFormat {
-    type Err = UnknownVideoFormat;
-
-    fn from_str(name: &str) -> Result<VideoFormat, UnknownVideoFormat> {
-        let found = VideoFormat::ALL.iter().find(|format| format.to_string() == name);
-        found.copied().ok_or_else(|| UnknownVideoFormat(name.to_owned()))
     }
 }
 

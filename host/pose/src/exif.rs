@@ -126,6 +126,35 @@ mod tests {
         }
     }
 
+    /// EXIF of short numbers, as a TIFF file.
+    fn tiff(tags: &[(u16, u16)]) -> Vec<u8> {
+        let mut bytes = b"MM\0*\0\0\0\x08\0\x01\x87\x69\0\x04\0\0\0\x01\0\0\0\x1a\0\0\0\0".to_vec();
+        bytes.extend((tags.len() as u16).to_be_bytes());
+        for (tag, value) in tags {
+            bytes.extend(tag.to_be_bytes());
+            bytes.extend([0, 3, 0, 0, 0, 1]);
+            bytes.extend(value.to_be_bytes());
+            bytes.extend([0, 0]);
+        }
+        bytes.extend([0; 4]);
+        bytes
+    }
+
+    #[test]
+    fn with_a_digital_zoom_no_focal_length_is_known() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (film, zoom) = ((0xa405, 27), 0xa404);
+        let read = |tags: &[(u16, u16)]| {
+            let path = folder.path().join("photograph.tif");
+            std::fs::write(&path, tiff(tags)).expect("a file");
+            let Exif { focal, digital_zoom, .. } = Exif::read(&path, [400, 300]);
+            (focal.map(f64::round), digital_zoom)
+        };
+        assert_eq!(read(&[film]), (Some(312.0), None));
+        assert_eq!(read(&[(zoom, 1), film]), (Some(312.0), None), "no zoom");
+        assert_eq!(read(&[(zoom, 2), film]), (None, Some(2.0)));
+    }
+
     #[test]
     fn the_focal_plane_counts_where_it_agrees() {
         let plane = |resolution| Plane { millimetres: Some(50.0), unit: 25.4, resolution };

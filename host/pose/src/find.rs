@@ -35,6 +35,8 @@ pub struct Found {
     pub intake: Intake,
     /// Their cameras before the work.
     pub cameras: Cameras,
+    /// Whether focal lengths were known, and do not count because the photographs showed others.
+    pub is_contradicted: bool,
     /// The attempts.
     pub attempts: Vec<Attempt>,
     /// Which photographs match which.
@@ -97,9 +99,9 @@ pub fn find(
     let mut after = 4;
     let solved =
         made.iter().filter_map(|attempt| Some((attempt.solution.as_ref()?.apart.as_ref(), &attempt.tried.focal[..])));
-    if cameras.groups.iter().any(|group| group.focal.is_some())
-        && cameras.are_contradicted(&cameras.guesses(photos, 1.0), &solved.collect::<Vec<_>>())
-    {
+    let is_contradicted = cameras.groups.iter().any(|group| group.focal.is_some())
+        && cameras.are_contradicted(&cameras.guesses(photos, 1.0), &solved.collect::<Vec<_>>());
+    if is_contradicted {
         progress.warn(
             "the focal lengths that were given, or that the photographs state (EXIF), are not what they show, as with \
              a digital zoom or after a crop: they do not count",
@@ -130,7 +132,7 @@ pub fn find(
         }
     }
     let matches = Matches::of(photos, &made);
-    Ok(Found { intake, cameras, attempts: made, matches, verdict: found })
+    Ok(Found { intake, cameras, is_contradicted, attempts: made, matches, verdict: found })
 }
 
 /// Of two verdicts, the second one beside more attempts, that which accepts more photographs; the first one if both

@@ -37,7 +37,7 @@ pub struct CameraGroup {
     pub size: [u32; 2],
     /// The photographs, as indices.
     pub photos: Vec<usize>,
-    /// Of an unknown focal length, how many times as long as the shortest one of photographs of this size.
+    /// Of an unknown focal length, how many times as long as the shortest one that is unknown.
     pub zoom: f64,
 }
 
@@ -64,10 +64,14 @@ impl Cameras {
         })
     }
 
-    /// The cameras where what is known of focal lengths does not count: photographs of one size, and of one digital
-    /// zoom, are of one camera.
+    /// The cameras where what is known of focal lengths does not count: photographs of one size are of one camera, but
+    /// of those that EXIF tells apart.
     pub(crate) fn of_unknown(photos: &[Photo]) -> Cameras {
-        Cameras::by(photos, unknown)
+        Cameras::by(photos, |photo| {
+            let (focal, source, key) = unknown(photo);
+            let Exif { camera, millimetres, .. } = &photo.exif;
+            (focal, source, format!("{key} {camera:?} {millimetres:?}"))
+        })
     }
 
     /// `about` has a photograph's focal length, where it comes from, and what tells its camera from others.
@@ -79,12 +83,18 @@ impl Cameras {
             let key = format!("{:?} {key}", photo.size);
             let place = groups.iter().position(|(known, _)| *known == key).unwrap_or(groups.len());
             if place == groups.len() {
-                groups.push((key, CameraGroup { focal, source, size: photo.size, photos: Vec::new(), zoom: 1.0 }));
+                let zoom = photo.exif.digital_zoom.filter(|_| focal.is_none()).unwrap_or(1.0);
+                groups.push((key, CameraGroup { focal, source, size: photo.size, photos: Vec::new(), zoom }));
             }
             groups[place].1.photos.push(index);
             of_photo.push(place);
         }
-        Cameras { groups: groups.into_iter().map(|(_, group)| group).collect(), of_photo }
+        let mut groups: Vec<CameraGroup> = groups.into_iter().map(|(_, group)| group).collect();
+        let unknown = groups.iter().filter(|group| group.focal.is_none()).map(|group| group.zoom);
+        if let Some(shortest) = unknown.reduce(f64::min) {
+            groups.iter_mut().filter(|group| group.focal.is_none()).for_each(|group| group.zoom /= shortest);
+        }
+        Cameras { groups, of_photo }
     }
 
     /// The cameras where photographs of one size, whose focal length is unknown, were taken with several: one for each.
@@ -107,8 +117,8 @@ impl Cameras {
     }
 
     /// Whether what is known of focal lengths is not what photographs show, as with a digital zoom or after a crop: with
-    /// a focal length for each the loss is far less, and those lie a zoom apart, as shares of what is known; or all
-    /// solutions have another one. `guesses` are those of the jobs; of each solution what the photographs say with a focal
+    /// a focal length for each the loss is far less, and two or more of them lie a zoom apart from two or more others, as
+    /// shares of what is known (a single one is that of a wrong pose, perhaps); or all solutions have another one. `guesses` are those of the jobs; of each solution what the photographs say with a focal
     /// length each, and the cameras' focal lengths in pixels of the photographs.
     pub(crate) fn are_contradicted(&self, guesses: &[CameraGuess], solved: &[(Option<&SolvedApart>, &[f64])]) -> bool {
         let is_apart = |apart: &SolvedApart| {
@@ -118,7 +128,8 @@ impl Cameras {
             };
             let mut shares: Vec<f64> = apart.focal.iter().enumerate().filter_map(share).collect();
             shares.sort_by(f64::total_cmp);
-            apart.loss < MAX_SHARED_LOSS && shares.windows(2).any(|two| two[1] >= MIN_ZOOM * two[0])
+            let is_gap = |at: usize| shares[at] >= MIN_ZOOM * shares[at - 1];
+            apart.loss < MAX_SHARED_LOSS && (2..shares.len().saturating_sub(1)).any(is_gap)
         };
         let is_changed = |focal: &[f64]| self.changed_focal(focal).is_some();
         solved.iter().filter_map(|(apart, _)| *apart).any(is_apart)
@@ -172,7 +183,7 @@ fn zooms(group: &CameraGroup, focal: &[Option<f64>]) -> Vec<CameraGroup> {
     let of_part = |(part, zoom): (Vec<(f64, usize)>, f64)| {
         let mut photos: Vec<usize> = part.into_iter().map(|(_, photo)| photo).collect();
         photos.sort_unstable();
-        CameraGroup { photos, zoom, ..group.clone() }
+        CameraGroup { photos, zoom: zoom * group.zoom, ..group.clone() }
     };
     parts.into_iter().zip(zooms).map(of_part).collect()
 }
@@ -182,7 +193,8 @@ fn longest(size: [u32; 2]) -> f64 {
 }
 
 fn unknown(photo: &Photo) -> (Option<f64>, FocalSource, String) {
-    let zoom = photo.exif.digital_zoom.map_or_else(String::new, |zoom| format!("{zoom:.2}"));
+    // Zooms of a few per cent more are the same.
+    let zoom = photo.exif.digital_zoom.map_or(0.0, |zoom| (zoom.ln() / MIN_ZOOM.ln()).round());
     (None, FocalSource::Unknown, format!("unknown {zoom}"))
 }
 
@@ -255,6 +267,7 @@ mod tests {
         let zoomed = [1009.0, 1434.0, 1022.0, 1404.0];
         assert!(is_contradicted(&cameras, &apart(0.55, zoomed), 1000.0));
         assert!(!is_contradicted(&cameras, &apart(0.9, zoomed), 1000.0), "the loss is nearly the same");
+        assert!(!is_contradicted(&cameras, &apart(0.6, [1000.0, 1010.0, 1005.0, 3000.0]), 1000.0), "one of them");
         assert!(!is_contradicted(&cameras, &apart(0.55, [1009.0, 1022.0, 1100.0, 1150.0]), 1000.0), "no zoom apart");
         assert!(is_contradicted(&cameras, &apart(0.99, [1300.0; 4]), 1300.0), "another focal length was found");
         let one_of_two: [(Option<&SolvedApart>, &[f64]); 2] = [(None, &[1300.0]), (None, &[1010.0])];

@@ -11,6 +11,7 @@ use viewfuse::field::optimise::OptimiseError;
 use viewfuse::field::options::OpenError;
 use viewfuse::field::render::RenderError;
 use viewfuse::job::files::WriteError;
+use viewfuse::job::named::UnknownName;
 use viewfuse::job::progress::Interrupted;
 use viewfuse::nn::checkpoint::CheckpointError;
 use viewfuse::pose::{PoseError, SolverError};
@@ -117,7 +118,8 @@ macro_rules! failures {
 }
 
 failures! {
-    Input: SceneError, SelectionError, WeightingError, AttentionError, UnknownDevice, CheckpointError, OpenError;
+    Input: SceneError, SelectionError, WeightingError, AttentionError, UnknownDevice, UnknownName, CheckpointError,
+        OpenError;
     Other: VulkanError;
     File: WriteError;
 }

@@ -72,7 +72,7 @@ impl Optimisation {
         };
         let count = given("count", self.count, MAX_COUNT)?;
         let iterations = given("iterations", self.iterations, MAX_ITERATIONS)?;
-        let quality = self.quality.parse::<Quality>().map_err(Failure::Input)?;
+        let quality = self.quality.parse::<Quality>()?;
         let is_of_one_colour = !holds_harmonics(output);
         let of_scene =
             SceneOptimisation::new(scene, &self.selection, self.left_out.as_deref(), self.towards.as_deref())?;

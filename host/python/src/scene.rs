@@ -16,7 +16,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
 use viewfuse::scene::few_shot::view_list;
-use viewfuse::scene::{MaskChoice, Scene, UnknownMasks};
+use viewfuse::scene::{MaskChoice, Scene};
 
 /// A scene: posed photographs, of which the poses and the headers of the photographs have been read and checked.
 ///
@@ -34,7 +34,7 @@ impl PyScene {
     #[new]
     #[pyo3(signature = (path, masks = "auto"))]
     pub(crate) fn open(py: Python<'_>, path: PathBuf, masks: &str) -> PyResult<PyScene> {
-        let masks: MaskChoice = masks.parse().map_err(|error: UnknownMasks| Failure::Input(error.to_string()))?;
+        let masks = masks.parse::<MaskChoice>().map_err(Failure::from)?;
         let scene = interruptible(py, |_| Ok(Scene::open_masked(path, masks)?))?;
         Ok(PyScene { scene })
     }

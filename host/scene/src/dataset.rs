@@ -18,7 +18,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-pub use crate::scene::{Split, UnknownSplit};
+pub use crate::scene::Split;
 
 /// The scenes of one split.
 #[derive(Clone, Debug, PartialEq, Eq)]

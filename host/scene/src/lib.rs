@@ -42,8 +42,8 @@ pub mod write;
 
 pub use scene::{
     FaultLocation, FileFault, FilePlace, ImageFault, IntrinsicsFault, MAX_SIDE, MaskChoice, MaskMeaning, NumpyFault,
-    Photograph, PlyFault, READERS, Scene, SceneError, SceneFault, SceneFrame, ScenePoint, Split, UnknownMasks, View,
-    encode_png, looked_for, picture_size, read_picture, reader, reads_below,
+    Photograph, PlyFault, READERS, Scene, SceneError, SceneFault, SceneFrame, ScenePoint, Split, View, encode_png,
+    looked_for, picture_size, read_picture, reader, reads_below,
 };
 
 /// The examples of the README, compiled and run.

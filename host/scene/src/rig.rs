@@ -52,14 +52,21 @@ impl Rig {
 
     /// The point that the cameras look at: in the sense of least squares where their principal axes meet, which is in
     /// front of all of them and in their pictures, or beyond these by no more than half their sides. `None` for a single
-    /// camera, and for axes that are nearly parallel or part from one another: nothing says then how far away it is.
+    /// camera, and for axes that are nearly parallel, part from one another, or miss one another by much of what lies
+    /// between the cameras: nothing says then how far away it is.
     pub fn meeting_point(cameras: &[Camera]) -> Option<Vec3> {
         let axes = || cameras.iter().map(|camera| camera.pose.forward_world());
         let angle = |a: Vec3| axes().map(|b| a.dot(b).clamp(-1.0, 1.0).acos()).fold(0.0, f32::max);
         if axes().map(angle).fold(0.0, f32::max) < MIN_MEETING_ANGLE {
             return None;
         }
-        let focus = Rig::of(cameras).focus;
+        let Rig { focus, axis_miss, .. } = Rig::of(cameras);
+        let count = cameras.len() as f32;
+        let centroid = cameras.iter().map(|camera| camera.pose.centre_world()).sum::<Vec3>() / count;
+        let squares = cameras.iter().map(|camera| camera.pose.centre_world().distance_squared(centroid));
+        if axis_miss > MAX_MISS * (squares.sum::<f32>() / count).sqrt() {
+            return None;
+        }
         let is_seen = |camera: &Camera| {
             let to = focus - camera.pose.centre_world();
             let depth = to.dot(camera.pose.forward_world());
@@ -98,6 +105,10 @@ impl Rig {
 /// Greatest angle between two principal axes, radians, below which they are taken for parallel: poses that were found
 /// from photographs are off by some tenths of a degree.
 const MIN_MEETING_ANGLE: f32 = 0.03;
+
+/// Most that axes may miss the point where they meet, as a share of how far their cameras spread: beyond that it is a
+/// crossing by chance.
+const MAX_MISS: f32 = 0.3;
 
 /// Angle between neighbouring views, seen from what they look at, beyond which depths are no longer found in whole
 /// photographs.

@@ -51,9 +51,9 @@ use images::Turn;
 pub use images::{encode_png, picture_size, read_picture};
 pub use inputs::reads_below;
 use masks::meaning::Decision;
-pub use masks::meaning::{MaskChoice, MaskMeaning, UnknownMasks};
+pub use masks::meaning::{MaskChoice, MaskMeaning};
 use reader::Reader;
-pub use split::{Split, UnknownSplit};
+pub use split::Split;
 
 /// The readers of all layouts, in the order in which they are tried: the first that recognises a path reads it.
 pub const READERS: [&dyn Reader; 6] =

@@ -20,10 +20,8 @@ mod readback;
 mod srn;
 mod transforms;
 
-use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 use viewfuse_job::files::WholeFolder;
 use viewfuse_job::progress::{Interrupted, Progress};
@@ -51,56 +49,30 @@ pub enum Layout {
     Neus,
 }
 
-impl Layout {
-    /// All of them.
-    pub const ALL: [Layout; 7] = [
-        Layout::Transforms,
-        Layout::Colmap,
-        Layout::ColmapBinary,
-        Layout::Srn,
-        Layout::Middlebury,
-        Layout::Llff,
-        Layout::Neus,
-    ];
+viewfuse_job::named! {
+    pub Layout: "a layout that is written" {
+        Transforms => "transforms",
+        Colmap => "colmap",
+        ColmapBinary => "colmap-binary",
+        Srn => "srn",
+        Middlebury => "middlebury",
+        Llff => "llff",
+        Neus => "neus",
+    }
+}
 
+impl Layout {
     /// The name of the reader that reads it ([`Scene::layout`]).
     pub const fn reader(self) -> &'static str {
         match self {
-            Layout::Transforms => "transforms",
-            Layout::Colmap | Layout::ColmapBinary => "colmap",
-            Layout::Srn => "srn",
-            Layout::Middlebury => "middlebury",
-            Layout::Llff => "llff",
-            Layout::Neus => "neus",
+            Layout::ColmapBinary => Layout::Colmap.name(),
+            text => text.name(),
         }
     }
 
     /// Whether it keeps reconstructed points and the photographs' lenses.
     const fn is_colmap(self) -> bool {
         matches!(self, Layout::Colmap | Layout::ColmapBinary)
-    }
-}
-
-impl fmt::Display for Layout {
-    /// The name of the layout's reader; `colmap-binary` for the binary form of `colmap`.
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(match self {
-            Layout::ColmapBinary => "colmap-binary",
-            text => text.reader(),
-        })
-    }
-}
-
-/// The name is not that of a layout that can be written.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{0}' is not a layout that is written: transforms, colmap, colmap-binary, srn, middlebury, llff or neus")]
-pub struct UnknownLayout(String);
-
-impl FromStr for Layout {
-    type Err = UnknownLayout;
-
-    fn from_str(name: &str) -> Result<Layout, UnknownLayout> {
-        Layout::ALL.into_iter().find(|layout| layout.to_string() == name).ok_or_else(|| UnknownLayout(name.to_owned()))
     }
 }
 

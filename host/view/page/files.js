@@ -7,11 +7,12 @@ export function said(text) {
   element('said').textContent = text;
 }
 
-// A name by what is saved: a second file of one name would get another from the browser, and a command that names it would
-// read the first.
+// A name by what is saved of this scene: a second file of one name would get another from the browser, and a command that
+// names it would read the first.
 export function nameOf(stem, end, content) {
+  const { origin, scale, lens, commands } = state.scene;
   let mark = 0x811c9dc5;
-  for (const letter of JSON.stringify(content)) mark = Math.imul(mark ^ letter.codePointAt(0), 0x01000193);
+  for (const letter of JSON.stringify([content, origin, scale, lens, commands])) mark = Math.imul(mark ^ letter.codePointAt(0), 0x01000193);
   return `${stem}-${(mark >>> 0).toString(16).padStart(8, '0')}${end}`;
 }
 

@@ -2,6 +2,7 @@
 
 use super::{Operations, Work};
 use crate::CheckError;
+use crate::poses::{numbers, random};
 use viewfuse_device::{Device, DeviceError};
 use viewfuse_kernels::limits::{CHAINS, ChainBlock, LOOK_UPS, LookUpBlock, REPEATED, ROUND_STEPS, RepeatedBlock};
 use viewfuse_vulkan::kernel::{Form, Kernel};
@@ -140,7 +141,9 @@ fn product<D: Device>(
     round_count: u32,
 ) -> Result<impl FnMut() -> Result<bool, DeviceError>, DeviceError> {
     let block = RepeatedBlock { row_count: side, column_count: side, round_count };
-    let matrix = || device.zeros::<f32>((side * REPEATED) as usize);
+    // A unit whose factors are 0 may run faster than one that has something to multiply.
+    let random = &mut random(93, 1, 1);
+    let mut matrix = || device.upload(&numbers((side * REPEATED) as usize, || random.range(-0.5, 0.5)));
     let (left, right, mut sums) = (matrix()?, matrix()?, device.zeros((side * side) as usize)?);
     Ok(move || device.repeat_product_by_units(&block, &left, &right, &mut sums))
 }

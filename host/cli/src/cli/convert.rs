@@ -33,7 +33,8 @@ pub(crate) struct Arguments {
     #[arg(long)]
     half: bool,
     /// Say in the output's metadata what the checkpoint does not say of itself; of a PixelNeRF viewfuse.first_pool,
-    /// whether its trunk has a max pool (0 or 1), and viewfuse.source_side, the longest side of its sources in pixels
+    /// whether its trunk has a max pool (0 or 1), viewfuse.source_side, the longest side of its sources in pixels, and
+    /// viewfuse.pixel_centre, where in a pixel its centre is (0 or 0.5)
     #[arg(long, value_name = "KEY=VALUE", value_parser = setting)]
     set: Vec<(String, String)>,
 }

@@ -112,7 +112,7 @@ fn parse_lpips(text: &str) -> Result<(LpipsTrunk, NetworkFile), String> {
     let Some((network, files)) = text.split_once('=') else {
         return Err("a network and its file, for example alex=alexnet.pth".to_owned());
     };
-    let network = network.parse().map_err(|error: viewfuse_evaluate::metrics::lpips::NoTrunk| error.to_string())?;
+    let network = network.parse::<LpipsTrunk>().map_err(|error| error.to_string())?;
     Ok((network, parse_file(files)?))
 }
 

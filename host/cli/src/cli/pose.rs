@@ -222,6 +222,7 @@ fn advice(found: &Found) -> String {
             "what EXIF states is not what the photographs show, as after a crop or with a digital zoom: try --focal \
              {focal:.0}; or {way}"
         ),
+        _ if found.is_contradicted => format!("leave out what was cropped or taken with a digital zoom; or {way}"),
         _ if found.cameras.are_known() => way,
         _ => format!("{way}; or give the focal length with --focal"),
     }

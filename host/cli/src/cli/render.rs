@@ -46,7 +46,8 @@ pub(crate) struct Arguments {
     scene: PathBuf,
     #[command(flatten)]
     pose: PoseOption,
-    /// Views to render, as for --sources; they are no sources [default: the scene's target poses]
+    /// Views to render, as for --sources; they are no sources, unless all views are rendered from --gaussians [default: the
+    /// scene's target poses]
     #[arg(long, value_name = "VIEWS")]
     targets: Option<String>,
     #[command(flatten)]

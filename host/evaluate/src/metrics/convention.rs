@@ -17,8 +17,6 @@
 
 use image::RgbImage;
 use std::borrow::Cow;
-use std::fmt::{Display, Formatter};
-use std::str::FromStr;
 
 /// How scores are computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -32,40 +30,21 @@ pub enum Convention {
     ViewAttention,
 }
 
-impl Convention {
-    /// All of them.
-    pub const ALL: [Convention; 3] = [Convention::Plain, Convention::PixelNerf, Convention::ViewAttention];
+viewfuse_job::named! {
+    pub Convention: "a convention of scores" {
+        Plain => "plain",
+        PixelNerf => "pixelnerf",
+        ViewAttention => "viewattention",
+    }
+}
 
+impl Convention {
     /// A picture as PSNR and SSIM compare it.
     pub fn shown(self, picture: &RgbImage) -> Cow<'_, RgbImage> {
         match self {
             Convention::Plain | Convention::PixelNerf => Cow::Borrowed(picture),
             Convention::ViewAttention => Cow::Owned(stretched(picture)),
         }
-    }
-}
-
-impl Display for Convention {
-    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Convention::Plain => "plain",
-            Convention::PixelNerf => "pixelnerf",
-            Convention::ViewAttention => "viewattention",
-        })
-    }
-}
-
-/// There is no such convention.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there are the conventions plain, pixelnerf and viewattention, not '{0}'")]
-pub struct NoConvention(pub String);
-
-impl FromStr for Convention {
-    type Err = NoConvention;
-
-    fn from_str(text: &str) -> Result<Convention, NoConvention> {
-        let found = Convention::ALL.into_iter().find(|convention| convention.to_string() == text);
-        found.ok_or_else(|| NoConvention(text.to_owned()))
     }
 }
 
@@ -83,15 +62,6 @@ fn stretched(picture: &RgbImage) -> RgbImage {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn names_lead_back() {
-        for convention in Convention::ALL {
-            assert_eq!(convention.to_string().parse(), Ok(convention));
-        }
-        let error = "genvs".parse::<Convention>().expect_err("there is none").to_string();
-        assert!(error.contains("viewattention") && error.contains("'genvs'"), "{error}");
-    }
 
     #[test]
     fn stretching() {

@@ -9,8 +9,6 @@
 use super::trunk::{Convolution, Pooling, Step, Trunk, alexnet, squeezenet, vgg16};
 use super::{MetricError, same_size, seen};
 use image::RgbImage;
-use std::fmt::{Display, Formatter};
-use std::str::FromStr;
 use viewfuse_device::Device;
 use viewfuse_nn::checkpoint::{Checkpoint, TensorShape};
 use viewfuse_nn::image::HostImage;
@@ -32,10 +30,15 @@ pub enum LpipsTrunk {
     Squeeze,
 }
 
-impl LpipsTrunk {
-    /// All of them.
-    pub const ALL: [LpipsTrunk; 3] = [LpipsTrunk::Alex, LpipsTrunk::Vgg, LpipsTrunk::Squeeze];
+viewfuse_job::named! {
+    pub LpipsTrunk: "a network of LPIPS" {
+        Alex => "alex",
+        Vgg => "vgg",
+        Squeeze => "squeeze",
+    }
+}
 
+impl LpipsTrunk {
     /// Name of the score.
     pub fn metric(self) -> &'static str {
         match self {
@@ -61,26 +64,6 @@ impl LpipsTrunk {
             LpipsTrunk::Vgg => &[64, 128, 256, 512, 512],
             LpipsTrunk::Squeeze => &[64, 128, 256, 384, 384, 512, 512],
         }
-    }
-}
-
-impl Display for LpipsTrunk {
-    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        f.write_str(self.metric().trim_start_matches("lpips-"))
-    }
-}
-
-/// There is no such network.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("LPIPS has the networks alex, vgg and squeeze, not '{0}'")]
-pub struct NoTrunk(pub String);
-
-impl FromStr for LpipsTrunk {
-    type Err = NoTrunk;
-
-    fn from_str(text: &str) -> Result<LpipsTrunk, NoTrunk> {
-        let found = LpipsTrunk::ALL.into_iter().find(|trunk| trunk.to_string() == text);
-        found.ok_or_else(|| NoTrunk(text.to_owned()))
     }
 }
 

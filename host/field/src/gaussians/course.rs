@@ -53,50 +53,118 @@ impl Optimised {
     }
 }
 
+/// How the steps of an optimisation are made: what differs from device to device.
+pub(super) trait Steps {
+    /// Makes the next iteration. A device may still be at work on it.
+    fn iterate(&mut self, course: &mut Course) -> Result<(), FieldError>;
+
+    /// Forgets the Gaussians, if it has any of its own: the course goes on from others.
+    fn forget(&mut self) {}
+
+    /// Waits until the device is done with all iterations so far.
+    fn finish(&mut self, _course: &Course) -> Result<(), FieldError> {
+        Ok(())
+    }
+
+    /// Gives the course what pictures and files need of the Gaussians so far, and the gains, if it has its own.
+    fn bring(&mut self, _course: &mut Course) -> Result<(), FieldError> {
+        Ok(())
+    }
+}
+
 /// An optimisation, on whatever device makes its steps.
-pub trait Optimisation {
+pub struct Optimisation<'d> {
+    course: Course,
+    steps: Box<dyn Steps + 'd>,
+}
+
+impl<'d> Optimisation<'d> {
+    pub(super) fn new(course: Course, steps: impl Steps + 'd) -> Optimisation<'d> {
+        Optimisation { course, steps: Box::new(steps) }
+    }
+
     /// Counts each source's differences by its weight from now on; the weights are scaled to 1 in the mean.
-    fn weigh(&mut self, weights: &[f32]);
+    pub fn weigh(&mut self, weights: &[f32]) {
+        let mean = weights.iter().sum::<f32>() / weights.len().max(1) as f32;
+        if mean > 0.0 && weights.len() == self.course.weights.len() {
+            self.course.weights = weights.iter().map(|weight| weight / mean).collect();
+        }
+    }
 
     /// Goes on from Gaussians that were optimised before, with the finest level's iterations.
-    fn resume(&mut self, scene: &GaussianScene);
+    pub fn resume(&mut self, scene: &GaussianScene) {
+        self.steps.forget();
+        self.course.resume(scene);
+    }
 
     /// Adds iterations at the finest level.
-    fn extend(&mut self, iterations: u32);
+    pub fn extend(&mut self, iterations: u32) {
+        let [.., finest] = &mut self.course.recipe.iterations;
+        *finest += iterations;
+    }
 
     /// So many iterations at the finest level in place of the recipe's, at least those that are done.
-    fn set_finest(&mut self, iterations: u32);
+    pub fn set_finest(&mut self, iterations: u32) {
+        let least = self.done_at_finest();
+        let [.., finest] = &mut self.course.recipe.iterations;
+        *finest = iterations.max(least);
+    }
 
     /// How many iterations are done at the finest level.
-    fn done_at_finest(&self) -> u32;
+    pub fn done_at_finest(&self) -> u32 {
+        let [.., finest] = self.course.recipe.iterations;
+        self.done().saturating_sub(self.iteration_count() - finest)
+    }
 
     /// How many times as many Gaussians there will be at the end.
-    fn growth(&self) -> f64;
+    pub fn growth(&self) -> f64 {
+        let Course { recipe, particles, .. } = &self.course;
+        let most = if recipe.grows { recipe.max_count } else { 0 };
+        (most as f64 / particles.len().max(1) as f64).max(1.0)
+    }
 
     /// How many iterations are done.
-    fn done(&self) -> u32;
+    pub fn done(&self) -> u32 {
+        self.course.iteration
+    }
 
     /// All iterations of the recipe.
-    fn iteration_count(&self) -> u32;
+    pub fn iteration_count(&self) -> u32 {
+        self.course.iteration_count()
+    }
 
     /// The iterations up to this number of them, as far as the recipe has so many; none if so many are done. A device
     /// may still be at work on the last ones.
     ///
     /// # Errors
     /// [`FieldError`]; where the device did not fail, the Gaussians so far are still there.
-    fn run_to(&mut self, iteration: u32, progress: &dyn Progress) -> Result<(), FieldError>;
+    pub fn run_to(&mut self, iteration: u32, progress: &dyn Progress) -> Result<(), FieldError> {
+        let end = iteration.min(self.iteration_count());
+        progress.expect(end.saturating_sub(self.done()) as usize);
+        while self.done() < end {
+            progress.check()?;
+            self.steps.iterate(&mut self.course)?;
+            progress.step();
+        }
+        Ok(())
+    }
 
     /// Waits until the device is done with all iterations so far, so that their time can be measured.
     ///
     /// # Errors
     /// [`FieldError`].
-    fn finish(&mut self) -> Result<(), FieldError>;
+    pub fn finish(&mut self) -> Result<(), FieldError> {
+        self.steps.finish(&self.course)
+    }
 
     /// The Gaussians so far.
     ///
     /// # Errors
     /// [`FieldError`] if the device fails.
-    fn optimised(&mut self) -> Result<Optimised, FieldError>;
+    pub fn optimised(&mut self) -> Result<Optimised, FieldError> {
+        self.steps.bring(&mut self.course)?;
+        Ok(self.course.optimised())
+    }
 }
 
 /// An iteration.
@@ -133,7 +201,7 @@ pub(super) struct Course {
     weights: Vec<f32>,
     /// The sources that are still to be drawn in this round.
     round: Vec<usize>,
-    pub(super) iteration: u32,
+    iteration: u32,
     level: Option<usize>,
 }
 
@@ -179,14 +247,7 @@ impl Course {
         }))
     }
 
-    pub(super) fn weigh(&mut self, weights: &[f32]) {
-        let mean = weights.iter().sum::<f32>() / weights.len().max(1) as f32;
-        if mean > 0.0 && weights.len() == self.weights.len() {
-            self.weights = weights.iter().map(|weight| weight / mean).collect();
-        }
-    }
-
-    pub(super) fn resume(&mut self, scene: &GaussianScene) {
+    fn resume(&mut self, scene: &GaussianScene) {
         let count = 3 * REST_COUNTS[scene.degree.min(3) as usize] as usize;
         let particle = |(index, mut gaussian): (usize, GaussianBlock)| {
             let rest = scene.f_rest.get(index * count..(index + 1) * count).filter(|_| self.recipe.degree > 0);
@@ -202,32 +263,11 @@ impl Course {
         self.level = Some(self.level_of(self.iteration).0);
     }
 
-    pub(super) fn extend(&mut self, iterations: u32) {
-        let [.., finest] = &mut self.recipe.iterations;
-        *finest += iterations;
-    }
-
-    pub(super) fn set_finest(&mut self, iterations: u32) {
-        let least = self.done_at_finest();
-        let [.., finest] = &mut self.recipe.iterations;
-        *finest = iterations.max(least);
-    }
-
-    pub(super) fn done_at_finest(&self) -> u32 {
-        let [.., finest] = self.recipe.iterations;
-        self.iteration.saturating_sub(self.iteration_count() - finest)
-    }
-
-    pub(super) fn growth_to_come(&self) -> f64 {
-        let most = if self.recipe.grows { self.recipe.max_count } else { 0 };
-        (most as f64 / self.particles.len().max(1) as f64).max(1.0)
-    }
-
-    pub(super) fn iteration_count(&self) -> u32 {
+    fn iteration_count(&self) -> u32 {
         self.recipe.iterations.iter().sum()
     }
 
-    pub(super) fn optimised(&self) -> Optimised {
+    fn optimised(&self) -> Optimised {
         let count = self.particles.iter().map(|particle| particle.harmonics.count()).max().unwrap_or(0);
         let degree = REST_COUNTS.iter().position(|rest| *rest as usize == count).unwrap_or(0);
         Optimised {

@@ -2,7 +2,7 @@
 //! memory is the host's, the host makes lists, loss and steps; elsewhere all of an iteration is the device's
 //! ([`resident`](super::resident)).
 
-use super::course::{Course, Optimisation, Optimised, Plan};
+use super::course::{Course, Optimisation, Optimised, Plan, Steps};
 use super::level::LevelView;
 use super::loss::{Pair, gradient};
 use super::particles::step_all;
@@ -17,7 +17,6 @@ use viewfuse_device::parallel::{for_each, map};
 use viewfuse_job::progress::Progress;
 use viewfuse_kernels::gaussians::steps::step_gain;
 use viewfuse_kernels::rows::{GaussianBlock, LossBlock};
-use viewfuse_scene::gaussians::GaussianScene;
 use viewfuse_scene::photographs::SourceImages;
 
 /// An optimisation at its beginning: on the device, or, where that is a software driver, by the CPU's own loops, which
@@ -31,7 +30,7 @@ pub fn optimisation<'d, D: Device>(
     images: &SourceImages,
     points: &[CloudPoint],
     recipe: Recipe,
-) -> Result<Option<Box<dyn Optimisation + 'd>>, FieldError> {
+) -> Result<Option<Optimisation<'d>>, FieldError> {
     match device.is_software() {
         true => optimisation_by_host(&Cpu, images, points, recipe),
         false => optimisation_on_device(device, images, points, recipe, None),
@@ -48,9 +47,9 @@ pub fn optimisation_by_host<'d, D: Device>(
     images: &SourceImages,
     points: &[CloudPoint],
     recipe: Recipe,
-) -> Result<Option<Box<dyn Optimisation + 'd>>, FieldError> {
+) -> Result<Option<Optimisation<'d>>, FieldError> {
     let course = Course::new(images, points, recipe)?;
-    Ok(course.map(|course| Box::new(ByHost { device, course }) as Box<dyn Optimisation + 'd>))
+    Ok(course.map(|course| Optimisation::new(course, ByHost { device })))
 }
 
 /// An optimisation whose iterations are a device's own: what [`optimisation`] takes for a GPU. The lists of a picture's
@@ -65,11 +64,11 @@ pub fn optimisation_on_device<'d, D: Device>(
     points: &[CloudPoint],
     recipe: Recipe,
     capacity: Option<usize>,
-) -> Result<Option<Box<dyn Optimisation + 'd>>, FieldError> {
+) -> Result<Option<Optimisation<'d>>, FieldError> {
     let Some(course) = Course::new(images, points, recipe)? else { return Ok(None) };
     Ok(Some(match fits(device, &course) {
-        true => Box::new(Resident::new(device, course, capacity)),
-        false => Box::new(ByHost { device, course }),
+        true => Optimisation::new(course, Resident::new(device, capacity)),
+        false => Optimisation::new(course, ByHost { device }),
     }))
 }
 
@@ -92,66 +91,12 @@ pub fn optimised<D: Device>(
 /// Lists, loss and steps by the host.
 struct ByHost<'d, D> {
     device: &'d D,
-    course: Course,
 }
 
-impl<D: Device> Optimisation for ByHost<'_, D> {
-    fn weigh(&mut self, weights: &[f32]) {
-        self.course.weigh(weights);
-    }
-
-    fn resume(&mut self, scene: &GaussianScene) {
-        self.course.resume(scene);
-    }
-
-    fn extend(&mut self, iterations: u32) {
-        self.course.extend(iterations);
-    }
-
-    fn set_finest(&mut self, iterations: u32) {
-        self.course.set_finest(iterations);
-    }
-
-    fn done_at_finest(&self) -> u32 {
-        self.course.done_at_finest()
-    }
-
-    fn growth(&self) -> f64 {
-        self.course.growth_to_come()
-    }
-
-    fn done(&self) -> u32 {
-        self.course.iteration
-    }
-
-    fn iteration_count(&self) -> u32 {
-        self.course.iteration_count()
-    }
-
-    fn run_to(&mut self, iteration: u32, progress: &dyn Progress) -> Result<(), FieldError> {
-        let end = iteration.min(self.iteration_count());
-        progress.expect(end.saturating_sub(self.done()) as usize);
-        while self.done() < end {
-            progress.check()?;
-            self.iterate()?;
-            progress.step();
-        }
-        Ok(())
-    }
-
-    fn finish(&mut self) -> Result<(), FieldError> {
-        Ok(())
-    }
-
-    fn optimised(&mut self) -> Result<Optimised, FieldError> {
-        Ok(self.course.optimised())
-    }
-}
-
-impl<D: Device> ByHost<'_, D> {
-    fn iterate(&mut self) -> Result<(), FieldError> {
-        let Plan { level, source, step, loss, gain_rate } = self.course.plan();
-        let (device, course) = (self.device, &mut self.course);
+impl<D: Device> Steps for ByHost<'_, D> {
+    fn iterate(&mut self, course: &mut Course) -> Result<(), FieldError> {
+        let Plan { level, source, step, loss, gain_rate } = course.plan();
+        let device = self.device;
         let Course { near, background, recipe: Recipe { is_antialiased, .. }, .. } = *course;
         let splatter = Splatter { device, near, background, is_antialiased, harmonics: None };
         let view = &course.levels[level][source];

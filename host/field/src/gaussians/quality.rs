@@ -1,8 +1,6 @@
 //! How sharp the Gaussians of a scene are to be, and the recipe for it.
 
 use super::recipe::Recipe;
-use std::fmt;
-use std::str::FromStr;
 
 /// Iterations of the fast recipe at the finest size of objects: harmonics learn in as many.
 const FINEST_OF_OBJECTS: u32 = 160;
@@ -19,19 +17,16 @@ pub enum Quality {
     High,
 }
 
-impl Quality {
-    /// All of them, the fastest first.
-    pub const ALL: [Quality; 3] = [Quality::Fast, Quality::Standard, Quality::High];
-
-    /// Its name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Quality::Fast => "fast",
-            Quality::Standard => "standard",
-            Quality::High => "high",
-        }
+viewfuse_job::named! {
+    // The fastest first.
+    pub Quality: "a quality" {
+        Fast => "fast",
+        Standard => "standard",
+        High => "high",
     }
+}
 
+impl Quality {
     /// The recipe, for sources with silhouettes or for whole photographs. Beyond [`Quality::Fast`] it begins with few
     /// Gaussians, their number rises to its limit, and colours depend on the direction: with exposures that differ from
     /// photograph to photograph, too, so that these have no gains. Rates are lower, for many iterations. Objects have
@@ -100,20 +95,5 @@ impl RecipeOptions {
         };
         // Where they do not depend on the direction, colours that no photograph has are only what fits the sources.
         Recipe { has_limited_colours: recipe.degree == 0, ..recipe }
-    }
-}
-
-impl fmt::Display for Quality {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(self.name())
-    }
-}
-
-impl FromStr for Quality {
-    type Err = String;
-
-    fn from_str(name: &str) -> Result<Quality, String> {
-        let found = Quality::ALL.into_iter().find(|quality| quality.name() == name);
-        found.ok_or_else(|| format!("{name} is no quality: fast, standard or high"))
     }
 }

@@ -10,19 +10,17 @@
 
 mod arrays;
 
-use super::course::{Course, Optimisation, Optimised, Plan};
+use super::course::{Course, Plan, Steps};
 use crate::FieldError;
 use arrays::{Entries, Level, Needed, Particles, Stepped, list_block, stepped};
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::gaussian::REST_COUNTS;
 use viewfuse_device::{Device, DeviceError};
-use viewfuse_job::progress::Progress;
 use viewfuse_kernels::gaussians::blend_gradient::SplatGradient;
 use viewfuse_kernels::gaussians::lists::ListStatus;
 use viewfuse_kernels::rows::{
     GainStepBlock, LossBlock, ParticleBlock, SHARE_RUN, STATUS_NUMBERS, SplatBlock, StepBlock,
 };
-use viewfuse_scene::gaussians::GaussianScene;
 
 pub(super) use arrays::fits;
 
@@ -33,10 +31,9 @@ const ROUND: usize = 64;
 pub(super) const ENTRIES_A_GAUSSIAN: usize = 8;
 const MIN_ENTRIES: usize = 4096;
 
-/// An optimisation on a device.
+/// What an optimisation has on a device.
 pub(super) struct Resident<'d, D: Device> {
     device: &'d D,
-    course: Course,
     /// What the lists have room for at first.
     first_capacity: Option<usize>,
     level: Option<Level<D>>,
@@ -50,14 +47,14 @@ pub(super) struct Resident<'d, D: Device> {
 }
 
 impl<'d, D: Device> Resident<'d, D> {
-    pub(super) fn new(device: &'d D, course: Course, first_capacity: Option<usize>) -> Resident<'d, D> {
+    pub(super) fn new(device: &'d D, first_capacity: Option<usize>) -> Resident<'d, D> {
         let (level, particles, entries, status, pending) = (None, None, None, None, Vec::new());
-        Resident { device, course, first_capacity, level, particles, rest_count: 0, entries, status, pending }
+        Resident { device, first_capacity, level, particles, rest_count: 0, entries, status, pending }
     }
 
     /// Takes what an iteration needs to the device, as far as it is not there.
-    fn load(&mut self, plan: &Plan) -> Result<(), DeviceError> {
-        let (device, course) = (self.device, &self.course);
+    fn load(&mut self, course: &Course, plan: &Plan) -> Result<(), DeviceError> {
+        let device = self.device;
         let level = match self.level.take().filter(|level| level.number == plan.level) {
             Some(level) => level,
             None => Level::new(device, plan.level, &course.levels[plan.level])?,
@@ -83,9 +80,9 @@ impl<'d, D: Device> Resident<'d, D> {
     }
 
     /// Dispatches an iteration.
-    fn dispatch(&mut self, plan: &Plan) -> Result<(), DeviceError> {
-        let (device, near, background) = (self.device, self.course.near, self.course.background);
-        let is_antialiased = u32::from(self.course.recipe.is_antialiased);
+    fn dispatch(&mut self, course: &Course, plan: &Plan) -> Result<(), DeviceError> {
+        let (device, near, background) = (self.device, course.near, course.background);
+        let is_antialiased = u32::from(course.recipe.is_antialiased);
         let (Some(level), Some(particles)) = (&mut self.level, &mut self.particles) else { return Ok(()) };
         let (Some(entries), Some(status)) = (&mut self.entries, &mut self.status) else { return Ok(()) };
         let Particles { count: gaussian_count, term_count, gaussians, states, terms, term_states, gains, .. } =
@@ -141,7 +138,7 @@ impl<'d, D: Device> Resident<'d, D> {
         device.sum_shares(&pixel_count, &level.shares, &mut level.share_sums)?;
         let gain = GainStepBlock {
             source: loss.source,
-            gain_count: self.course.gains.len() as u32,
+            gain_count: course.gains.len() as u32,
             run_count: pixel_count.div_ceil(SHARE_RUN),
             rate: plan.gain_rate,
             factor: loss.factor,
@@ -154,7 +151,7 @@ impl<'d, D: Device> Resident<'d, D> {
 
     /// Sees to it that all iterations so far are done: those from the first one on whose lists had no room are
     /// dispatched again, with longer lists. Returns whether there were some.
-    fn settle(&mut self) -> Result<bool, DeviceError> {
+    fn settle(&mut self, course: &Course) -> Result<bool, DeviceError> {
         let mut changes = false;
         while !self.pending.is_empty() {
             let Some(status) = &mut self.status else { break };
@@ -172,99 +169,58 @@ impl<'d, D: Device> Resident<'d, D> {
             self.entries = None;
             self.entries = Some(Entries::new(self.device, most + most / 4)?);
             for plan in self.pending.clone() {
-                self.dispatch(&plan)?;
+                self.dispatch(course, &plan)?;
             }
         }
         Ok(changes)
     }
 
-    /// What the host needs of the Gaussians, and the gains. They stay on the device, too.
-    fn bring(&mut self, needed: Needed) -> Result<(), DeviceError> {
+    /// Gives the course what is needed of the Gaussians, and the gains. They stay on the device, too.
+    fn give(&mut self, course: &mut Course, needed: Needed) -> Result<(), DeviceError> {
         // They come with the status, and a second time where that says that they are not there yet.
         let device = self.device;
         let later =
             |particles: &Option<Particles<D>>| particles.as_ref().map(|now| now.later(device, needed)).transpose();
         let mut coming = later(&self.particles)?;
-        if self.settle()? {
+        if self.settle(course)? {
             coming = later(&self.particles)?;
         }
         if let Some(arrived) = coming {
-            (self.course.particles, self.course.gains) = arrived()?;
-        }
-        Ok(())
-    }
-
-    fn iterate(&mut self) -> Result<(), DeviceError> {
-        if self.course.changes() {
-            // What grows goes on with its states; a level begins without any.
-            self.bring(if self.course.begins_level() { Needed::Blocks } else { Needed::All })?;
-            self.particles = None;
-        }
-        let plan = self.course.plan();
-        self.load(&plan)?;
-        self.rest_count = self.rest_count.max(REST_COUNTS[plan.step.degree as usize]);
-        self.pending.push(plan);
-        self.dispatch(&plan)?;
-        if self.pending.len() >= ROUND {
-            self.settle()?;
+            (course.particles, course.gains) = arrived()?;
         }
         Ok(())
     }
 }
 
-impl<D: Device> Optimisation for Resident<'_, D> {
-    fn weigh(&mut self, weights: &[f32]) {
-        self.course.weigh(weights);
-    }
-
-    fn resume(&mut self, scene: &GaussianScene) {
-        (self.particles, self.pending) = (None, Vec::new());
-        self.status = None;
-        self.course.resume(scene);
-    }
-
-    fn extend(&mut self, iterations: u32) {
-        self.course.extend(iterations);
-    }
-
-    fn set_finest(&mut self, iterations: u32) {
-        self.course.set_finest(iterations);
-    }
-
-    fn done_at_finest(&self) -> u32 {
-        self.course.done_at_finest()
-    }
-
-    fn growth(&self) -> f64 {
-        self.course.growth_to_come()
-    }
-
-    fn done(&self) -> u32 {
-        self.course.iteration
-    }
-
-    fn iteration_count(&self) -> u32 {
-        self.course.iteration_count()
-    }
-
-    fn run_to(&mut self, iteration: u32, progress: &dyn Progress) -> Result<(), FieldError> {
-        let end = iteration.min(self.iteration_count());
-        progress.expect(end.saturating_sub(self.done()) as usize);
-        while self.done() < end {
-            progress.check()?;
-            self.iterate()?;
-            progress.step();
+impl<D: Device> Steps for Resident<'_, D> {
+    fn iterate(&mut self, course: &mut Course) -> Result<(), FieldError> {
+        if course.changes() {
+            // What grows goes on with its states; a level begins without any.
+            let needed = if course.begins_level() { Needed::Blocks } else { Needed::All };
+            self.give(course, needed)?;
+            self.particles = None;
+        }
+        let plan = course.plan();
+        self.load(course, &plan)?;
+        self.rest_count = self.rest_count.max(REST_COUNTS[plan.step.degree as usize]);
+        self.pending.push(plan);
+        self.dispatch(course, &plan)?;
+        if self.pending.len() >= ROUND {
+            self.settle(course)?;
         }
         Ok(())
     }
 
-    fn finish(&mut self) -> Result<(), FieldError> {
-        self.settle()?;
+    fn forget(&mut self) {
+        (self.particles, self.status, self.pending) = (None, None, Vec::new());
+    }
+
+    fn finish(&mut self, course: &Course) -> Result<(), FieldError> {
+        self.settle(course)?;
         Ok(self.device.finish()?)
     }
 
-    fn optimised(&mut self) -> Result<Optimised, FieldError> {
-        self.bring(Needed::Scene(self.rest_count))?;
-        Ok(self.course.optimised())
+    fn bring(&mut self, course: &mut Course) -> Result<(), FieldError> {
+        Ok(self.give(course, Needed::Scene(self.rest_count))?)
     }
 }

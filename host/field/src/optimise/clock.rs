@@ -46,7 +46,7 @@ impl Pace {
     ///
     /// # Errors
     /// [`FieldError`] if the device fails.
-    pub(super) fn of(optimisation: &mut dyn Optimisation) -> Result<Pace, FieldError> {
+    pub(super) fn of(optimisation: &mut Optimisation<'_>) -> Result<Pace, FieldError> {
         let (count, growth) = (optimisation.optimised()?.gaussians.len(), optimisation.growth());
         optimisation.run_to(FIRST, &Silent)?;
         optimisation.finish()?;
@@ -94,7 +94,7 @@ impl Clock {
     /// [`FieldError`] if the device fails.
     pub(super) fn has_measured(
         &mut self,
-        optimisation: &mut dyn Optimisation,
+        optimisation: &mut Optimisation<'_>,
         progress: &dyn Progress,
     ) -> Result<bool, FieldError> {
         let done = optimisation.done_at_finest();
@@ -129,7 +129,7 @@ impl Clock {
 
     /// To be called on the way, after what is done beside the iterations: with a limit, as many of them are left as fit
     /// at the pace since the last time; none once it is over.
-    pub(super) fn go_on(&mut self, optimisation: &mut dyn Optimisation) {
+    pub(super) fn go_on(&mut self, optimisation: &mut Optimisation<'_>) {
         let done = optimisation.done_at_finest();
         let Some((begun, first)) = self.measured.filter(|(_, first)| self.is_told && done > *first) else { return };
         let one = begun.elapsed().as_secs_f64() / f64::from(done - first);
@@ -138,7 +138,7 @@ impl Clock {
     }
 
     /// With a limit, leaves as many iterations as fit, of so many seconds each, and no more than without.
-    fn fit(&self, optimisation: &mut dyn Optimisation, one: f64) {
+    fn fit(&self, optimisation: &mut Optimisation<'_>, one: f64) {
         let Some(left) = self.left() else { return };
         let fitting = (left.as_secs_f64() / one.max(1.0e-9)) as u32;
         optimisation.set_finest(optimisation.done_at_finest().saturating_add(fitting).min(self.wanted));

@@ -104,7 +104,7 @@ impl SceneOptimisation<'_> {
             let mut optimisation = trial.begin(device, &stage.images, &points, tried)?;
             let mut scores = Vec::new();
             let counted = Counted { progress, until };
-            trial.advance(optimisation.as_mut(), photographed, &counted, None, &mut |_| Ok(()), &mut scores)?;
+            trial.advance(&mut optimisation, photographed, &counted, None, &mut |_| Ok(()), &mut scores)?;
             progress.check().map_err(|error| OptimiseError::Render(crate::FieldError::from(error).into()))?;
             curves.push(scores);
             if index == 0 && self.max_time.is_none() {
@@ -113,7 +113,7 @@ impl SceneOptimisation<'_> {
                 let pace = |recipe: Recipe| -> Result<Pace, OptimiseError> {
                     let alone = Recipe { iterations: [0, 0, 0, MAX_ITERATIONS], ..small(recipe) };
                     let mut begun = trial.begin(device, &stage.images, &points, alone)?;
-                    Ok(Pace::of(begun.as_mut()).map_err(RenderError::from)?)
+                    Ok(Pace::of(&mut begun).map_err(RenderError::from)?)
                 };
                 let more = Recipe { cell: 0.5 * recipe.cell, least_points: 1, ..recipe };
                 let sharp = clock.mean(pace(recipe)?, pace(more)?);

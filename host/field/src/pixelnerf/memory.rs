@@ -9,8 +9,8 @@ use viewfuse_device::Device;
 
 /// Bytes that a run takes beside the photographs and the pictures: parameters (on the host, on the device, and packed
 /// there), the encoding of every view (`source_sizes[view]` is width and height), activations, the rays of a tile.
-/// Probes take 8 bytes more a first-pass sample of one ray in every square, which is half a byte a pixel and sample for
-/// squares of 4.
+/// Probes take 8 bytes more a first-pass sample of one ray in every square: half a byte a pixel and sample for squares
+/// of 4, two where these meet nothing.
 pub(super) fn estimate<D: Device>(
     device: &D,
     architecture: &Architecture,

@@ -66,7 +66,8 @@ pub struct Omissions {
     /// Views at points behind their cameras, where their weight is 0. Exact.
     pub unseen_points: bool,
     /// First-pass samples in empty space: one ray in every square of this side in pixels (a probe) is computed first,
-    /// the others only where the four probes around them are not empty. 0 or 1: no probes.
+    /// the others only where the four probes around them are not empty; with a [`probe_error`](Self::probe_error),
+    /// probes of which none meets anything are set more densely, down to squares of 2. 0 or 1: no probes.
     pub empty_space: u32,
     /// The largest change of the probes' colours, root mean square, `1` from black to white: the largest threshold of a
     /// part's opacity that stays within it replaces [`MIN_SHARE`]. 0: always [`MIN_SHARE`].

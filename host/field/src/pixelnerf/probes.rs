@@ -27,14 +27,27 @@ impl<D: Device> Renderer<'_, D> {
         let mut work = Evaluated::default();
         let probes = loop {
             let (probes, meets) = self.probe(workspace, step, &mut work)?;
-            if meets || step <= 2 {
+            let denser = (step / 2).max(2);
+            if meets || denser == step || self.probe_values(denser) > self.device.most_elements::<[f32; 2]>() {
                 break probes;
             }
-            step /= 2;
+            step = denser;
         };
         evaluated.evaluated += work.evaluated;
         evaluated.unseen += work.unseen;
         Ok(Some(probes))
+    }
+
+    /// Columns and rows of probes.
+    fn probe_grid(&self, step: u32) -> [u32; 2] {
+        let [width, height] = [self.cast.camera.width, self.cast.camera.height];
+        [width, height].map(|side| (side - 1).div_ceil(step) + 1)
+    }
+
+    /// Numbers of all their samples.
+    fn probe_values(&self, step: u32) -> usize {
+        let [columns, rows] = self.probe_grid(step).map(|count| count as usize);
+        columns * rows * self.sampling.coarse_count as usize
     }
 
     /// Runs the first pass along one ray in every square of `step` pixels, and along those of the last row and column;
@@ -46,7 +59,7 @@ impl<D: Device> Renderer<'_, D> {
         evaluated: &mut Evaluated,
     ) -> Result<(Probes<D>, bool), FieldError> {
         let (width, height) = (self.cast.camera.width, self.cast.camera.height);
-        let [columns, rows] = [width, height].map(|side| (side - 1).div_ceil(step) + 1);
+        let [columns, rows] = self.probe_grid(step);
         let place = |index: u32, side: u32| (index * step).min(side - 1);
         let pixels: Vec<u32> =
             (0..columns * rows).map(|ray| place(ray / columns, height) * width + place(ray % columns, width)).collect();
@@ -61,7 +74,7 @@ impl<D: Device> Renderer<'_, D> {
             self.device.weigh_samples(&samples.block(first_ray), rays.count, &samples.values, &mut values)?;
             first_ray += rays.count;
             if self.omissions.probe_error > 0.0 {
-                // The one choice that is made from whole samples on the host, in f64: once a picture, of few rays.
+                // The one choice that is made from whole samples on the host, in f64.
                 let samples = self.device.download(&samples.values)?;
                 let opacity = |sample: &[f32; 4]| -(-sample[3]).exp_m1();
                 meets |= samples.iter().any(|sample| opacity(sample) >= MIN_SHARE);

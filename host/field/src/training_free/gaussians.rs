@@ -138,7 +138,7 @@ struct Alone<'a, D: Device> {
     /// sources have too few surfaces.
     splats: BTreeMap<u32, Option<Splats<D>>>,
     /// The optimisation for the current weighting, as far as it went, where a dearer effort may go on from there.
-    optimisation: Option<Box<dyn Optimisation + 'a>>,
+    optimisation: Option<Optimisation<'a>>,
 }
 
 impl<D: Device> Alone<'_, D> {

@@ -71,7 +71,7 @@ impl<'a, D: Device> SourceDepths<'a, D> {
         &mut self,
         recipe: Recipe,
         progress: &dyn Progress,
-    ) -> Result<Option<Box<dyn Optimisation + 'a>>, FieldError> {
+    ) -> Result<Option<Optimisation<'a>>, FieldError> {
         let quiet = &Quiet(progress);
         for view in 0..self.encoded.len() {
             progress.check()?;

@@ -134,7 +134,7 @@ impl TrainingScene {
             cameras.push(Camera { pose: view.camera.pose, pinhole });
             pictures.push(picture);
         }
-        // As the field shows them to a network.
+        // As the field shows them to a network where the photographs look at one point.
         let network_unit = RigUnit::of_network(&cameras);
         cameras.iter_mut().for_each(|camera| *camera = network_unit.camera(camera));
         Ok(TrainingScene {

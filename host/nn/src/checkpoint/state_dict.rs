@@ -13,7 +13,7 @@ use std::collections::{BTreeMap, HashSet};
 
 /// Keys under which training scripts put the `state_dict`.
 pub const PLACES: [&str; 5] = ["state_dict", "model", "model_state_dict", "net", "ema"];
-/// What names of a moving average contain.
+/// A word in names of a moving average.
 const AVERAGED: &str = "ema";
 /// The prefix that `DataParallel` adds to every name.
 const PARALLEL_PREFIX: &str = "module.";
@@ -92,9 +92,14 @@ pub(super) fn find(pickle: &Pickle, storage_of: &StorageOf<'_>) -> Result<StateD
     let inner = places.next();
     // The same table may stand under two keys.
     let other = inner.and_then(|(first, found)| {
-        let averaged = table.iter().filter_map(|(key, _)| pickle.text(*key)).filter(|key| key.contains(AVERAGED));
-        let others = PLACES.into_iter().chain(averaged).filter(|place| *place != first);
-        others.filter(|place| at(place).is_some_and(|value| value != found && holds_tensors(value))).next()
+        let is_averaged =
+            |key: &&str| key.split(|letter: char| !letter.is_ascii_alphabetic()).any(|word| word == AVERAGED);
+        let averaged = table.iter().filter_map(|(key, _)| pickle.text(*key)).filter(is_averaged);
+        // Under a name of its own in the average's state, perhaps.
+        let inner = |value: Id| entries(pickle, value).unwrap_or_default().into_iter().map(|(_, value)| value);
+        let holds = |value: Id| holds_tensors(value) || inner(value).any(holds_tensors);
+        let mut others = PLACES.into_iter().chain(averaged).filter(|place| *place != first);
+        others.find(|place| at(place).is_some_and(|value| value != found && holds(value)))
     });
     if let (Some((first, _)), Some(other)) = (inner, other) {
         return Err(format!(

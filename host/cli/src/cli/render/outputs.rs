@@ -6,10 +6,10 @@ use anyhow::Context;
 use clap::Args;
 use std::path::Path;
 use viewfuse_field::About;
-use viewfuse_output::depth::{DepthFormat, UnknownDepthFormat};
+use viewfuse_output::depth::DepthFormat;
 use viewfuse_output::rate::FrameRate;
 use viewfuse_output::run::Outputs;
-use viewfuse_output::video::{UnknownVideoFormat, VideoFormat};
+use viewfuse_output::video::VideoFormat;
 
 /// What a rate may be.
 const RATES: &str = "from 0.1 to 240";
@@ -39,7 +39,7 @@ pub(crate) struct OutputOptions {
     pub(crate) replace: bool,
     /// Write all pictures, in order, also as video.FORMAT: webp and gif (animated), y4m (not compressed), mp4
     /// (by the ffmpeg on the path; without one y4m)
-    #[arg(long, value_name = "FORMATS", value_delimiter = ',', value_parser = parse_video, help_heading = FILES)]
+    #[arg(long, value_name = "FORMATS", value_delimiter = ',', help_heading = FILES)]
     pub(crate) video: Vec<VideoFormat>,
     /// Frames per second of a video [default: those of the camera path's file, else 30]
     #[arg(long, value_name = "N", value_parser = parse_rate, help_heading = FILES)]
@@ -103,14 +103,10 @@ impl OutputOptions {
 }
 
 fn parse_depth(text: &str) -> Result<DepthFormat, String> {
-    text.parse().map_err(|error: UnknownDepthFormat| match text {
+    text.parse::<DepthFormat>().map_err(|error| match text {
         "exr" => not_built("OpenEXR", "formats"),
         _ => error.to_string(),
     })
-}
-
-fn parse_video(text: &str) -> Result<VideoFormat, String> {
-    text.parse().map_err(|error: UnknownVideoFormat| error.to_string())
 }
 
 fn parse_rate(text: &str) -> Result<FrameRate, String> {

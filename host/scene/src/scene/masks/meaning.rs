@@ -8,9 +8,6 @@
 //! All other masks say which pixels do not count. Where these leave little of the photographs, they may be inverted, or
 //! of an object that reaches the border: then it is unclear, and asked.
 
-use std::fmt;
-use std::str::FromStr;
-
 use glam::DVec3;
 use image::GrayImage;
 use rayon::prelude::*;
@@ -36,28 +33,12 @@ pub enum MaskChoice {
     None,
 }
 
-/// The text is not a choice of masks.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown meaning of masks '{0}'; the choices are auto, object, ignore and none")]
-pub struct UnknownMasks(String);
-
-impl FromStr for MaskChoice {
-    type Err = UnknownMasks;
-
-    fn from_str(text: &str) -> Result<MaskChoice, UnknownMasks> {
-        let all = [MaskChoice::Auto, MaskChoice::Object, MaskChoice::Ignore, MaskChoice::None];
-        all.into_iter().find(|choice| choice.to_string() == text).ok_or_else(|| UnknownMasks(text.to_owned()))
-    }
-}
-
-impl fmt::Display for MaskChoice {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            MaskChoice::Auto => "auto",
-            MaskChoice::Object => "object",
-            MaskChoice::Ignore => "ignore",
-            MaskChoice::None => "none",
-        })
+viewfuse_job::named! {
+    pub MaskChoice: "a meaning of masks" {
+        Auto => "auto",
+        Object => "object",
+        Ignore => "ignore",
+        None => "none",
     }
 }
 
