@@ -294,28 +294,3 @@ fn seconds<D: Device>(device: &D, work: &mut Work<'_>, repeats: u32) -> Result<f
 fn median(values: Vec<f64>) -> f64 {
     medians::median(values).expect("a round")
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_form_is_compared_with_what_its_units_can_do() {
-        let with = |units| Limits { bytes: 1.0e3, operations: 10.0, look_ups: 1.0, units };
-        let product = |form| Work {
-            kernel: Kernel::Linear,
-            form,
-            size: String::new(),
-            work: Operations::Fused(1200.0),
-            bytes: 1.0,
-            run: Box::new(|| Ok(())),
-        };
-        let seconds = |units, form| with(units).seconds(&product(form));
-        assert_eq!(seconds(Some(400.0), None), (120.0, Limit::MultiplyAdd));
-        assert_eq!(seconds(Some(400.0), Some(Form::Half)), (3.0, Limit::MatrixUnits));
-        // Three products of parts.
-        assert_eq!(seconds(Some(400.0), Some(Form::TwoHalvesSmall)), (9.0, Limit::MatrixUnits));
-        assert_eq!(seconds(Some(400.0), Some(Form::Fused)), (60.0, Limit::MultiplyAdd));
-        assert_eq!(seconds(None, Some(Form::Half)), (120.0, Limit::MultiplyAdd), "units that were not measured");
-    }
-}
