@@ -1,5 +1,6 @@
 //! PixelNeRF's family of networks: what its metadata say.
 
+use std::f32::consts::FRAC_PI_2;
 use std::path::Path;
 use viewfuse::field::pixelnerf::{Architecture, PixelNerf};
 use viewfuse::job::progress::Silent;
@@ -161,13 +162,14 @@ fn what_contradicts_itself_is_refused() {
         });
         Architecture::of(&checkpoint).map(|found| found.frequency).map_err(|error| error.to_string())
     };
-    let (frequencies, phases) = (("code._freqs", [3.0, 3.0, 6.0, 6.0]), ("code._phases", [0.0, 1.5708, 0.0, 1.5708]));
+    let (frequencies, phases) =
+        (("code._freqs", [3.0, 3.0, 6.0, 6.0]), ("code._phases", [0.0, FRAC_PI_2, 0.0, FRAC_PI_2]));
     let tables: [(&str, &[f32]); 2] = [(frequencies.0, &frequencies.1), (phases.0, &phases.1)];
     assert_eq!(of(2, &tables, &[]), Ok(3.0));
     assert_eq!(of(2, &tables, &[("viewfuse.frequency", "3")]), Ok(3.0));
     let said = of(2, &tables, &[("viewfuse.frequency", "1.5")]).expect_err("another frequency");
     assert!(said.contains("viewfuse.frequency = 1.5, and code._freqs begins with 3"), "{said}");
-    for wrong in [&[1.5708, 0.0, 1.5708, 0.0][..], &[0.0, 1.5708]] {
+    for wrong in [&[FRAC_PI_2, 0.0, FRAC_PI_2, 0.0][..], &[0.0, FRAC_PI_2]] {
         let said = of(2, &[tables[0], (phases.0, wrong)], &[]).expect_err("other phases");
         assert!(said.contains("code._phases does not hold 0 and pi/2 in turns for 2 octaves"), "{said}");
     }

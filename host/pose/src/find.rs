@@ -5,7 +5,7 @@ use crate::focal::Cameras;
 use crate::intake::{Intake, IntakeError, crop_warning};
 use crate::matches::Matches;
 use crate::solution::{Solver, SolverError};
-use crate::verdict::{Refusal, Verdict, verdict};
+use crate::verdict::{MIN_PHOTOGRAPHS, Refusal, Verdict, verdict};
 use std::path::Path;
 use viewfuse_field::render::RenderError;
 use viewfuse_job::hint::{Hint, Hinted};
@@ -97,8 +97,11 @@ pub fn find(
     let part = Part::begin(progress, "", 1..4, 10);
     let mut made = attempts(solvers, (photos, photos), &cameras, options.seed, &part)?;
     let mut after = 4;
-    let solved =
-        made.iter().filter_map(|attempt| Some((attempt.solution.as_ref()?.apart.as_ref(), &attempt.tried.focal[..])));
+    // What has no poses says nothing of focal lengths.
+    let solved = made.iter().filter(|attempt| attempt.tried.registered >= MIN_PHOTOGRAPHS).filter_map(|attempt| {
+        let solution = attempt.solution.as_ref()?;
+        Some((solution.apart.as_ref(), &attempt.tried.focal[..]))
+    });
     let is_contradicted = cameras.groups.iter().any(|group| group.focal.is_some())
         && cameras.are_contradicted(&cameras.guesses(photos, 1.0), &solved.collect::<Vec<_>>());
     if is_contradicted {

@@ -459,7 +459,7 @@ mod tests {
         assert_eq!(names(scratch.path()), expected(&[("left_1", "left/1.png"), ("right_1", "right/1.png")]));
         // Two places of one name.
         put_all(scratch.path(), &["images/a_b/c.png", "images/a/b_c.png"]);
-        let error = Intake::read(scratch.path(), 1, &Silent).err().expect("two of a name").to_string();
+        let error = Intake::read(scratch.path(), 1, &Silent).expect_err("two of a name").to_string();
         assert!(error.ends_with("two photographs have the name a_b_c: a/b_c.png and a_b/c.png; rename one"), "{error}");
     }
 

@@ -27,7 +27,7 @@ use viewfuse_job::progress::{Part, Progress};
 use viewfuse_scene::Scene;
 
 /// Fewest photographs: each must be seen again by two others.
-const MIN_PHOTOGRAPHS: usize = 3;
+pub(crate) const MIN_PHOTOGRAPHS: usize = 3;
 /// Plausible focal lengths, in widths of the photograph.
 const PLAUSIBLE_WIDTHS: std::ops::RangeInclusive<f64> = 0.5..=3.0;
 /// Most that unknown focal lengths of two attempts may differ, as a share.

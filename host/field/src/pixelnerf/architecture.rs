@@ -349,7 +349,7 @@ fn check_phases(sizes: &Sizes<'_>, octaves: usize) -> Result<(), CheckpointError
     const TABLE: &str = "code._phases";
     let Some(shape) = sizes.shape(TABLE) else { return Ok(()) };
     let holds_octaves = shape.iter().try_fold(1_usize, |count, side| count.checked_mul(*side)) == Some(2 * octaves);
-    let phase = |index: usize| if index % 2 == 0 { 0.0 } else { std::f32::consts::FRAC_PI_2 };
+    let phase = |index: usize| if index.is_multiple_of(2) { 0.0 } else { std::f32::consts::FRAC_PI_2 };
     let is_usual =
         |table: &[f32]| table.iter().enumerate().all(|(at, value)| (value - phase(at)).abs() < MAX_PHASE_ERROR);
     if !holds_octaves || !is_usual(&sizes.checkpoint().tensor(TABLE)?) {
