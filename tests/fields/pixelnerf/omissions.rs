@@ -86,18 +86,6 @@ fn probes_stand_at_the_last_row_and_column_too() {
     }
 }
 
-/// A body in the middle, which the probes in the picture's corners do not meet.
-#[test]
-fn probes_that_meet_nothing_are_set_more_densely() {
-    let (sources, target) = (sources(3), target(32));
-    let [reference, found] =
-        [exact(), omitting(Omissions { empty_space: 64, probe_error: 1.0 / 128.0, ..Omissions::NONE })]
-            .map(|options| picture(&body(options), &sources, &target));
-    assert!([0, 31, 32 * 31, 32 * 32 - 1].iter().all(|corner| reference.colours[*corner][3] < 0.1), "in the middle");
-    let opaque = |picture: &Rendered| picture.colours.iter().filter(|colour| colour[3] > 0.5).count();
-    assert!(opaque(&reference) > 60 && 10 * opaque(&found) > 9 * opaque(&reference), "{}", opaque(&found));
-}
-
 #[test]
 fn samples_between_nodes_converge_to_the_exact_picture() {
     let (sources, target) = (sources(3), target(32));

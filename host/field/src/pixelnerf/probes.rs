@@ -66,7 +66,7 @@ impl<D: Device> Renderer<'_, D> {
         let count = self.sampling.coarse_count;
         let mut values = self.zeros(pixels.len() * count as usize)?;
         let mut first_ray = 0;
-        let (mut changes, mut meets) = ([0.0; SHARES.len()], self.omissions.probe_error <= 0.0);
+        let (mut changes, mut greatest) = ([0.0; SHARES.len()], 0.0_f32);
         for some in pixels.chunks(rays_at_once(self.device, &self.sampling)) {
             let rays = self.rays(some)?;
             self.progress.expect(pieces(workspace, rays.count * count));
@@ -76,8 +76,7 @@ impl<D: Device> Renderer<'_, D> {
             if self.omissions.probe_error > 0.0 {
                 // The one choice that is made from whole samples on the host, in f64.
                 let samples = self.device.download(&samples.values)?;
-                let opacity = |sample: &[f32; 4]| -(-sample[3]).exp_m1();
-                meets |= samples.iter().any(|sample| opacity(sample) >= MIN_SHARE);
+                greatest = samples.iter().map(|sample| -(-sample[3]).exp_m1()).fold(greatest, f32::max);
                 for ray in samples.chunks(count as usize) {
                     let changed = SHARES.map(|share| change(ray, share, &self.background));
                     changes.iter_mut().zip(changed).for_each(|(sum, change)| *sum += change);
@@ -87,6 +86,7 @@ impl<D: Device> Renderer<'_, D> {
         let most = f64::from(self.omissions.probe_error).powi(2) * pixels.len() as f64;
         let harmless = changes.iter().position(|change| *change < most);
         let least_share = harmless.map_or(MIN_SHARE, |index| SHARES[index]);
+        let meets = self.omissions.probe_error <= 0.0 || greatest >= least_share;
         Ok((Probes { values, part_count: count, columns, rows, step, least_share }, meets))
     }
 }
