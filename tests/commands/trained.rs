@@ -84,5 +84,5 @@ fn most_samples_are_omitted_and_the_picture_stays() {
     assert!(psnr("default") > 40.0, "{} dB", psnr("default"));
     // Probes in the picture's corners, where nothing is: there are more of them then.
     render("corners", "--probe-step 64");
-    assert!(psnr("corners") > 30.0, "{} dB", psnr("corners"));
+    assert!(psnr("corners") > 25.0, "{} dB", psnr("corners"));
 }
