@@ -54,7 +54,9 @@ impl Cameras {
     /// Photographs of one size are of one camera; with focal lengths by EXIF, of one size, camera and zoom. `given` is
     /// a focal length in pixels of photographs as large as the first: of others it is scaled with the longest side.
     pub fn of(photos: &[Photo], given: Option<f64>) -> Cameras {
+        let of_size = |size: [u32; 2]| photos.iter().filter(move |photo| photo.size == size).map(|photo| &photo.exif);
         Cameras::by(photos, |photo| match (given, photo.exif.focal) {
+            (None, Some(_)) if is_odd(&photo.exif, of_size(photo.size)) => unknown(photo),
             (Some(given), _) => {
                 let focal = given * longest(photo.size) / longest(photos[0].size);
                 (Some(focal), FocalSource::Given, String::new())
@@ -198,6 +200,16 @@ fn unknown(photo: &Photo) -> (Option<f64>, FocalSource, String) {
     (None, FocalSource::Unknown, format!("unknown {zoom}"))
 }
 
+/// Whether a photograph states another focal length, by a zoom, than most of its lens at the same millimetres, among
+/// those of its size: one of them is wrong, or a digital zoom that nothing else tells.
+fn is_odd<'a>(exif: &Exif, of_size: impl Iterator<Item = &'a Exif>) -> bool {
+    let Exif { focal: Some(focal), camera: Some(_), millimetres: Some(_), .. } = exif else { return false };
+    let is_alike = |other: &&Exif| other.camera == exif.camera && other.millimetres == exif.millimetres;
+    let stated: Vec<f64> = of_size.filter(is_alike).filter_map(|other| other.focal).collect();
+    let near = stated.iter().filter(|other| (focal / **other).max(**other / focal) < MIN_ZOOM).count();
+    2 * near < stated.len()
+}
+
 /// The camera that photographs state, with a focal length in pixels: a digital zoom changes this, but not the lens.
 fn camera_of(Exif { camera, millimetres, .. }: &Exif, focal: f64) -> String {
     format!("{camera:?} {millimetres:?} {focal:.0}")
@@ -218,6 +230,26 @@ mod tests {
         let camera = |focal| camera_of(&phone(focal), focal);
         assert_eq!(camera(427.0), camera(427.2));
         assert_ne!(camera(427.0), camera(480.0));
+    }
+
+    #[test]
+    fn one_that_states_another_focal_length_of_the_same_lens_is_odd() {
+        let of = |camera: &str, millimetres, focal| Exif {
+            focal: Some(focal),
+            camera: Some(camera.to_owned()),
+            millimetres,
+            ..Exif::default()
+        };
+        let phone = |focal| of("phone", Some(5.4), focal);
+        let all = [phone(700.0), phone(702.0), phone(1400.0), phone(690.0)];
+        assert_eq!(all.each_ref().map(|exif| is_odd(exif, all.iter())), [false, false, true, false]);
+        // As many of either, other lenses, and what does not say its lens.
+        let halves = [phone(700.0), phone(1400.0)];
+        assert!(halves.iter().all(|exif| !is_odd(exif, halves.iter())));
+        let zoom = [of("camera", Some(24.0), 700.0), of("camera", Some(24.0), 700.0), of("camera", Some(48.0), 1400.0)];
+        assert!(zoom.iter().all(|exif| !is_odd(exif, zoom.iter())));
+        let silent = [of("phone", None, 700.0), of("phone", None, 700.0), of("phone", None, 1400.0)];
+        assert!(silent.iter().all(|exif| !is_odd(exif, silent.iter())));
     }
 
     #[test]
