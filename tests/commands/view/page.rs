@@ -81,6 +81,8 @@ fn done_by_line(folder: &Path, line: &str) {
 /// Downloads go to the folder `saved` of the browser's own.
 fn keep_downloads(chromium: &Chromium) -> PathBuf {
     let saved = chromium.folder().join("saved");
+    // The browser would make it when it first needs it, and it is looked into before.
+    fs::create_dir(&saved).expect("a folder");
     let downloads = json!({"behavior": "allow", "downloadPath": saved.display().to_string()});
     chromium.call(None, "Browser.setDownloadBehavior", downloads);
     saved
