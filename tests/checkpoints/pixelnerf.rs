@@ -145,7 +145,7 @@ fn the_side_of_sources_is_read_and_one_without_sense_refused() {
 /// Tables of octaves and phases, and more octaves than any network that was published has.
 #[test]
 fn what_contradicts_itself_is_refused() {
-    let of = |octaves: usize, tables: &[(&str, &[f32])], metadata: &[(&str, &str)]| {
+    let frequency = |octaves: usize, tables: &[(&str, &[f32])], metadata: &[(&str, &str)]| {
         let mut architecture = Architecture::small(16);
         architecture.frequency_count = octaves;
         let shape = |(name, values): &(&str, &[f32])| viewfuse::nn::checkpoint::TensorShape {
@@ -165,17 +165,17 @@ fn what_contradicts_itself_is_refused() {
     let (frequencies, phases) =
         (("code._freqs", [3.0, 3.0, 6.0, 6.0]), ("code._phases", [0.0, FRAC_PI_2, 0.0, FRAC_PI_2]));
     let tables: [(&str, &[f32]); 2] = [(frequencies.0, &frequencies.1), (phases.0, &phases.1)];
-    assert_eq!(of(2, &tables, &[]), Ok(3.0));
-    assert_eq!(of(2, &tables, &[("viewfuse.frequency", "3")]), Ok(3.0));
-    let said = of(2, &tables, &[("viewfuse.frequency", "1.5")]).expect_err("another frequency");
+    assert_eq!(frequency(2, &tables, &[]), Ok(3.0));
+    assert_eq!(frequency(2, &tables, &[("viewfuse.frequency", "3")]), Ok(3.0));
+    let said = frequency(2, &tables, &[("viewfuse.frequency", "1.5")]).expect_err("another frequency");
     assert!(said.contains("viewfuse.frequency = 1.5, and code._freqs begins with 3"), "{said}");
     for wrong in [&[FRAC_PI_2, 0.0, FRAC_PI_2, 0.0][..], &[0.0, FRAC_PI_2]] {
-        let said = of(2, &[tables[0], (phases.0, wrong)], &[]).expect_err("other phases");
+        let said = frequency(2, &[tables[0], (phases.0, wrong)], &[]).expect_err("other phases");
         assert!(said.contains("code._phases does not hold 0 and pi/2 in turns for 2 octaves"), "{said}");
     }
     // Six octaves of points and of directions have as many inputs.
-    let said = of(12, &[], &[]).expect_err("directions, perhaps");
+    let said = frequency(12, &[], &[]).expect_err("directions, perhaps");
     assert!(said.contains("78 numbers a point") && said.contains("use_code_viewdirs"), "{said}");
-    assert_eq!(of(12, &[], &[("viewfuse.frequency", "1.5")]), Ok(1.5));
-    assert_eq!(of(6, &[], &[]), Ok(1.5));
+    assert_eq!(frequency(12, &[], &[("viewfuse.frequency", "1.5")]), Ok(1.5));
+    assert_eq!(frequency(6, &[], &[]), Ok(1.5));
 }

@@ -63,20 +63,20 @@ impl Distance {
             let sum: f32 = cameras.iter().map(|camera| camera.pose.centre_world().distance(point)).sum();
             sum / cameras.len().max(1) as f32
         };
-        let own = distance_of(&cameras);
-        let is_own = cameras.len() < 2 || Rig::meeting_point(&cameras).is_some();
+        let alone = distance_of(&cameras);
+        let do_meet = cameras.len() < 2 || Rig::meeting_point(&cameras).is_some();
         let stated = sources.near_far.map(|[near, far]| 0.5 * (near + far)).filter(|middle| middle.is_normal());
         let sees_origin = || cameras.iter().all(|camera| camera.block(0).project(Vec3::ZERO).in_image);
         match sources.focus.map(from) {
-            Some(all) if !is_own || (own / all - 1.0).abs() > SAME_DISTANCE => {
+            Some(all) if !do_meet || (alone / all - 1.0).abs() > SAME_DISTANCE => {
                 Distance { length: all, is_guess: false }
             }
-            Some(_) => Distance { length: own, is_guess: false },
-            None if is_own && cameras.len() > 1 => Distance { length: own, is_guess: false },
-            None if stated.is_some() => Distance { length: stated.unwrap_or(own), is_guess: false },
-            None if is_own => Distance { length: own, is_guess: !sees_origin() },
+            Some(_) => Distance { length: alone, is_guess: false },
+            None if do_meet && cameras.len() > 1 => Distance { length: alone, is_guess: false },
+            None if stated.is_some() => Distance { length: stated.unwrap_or(alone), is_guess: false },
+            None if do_meet => Distance { length: alone, is_guess: !sees_origin() },
             None if sees_origin() => Distance { length: from(Vec3::ZERO), is_guess: true },
-            None => Distance { length: own, is_guess: true },
+            None => Distance { length: alone, is_guess: true },
         }
     }
 
@@ -205,28 +205,28 @@ mod tests {
 
     #[test]
     fn the_distance_is_that_from_where_axes_meet() {
-        let of = |sources: &SourceImages| Distance::of(sources);
+        let distance = |sources: &SourceImages| Distance::of(sources);
         let is_near = |found: Distance, length: f32, is_guess: bool| {
             assert!((found.length - length).abs() < 0.02 * length && found.is_guess == is_guess, "{found:?}");
         };
-        is_near(of(&pair(1.3, None)), 1.3, false);
+        is_near(distance(&pair(1.3, None)), 1.3, false);
         // Its photographs look at a nearer point than these two do.
-        is_near(of(&pair(3.0, Some(Vec3::ZERO))), 1.3, false);
-        is_near(of(&pair(3.0, None)), 3.0, false);
+        is_near(distance(&pair(3.0, Some(Vec3::ZERO))), 1.3, false);
+        is_near(distance(&pair(3.0, None)), 3.0, false);
         // Axes that are parallel, and that part.
         let parallel = [-0.1, 0.1].map(|x| [Vec3::new(x, 0.0, 1.3), Vec3::new(x, 0.0, 0.0)]);
         let parting = [-0.1, 0.1].map(|x| [Vec3::new(x, 0.0, 1.3), Vec3::new(3.0 * x, 0.0, 0.0)]);
         for places in [parallel, parting] {
-            is_near(of(&sources(&places, Some(Vec3::ZERO))), 1.3, false);
-            is_near(of(&sources(&places, None)), 1.3, true);
+            is_near(distance(&sources(&places, Some(Vec3::ZERO))), 1.3, false);
+            is_near(distance(&sources(&places, None)), 1.3, true);
         }
         // The origin is behind them.
         let moved = parallel.map(|place| place.map(|point| point - Vec3::new(0.0, 0.0, 9.0)));
-        assert!(of(&sources(&moved, None)).is_guess);
+        assert!(distance(&sources(&moved, None)).is_guess);
         // A single one looks at the origin, or at what the others look at.
-        is_near(of(&sources(&parallel[..1], None)), 1.3, false);
-        is_near(of(&sources(&moved[..1], Some(Vec3::new(0.0, 0.0, -9.0)))), 1.3, false);
-        assert!(of(&sources(&moved[..1], None)).is_guess);
+        is_near(distance(&sources(&parallel[..1], None)), 1.3, false);
+        is_near(distance(&sources(&moved[..1], Some(Vec3::new(0.0, 0.0, -9.0)))), 1.3, false);
+        assert!(distance(&sources(&moved[..1], None)).is_guess);
     }
 
     #[test]

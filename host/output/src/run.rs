@@ -146,11 +146,9 @@ impl RunWriter {
         self.videos = Videos::new(formats, rate, files);
     }
 
-    /// Adds a warning to the record, unless it is there: what is told of the sources has the scene in front.
+    /// Adds a warning to the record, which has each once.
     pub fn warn(&mut self, warning: String) {
-        if !self.given.iter().chain(&self.warnings).any(|known| warning.ends_with(known.as_str())) {
-            self.given.push(warning);
-        }
+        self.given.push(warning);
     }
 
     /// Lets no other process write to the folder, as soon as it is there.
@@ -408,12 +406,12 @@ pub fn confidence_map(frame: &Frame) -> Option<ImageBuffer<Luma<u8>, Vec<u8>>> {
     Some(ImageBuffer::from_fn(width, height, confidence))
 }
 
-/// Texts without those that another one before them ends with: what is told of a scene has its path in front.
-fn once_each(texts: impl Iterator<Item = String>) -> Vec<String> {
-    texts.fold(Vec::new(), |mut kept, text| {
-        if !kept.iter().any(|known: &String| known.ends_with(&text)) {
-            kept.push(text);
+/// Each warning once: what is told of a scene has its path in front, and is the same without it.
+fn once_each(warnings: impl Iterator<Item = String>) -> Vec<String> {
+    warnings.fold(Vec::new(), |mut listed: Vec<String>, warning| {
+        if !listed.iter().any(|known| known.ends_with(&warning) || warning.ends_with(known)) {
+            listed.push(warning);
         }
-        kept
+        listed
     })
 }

@@ -234,21 +234,25 @@ mod tests {
 
     #[test]
     fn one_that_states_another_focal_length_of_the_same_lens_is_odd() {
-        let of = |camera: &str, millimetres, focal| Exif {
+        let stated = |camera: &str, millimetres, focal| Exif {
             focal: Some(focal),
             camera: Some(camera.to_owned()),
             millimetres,
             ..Exif::default()
         };
-        let phone = |focal| of("phone", Some(5.4), focal);
+        let phone = |focal| stated("phone", Some(5.4), focal);
         let all = [phone(700.0), phone(702.0), phone(1400.0), phone(690.0)];
         assert_eq!(all.each_ref().map(|exif| is_odd(exif, all.iter())), [false, false, true, false]);
         // As many of either, other lenses, and what does not say its lens.
         let halves = [phone(700.0), phone(1400.0)];
         assert!(halves.iter().all(|exif| !is_odd(exif, halves.iter())));
-        let zoom = [of("camera", Some(24.0), 700.0), of("camera", Some(24.0), 700.0), of("camera", Some(48.0), 1400.0)];
+        let zoom = [
+            stated("camera", Some(24.0), 700.0),
+            stated("camera", Some(24.0), 700.0),
+            stated("camera", Some(48.0), 1400.0),
+        ];
         assert!(zoom.iter().all(|exif| !is_odd(exif, zoom.iter())));
-        let silent = [of("phone", None, 700.0), of("phone", None, 700.0), of("phone", None, 1400.0)];
+        let silent = [stated("phone", None, 700.0), stated("phone", None, 700.0), stated("phone", None, 1400.0)];
         assert!(silent.iter().all(|exif| !is_odd(exif, silent.iter())));
     }
 
