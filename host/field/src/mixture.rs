@@ -19,6 +19,7 @@ use crate::{AnyOptions, Rendered};
 pub use near::NearTargets;
 use serde::Serialize;
 use viewfuse_core::pose::Pose;
+use viewfuse_device::parallel::{for_each, for_each_row, map};
 use viewfuse_job::medians::upper_median;
 
 /// Confidences count from here (`K`).
@@ -33,6 +34,9 @@ const REACH: f32 = 0.01;
 const DISPARITY_SHARE: f32 = 0.1;
 /// ... and at most so many times.
 const MAX_DIFFERENCE: f32 = 2.0;
+/// Pixels, and terms of pixels, that are enough work for a thread.
+const MIN_PIXELS: usize = 1024;
+const MIN_TERMS: usize = 8 * MIN_PIXELS;
 
 /// Settings under which a target is rendered, and how the pictures are mixed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -98,67 +102,74 @@ pub(crate) fn between(first: Rendered, second: Rendered, share: f32) -> Rendered
 /// Pictures of one size, each with a share at each pixel, and the mean share of each. Colours are mixed; confidences
 /// are mixed, and divided by 1 plus the spread of the parts' colours over [`USUAL_SPREAD`]; a pixel's depth is that of
 /// the picture with the greatest share, so that no surface stands between two others.
-fn blended(parts: &[Rendered], shares_at: impl Fn(usize, &mut [f32])) -> (Rendered, Vec<f32>) {
+fn blended(parts: &[Rendered], shares_at: impl Fn(usize, &mut [f32]) + Sync) -> (Rendered, Vec<f32>) {
     let Some(first) = parts.first() else {
         let nothing =
             Rendered { colours: Vec::new(), depths: Vec::new(), confidences: Vec::new(), width: 0, height: 0 };
         return (nothing, Vec::new());
     };
-    let mut blended = first.clone();
-    let mut sums = vec![0.0_f64; parts.len()];
-    let mut shares = vec![0.0; parts.len()];
-    for pixel in 0..first.colours.len() {
-        shares_at(pixel, &mut shares);
-        let mean = |value: &dyn Fn(&Rendered) -> f32| -> f32 {
-            parts.iter().zip(&shares).map(|(part, share)| share * value(part)).sum()
+    let (mut blended, count) = (first.clone(), parts.len());
+    let mut shares = vec![0.0; first.colours.len() * count];
+    for_each_row(&mut shares, count, MIN_TERMS, shares_at);
+    let shares_of = |pixel: usize| &shares[pixel * count..][..count];
+    let mean = |pixel: usize, value: &dyn Fn(&Rendered) -> f32| -> f32 {
+        parts.iter().zip(shares_of(pixel)).map(|(part, share)| share * value(part)).sum()
+    };
+    for_each(&mut blended.colours, MIN_PIXELS, |pixel, colour| {
+        *colour = [0, 1, 2, 3].map(|channel| mean(pixel, &|part| part.colours[pixel][channel]));
+    });
+    let colours = &blended.colours;
+    for_each(&mut blended.confidences, MIN_PIXELS, |pixel, confidence| {
+        let square = |part: &Rendered| -> f32 {
+            let difference = |channel: usize| part.colours[pixel][channel] - colours[pixel][channel];
+            (0..3).map(|channel| difference(channel).powi(2)).sum::<f32>() / 3.0
         };
-        let colour = [0, 1, 2, 3].map(|channel| mean(&|part| part.colours[pixel][channel]));
-        blended.colours[pixel] = colour;
-        if let Some(confidence) = blended.confidences.get_mut(pixel) {
-            let square = |part: &Rendered| -> f32 {
-                (0..3).map(|channel| (part.colours[pixel][channel] - colour[channel]).powi(2)).sum::<f32>() / 3.0
-            };
-            let spread = mean(&square).sqrt() / USUAL_SPREAD;
-            *confidence = mean(&|part| part.confidences.get(pixel).copied().unwrap_or(0.0)) / (1.0 + spread);
-        }
-        let greatest = (1..parts.len()).fold(0, |best, part| if shares[part] > shares[best] { part } else { best });
-        if let (Some(depth), Some(surest)) = (blended.depths.get_mut(pixel), parts[greatest].depths.get(pixel)) {
-            *depth = *surest;
-        }
-        sums.iter_mut().zip(&shares).for_each(|(sum, share)| *sum += f64::from(*share));
+        let spread = mean(pixel, &square).sqrt() / USUAL_SPREAD;
+        *confidence = mean(pixel, &|part| part.confidences.get(pixel).copied().unwrap_or(0.0)) / (1.0 + spread);
+    });
+    for_each(&mut blended.depths, MIN_PIXELS, |pixel, depth| {
+        let shares = shares_of(pixel);
+        let greatest = (1..count).fold(0, |best, part| if shares[part] > shares[best] { part } else { best });
+        *depth = parts[greatest].depths.get(pixel).copied().unwrap_or(*depth);
+    });
+    let mut sums = vec![0.0_f64; count];
+    for shares in shares.chunks_exact(count) {
+        sums.iter_mut().zip(shares).for_each(|(sum, share)| *sum += f64::from(*share));
     }
-    let count = blended.colours.len().max(1) as f64;
-    (blended, sums.into_iter().map(|sum| (sum / count) as f32).collect())
+    let pixels = blended.colours.len().max(1) as f64;
+    (blended, sums.into_iter().map(|sum| (sum / pixels) as f32).collect())
 }
 
 /// The terms `x` of all pixels, `[pixel][term]`.
 pub(crate) fn terms(parts: &[Rendered]) -> Vec<f32> {
     let Some(Rendered { width, height, colours, .. }) = parts.first() else { return Vec::new() };
     let (size, count) = ([*width as usize, *height as usize], term_count(parts.len()));
-    let mut terms = vec![0.0; colours.len() * count];
-    let mut set = |term: usize, values: &dyn Fn(usize) -> f32| {
-        terms.chunks_exact_mut(count).enumerate().for_each(|(pixel, terms)| terms[term] = values(pixel));
-    };
-    set(0, &|_| 1.0);
-    for (index, part) in parts.iter().enumerate() {
-        if part.confidences.len() == colours.len() {
-            let smooth = smooth(&part.confidences, size);
-            set(1 + index, &|pixel| smooth[pixel] - USUAL_CONFIDENCE);
-        }
-    }
     let disparity = |depth: f32| if depth > 0.0 { depth.recip() } else { 0.0 };
     let first: Vec<f32> = parts[0].depths.iter().copied().map(disparity).collect();
     let usual = DISPARITY_SHARE * upper_median(first.iter().copied(), f32::total_cmp).unwrap_or(0.0);
-    for (index, part) in parts.iter().enumerate().skip(1) {
-        if usual > 0.0 && part.depths.len() == first.len() {
-            let difference = |(depth, first): (&f32, &f32)| {
-                ((disparity(*depth) - first) / usual).clamp(-MAX_DIFFERENCE, MAX_DIFFERENCE)
-            };
-            let differences: Vec<f32> = part.depths.iter().zip(&first).map(difference).collect();
-            let smooth = smooth(&differences, size);
-            set(parts.len() + index, &|pixel| smooth[pixel].abs());
+    let confidences = |part: usize| {
+        let confidences = &parts[part].confidences;
+        (confidences.len() == colours.len()).then(|| smooth(confidences, size))
+    };
+    let differences = |part: usize| {
+        let difference =
+            |(depth, first): (&f32, &f32)| ((disparity(*depth) - first) / usual).clamp(-MAX_DIFFERENCE, MAX_DIFFERENCE);
+        let differences = || -> Vec<f32> { parts[part].depths.iter().zip(&first).map(difference).collect() };
+        (usual > 0.0 && parts[part].depths.len() == first.len()).then(|| smooth(&differences(), size))
+    };
+    // Confidences of all pictures, and disparities of all but the first.
+    let means: Vec<Option<Vec<f32>>> = map(count - 1, 1, |mean| match mean.checked_sub(parts.len()) {
+        None => confidences(mean),
+        Some(part) => differences(1 + part),
+    });
+    let mut terms = vec![0.0; colours.len() * count];
+    for_each_row(&mut terms, count, MIN_TERMS, |pixel, terms| {
+        terms[0] = 1.0;
+        for (mean, term) in terms[1..].iter_mut().enumerate() {
+            let Some(means) = &means[mean] else { continue };
+            *term = if mean < parts.len() { means[pixel] - USUAL_CONFIDENCE } else { means[pixel].abs() };
         }
-    }
+    });
     terms
 }
 

@@ -16,6 +16,7 @@ use crate::mixture::{Mixture, term_count, terms};
 use crate::render::RenderError;
 use crate::{AnyOptions, Rendered, Variant};
 use image::RgbImage;
+use viewfuse_device::parallel::{for_each_part, map};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::{GroundTruth, to_rgb8};
 use viewfuse_weighting::Weighting;
@@ -176,19 +177,19 @@ fn picture(rendered: &Rendered) -> RgbImage {
 
 /// The mixture of the examples' pictures.
 fn fitted(held_out: &HeldOutSources<'_>, examples: &mut [Example], label: &str, parts: &[AnyOptions]) -> Mixed {
-    for example in &mut *examples {
-        example.terms = terms(&example.parts);
-    }
-    let sums: Vec<Sums> = examples.iter().map(Sums::of).collect();
+    for_each_part(examples, 1, &|_, example| example[0].terms = terms(&example[0].parts));
+    let sums = map(examples.len(), 1, |index| Sums::of(&examples[index]));
     let count = parts.len();
+    let without = |index: usize| {
+        let others = sums.iter().enumerate().filter(|(other, _)| *other != index).map(|(_, sums)| sums);
+        Mixture::new(parts.to_vec(), solved(others, count))
+    };
+    let mixed = map(examples.len(), 1, |index| without(index).mixed(&examples[index].parts));
     let mut outcomes = Vec::with_capacity(examples.len());
     let mut last_share = 0.0;
-    for (index, example) in examples.iter().enumerate() {
-        let others = sums.iter().enumerate().filter(|(other, _)| *other != index).map(|(_, sums)| sums);
-        let mixture = Mixture::new(parts.to_vec(), solved(others, count));
-        let (rendered, shares) = mixture.mixed(&example.parts);
+    for (index, (rendered, shares)) in mixed.iter().enumerate() {
         last_share += shares.last().copied().unwrap_or(0.0) / examples.len() as f32;
-        outcomes.push(held_out.outcome(index, &picture(&rendered), &rendered.confidences));
+        outcomes.push(held_out.outcome(index, &picture(rendered), &rendered.confidences));
     }
     let mixture = Mixture::new(parts.to_vec(), solved(sums.iter(), count));
     let nearest = held_out.nearest();
@@ -199,7 +200,7 @@ fn fitted(held_out: &HeldOutSources<'_>, examples: &mut [Example], label: &str, 
 
 /// The normal equations of a source's errors, over the mean square error of the plain mean.
 struct Sums {
-    /// Row-major.
+    /// Row-major, its lower half: it is symmetric.
     matrix: Vec<f64>,
     right: Vec<f64>,
 }
@@ -224,7 +225,7 @@ impl Sums {
                 }
                 for (row, product) in products.iter().enumerate() {
                     right[row] += product * error;
-                    let columns = matrix[row * size..].iter_mut().zip(&products);
+                    let columns = matrix[row * size..].iter_mut().zip(&products[..=row]);
                     columns.for_each(|(sum, other)| *sum += product * other);
                 }
             }
@@ -251,7 +252,7 @@ fn solved<'s>(sums: impl Iterator<Item = &'s Sums>, parts: usize) -> Vec<Vec<f32
     solution.chunks_exact(term_count).map(|constants| constants.iter().map(|value| *value as f32).collect()).collect()
 }
 
-/// Solves `matrix x = right` for a symmetric positive definite matrix, row-major.
+/// Solves `matrix x = right` for a symmetric positive definite matrix, row-major, of which the lower half is read.
 fn cholesky(mut matrix: Vec<f64>, right: Vec<f64>) -> Vec<f64> {
     let size = right.len();
     for row in 0..size {

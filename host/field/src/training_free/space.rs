@@ -4,6 +4,7 @@ use crate::Surfaces;
 use std::cell::RefCell;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock};
+use viewfuse_device::parallel::map;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_scene::rig::Rig;
 
@@ -45,8 +46,12 @@ impl Space {
     /// From surface points. For a camera that sees too few, the bounds are those of all the cameras that see enough; if
     /// there are none, those of the volume common to all cameras.
     pub(super) fn of_points(points: Vec<Vec3>, cameras: &[Camera]) -> Space {
-        let seen = cameras.iter().filter_map(|camera| in_frustum(&points, &camera.block(0)));
-        let bounds = seen.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).unwrap_or_else(|| common_volume(cameras));
+        let seen = map(cameras.len(), 1, |camera| in_frustum(&points, &cameras[camera].block(0)));
+        let bounds = seen
+            .into_iter()
+            .flatten()
+            .reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
+            .unwrap_or_else(|| common_volume(cameras));
         Space::new(points, Some(bounds))
     }
 

@@ -16,12 +16,15 @@ use crate::{
 use std::borrow::Cow;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::Device;
+use viewfuse_device::parallel::map;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::{SourceImage, SourceImages, longest_side};
 use viewfuse_weighting::sources::SourceWeights;
 
 /// Most views that contribute to a picture: more of less weight lose (`host/results/training_free.md`, "Many sources").
 const MAX_VIEWS: usize = 9;
+/// Pixels that are enough work for a thread.
+const MIN_PIXELS: usize = 1 << 14;
 
 /// Photographs on the device at two sizes, and their disparity maps.
 pub(super) struct Views<'a, D: Device> {
@@ -108,13 +111,13 @@ impl<'a, D: Device> Views<'a, D> {
     /// A view's depths, of the disparities of all views.
     fn depth_map(&self, view: usize, maps: &[[f32; 2]]) -> DepthMap {
         let (camera, step) = (self.matched.images.cameras[view], self.maps.steps[view]);
-        let pixels = maps[camera.first_texel as usize..].iter().take((camera.width * camera.height) as usize);
+        let pixels = &maps[camera.first_texel as usize..][..(camera.width * camera.height) as usize];
         // Below half a step a disparity is that of the farthest plane: it bounds nothing.
         let depth = |disparity: f32| if step > 0.0 && disparity > 0.5 * step { 1.0 / disparity } else { 0.0 };
         DepthMap {
             camera: CameraBlock { first_texel: 0, ..camera },
-            depths: pixels.clone().map(|[disparity, _]| depth(*disparity)).collect(),
-            confidences: pixels.map(|[_, confidence]| *confidence).collect(),
+            depths: map(pixels.len(), MIN_PIXELS, |pixel| depth(pixels[pixel][0])),
+            confidences: map(pixels.len(), MIN_PIXELS, |pixel| pixels[pixel][1]),
         }
     }
 }
