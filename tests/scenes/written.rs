@@ -572,3 +572,16 @@ fn cut_out_photographs_get_masks_of_neus() {
     assert!(photograph.pixels.pixels().zip(mask.pixels()).all(|(pixel, level)| pixel[3] == level[0]));
     assert!(read.photograph(0).expect("the same") == photograph);
 }
+
+/// Through a lens that does not see the corners of the pinhole's picture: the mask is the object, not what it saw.
+#[test]
+fn cut_out_photographs_through_a_lens_get_masks_of_neus() {
+    let mut scene = Scene::open(viewfuse_tests::places::data("toy")).expect("the sample");
+    let lens = Lens::new(Projection::Perspective, [0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).expect("a lens");
+    scene.views.iter_mut().for_each(|view| view.lens = Some(lens));
+    let photograph = scene.photograph(0).expect("a photograph");
+    assert!(photograph.has_alpha && photograph.seen.is_some());
+    let (folder, ..) = written(&scene, Layout::Neus);
+    let mask = image::open(folder.file("out/mask/000000.png")).expect("a mask").into_luma8();
+    assert!(photograph.pixels.pixels().zip(mask.pixels()).all(|(pixel, level)| pixel[3] == level[0]));
+}

@@ -140,10 +140,11 @@ impl Draft<'_> {
     ) -> Result<String, WriteSceneError> {
         self.progress.check()?;
         let Photograph { pixels, seen, .. } = self.scene.photograph(view)?;
-        let name = &self.names[view];
+        let (name, changed) = (&self.names[view], &self.scene.views[view]);
         let (width, height) = pixels.dimensions();
         let mask = match seen {
-            Some(seen) if !self.scene.has_object_mask(&self.scene.views[view]) => seen,
+            // Without an ignore mask it tells only what the lens did not see.
+            Some(seen) if changed.mask.is_some() && !self.scene.has_object_mask(changed) => seen,
             _ => GrayImage::from_fn(width, height, |x, y| image::Luma([pixels.get_pixel(x, y)[3]])),
         };
         self.png(mask_folder, mask_name, mask.into())?;
