@@ -8,7 +8,7 @@ use viewfuse::job::progress::Silent;
 use viewfuse::scene::write::{Layout, WriteSceneError, Written, write};
 use viewfuse::scene::{MaskChoice, MaskMeaning, Scene, Split, View};
 use viewfuse_core::lens::{Lens, Projection};
-use viewfuse_tests::command::names_in;
+use viewfuse_tests::command::{names_in, toy};
 use viewfuse_tests::listener::Listener;
 use viewfuse_tests::scenes::{self, Folder};
 
@@ -571,6 +571,23 @@ fn cut_out_photographs_get_masks_of_neus() {
     let photograph = scene.photograph(0).expect("a photograph");
     assert!(photograph.pixels.pixels().zip(mask.pixels()).all(|(pixel, level)| pixel[3] == level[0]));
     assert!(read.photograph(0).expect("the same") == photograph);
+}
+
+/// One of them may be near enough to be cut off by most of its border, and one may have no alpha channel.
+#[test]
+fn each_of_the_cut_out_photographs_gets_a_mask_of_neus() {
+    let folder = toy();
+    let near = image::RgbaImage::from_fn(128, 128, |x, _| image::Rgba([90, 120, 150, if x < 96 { 255 } else { 0 }]));
+    near.save(folder.file("toy/rgb/000003.png")).expect("a photograph");
+    image::RgbImage::new(128, 128).save(folder.file("toy/rgb/000005.png")).expect("a photograph");
+    let scene = Scene::open(folder.join("toy")).expect("a scene");
+    let (folder, read, _) = written(&scene, Layout::Neus);
+    assert_eq!(read.views.iter().filter(|view| read.has_object_mask(view)).count(), 24);
+    let share = |name: &str| {
+        let mask = image::open(folder.file(&format!("out/mask/{name}.png"))).expect("a mask").into_luma8();
+        mask.iter().filter(|level| **level == 255).count() as f64 / f64::from(128 * 128)
+    };
+    assert_eq!((share("000003"), share("000005")), (0.75, 1.0));
 }
 
 /// Through a lens that does not see the corners of the pinhole's picture: the mask is the object, not what it saw.

@@ -240,7 +240,8 @@ fn lost(scene: &Scene, layout: Layout, read: &Scene) -> Vec<String> {
         let may_have_alpha = |file: &Path| !has_extension(file, &["jpg", "jpeg"]);
         view.mask.is_none() && view.image.as_deref().is_some_and(may_have_alpha)
     };
-    if scene.mask_choice == MaskChoice::Object && scene.views.iter().any(is_said) {
+    // NeuS's masks say it.
+    if scene.mask_choice == MaskChoice::Object && layout != Layout::Neus && scene.views.iter().any(is_said) {
         lines.push("that alpha channels say where the object is, which must be said of this folder, too".to_owned());
     }
     let are_masks =
@@ -248,9 +249,7 @@ fn lost(scene: &Scene, layout: Layout, read: &Scene) -> Vec<String> {
     if are_masks(scene) && !are_masks(read) && read.views.iter().any(|view| view.mask.is_some()) {
         lines.push("that masks say which pixels do not count, which must be said of this folder, too".to_owned());
     }
-    // What cannot be read is said when it is written.
-    let is_cut_out = || layout == Layout::Neus && neus::is_cut_out(scene, 0).unwrap_or(false);
-    let has_object = scene.views.iter().any(|view| scene.has_object_mask(view)) || is_cut_out();
+    let has_object = read.views.iter().any(|view| read.has_object_mask(view));
     if layout == Layout::Neus && !has_object {
         lines.push(
             "masks, of which there are none: NeuS's own program needs mask/, in which white pictures will do"

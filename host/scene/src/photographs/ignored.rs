@@ -1,6 +1,7 @@
 //! Pixels of a photograph that do not count: by an ignore mask, or by an alpha channel that is one.
 
-use crate::Photograph;
+use crate::scene::files::has_extension;
+use crate::{MaskChoice, Photograph, Scene, SceneError};
 use image::{GrayImage, Luma};
 
 /// Alpha from which on a pixel counts.
@@ -25,9 +26,22 @@ pub(super) fn is_of_ignored(mut shares: Vec<f32>) -> bool {
     shares.get(shares.len() / 2).is_some_and(|share| *share > MAX_OBJECT_BORDER)
 }
 
-/// Whether the alpha channel of a photograph says where the object is.
-pub(crate) fn shows_object(photograph: &Photograph) -> bool {
-    photograph.has_alpha && !is_of_ignored(vec![border_share(photograph)])
+/// Whether the alpha channels of a scene's photographs say where the object is: all together, as those of sources do,
+/// since the object may be cut off by most of the border of a single one.
+pub(crate) fn shows_object(scene: &Scene) -> Result<bool, SceneError> {
+    if !matches!(scene.mask_choice, MaskChoice::Auto | MaskChoice::Object) {
+        return Ok(false);
+    }
+    let mut shares = Vec::new();
+    for (index, view) in scene.views.iter().enumerate() {
+        // JPEGs have no alpha channel.
+        let may_have_alpha = view.image.as_ref().is_some_and(|file| !has_extension(file, &["jpg", "jpeg"]));
+        if may_have_alpha && view.mask.is_none() {
+            let photograph = scene.photograph(index)?;
+            shares.extend(photograph.has_alpha.then(|| border_share(&photograph)));
+        }
+    }
+    Ok(!shares.is_empty() && (scene.mask_choice == MaskChoice::Object || !is_of_ignored(shares)))
 }
 
 /// The whole photograph, of which what is transparent does not count.

@@ -21,9 +21,9 @@ use super::{Draft, Layout, WriteSceneError, camera_from_world};
 use crate::numpy::npy;
 use crate::photographs::ignored::shows_object;
 use crate::rig::Rig;
-use crate::scene::files::{has_extension, natural_order};
+use crate::scene::files::natural_order;
 use crate::scene::neus::matrices_of;
-use crate::{MaskChoice, Scene, SceneError, View};
+use crate::{Scene, View};
 
 /// Whether the scene is in the coordinates of a unit sphere that this layout gave it.
 pub(super) fn has_unit_sphere(scene: &Scene) -> bool {
@@ -44,7 +44,8 @@ pub(super) fn fits(scene: &Scene) -> Result<(), String> {
 
 pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
     let count = out.scene.views.len();
-    (0..count).try_for_each(|view| photograph(out, view))?;
+    let are_cut_out = shows_object(out.scene)?;
+    (0..count).try_for_each(|view| photograph(out, view, are_cut_out))?;
     let numbers = places(&out.names);
     let (centre, radius) = sphere(out.scene);
     let scale = [
@@ -71,21 +72,14 @@ pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
 /// The only format that NeuS's own program reads.
 const PNG: [&str; 1] = ["png"];
 
-/// Whether the alpha channel of a view's photograph says where its object is: it becomes a mask.
-pub(super) fn is_cut_out(scene: &Scene, index: usize) -> Result<bool, SceneError> {
-    let View { image, mask, .. } = &scene.views[index];
-    let is_used = matches!(scene.mask_choice, MaskChoice::Auto | MaskChoice::Object);
-    // JPEGs have no alpha channel.
-    let may_be = is_used && mask.is_none() && image.as_ref().is_some_and(|file| !has_extension(file, &["jpg", "jpeg"]));
-    Ok(may_be && shows_object(&scene.photograph(index)?))
-}
-
-/// Writes the photograph of a view and its mask.
-fn photograph(out: &Draft, index: usize) -> Result<(), WriteSceneError> {
-    let view = &out.scene.views[index];
-    let is_cut_out = is_cut_out(out.scene, index)?;
-    match (&view.lens, &view.mask) {
-        _ if is_cut_out => drop(out.pinhole_photograph_and_mask(index, "image", ["mask", &out.names[index]])?),
+/// Writes the photograph of a view and its mask. Where alpha channels say where the object is (`are_cut_out`), each
+/// photograph has a mask: NeuS's own program counts masks as it counts photographs.
+fn photograph(out: &Draft, index: usize, are_cut_out: bool) -> Result<(), WriteSceneError> {
+    let View { lens, mask, .. } = &out.scene.views[index];
+    match (lens, mask) {
+        (_, None) if are_cut_out => {
+            out.pinhole_photograph_and_mask(index, "image", ["mask", &out.names[index]])?;
+        }
         (None, _) => {
             out.stored_photograph(index, "image", &PNG)?;
             out.mask(index, "mask", &out.names[index], &PNG)?;
