@@ -323,6 +323,20 @@ fn layouts_without_ignore_masks_hold_them_as_transparency_or_not_at_all() {
     assert!(error.contains("cannot hold this scene: its masks say where the object is"), "{error}");
 }
 
+/// A rim that does not count, as of a fisheye, is the border's as an object's surroundings are.
+#[test]
+fn transparency_that_would_be_an_objects_is_told() {
+    let rim = |_: u32, x: u32, y: u32| (f64::from(x) / 160.0 - 1.0).hypot(f64::from(y) / 120.0 - 1.0) < 0.97;
+    let is_told = |counts: &dyn Fn(u32, u32, u32) -> bool| {
+        let folder = room(|name| format!("masks/{name}.png"), counts);
+        let scene = opened(&folder, MaskChoice::Auto);
+        assert_eq!(scene.masks, MaskMeaning::Ignore);
+        let written = write(&scene, Layout::Middlebury, &folder.join("out"), &Silent).expect("written");
+        written.lost.iter().any(|line| line.starts_with("that alpha channels say which pixels do not count"))
+    };
+    assert!(is_told(&rim) && !is_told(&|view, x, y| !thing(view, x, y)));
+}
+
 /// A person's word on masks holds for what is exported: no alpha channel where it is not used, a line where it cannot be
 /// said again.
 #[test]
@@ -332,7 +346,8 @@ fn what_is_said_of_alpha_channels_is_exported_or_told() {
     let cut = image::RgbaImage::from_fn(128, 128, |x, _| image::Rgba([90, 120, 150, if x < 64 { 0 } else { 255 }]));
     cut.save(folder.file("toy/rgb/000003.png")).expect("a photograph");
     let out = Folder::new();
-    for (choice, has_alpha) in [(MaskChoice::Auto, true), (MaskChoice::Object, true), (MaskChoice::None, false)] {
+    let choices = [MaskChoice::Auto, MaskChoice::Object, MaskChoice::Ignore, MaskChoice::None];
+    for (choice, has_alpha) in choices.into_iter().zip([true, true, true, false]) {
         let scene = Scene::open_masked(&path, choice).expect("a scene");
         for layout in [Layout::Transforms, Layout::ColmapBinary] {
             let folder = out.join(format!("{choice:?}-{layout}"));
@@ -345,7 +360,8 @@ fn what_is_said_of_alpha_channels_is_exported_or_told() {
             let picture = image::open(folder.join("images/000003.png")).expect("a photograph");
             assert_eq!(picture.color().has_alpha(), has_alpha, "{choice:?} {layout}");
             let is_told = written.lost.iter().any(|line| line.contains("must be said of this folder, too"));
-            assert_eq!(is_told, choice == MaskChoice::Object, "{:?}", written.lost);
+            let is_said = matches!(choice, MaskChoice::Object | MaskChoice::Ignore);
+            assert_eq!(is_told, is_said, "{:?}", written.lost);
         }
     }
 }

@@ -26,6 +26,7 @@ use std::path::{Path, PathBuf};
 use viewfuse_job::files::WholeFolder;
 use viewfuse_job::progress::{Interrupted, Progress};
 
+use crate::photographs::ignored::shows_object;
 use crate::scene::files::has_extension;
 use crate::{MaskChoice, MaskMeaning, Scene, SceneError, View};
 pub use names::check_name;
@@ -165,8 +166,10 @@ pub fn write_with(
     };
     let read = readback::check(scene, layout, &draft, &names).map_err(unfit)?;
     beside.iter().try_for_each(|(name, bytes)| out.put(name, bytes))?;
+    // While what was read is where it was read.
+    let lost = lost(scene, layout, &read);
     unfinished.finish().map_err(failed)?;
-    Ok(Written { folder: folder.to_path_buf(), photograph_count, lost: lost(scene, layout, &read) })
+    Ok(Written { folder: folder.to_path_buf(), photograph_count, lost })
 }
 
 /// A folder that is being filled.
@@ -268,8 +271,16 @@ fn lost(scene: &Scene, layout: Layout, read: &Scene) -> Vec<String> {
         lines.push(format!("the part of the scene that {parts} views belong to"));
     }
     let masks = scene.views.iter().filter(|view| view.mask.is_some() && !scene.has_object_mask(view)).count();
-    if layout != Layout::Transforms && !layout.is_colmap() && masks > 0 {
+    let become_alpha = layout != Layout::Transforms && !layout.is_colmap() && masks > 0;
+    if become_alpha {
         lines.push(format!("the ignore masks of {masks} photographs: what does not count is transparent"));
+    }
+    // Where they hide most of the border they are read as an object's. What cannot be read was not written.
+    let are_ignored = become_alpha || scene.mask_choice == MaskChoice::Ignore && scene.views.iter().any(is_said);
+    if are_ignored && shows_object(read).unwrap_or(false) {
+        lines.push(
+            "that alpha channels say which pixels do not count, which must be said of this folder, too".to_owned(),
+        );
     }
     let lenses = match layout {
         Layout::Transforms => views(&|view| view.lens.is_some_and(|lens| !transforms::holds(scene, &lens))),
