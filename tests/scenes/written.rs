@@ -126,6 +126,21 @@ fn every_layout_that_can_hold_a_scene_gives_it_back() {
     }
 }
 
+/// A layout without a list has the order of its files, which indices of views count in.
+#[test]
+fn another_order_of_the_views_is_told() {
+    let mut scene = Scene::open(viewfuse_tests::places::data("toy")).expect("the sample");
+    for is_reversed in [false, true] {
+        for layout in [Layout::Transforms, Layout::Middlebury, Layout::Srn, Layout::ColmapBinary] {
+            let (_folder, read, written) = written(&scene, layout);
+            let is_told = written.lost.iter().any(|line| line.starts_with("the order of the views"));
+            let has_list = matches!(layout, Layout::Transforms | Layout::Middlebury);
+            assert_eq!((is_told, names(&read) != names(&scene)), (is_reversed && !has_list, is_told), "{layout}");
+        }
+        scene.views.reverse();
+    }
+}
+
 #[test]
 fn points_and_poses_without_photographs() {
     let folder = colmap_text();

@@ -229,8 +229,12 @@ fn lost(scene: &Scene, layout: Layout, read: &Scene) -> Vec<String> {
     if layout != Layout::Llff && !(layout == Layout::Neus && neus::has_unit_sphere(scene)) && depths > 0 {
         lines.push(format!("near and far depths of {depths} views"));
     }
+    let names = names_in(scene, layout);
     if layout == Layout::Neus && neus::numbered(scene).is_some() {
         lines.push("the names of the photographs, which are numbered".to_owned());
+    }
+    if !names.iter().eq(read.views.iter().map(|view| &view.name)) {
+        lines.push("the order of the views, which is that of their names there".to_owned());
     }
     if layout.is_colmap() && scene.points.iter().any(|point| !point.views.is_empty()) {
         lines.push(
