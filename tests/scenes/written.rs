@@ -482,7 +482,9 @@ fn a_scene_far_from_the_origin_is_written_in_its_own_coordinates() {
     let scene = open(&folder);
     assert!(scene.frame.origin.distance(centres[0]) < 2.0);
     for layout in Layout::ALL {
-        let (_folder, read, _) = written(&scene, layout);
+        let (_folder, read, given) = written(&scene, layout);
+        let is_told = given.lost.iter().any(|line| line.contains("it reads matrices in f32"));
+        assert_eq!(is_told, layout == Layout::Neus, "{:?}", given.lost);
         let (centre, radius) = if layout == Layout::Neus { sphere(&read.path) } else { (DVec3::ZERO, 1.0) };
         for (view, expected) in read.views.iter().zip(centres) {
             let file = centre + radius * read.frame.file(view.camera.pose.centre_world().as_dvec3());
@@ -495,6 +497,21 @@ fn a_scene_far_from_the_origin_is_written_in_its_own_coordinates() {
         };
         assert!((radius * distance(&read) - distance(&scene)).abs() < 1e-6, "{layout}");
     }
+}
+
+#[test]
+fn the_sphere_of_a_small_scene_is_told() {
+    let folder = llff();
+    let rows = [0.0, 1.0e-5].map(|x| {
+        let mut row = llff_row();
+        (row[3], row[8], row[13]) = (x, 2.0e-5, 3.0e-5);
+        row
+    });
+    folder.write("poses_bounds.npy", npy(&[2, 17], rows.as_flattened()));
+    let (out, _, written) = written(&open(&folder), Layout::Neus);
+    let (_, radius) = sphere(&out.join("out"));
+    let told = written.lost.iter().find_map(|line| line.split_once("farther than ")?.1.split(' ').next()?.parse().ok());
+    assert!(told.is_some_and(|told: f64| (told / radius - 1.0).abs() < 0.01), "{radius} {:?}", written.lost);
 }
 
 /// Names that file systems hold, and the layouts that do not.

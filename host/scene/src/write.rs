@@ -265,10 +265,19 @@ fn lost(scene: &Scene, layout: Layout, read: &Scene) -> Vec<String> {
     }
     if layout == Layout::Neus && !neus::has_unit_sphere(scene) && !has_object {
         let (_, radius) = neus::sphere(scene);
+        // Three digits that say something, whatever the unit of length.
+        let digits = (2.0 - radius.log10().floor()).clamp(0.0, 12.0) as usize;
         lines.push(format!(
-            "of whole photographs what is farther than {radius:.3} from the point that the cameras look at: programs \
-             that read this layout look for surfaces within that sphere"
+            "of whole photographs what is farther than {radius:.digits$} from the point that the cameras look at: \
+             programs that read this layout look for surfaces within that sphere"
         ));
+    }
+    if layout == Layout::Neus && neus::is_far(scene) {
+        lines.push(
+            "for NeuS's own program, where the cameras are: it reads matrices in f32, which is too coarse so far from \
+             the origin of coordinates"
+                .to_owned(),
+        );
     }
     let parts = views(&|view| view.split.is_some());
     if layout != Layout::Transforms && parts > 0 {

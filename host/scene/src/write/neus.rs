@@ -127,6 +127,13 @@ pub(super) fn sphere(scene: &Scene) -> (DVec3, f64) {
     (scene.frame.file(focus.as_dvec3()), radius * scene.frame.scale)
 }
 
+/// Whether the sphere is so far from the origin that matrices in f32, which NeuS's own program takes, are wrong by a
+/// thousandth of its radius.
+pub(super) fn is_far(scene: &Scene) -> bool {
+    let (centre, radius) = sphere(scene);
+    centre.length() > 1.0e4 * radius
+}
+
 /// `K [R | t]` with the last row `0 0 0 1`; pixel centres at whole numbers.
 fn projection(scene: &Scene, view: &View) -> [[f64; 4]; 4] {
     let pinhole = &view.camera.pinhole;
