@@ -97,6 +97,9 @@ fn what_is_unclear_is_asked() {
     });
     let parts = ["room/masks/", "leave 8 % of the photographs", "inverted", "--masks object or --masks ignore"];
     assert_refused(folder.path(), "render room --targets 5 --size 32x24 --device cpu -o out", &parts);
+    for layout in ["transforms", "colmap", "srn"] {
+        assert_refused(folder.path(), &format!("export room --layout {layout} -o out"), &parts);
+    }
     let printed = done(folder.path(), "inspect room");
     assert!(printed.contains("read as    masks: unclear whether"), "{printed}");
     let wrong = "render room --targets 5 -o out --masks person";

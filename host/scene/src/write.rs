@@ -24,6 +24,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use viewfuse_job::files::WholeFolder;
+use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_job::progress::{Interrupted, Progress};
 
 use crate::photographs::ignored::shows_object;
@@ -100,6 +101,15 @@ pub enum WriteSceneError {
     Interrupted(#[from] Interrupted),
 }
 
+impl Hinted for WriteSceneError {
+    fn hint(&self) -> Option<Hint> {
+        match self {
+            WriteSceneError::Scene(error) => error.hint(),
+            _ => None,
+        }
+    }
+}
+
 /// The result of writing a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Written {
@@ -149,6 +159,11 @@ pub fn write_with(
         Layout::Llff => all_photographed(scene).and_then(|()| llff::fits(scene)),
     }
     .map_err(unfit)?;
+    if let MaskMeaning::Unclear { .. } = scene.masks {
+        // A layout holds each meaning in a way of its own: the error of the first.
+        let first = scene.views.iter().position(|view| view.mask.is_some());
+        first.map_or(Ok(()), |view| scene.photograph(view).map(drop))?;
+    }
 
     let unfinished = WholeFolder::create(folder).map_err(failed)?;
     let draft = unfinished.path();

@@ -12,6 +12,7 @@ use viewfuse_pose::PoseError;
 use viewfuse_scene::SceneError;
 use viewfuse_scene::few_shot::SelectionError;
 use viewfuse_scene::photographs::PhotographsError;
+use viewfuse_scene::write::WriteSceneError;
 use viewfuse_view::ListenError;
 
 /// The hint, if there is one, for an error or one of its causes.
@@ -25,9 +26,10 @@ pub(crate) fn is_of_arguments(error: &anyhow::Error) -> bool {
 }
 
 /// The errors that may have hints, and that reach the command as they are.
-const HINTED: [fn(&(dyn Error + 'static)) -> Option<Hint>; 11] = [
-    of::<SelectionError>, of::<PhotographsError>, of::<SceneError>, of::<RenderError>, of::<OptimiseError>,
-    of::<OutputError>, of::<FolderError>, of::<EvaluateError>, of::<ProtocolError>, of::<PoseError>, of::<ListenError>,
+const HINTED: [fn(&(dyn Error + 'static)) -> Option<Hint>; 12] = [
+    of::<SelectionError>, of::<PhotographsError>, of::<SceneError>, of::<WriteSceneError>, of::<RenderError>,
+    of::<OptimiseError>, of::<OutputError>, of::<FolderError>, of::<EvaluateError>, of::<ProtocolError>,
+    of::<PoseError>, of::<ListenError>,
 ];
 
 fn hinted(cause: &(dyn Error + 'static)) -> Option<Hint> {
