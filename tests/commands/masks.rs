@@ -5,7 +5,12 @@ use image::{DynamicImage, GrayImage, ImageFormat, Luma, Rgb, RgbImage, Rgba, Rgb
 use viewfuse_tests::command::{Outcome, sample};
 use viewfuse_tests::scenes::Folder;
 
-viewfuse_tests::trials![what_masks_hide_takes_no_part, what_is_unclear_is_asked, what_shows_nothing_is_not_scored,];
+viewfuse_tests::trials![
+    what_masks_hide_takes_no_part,
+    kept_pictures_have_the_scores_of_the_table,
+    what_is_unclear_is_asked,
+    what_shows_nothing_is_not_scored,
+];
 
 /// Rows that show the car that carried the camera: 8 % of the photograph, the same in all.
 const BONNET: u32 = 221;
@@ -86,6 +91,24 @@ fn what_masks_hide_takes_no_part() {
         assert!(said.contains(&format!("{count} photographs have an alpha channel that is opaque")), "{said}");
         assert!((psnr - expected).abs() < tolerance, "{psnr} dB instead of {expected} dB");
         assert_eq!(score(folder, "--masks ignore"), psnr);
+    }
+}
+
+fn kept_pictures_have_the_scores_of_the_table() {
+    let folder = driven(|folder, name, photograph| {
+        put(folder, &format!("images/{name}.jpg"), photograph);
+        let mask = GrayImage::from_fn(320, 240, |_, y| Luma([if y < BONNET { 255 } else { 0 }]));
+        put(folder, &format!("masks/{name}.jpg.png"), mask);
+    });
+    let evaluate = "evaluate room --protocol nearest:3 --targets 5 --size 80x60 --weights mean --device cpu -o out";
+    let Outcome { code, stderr, .. } = run(&folder, evaluate);
+    assert_eq!(code, Some(0), "{stderr}");
+    let table = std::fs::read_to_string(folder.join("out/scores.csv")).expect("a table");
+    let shown = read_json(folder.join("out/pictures/job-00000.json"));
+    for (scheme, shown) in [("nearest copy", &shown["copy"]["psnr"]), ("mean", &shown["schemes"][0]["values"][0][1])] {
+        let row = table.lines().find(|line| line.contains(&format!(",{scheme},"))).expect("a row");
+        let scored: f64 = row.split(',').nth(6).expect("PSNR").parse().expect("a number");
+        assert!((number_of(shown) - scored).abs() < 1e-5, "{scheme}: {shown} {scored}");
     }
 }
 

@@ -1,10 +1,12 @@
 //! Pictures of an evaluation for its report: of a job's first target the sources, every scheme's prediction, the truth.
 
+use crate::baseline::Baseline;
+use crate::run_folder::Finished;
+use crate::{PSNR, Score};
 use image::{DynamicImage, RgbImage, imageops};
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::{Path, PathBuf};
-use viewfuse_core::metrics::psnr;
 use viewfuse_field::held_out::nearest;
 use viewfuse_field::render::Frame;
 use viewfuse_job::files::{WriteError, read_at_most, write_whole};
@@ -195,18 +197,12 @@ impl Gallery {
         self.schemes.push((frame.picture.clone(), shown));
     }
 
-    /// Writes the pictures and then their description. `names` are those of the sources.
+    /// Writes the pictures of a job at a target, and then their description.
     ///
     /// # Errors
     /// [`GalleryError::Write`].
-    pub fn write(
-        self,
-        folder: &Path,
-        job: usize,
-        scene: &str,
-        target: &str,
-        names: &[String],
-    ) -> Result<(), GalleryError> {
+    pub fn write(self, folder: &Path, done: &Finished, target: &str) -> Result<(), GalleryError> {
+        let &Finished { job, ref scene_name, sources: ref names, ref scores, .. } = done;
         let Some(truth) = self.truth else { return Ok(()) };
         let folder = folder.join(PICTURES);
         let write = |name: String, picture: RgbImage| -> Result<String, GalleryError> {
@@ -215,7 +211,10 @@ impl Gallery {
         };
         let copy = match self.copy {
             Some((source, picture)) => {
-                let psnr = Some(psnr(&picture, &truth)).filter(|psnr| psnr.is_finite());
+                // That of its row: of what counts.
+                let is_copy = |score: &&Score| score.target == target && score.scheme == Baseline::NearestCopy.name();
+                let psnr = scores.iter().find(is_copy).and_then(|score| score.value(PSNR));
+                let psnr = psnr.filter(|psnr| psnr.is_finite());
                 let file = write(format!("job-{job:05}-copy.png"), picture)?;
                 Some(CopyPicture { source: names.get(source).cloned().unwrap_or_default(), file, psnr })
             }
@@ -232,8 +231,8 @@ impl Gallery {
             let file = write(format!("job-{job:05}-scheme-{index:03}.png"), picture)?;
             schemes.push(SchemePicture { file, ..shown });
         }
-        let shown =
-            TargetPictures { job, scene: scene.to_owned(), target: target.to_owned(), truth, copy, sources, schemes };
+        let (scene, target) = (scene_name.clone(), target.to_owned());
+        let shown = TargetPictures { job, scene, target, truth, copy, sources, schemes };
         let path = folder.join(format!("job-{job:05}.json"));
         let json = serde_json::to_vec(&shown).map_err(|cause| GalleryError::Json { path: path.clone(), cause })?;
         Ok(write_whole(&path, &json)?)

@@ -95,7 +95,7 @@ impl Jobs<'_> {
             };
             if let (Some(folder), Some(journal)) = (&folder, &mut journal) {
                 // Before the line that says that the job is done: it is not done again.
-                gallery.write(folder.path(), number, &done.scene_name, first, &done.sources)?;
+                gallery.write(folder.path(), &done, first)?;
                 journal.add(&done)?;
             }
             finished.insert(number, done);
