@@ -138,7 +138,7 @@ fn other_settings_are_refused() {
     let pose = folder.join("toy/pose/000003.txt");
     let text = fs::read_to_string(&pose).expect("a pose");
     change_poses(&folder, |view, matrix| matrix[3] += if view == 3 { 0.1 } else { 0.0 });
-    refused(&first, &["cameras of toy: "]);
+    refused(&first, &["cameras, photographs, masks or sizes of toy"]);
     fs::write(&pose, text).expect("a file");
     let intrinsics = folder.join("toy/intrinsics.txt");
     let text = fs::read_to_string(&intrinsics).expect("intrinsics");
@@ -152,19 +152,19 @@ fn other_settings_are_refused() {
         ),
     )
     .expect("a file");
-    refused(&first, &["cameras of toy: "]);
+    refused(&first, &["cameras, photographs, masks or sizes of toy"]);
     fs::write(&intrinsics, text).expect("a file");
     // Another photograph under the same name.
     let photograph = folder.join("toy/rgb/000003.png");
     let before = fs::read(&photograph).expect("a photograph");
     fs::copy(folder.join("toy/rgb/000004.png"), &photograph).expect("another one");
-    refused(&first, &["cameras of toy: "]);
+    refused(&first, &["cameras, photographs, masks or sizes of toy"]);
     // Of the same length, as files that are not compressed have.
     let mut of_its_length = before.clone();
     let middle = of_its_length.len() / 2;
     of_its_length[middle] ^= 1;
     fs::write(&photograph, of_its_length).expect("a file");
-    refused(&first, &["cameras of toy: "]);
+    refused(&first, &["cameras, photographs, masks or sizes of toy"]);
     fs::write(&photograph, before).expect("a file");
 
     // Damage is told with file and line.

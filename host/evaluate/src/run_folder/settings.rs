@@ -55,6 +55,9 @@ pub struct SceneSettings {
 /// Bytes in the middle of a photograph's file that tell it from another one of the same length.
 const MIDDLE: u64 = 4096;
 
+/// What the key of a scene's settings begins with.
+const OF_SCENE: &str = "cameras of ";
+
 /// What follows from the other settings.
 const FOLLOWING: [&str; 2] = ["job_count", "notes"];
 
@@ -102,7 +105,8 @@ impl Settings {
         hexadecimal(&Sha256::digest(text)[..8])
     }
 
-    /// The differences from `found`, in words: key, value here, value there.
+    /// The differences from `found`, in words: key, value here, value there. Of a scene what may differ: digests say
+    /// nothing to a person.
     pub fn differences(&self, found: &Settings) -> Vec<String> {
         let (here, there) = (self.flat(), found.flat());
         let keys = here.keys().chain(there.keys().filter(|key| !here.contains_key(*key)));
@@ -118,7 +122,11 @@ impl Settings {
                 format!("{}...", text.chars().take(57).collect::<String>())
             }
         };
-        told.into_iter().map(|key| format!("{key}: {} here, {} there", words(&here, key), words(&there, key))).collect()
+        let told = told.into_iter().map(|key| match key.strip_prefix(OF_SCENE) {
+            Some(scene) => format!("cameras, photographs, masks or sizes of {scene}"),
+            None => format!("{key}: {} here, {} there", words(&here, key), words(&there, key)),
+        });
+        told.collect()
     }
 
     /// Values as text by key, options and files one by one.
@@ -135,7 +143,7 @@ impl Settings {
                     // Scenes may have one name.
                     let cameras = items.into_iter().enumerate().map(|(index, item)| {
                         let numbered = if index == 0 { String::new() } else { format!(" (scene {})", index + 1) };
-                        (format!("cameras of {}{numbered}", name(&item)), item.to_string())
+                        (format!("{OF_SCENE}{}{numbered}", name(&item)), item.to_string())
                     });
                     flat.extend(cameras);
                 }
