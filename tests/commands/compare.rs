@@ -184,6 +184,8 @@ fn what_cannot_be_compared() {
         assert_refused(&folder, &format!("compare {arguments} --device cpu"), parts);
     };
     refused("made toy/rgb", &["made: has no pictures"]);
+    refused("nowhere toy/rgb", &["nowhere: no such file or folder"]);
+    refused("toy/rgb nowhere", &["nowhere: no such file or folder"]);
     refused("toy/rgb made", &["made/000000.png: is missing", "toy/rgb/000000.png"]);
     folder.image("one/x.png", 8, 8).write("two/x.jpeg", "").write("two/x.jpg", "");
     refused("one two", &["one/x.png: may be compared with two/x.jpeg or two/x.jpg"]);

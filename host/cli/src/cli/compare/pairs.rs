@@ -17,6 +17,9 @@ pub(super) struct Pair {
 
 /// Every picture with its ground truth.
 pub(super) fn pairs(prediction: &Path, truth: &Path) -> anyhow::Result<Vec<Pair>> {
+    if let Some(path) = [prediction, truth].into_iter().find(|path| !path.exists()) {
+        bail!("{}: no such file or folder", path.display());
+    }
     if !prediction.is_dir() {
         ensure!(!truth.is_dir(), "{}: is a folder, {} is not", truth.display(), prediction.display());
         let name = prediction.display().to_string();
