@@ -470,6 +470,23 @@ fn photographs_of_which_nothing_counts_are_told() {
     assert!(error.contains("of the photographs nothing counts ('003' is the first)"), "{error}");
 }
 
+/// Whatever colour it has: a source's truth is the picture of the copies that fields are compared with.
+#[test]
+fn what_is_transparent_is_in_no_truth() {
+    let truth = |colour: [u8; 3]| {
+        let folder = toy();
+        let path = folder.join("toy/rgb/000020.png");
+        let mut picture = image::open(&path).expect("a picture").into_rgba8();
+        let hidden = picture.pixels_mut().filter(|pixel| pixel[3] == 0);
+        hidden.for_each(|pixel| pixel.0[..3].copy_from_slice(&colour));
+        picture.save(&path).expect("a picture");
+        let scene = Scene::open(folder.join("toy")).expect("a scene");
+        let album = Album::open(&scene, [20], &Silent).expect("a photograph");
+        album.truth(20, [64, 64], None).expect("a truth")
+    };
+    assert!(truth([0; 3]) == truth([255; 3]));
+}
+
 /// A target whose object is cut off by its border is no photograph with pixels that do not count, where the sources are
 /// of an object; and one of which all is transparent is none that could be met.
 #[test]

@@ -38,8 +38,8 @@ pub fn read_over(path: &Path, size: Option<[u32; 2]>, background: Option<[f32; 3
 
 impl Album<'_> {
     /// The truth at a view, resampled to a size, rounded to 8 bits: composited over the background if there is one;
-    /// otherwise the whole photograph, of which transparent pixels do not count. Nothing counts of a photograph that is
-    /// transparent everywhere, or whose mask shows nothing.
+    /// otherwise the whole photograph, of which transparent pixels do not count: the nearest that do take their place,
+    /// as in sources. Nothing counts of a photograph that is transparent everywhere, or whose mask shows nothing.
     ///
     /// # Errors
     /// [`SceneError`] if it cannot be read.
@@ -58,7 +58,7 @@ impl Album<'_> {
                 _ => false,
             };
             if ignores {
-                photograph = Cow::Owned(ignored::by_alpha(photograph.into_owned()));
+                photograph = Cow::Owned(ignored::filled(ignored::by_alpha(photograph.into_owned())));
             }
         } else if background.is_none() && photograph.has_alpha {
             photograph = Cow::Owned(photograph.into_owned().without_alpha());
