@@ -19,9 +19,9 @@ use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, open_albu
 use viewfuse_field::scores::shows_anything;
 use viewfuse_job::hint::{Hint, Hinted};
 use viewfuse_job::progress::{Part, Progress};
+use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{Selection, SelectionError, SelectionFault, target_of, view_list};
 use viewfuse_scene::photographs::{Album, GroundTruth, PhotographsError, SourceImages};
-use viewfuse_scene::{MaskMeaning, Scene};
 use viewfuse_weighting::OpenedChoice;
 
 /// Why an evaluation failed.
@@ -106,16 +106,6 @@ pub struct Subject<'a> {
     /// The scene with the masks that targets are scored by as well ([`crate::metrics::masked`]); `None` without masked
     /// metrics. Its views are those of `scene`.
     pub masked: Option<&'a Scene>,
-}
-
-/// A scene whose photographs have no objects' masks: whole photographs are used. What does not count does not here
-/// either.
-pub fn without_masks(scene: &Scene) -> Scene {
-    let mut scene = scene.clone();
-    if scene.masks == MaskMeaning::Object {
-        scene.views.iter_mut().for_each(|view| view.mask = None);
-    }
-    scene
 }
 
 /// What renders and scores.

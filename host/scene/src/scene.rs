@@ -307,10 +307,11 @@ impl Scene {
     /// The same with its mask.
     pub(crate) fn masked_photograph(&self, view: usize) -> Result<Photograph, SceneError> {
         let (mut photograph, turn) = images::decode(self.photograph_file(view)?, self.size(view)?)?;
-        match &self.view(view)?.mask {
-            Some(mask) => masks::apply(mask, &mut photograph, &turn, self.masks)?,
-            None if !self.uses_alpha() => photograph = photograph.without_alpha(),
-            None => {}
+        if !self.uses_alpha() {
+            photograph = photograph.without_alpha();
+        }
+        if let Some(mask) = &self.view(view)?.mask {
+            masks::apply(mask, &mut photograph, &turn, self.masks)?;
         }
         Ok(photograph)
     }

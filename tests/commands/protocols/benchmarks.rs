@@ -288,8 +288,8 @@ fn nearest_with_targets() {
 }
 
 /// The sample scene with the names of DTU's views, its photographs laid over black, and its silhouettes as masks beside
-/// them if they are wanted.
-fn like_dtu(folder: &Folder, scene: &str, with_masks: bool) {
+/// them if it is called `masked`, as their alpha channels if `cut`.
+fn like_dtu(folder: &Folder, scene: &str) {
     let numbers = [1, 10, 14, 24, 27, 29, 22, 25, 28];
     let mut frames = Vec::new();
     let sample = sample();
@@ -300,7 +300,16 @@ fn like_dtu(folder: &Folder, scene: &str, with_masks: bool) {
             let pixel = photograph.get_pixel(x, y);
             image::Rgb([0, 1, 2].map(|c| (u32::from(pixel[c]) * u32::from(pixel[3]) / 255) as u8))
         });
-        over_black.save(folder.file(&format!("{scene}/{name}"))).expect("a picture");
+        let path = folder.file(&format!("{scene}/{name}"));
+        if scene == "cut" {
+            let cut = image::RgbaImage::from_fn(photograph.width(), photograph.height(), |x, y| {
+                let [red, green, blue] = over_black.get_pixel(x, y).0;
+                image::Rgba([red, green, blue, photograph.get_pixel(x, y)[3]])
+            });
+            cut.save(path).expect("a picture");
+        } else {
+            over_black.save(path).expect("a picture");
+        }
         let [fx, fy] = view.camera.pinhole.focal();
         let [cx, cy] = view.camera.pinhole.principal();
         let mut frame = json!({
@@ -308,7 +317,7 @@ fn like_dtu(folder: &Folder, scene: &str, with_masks: bool) {
             "cy": cy,
             "w": photograph.width(), "h": photograph.height(),
         });
-        if with_masks {
+        if scene == "masked" {
             let mask = GrayImage::from_fn(photograph.width(), photograph.height(), |x, y| {
                 Luma([photograph.get_pixel(x, y)[3]])
             });
@@ -323,8 +332,7 @@ fn like_dtu(folder: &Folder, scene: &str, with_masks: bool) {
 
 fn masks_serve_the_metric() {
     let folder = Folder::new();
-    like_dtu(&folder, "masked", true);
-    like_dtu(&folder, "bare", false);
+    ["masked", "cut", "bare"].into_iter().for_each(|scene| like_dtu(&folder, scene));
     let run = |scene: &str, protocol: &str| json(&folder, &format!("{scene} --protocol {protocol} --size 32x32"));
     let names = |whole: &Value| -> Vec<String> {
         let metrics = list_of(&whole["tables"][0]["metrics"]).clone();
@@ -337,8 +345,11 @@ fn masks_serve_the_metric() {
     assert_eq!((&masked["tables"][0]["headline"], &masked["settings"]["scenes"][0]["masks"]), (&3.into(), &9.into()));
     // Fields and the full metric see the photographs as if there were no masks.
     let full = |whole: &Value, row: usize| whole["tables"][0]["rows"][row]["cells"][0]["value"]["mean"].clone();
+    let cut = run("cut", "dtu:3");
+    assert_eq!(names(&cut), names(&masked));
     for row in 0..5 {
         assert_eq!(full(&masked, row), full(&bare, row), "row {row}");
+        assert_eq!(full(&cut, row), full(&bare, row), "row {row}, cut out");
     }
     // Given masks, they are sources with an alpha channel, over white.
     let given = run("masked", "dtu:3,masks=given");

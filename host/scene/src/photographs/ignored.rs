@@ -1,7 +1,7 @@
 //! Pixels of a photograph that do not count: by an ignore mask, or by an alpha channel that is one.
 
-use crate::scene::files::has_extension;
-use crate::{MaskChoice, Photograph, Scene, SceneError};
+use crate::scene::masks::has_alpha;
+use crate::{MaskChoice, MaskMeaning, Photograph, Scene, SceneError};
 use image::{GrayImage, Luma};
 
 /// Alpha from which on a pixel counts.
@@ -34,14 +34,30 @@ pub(crate) fn shows_object(scene: &Scene) -> Result<bool, SceneError> {
     }
     let mut shares = Vec::new();
     for (index, view) in scene.views.iter().enumerate() {
-        // JPEGs have no alpha channel.
-        let may_have_alpha = view.image.as_ref().is_some_and(|file| !has_extension(file, &["jpg", "jpeg"]));
-        if may_have_alpha && view.mask.is_none() {
+        if view.image.as_deref().is_some_and(has_alpha) && !scene.has_object_mask(view) {
             let photograph = scene.photograph(index)?;
             shares.extend(photograph.has_alpha.then(|| border_share(&photograph)));
         }
     }
     Ok(!shares.is_empty() && (scene.mask_choice == MaskChoice::Object || !is_of_ignored(shares)))
+}
+
+impl Scene {
+    /// The scene with whole photographs: neither masks nor alpha channels say where an object is. What does not count
+    /// does not here either.
+    ///
+    /// # Errors
+    /// [`SceneError`] if a photograph with an alpha channel cannot be read.
+    pub fn without_silhouettes(&self) -> Result<Scene, SceneError> {
+        let mut scene = self.clone();
+        if scene.masks == MaskMeaning::Object {
+            scene.views.iter_mut().for_each(|view| view.mask = None);
+        }
+        if shows_object(&scene)? {
+            scene.mask_choice = MaskChoice::None;
+        }
+        Ok(scene)
+    }
 }
 
 /// The whole photograph, of which what is transparent does not count.

@@ -72,10 +72,8 @@ pub(super) fn exclude_unmasked(root: &Path, views: &mut [View]) -> Option<String
     if 2 * masked < all {
         return None;
     }
-    let says_nothing = |view: &&mut View| {
-        let has_alpha = |file: &Path| images::header(file).is_ok_and(|header| header.has_alpha);
-        view.mask.is_none() && view.image.as_deref().is_some_and(|file| !has_alpha(file))
-    };
+    let says_nothing =
+        |view: &&mut View| view.mask.is_none() && view.image.as_deref().is_some_and(|file| !has_alpha(file));
     let excluded: Vec<PathBuf> = views.iter_mut().filter(says_nothing).filter_map(|view| view.image.take()).collect();
     let first = files::exact(excluded.first()?.file_name().unwrap_or_default());
     Some(format!(
@@ -84,6 +82,11 @@ pub(super) fn exclude_unmasked(root: &Path, views: &mut [View]) -> Option<String
         root.display(),
         excluded.len()
     ))
+}
+
+/// Whether a photograph's file has an alpha channel. The error of one that cannot be read comes with its pixels.
+pub(crate) fn has_alpha(file: &Path) -> bool {
+    images::header(file).is_ok_and(|header| header.has_alpha)
 }
 
 /// A warning where a folder of masks has pictures, and none of them is named as a photograph.

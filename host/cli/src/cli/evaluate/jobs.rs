@@ -7,7 +7,7 @@ use viewfuse_device::choice::AnyDevice;
 use viewfuse_evaluate::gallery::Gallery;
 use viewfuse_evaluate::protocol::{Job, Plan, Protocol};
 use viewfuse_evaluate::run_folder::{Finished, FolderError, RunFolder, Settings, Shard};
-use viewfuse_evaluate::{Evaluator, Subject, without_masks};
+use viewfuse_evaluate::{Evaluator, Subject};
 use viewfuse_field::AnyField;
 use viewfuse_field::render::{RenderOptions, open_album};
 use viewfuse_job::progress::{Part, Progress};
@@ -52,7 +52,7 @@ impl Jobs<'_> {
         }
         // What fields may see of the scenes.
         let shown: Vec<Scene> = match self.protocol.hides_masks() {
-            true => scenes.iter().map(without_masks).collect(),
+            true => scenes.iter().map(Scene::without_silhouettes).collect::<Result<_, _>>()?,
             false => scenes.to_vec(),
         };
         let (renderer, scorer) = (renderer.as_ref(), scorer.as_ref());
