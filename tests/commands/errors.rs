@@ -273,6 +273,7 @@ fn references_that_are_none() {
 
 fn an_evaluation_of_nothing() {
     toy_refused("evaluate toy --targets ,", &["toy", "no targets"]);
+    toy_refused("evaluate toy --sources all", &["toy: no photograph is left to compare with"]);
     // Every scene is opened before the first is computed.
     toy_refused("evaluate toy nowhere", &["nowhere"]);
 }

@@ -38,6 +38,9 @@ pub enum EvaluateError {
         /// The view.
         view: String,
     },
+    /// All photographs are sources, or there are none.
+    #[error("{0}: no photograph is left to compare with: a source is never a target")]
+    NothingLeft(String),
     /// Of no target's photograph anything counts.
     #[error(
         "{0}: nothing can be scored: of the photographs of the targets nothing counts, as their masks or alpha \
@@ -338,18 +341,21 @@ fn source_groups(scene: &Scene, selection: &Selection, least_sources: usize) -> 
         let view = scene.views[view].name.clone();
         return Err(EvaluateError::NoTruth { scene: scene.path.display().to_string(), view });
     }
+    let no_targets = || -> EvaluateError {
+        match &selection.targets {
+            Some(_) => SelectionFault::NoTargets.in_scene(scene).into(),
+            None => EvaluateError::NothingLeft(scene.path.display().to_string()),
+        }
+    };
     if selection.sources.is_some() {
         let excluded = requested.clone().unwrap_or_default();
         let sources = selection.sources_without(scene, &excluded, least_sources)?;
         let targets = requested.unwrap_or_else(|| photographed().filter(|view| !sources.contains(view)).collect());
-        if targets.is_empty() {
-            return Err(SelectionFault::NoTargets.in_scene(scene).into());
-        }
-        return Ok(vec![(sources, targets)]);
+        return if targets.is_empty() { Err(no_targets()) } else { Ok(vec![(sources, targets)]) };
     }
     let targets = requested.unwrap_or_else(|| photographed().collect());
     if targets.is_empty() {
-        return Err(SelectionFault::NoTargets.in_scene(scene).into());
+        return Err(no_targets());
     }
     targets
         .into_iter()
