@@ -31,7 +31,7 @@ fn one_picture_and_folders() {
         let bytes = std::fs::read(folder.file(&format!("toy/rgb/{shown}.png"))).expect("a picture");
         folder.write(&format!("made/{name}.png"), bytes);
     }
-    folder.write("made/notes.txt", "no picture");
+    folder.write("made/notes.txt", "no picture").write("made/._000001.png", "no picture");
     // A video of the run may be a picture, too.
     let bytes = std::fs::read(folder.file("made/000001.png")).expect("a picture");
     folder.write("made/video.webp", &bytes).write("made/run.json", "{}");

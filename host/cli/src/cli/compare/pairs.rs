@@ -60,14 +60,15 @@ pub(super) fn pairs(prediction: &Path, truth: &Path) -> anyhow::Result<Vec<Pair>
     predictions.iter().map(pair).collect()
 }
 
-/// The pictures of a folder, sorted by name.
+/// The pictures of a folder, sorted by name: those that begin with a dot are macOS's notes of them.
 fn pictures(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let listed = || format!("{}: cannot be listed", folder.display());
     let mut pictures = Vec::new();
     for entry in std::fs::read_dir(folder).with_context(listed)? {
         let path = entry.with_context(listed)?.path();
         let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
-        if extension.is_some_and(|extension| EXTENSIONS.iter().any(|known| extension == *known)) {
+        let is_hidden = path.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b"."));
+        if !is_hidden && extension.is_some_and(|extension| EXTENSIONS.iter().any(|known| extension == *known)) {
             pictures.push(path);
         }
     }
