@@ -623,6 +623,22 @@ fn each_of_the_cut_out_photographs_gets_a_mask_of_neus() {
     assert_eq!((share("000003"), share("000005")), (0.75, 1.0));
 }
 
+/// A mask of one photograph would be taken for that of the first.
+#[test]
+fn photographs_beside_one_with_a_mask_get_masks_of_neus() {
+    let mut scene = Scene::open(viewfuse_tests::places::data("room")).expect("the sample");
+    let folder = Folder::new();
+    let mask = image::GrayImage::from_fn(320, 240, |x, _| image::Luma([if x < 80 { 255 } else { 0 }]));
+    mask.save(folder.file("mask.png")).expect("a mask");
+    (scene.views[4].mask, scene.masks) = (Some(folder.join("mask.png")), MaskMeaning::Object);
+    let (folder, read, _) = written(&scene, Layout::Neus);
+    assert!(read.views.iter().all(|view| read.has_object_mask(view)));
+    for (name, share) in [("003", 1.0), ("004", 0.25)] {
+        let mask = image::open(folder.file(&format!("out/mask/{name}.png"))).expect("a mask").into_luma8();
+        assert_eq!(mask.iter().filter(|level| **level == 255).count() as f64 / f64::from(320 * 240), share);
+    }
+}
+
 /// Through a lens that does not see the corners of the pinhole's picture: the mask is the object, not what it saw.
 #[test]
 fn cut_out_photographs_through_a_lens_get_masks_of_neus() {

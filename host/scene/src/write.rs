@@ -222,7 +222,7 @@ fn names_in(scene: &Scene, layout: Layout) -> Vec<String> {
 /// Refuses poses without a photograph.
 fn all_photographed(scene: &Scene) -> Result<(), String> {
     match scene.views.iter().find(|view| view.image.is_none()) {
-        Some(view) => Err(format!("view {:?} is a pose without a photograph", view.name)),
+        Some(view) => Err(format!("view {:?} is a pose without a photograph, or with one that is excluded", view.name)),
         None => Ok(()),
     }
 }

@@ -44,8 +44,8 @@ pub(super) fn fits(scene: &Scene) -> Result<(), String> {
 
 pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
     let count = out.scene.views.len();
-    let are_cut_out = shows_object(out.scene)?;
-    (0..count).try_for_each(|view| photograph(out, view, are_cut_out))?;
+    let has_masks = out.scene.views.iter().any(|view| out.scene.has_object_mask(view)) || shows_object(out.scene)?;
+    (0..count).try_for_each(|view| photograph(out, view, has_masks))?;
     let numbers = places(&out.names);
     let (centre, radius) = sphere(out.scene);
     let scale = [
@@ -72,12 +72,12 @@ pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
 /// The only format that NeuS's own program reads.
 const PNG: [&str; 1] = ["png"];
 
-/// Writes the photograph of a view and its mask. Where alpha channels say where the object is (`are_cut_out`), each
-/// photograph has a mask: NeuS's own program counts masks as it counts photographs.
-fn photograph(out: &Draft, index: usize, are_cut_out: bool) -> Result<(), WriteSceneError> {
+/// Writes the photograph of a view and its mask. If any has one, or an alpha channel that says where the object is,
+/// each gets one (`has_masks`): NeuS's own program counts masks as it counts photographs.
+fn photograph(out: &Draft, index: usize, has_masks: bool) -> Result<(), WriteSceneError> {
     let View { lens, mask, .. } = &out.scene.views[index];
     match (lens, mask) {
-        (_, None) if are_cut_out => {
+        (_, None) if has_masks => {
             out.pinhole_photograph_and_mask(index, "image", ["mask", &out.names[index]])?;
         }
         (None, _) => {
