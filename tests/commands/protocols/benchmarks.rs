@@ -288,7 +288,7 @@ fn nearest_with_targets() {
 }
 
 /// The sample scene with the names of DTU's views, its photographs laid over black, and its silhouettes as masks beside
-/// them if it is called `masked`, as their alpha channels if `cut`.
+/// them if it is called `masked`, as their alpha channels if `cut`: there the first target's fills most of its border.
 fn like_dtu(folder: &Folder, scene: &str) {
     let numbers = [1, 10, 14, 24, 27, 29, 22, 25, 28];
     let mut frames = Vec::new();
@@ -304,7 +304,8 @@ fn like_dtu(folder: &Folder, scene: &str) {
         if scene == "cut" {
             let cut = image::RgbaImage::from_fn(photograph.width(), photograph.height(), |x, y| {
                 let [red, green, blue] = over_black.get_pixel(x, y).0;
-                image::Rgba([red, green, blue, photograph.get_pixel(x, y)[3]])
+                let fills = number == 1 && x < 100;
+                image::Rgba([red, green, blue, if fills { 255 } else { photograph.get_pixel(x, y)[3] }])
             });
             cut.save(path).expect("a picture");
         } else {
@@ -347,6 +348,9 @@ fn masks_serve_the_metric() {
     let full = |whole: &Value, row: usize| whole["tables"][0]["rows"][row]["cells"][0]["value"]["mean"].clone();
     let cut = run("cut", "dtu:3");
     assert_eq!(names(&cut), names(&masked));
+    // Each target is scored by its silhouette.
+    let counts = list_of(&cut["tables"][0]["rows"][0]["cells"]).iter().map(|cell| &cell["value"]["count"]);
+    assert!(counts.into_iter().all(|count| *count == 6), "{}", cut["tables"][0]["rows"][0]);
     for row in 0..5 {
         assert_eq!(full(&masked, row), full(&bare, row), "row {row}");
         assert_eq!(full(&cut, row), full(&bare, row), "row {row}, cut out");

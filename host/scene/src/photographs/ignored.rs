@@ -58,6 +58,16 @@ impl Scene {
         }
         Ok(scene)
     }
+
+    /// The scene in which alpha channels that say where the object is do so in each photograph by itself, also in one
+    /// whose border the object fills.
+    ///
+    /// # Errors
+    /// [`SceneError`] if a photograph with an alpha channel cannot be read.
+    pub fn with_silhouettes(&self) -> Result<Scene, SceneError> {
+        let mask_choice = if shows_object(self)? { MaskChoice::Object } else { self.mask_choice };
+        Ok(Scene { mask_choice, ..self.clone() })
+    }
 }
 
 /// The whole photograph, of which what is transparent does not count.

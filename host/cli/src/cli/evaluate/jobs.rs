@@ -55,6 +55,10 @@ impl Jobs<'_> {
             true => scenes.iter().map(Scene::without_silhouettes).collect::<Result<_, _>>()?,
             false => scenes.to_vec(),
         };
+        let masked: Vec<Scene> = match self.protocol.is_masked() {
+            true => scenes.iter().map(Scene::with_silhouettes).collect::<Result<_, _>>()?,
+            false => Vec::new(),
+        };
         let (renderer, scorer) = (renderer.as_ref(), scorer.as_ref());
         let is_open = |number: &usize| shard.does(*number) && !finished.contains_key(number);
         let open: Vec<usize> = (0..plan.jobs.len()).filter(is_open).collect();
@@ -70,7 +74,7 @@ impl Jobs<'_> {
             let album = open_album(scene, views, renderer, options, progress)?;
             let progress = &Part::begin(progress, "", 1..10, 10);
             let evaluator = Evaluator { weightings, renderer, options, scorer, progress };
-            let masked = self.protocol.is_masked().then(|| &scenes[job.scene]);
+            let masked = masked.get(job.scene);
             let mut gallery = Gallery::default();
             let first = job.targets.first().map_or("", |&target| &scene.views[target].name);
             let scores = evaluator.score(
