@@ -623,6 +623,23 @@ fn each_of_the_cut_out_photographs_gets_a_mask_of_neus() {
     assert_eq!((share("000003"), share("000005")), (0.75, 1.0));
 }
 
+/// An alpha channel of pixels that do not count is none of an object, and NeuS's program does not read it.
+#[test]
+fn transparency_that_neus_does_not_read_is_told() {
+    let is_told = |scene: &Scene| {
+        written(scene, Layout::Neus).2.lost.iter().any(|line| line.contains("it reads no alpha channel"))
+    };
+    let folder = toy();
+    for view in 0..24 {
+        let hole = |x: u32, y: u32| if (40..60).contains(&x) && (40..60).contains(&y) { 0 } else { 255 };
+        let picture = image::RgbaImage::from_fn(128, 128, |x, y| image::Rgba([90, 2 * x as u8, y as u8, hole(x, y)]));
+        picture.save(folder.file(&format!("toy/rgb/{view:06}.png"))).expect("a photograph");
+    }
+    assert!(is_told(&Scene::open(folder.join("toy")).expect("a scene")));
+    let samples = ["toy", "room"].map(viewfuse_tests::places::data);
+    assert!(samples.iter().all(|path| !is_told(&Scene::open(path).expect("a sample"))));
+}
+
 /// A mask of one photograph would be taken for that of the first.
 #[test]
 fn photographs_beside_one_with_a_mask_get_masks_of_neus() {

@@ -29,6 +29,7 @@ use viewfuse_job::progress::{Interrupted, Progress};
 
 use crate::photographs::ignored::shows_object;
 use crate::scene::files::has_extension;
+use crate::scene::masks::has_alpha;
 use crate::{MaskChoice, MaskMeaning, Scene, SceneError, View};
 pub use names::check_name;
 
@@ -286,6 +287,15 @@ fn lost(scene: &Scene, layout: Layout, read: &Scene) -> Vec<String> {
             "of whole photographs what is farther than {radius:.digits$} from the point that the cameras look at: \
              programs that read this layout look for surfaces within that sphere"
         ));
+    }
+    let is_transparent = |(index, view): (usize, &View)| {
+        let may_be = view.image.as_deref().is_some_and(has_alpha);
+        may_be && read.photograph(index).is_ok_and(|photograph| photograph.has_alpha)
+    };
+    if layout == Layout::Neus && !has_object && read.views.iter().enumerate().any(is_transparent) {
+        lines.push(
+            "for NeuS's own program, that what is transparent does not count: it reads no alpha channel".to_owned(),
+        );
     }
     if layout == Layout::Neus && neus::is_far(scene) {
         lines.push(
