@@ -239,6 +239,20 @@ fn smaller_formats_are_written_and_read() {
     }
 }
 
+/// A .splat begins with the first coordinate, any of whose bytes a page, an archive or a .ply may begin with, too.
+#[test]
+fn a_splat_is_one_whatever_its_first_coordinate() {
+    let folder = Folder::new();
+    let path = folder.join("a.splat");
+    for first in [*b"<p\x8a\x40", *b"\x1f\x8b\x08\x40", *b" \n<\x40", *b"ply\x40"] {
+        let mut scene = drawn(20, 0, 3);
+        scene.gaussians[0].position[0] = f32::from_le_bytes(first);
+        scene.write(&path, &SceneFrame::FILE).expect("a file");
+        let found = read(&path).unwrap_or_else(|error| panic!("{first:x?}: {error}")).scene;
+        assert_eq!(found.gaussians[0].position[0].to_le_bytes(), first);
+    }
+}
+
 /// One chunk as PlayCanvas packs it: the middle of each range, no rotation.
 #[test]
 fn compressed_ply_is_read() {

@@ -76,13 +76,15 @@ fn read(path: &Path, frame: &SceneFrame, world: Option<&(ParserWorld, PathBuf)>)
     }
     let mut notes = Vec::new();
     let mut place = GaussianPlace::new(path, frame, world.map(|(world, _)| world));
-    let is_splat = has_extension(path, &["splat"]) || splat::is_likely(&bytes);
     let known = |(magic, extension, _): &&(&[u8], &str, &str)| match *extension {
         // Two bytes are no proof.
         "ksplat" => bytes.starts_with(magic) && has_extension(path, &["ksplat"]),
         _ => bytes.starts_with(magic),
     };
-    let mut scene = if bytes.starts_with(&[0x1f, 0x8b]) {
+    // First of all: such a file begins with the bytes of a number, which may be those that others begin with.
+    let mut scene = if splat::is_likely(&bytes) {
+        splat::read(path, &bytes, &place)?
+    } else if bytes.starts_with(&[0x1f, 0x8b]) {
         if spz::is_by_viewfuse(&bytes) {
             place = GaussianPlace::new(path, frame, None);
         }
@@ -91,7 +93,7 @@ fn read(path: &Path, frame: &SceneFrame, world: Option<&(ParserWorld, PathBuf)>)
         return Err(refused(path, "a page or another text: Gaussians are not read from it; write them as .ply, too"));
     } else if let Some((_, _, what)) = OTHERS.iter().find(known) {
         return Err(refused(path, &format!("{what}: {WAY_OUT}")));
-    } else if !bytes.starts_with(b"ply") && is_splat {
+    } else if !bytes.starts_with(b"ply") && has_extension(path, &["splat"]) {
         splat::read(path, &bytes, &place)?
     } else {
         let header = PlyHeader::read(path, &bytes)?;
