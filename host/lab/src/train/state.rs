@@ -198,3 +198,17 @@ fn first_difference(place: &str, earlier: Option<&Value>, now: Option<&Value>) -
     let shown = |value: Option<&Value>| value.map_or("nothing".to_owned(), Value::to_string);
     (earlier != now).then(|| format!("{place} was {} and is {}", shown(earlier), shown(now)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Else the curves of a run that was killed differ in a last digit from those of one that was not.
+    #[test]
+    fn numbers_are_read_as_they_were_written() {
+        let scores = vec![(4, 13.428_669_558_878_365), (8, 13.447_764_065_263_021)];
+        let progressed = Progressed { steps: 8, scores, ..Progressed::default() };
+        let text = serde_json::to_string(&progressed).expect("JSON");
+        assert_eq!(serde_json::from_str::<Progressed>(&text).expect("JSON"), progressed);
+    }
+}
