@@ -317,7 +317,18 @@ fn a_damaged_state_is_refused_and_an_empty_one_is_none() {
     let before = bytes(&folder, "run/model.safetensors");
     assert_refused(&folder, &format!("{run} --seed 5"), &["run/model.safetensors: is there, and no state"]);
     assert!(bytes(&folder, "run/model.safetensors") == before);
-    assert!(done(&folder, &run).contains("2 steps in"));
+    let again = super::run(&folder, &run);
+    assert!(again.code == Some(0) && again.stdout.contains("2 steps in"), "{}", again.stderr);
+    assert!(again.stderr.contains("run/state.safetensors: is empty") && again.stderr.contains("begins anew"));
+    // Numbers that are none, as of a rate that is too high: of what was written nothing is lost.
+    let broken = [&state[..state.len() - 4000], &[0xff; 4000]].concat();
+    fs::write(&path, &broken).expect("a file");
+    let on = run.replace("--steps 2", "--steps 9").replace("--write-every 0", "--write-every 1000");
+    let failed = super::run(&folder, &on);
+    for part in ["step 3: the loss is not finite", "the state that was written last is kept", "--rate"] {
+        assert!(failed.code == Some(1) && failed.stderr.contains(part), "{}", failed.stderr);
+    }
+    assert!(fs::read(&path).expect("a state") == broken);
     fs::remove_file(&path).expect("a file");
     fs::create_dir(&path).expect("a folder in the way");
     assert_refused(&folder, &run, &["run/state.safetensors: cannot be written: it is a folder"]);

@@ -89,7 +89,7 @@ pub enum TrainError {
     OtherRun { path: PathBuf, difference: String },
     #[error("{}: is not the state of a training run: {reason}", path.display())]
     State { path: PathBuf, reason: String },
-    #[error("step {step}: the {what} is not finite; the state before it is kept")]
+    #[error("step {step}: the {what} is not finite; the state that was written last is kept")]
     NotFinite { step: u32, what: String },
     #[error(transparent)]
     Write(#[from] WriteError),

@@ -200,6 +200,10 @@ pub(crate) fn run<S: Serialize>(
         }
     }
     let is_new = found.is_none();
+    if is_new && run.state().exists() {
+        let state = run.state();
+        progress.warn(&format!("{}: is empty, as a loss of power leaves it: the run begins anew", state.display()));
+    }
     let mut so_far = found.unwrap_or_default();
     if let Some((step, planned)) = so_far.extended.last().filter(|(step, _)| *step == so_far.steps) {
         progress.note(&format!(
@@ -309,8 +313,9 @@ impl Run<'_> {
     /// The state is written last, so that all other files exist when a run continues from it.
     fn write(&self, so_far: &Progressed, learned: &Learned<'_>) -> Result<(), TrainError> {
         let (tensors, metadata) = learned.as_written(|| self.learner.checkpoint())?;
-        Checkpoint::in_memory("trained", tensors, metadata).write_safetensors(
-            &self.model(),
+        let model = self.model();
+        Checkpoint::in_memory(&model.display().to_string(), tensors, metadata).write_safetensors(
+            &model,
             Precision::Kept,
             &Silent,
         )?;
