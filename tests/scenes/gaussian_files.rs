@@ -239,6 +239,20 @@ fn smaller_formats_are_written_and_read() {
     }
 }
 
+/// In one direction a Gaussian may be as thin as it likes; where many are in two, the format's picture would be another.
+#[test]
+fn what_spz_has_no_room_for_is_said() {
+    let folder = Folder::new();
+    let mut scene = drawn(20, 0, 3);
+    let mut write = |count: usize, log_scales: [f32; 3]| {
+        scene.gaussians[..count].iter_mut().for_each(|gaussian| gaussian.log_scales = log_scales);
+        scene.write(&folder.join("a.spz"), &SceneFrame::FILE).map_err(|error| error.to_string())
+    };
+    write(20, [-20.0, -3.0, -4.0]).expect("discs");
+    let told = write(4, [-12.0, -11.0, -3.0]).expect_err("needles");
+    assert!(told.contains("from 4.5e-5 to 370; 20 % of the Gaussians here are smaller or larger"), "{told}");
+}
+
 /// A .splat begins with the first coordinate, any of whose bytes a page, an archive or a .ply may begin with, too.
 #[test]
 fn a_splat_is_one_whatever_its_first_coordinate() {

@@ -14,7 +14,7 @@ use viewfuse_core::gaussian::{REST_COUNTS, opacity};
 use super::harmonics::signs_without_yz;
 use super::place::{GaussianPlace, RawGaussian};
 use super::splat::{logit, unit};
-use super::{GaussianScene, MAX_DEGREE, refused};
+use super::{Gaussian, GaussianScene, MAX_DEGREE, refused};
 use crate::SceneFrame;
 use crate::scene::SceneError;
 
@@ -32,6 +32,9 @@ const ANTIALIASED: u8 = 1;
 const COMMENT: &str = "viewfuse";
 /// Bytes behind the arrays from which on a file is no such file.
 const MAX_SURPLUS: u64 = 1 << 20;
+/// The greatest share of Gaussians that are smaller or larger than the format holds: of the room in a thousandth of its
+/// unit, where it was 0.32, a view lost 0.8 dB; at 0.12 0.4 dB.
+const MAX_BEYOND: f64 = 0.1;
 /// Levels of a magnitude in the quaternions of version 3.
 const MAGNITUDE: u32 = (1 << 9) - 1;
 
@@ -156,14 +159,17 @@ pub(super) fn bytes(scene: &GaussianScene, frame: &SceneFrame) -> Result<Vec<u8>
     if fraction < 0.0 {
         return Err(format!(".spz has no room for the coordinate {greatest:e}"));
     }
-    let mut log_scales: Vec<f64> =
-        scene.gaussians.iter().flat_map(|gaussian| gaussian.log_scales).map(f64::from).collect();
-    log_scales.sort_by(f64::total_cmp);
-    let median = log_scales.get(log_scales.len() / 2).map_or(0.0, |median| median + frame.scale.ln());
-    if !(-10.0..=5.9).contains(&median) {
+    // What is too thin in one direction looks the same; in two, it looks thicker than it is.
+    let is_beyond = |gaussian: &&Gaussian| {
+        let mut log_scales = gaussian.log_scales;
+        log_scales.sort_by(f32::total_cmp);
+        !(-10.0..=5.9).contains(&(f64::from(log_scales[1]) + frame.scale.ln()))
+    };
+    let beyond = scene.gaussians.iter().filter(is_beyond).count() as f64 / scene.gaussians.len().max(1) as f64;
+    if beyond > MAX_BEYOND {
         return Err(format!(
-            ".spz holds standard deviations from 4.5e-5 to 370; here their median is {:e}",
-            median.exp()
+            ".spz holds standard deviations from 4.5e-5 to 370; {:.0} % of the Gaussians here are smaller or larger",
+            100.0 * beyond
         ));
     }
     let [mut positions, mut alphas, mut colours, mut scales, mut rotations, mut harmonics] =
