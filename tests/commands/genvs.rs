@@ -54,6 +54,8 @@ fn a_picture_of_any_size_a_sheet_and_a_record_without_depth() {
     let picture = image::open(folder.join("out/000020.png")).expect("a picture").to_rgb8();
     assert_eq!(picture.dimensions(), (21, 20));
     let record = read_json(folder.join("out/run.json"));
+    let one = done(&folder, "render toy --targets 20 --views 1 --size 8x8 --model body:16 --device cpu -o one");
+    assert!(one.contains("1 view from 1 source, "), "{one}");
     assert_eq!((&record["field"], &record["model"]), (&"genvs".into(), &"genvs:small".into()));
     assert_eq!((&record["seed"], &record["size"]), (&5.into(), &[21, 20][..].into()));
     assert_eq!((&record["early_termination"], &record["frames"][0]["depth_step"]), (&0.0.into(), &Value::Null));

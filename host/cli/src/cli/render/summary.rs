@@ -1,6 +1,6 @@
 //! What is printed of a run.
 
-use crate::cli::printing::say;
+use crate::cli::printing::{counted, say};
 use crate::cli::verdict::of_two;
 use std::path::Path;
 use viewfuse_field::auto::{Beyond, Candidate, Expected};
@@ -23,11 +23,11 @@ pub(super) fn print(record: &RunRecord, folder: &Path) -> std::io::Result<()> {
     for frame in &record.frames {
         say(format_args!("{}", summary(frame, &record.sources, is_of_sources, folder)))?;
     }
-    let views = if record.frames.len() == 1 { "1 view".to_owned() } else { format!("{} views", record.frames.len()) };
+    let (views, sources) = (counted(record.frames.len(), "view"), counted(record.sources.len(), "source"));
     let RunRecord { weighting, field, device, .. } = record;
-    let (source_count, seconds) = (record.sources.len(), record.times.total);
+    let seconds = record.times.total;
     if is_of_sources {
-        say(format_args!("{views} from {source_count} sources, {weighting}, {field} on {device}: {seconds:.2} s"))?;
+        say(format_args!("{views} from {sources}, {weighting}, {field} on {device}: {seconds:.2} s"))?;
     } else {
         say(format_args!("{views} of the file's Gaussians on {device}: {seconds:.2} s"))?;
     }
