@@ -32,7 +32,7 @@ export function drawPicture() {
     drawSources(context, state.shown.pose, project, ratio, state.shown.weights, false);
     context.restore();
   }
-  if (tellSeen(element('support'), state.shown.seen)) {
+  if (tellSeen(element('support'), state.shown.seen, state.shown.record?.frames[0])) {
     context.fillStyle = 'rgba(0, 0, 0, 0.5)';
     context.fillRect(left, top, own * scale, tall * scale);
   }

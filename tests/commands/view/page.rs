@@ -25,6 +25,7 @@ viewfuse_tests::trials![;
         a_path_goes_through_keyframes,
         the_scheme_becomes_that_of_render,
         where_nothing_was_photographed_it_is_said,
+        a_picture_that_is_poor_is_said_to_be_so,
         names_from_files_are_no_commands,
 ];
 
@@ -287,6 +288,28 @@ fn where_nothing_was_photographed_it_is_said() {
         assert_eq!(tab.console(), [""; 0]);
         tab.close();
     }
+}
+
+/// The share that was photographed is one of cameras alone: what left-out photographs say of a picture is said as well.
+fn a_picture_that_is_poor_is_said_to_be_so() {
+    let browser = &Browser::needed();
+    let program = room(SMALL);
+    let chromium = Chromium::start(browser);
+    let tab = opened(&chromium, &program);
+    let said = |seen: f32, frame: &str| {
+        let told = format!(
+            "import('./seen.js').then(({{ tellSeen }}) => {{ const place = {{}}; tellSeen(place, {seen}, {frame}); \
+             return place.hidden ? 'nothing' : place.textContent; }})"
+        );
+        tab.text(&told)
+    };
+    assert_eq!(said(1.0, "undefined"), "nothing");
+    assert_eq!(said(0.95, "{ expected: { psnr: 26.3 }, beyond: null }"), "nothing");
+    let poor = "{ expected: { psnr: 17.4 }, beyond: null }";
+    assert_eq!(said(0.95, poor), "It is poor: a PSNR of 17 dB is expected.");
+    assert!(said(0.7, poor).starts_with("The photographs show 70 % of this. It is poor"));
+    assert!(said(1.0, "{ expected: null, beyond: { unseen: 0.31 } }").contains("no photograph shows 31 %"));
+    assert!(said(1.0, "{ expected: null, beyond: { far: 1.4 } }").contains("cannot be told"));
 }
 
 /// A pose is saved as a file that viewfuse reads, and the command line says how this view is rendered.
