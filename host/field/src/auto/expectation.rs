@@ -4,8 +4,8 @@
 //! expected = P + c0 + c1 log2(G / g) + c2 (e - E) + c3 D + c4 n + s (c5 + c6 D), at most M + 3 dB
 //! ```
 //!
-//! `P`, `G`: the means of score and gap over the held-out sources (of the gap, the geometric one); `M`: the best of
-//! these scores, beyond which a run has seen little; `E`: of the scores
+//! `P`, `G`: the means of score and gap over the held-out sources (of the gap, the geometric one; small gaps are
+//! raised, see [`SMALL_GAP`]); `M`: the best of these scores, beyond which a run has seen little; `E`: of the scores
 //! that their confidences say by the calibration; `g`, `e`: the target's gap and score by its confidences; `D`: the
 //! decibels that the coarse pictures do not show, see [`Basis::detail`]; `n`: the share of its surfaces that no
 //! photograph shows ([`Seen::by_none`]); `s`: 1 for objects with silhouettes, whose `D` there is at most
@@ -19,10 +19,12 @@ use crate::standing::Standing;
 use serde::{Deserialize, Serialize};
 
 /// `c0` to `c6`, fitted to the targets of 11 scenes (`host/results/training_free.md`, "What auto chooses and expects").
-const CONSTANTS: [f64; TERMS] = [1.38, 2.30, 0.80, 0.085, -14.5, 1.68, 1.84];
+const CONSTANTS: [f64; TERMS] = [0.90, 5.20, 0.80, 0.085, -14.5, 1.68, 1.84];
 /// Most decibels that count as lost detail of an object: of pictures as small as the coarse ones, which lack none, more
 /// was expected than there is (1.5 dB in the mean of five objects at 48 to 96 pixels).
 const MAX_DETAIL: f64 = -0.75;
+/// A gap far below this, 4 degrees on a circle, is as good as none: errors are left that no nearer source takes away.
+const SMALL_GAP: f64 = 0.1;
 /// The most that is expected above the best held-out source, decibels.
 const MAX_ABOVE: f64 = 3.0;
 /// Half of the interval, decibels: the error that four of five targets of scenes that the fit has not seen stay below
@@ -84,7 +86,7 @@ pub struct Basis {
     pub psnr: f64,
     /// The best score, decibels.
     pub best: f64,
-    /// Mean base-2 logarithm of the gaps.
+    /// Mean base-2 logarithm of the gaps, of which small ones are raised.
     pub log_gap: f64,
     /// The greatest gap.
     pub greatest_gap: f64,
@@ -110,7 +112,7 @@ impl Basis {
         Basis {
             psnr: sum(&|outcome| outcome.psnr),
             best: outcomes.iter().map(|outcome| outcome.psnr).fold(f64::NEG_INFINITY, f64::max),
-            log_gap: sum(&|outcome| outcome.standing.gap.log2()),
+            log_gap: sum(&|outcome| log_gap(outcome.standing)),
             greatest_gap: outcomes.iter().map(|outcome| outcome.standing.gap).fold(0.0, f64::max),
             calibrated: calibration.and_then(|calibration| {
                 let scores = outcomes.iter().map(|outcome| {
@@ -130,7 +132,7 @@ impl Basis {
             (Some(score), Some(mean)) => score - mean,
             _ => 0.0,
         };
-        let gap = self.log_gap - standing.gap.log2();
+        let gap = self.log_gap - log_gap(standing);
         let (unseen, none) = (self.unseen(), seen.map_or(0.0, |seen| f64::from(seen.by_none)));
         let object = f64::from(u8::from(self.has_silhouettes));
         [1.0, gap, surer, unseen, none, object, object * unseen.min(MAX_DETAIL)]
@@ -158,6 +160,11 @@ impl Basis {
         let error = 10.0_f64.powf(-0.1 * self.psnr);
         -10.0 * ((error + self.detail) / error).log10()
     }
+}
+
+/// The base-2 logarithm of a gap, a small one raised: it hardly falls below that of [`SMALL_GAP`].
+fn log_gap(standing: Standing) -> f64 {
+    standing.gap.hypot(SMALL_GAP).log2()
 }
 
 /// The peak signal to noise ratio of a mean square error, decibels.
@@ -197,6 +204,26 @@ mod tests {
         let error = 10.0_f64.powf(-2.5);
         assert!((expected(0.0) - expected(error / 6.0)).abs() < 0.1, "{} {}", expected(0.0), expected(error / 6.0));
         assert!(expected(error) < expected(0.0) - 3.0, "{}", expected(error));
+    }
+
+    /// Twice as far from the sources costs about 5 dB, unless both are near, and in the middle of the held-out sources
+    /// little more than their mean is expected.
+    #[test]
+    fn a_target_that_is_farther_is_worse() {
+        let at = |gap: f64| Standing { gap, outside: 0.5 };
+        let basis = Basis {
+            psnr: 25.0,
+            best: 30.0,
+            log_gap: log_gap(at(0.25)),
+            greatest_gap: 0.4,
+            calibrated: None,
+            detail: 0.0,
+            has_silhouettes: false,
+        };
+        let expected = |gap: f64| basis.expected(at(gap), None, None).psnr;
+        assert!((25.0..26.2).contains(&expected(0.25)), "{}", expected(0.25));
+        assert!((4.0..5.5).contains(&(expected(0.25) - expected(0.5))), "{}", expected(0.5));
+        assert!(expected(0.02) - expected(0.04) < 0.5, "{} {}", expected(0.02), expected(0.04));
     }
 
     #[test]
