@@ -120,6 +120,8 @@ pub fn find(
         made = attempts(solvers, (photos, photos), &by_zoom, options.seed, &part)?;
         (cameras, after) = (by_zoom, 8);
     }
+    let rest = || solvers.iter().for_each(|solver| solver.rest());
+    rest();
     let part = Part::begin(progress, "", after..after + 1, 10);
     let mut found = verdict(folder, photos, &cameras, &mut made, &part)?;
     let accepted = found.as_ref().map_or(Vec::new(), |found| found.photos.clone());
@@ -129,6 +131,7 @@ pub fn find(
         if let Some(finer) = intake.finer(&part)? {
             let before = made.iter().map(|attempt| attempt.tried.refused.clone()).collect();
             made.extend(attempts(solvers, (photos, &finer), &cameras, options.seed, &part)?);
+            rest();
             let part = Part::begin(progress, "", 8..9, 10);
             let second = verdict(folder, photos, &cameras, &mut made, &part)?;
             found = taken(found, second, &mut made, before);

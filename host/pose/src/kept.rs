@@ -173,6 +173,10 @@ impl Solver for Kept<'_> {
         // As a run that goes on reads it: numbers as text may differ from their own in the last bit.
         serde_json::from_slice(&text).unwrap_or(answer).into()
     }
+
+    fn rest(&self) {
+        self.solver.rest();
+    }
 }
 
 impl From<Answer> for Result<Solution, SolverError> {

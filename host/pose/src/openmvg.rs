@@ -1,17 +1,19 @@
 //! OpenMVG's crates, as a process of their own: `viewfuse-openmvg`, which is built from this crate's folder `openmvg`.
+//! It stays for the next job: features and matches are found once for all jobs with the same photographs.
 
 use crate::process::{GRACE, LOOK, end_of};
 use crate::solution::{Features, MAX_ANSWER, PoseJob, Solution, Solver, SolverError};
 use serde::Deserialize;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::PathBuf;
-use std::process::{ChildStderr, ChildStdout, Command, Stdio};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel, sync_channel};
+use std::process::{ChildStderr, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel, sync_channel};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Instant;
 use viewfuse_job::digest::sha256_of;
 use viewfuse_job::process::Process;
-use viewfuse_job::progress::Progress;
+use viewfuse_job::progress::{Interrupted, Progress};
 
 /// Most lines of progress: a hundred photographs have 4,950 pairs, and some stages for each.
 const MAX_PROGRESS: usize = 1 << 18;
@@ -29,10 +31,10 @@ const MAX_WORDS: usize = 200;
 const STAGE_COUNT: usize = 8;
 
 /// The program `viewfuse-openmvg`.
-#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OpenMvg {
-    /// Its file.
-    pub program: PathBuf,
+    program: PathBuf,
+    /// A process that has answered, for the next job.
+    idle: Mutex<Option<Started>>,
 }
 
 /// A line that it writes.
@@ -58,9 +60,73 @@ impl Solver for OpenMvg {
     }
 
     fn solve(&self, job: &PoseJob, progress: &dyn Progress) -> Result<Solution, SolverError> {
-        let broken = |problem: String| SolverError::Broken(self.program.clone(), problem);
+        let idle = self.idle().take();
+        if let Some(idle) = idle {
+            match self.answer(&idle, job, progress) {
+                // It ended behind its last answer.
+                Ok(Answered::Not { has_spoken: false }) => {}
+                answered => return self.with_idle(idle, answered, progress),
+            }
+        }
+        let started = self.start()?;
+        let answered = self.answer(&started, job, progress);
+        self.with_idle(started, answered, progress)
+    }
+
+    fn rest(&self) {
+        self.idle().take();
+    }
+}
+
+/// What a process made of a job.
+enum Answered {
+    Solution(Solution),
+    Nothing(String),
+    /// It has nothing more to say.
+    Not {
+        has_spoken: bool,
+    },
+}
+
+impl OpenMvg {
+    /// Of this file.
+    pub fn new(program: PathBuf) -> OpenMvg {
+        OpenMvg { program, idle: Mutex::new(None) }
+    }
+
+    fn idle(&self) -> MutexGuard<'_, Option<Started>> {
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn broken(&self, problem: String) -> SolverError {
+        SolverError::Broken(self.program.clone(), problem)
+    }
+
+    /// What a process answered, which then waits for the next job; it ends where it has not answered.
+    fn with_idle(
+        &self,
+        started: Started,
+        answered: Result<Answered, SolverError>,
+        progress: &dyn Progress,
+    ) -> Result<Solution, SolverError> {
+        let answer = match answered? {
+            Answered::Solution(solution) => Ok(solution),
+            Answered::Nothing(reason) => Err(SolverError::Nothing(reason)),
+            Answered::Not { .. } => return Err(self.without_answer(started, progress)?),
+        };
+        *self.idle() = Some(started);
+        answer
+    }
+
+    /// Gives a process a job and waits for its answer.
+    fn answer(&self, started: &Started, job: &PoseJob, progress: &dyn Progress) -> Result<Answered, SolverError> {
+        let Started { process, jobs, lines, .. } = started;
+        let broken = |problem: String| self.broken(problem);
         let unread = |error: &dyn std::fmt::Display| broken(format!("its answer cannot be read: {error}"));
-        let Started { process, lines, complaint } = self.start(job)?;
+        let mut text = serde_json::to_vec(job).unwrap_or_default();
+        text.push(b'\n');
+        // A process that does not take it, or has ended already, is noticed by its missing answer.
+        let _ = jobs.send(text);
         let (mut begun, mut told, mut has_ended) = (0, 0, None);
         loop {
             progress.check()?;
@@ -90,12 +156,18 @@ impl Solver for OpenMvg {
                         begun += 1;
                     }
                 }
-                Ok(Line::Solution(solution)) if solution.fits(job) => return Ok(solution),
+                Ok(Line::Solution(solution)) if solution.fits(job) => return Ok(Answered::Solution(solution)),
                 Ok(Line::Solution(_)) => return Err(broken("its answer does not fit the photographs".to_owned())),
-                Ok(Line::Failed { reason }) => return Err(SolverError::Nothing(beginning(&reason))),
+                Ok(Line::Failed { reason }) => return Ok(Answered::Nothing(beginning(&reason))),
                 Err(error) => return Err(unread(&error)),
             }
         }
+        Ok(Answered::Not { has_spoken: told > 0 })
+    }
+
+    /// What is said of a process that has not answered.
+    fn without_answer(&self, started: Started, progress: &dyn Progress) -> Result<SolverError, Interrupted> {
+        let Started { process, complaint, .. } = started;
         let ended = match end_of(&process, progress)? {
             Some(status) => format!("ended without an answer ({status})"),
             None => "closed its output without an answer, and stayed".to_owned(),
@@ -104,8 +176,28 @@ impl Solver for OpenMvg {
         drop(process);
         let words = complaint.recv_timeout(GRACE).unwrap_or_default();
         let words = beginning(words.lines().next().unwrap_or_default());
-        Err(broken(format!("{ended}{}{words}", if words.is_empty() { "" } else { ": " })))
+        Ok(self.broken(format!("{ended}{}{words}", if words.is_empty() { "" } else { ": " })))
     }
+
+    /// Starts the process.
+    fn start(&self) -> Result<Started, SolverError> {
+        let mut command = Command::new(&self.program);
+        command.env("RAYON_NUM_THREADS", rayon::current_num_threads().to_string());
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let process = Process::start(&mut command);
+        let process = process.map_err(|cause| SolverError::not_started(self.name(), &self.program, &cause))?;
+        let (Some(input), Some(said), Some(complained)) = process.pipes() else {
+            return Err(self.broken("has no input or output".to_owned()));
+        };
+        Ok(Started { process, jobs: jobs_to(input), lines: lines_of(said), complaint: beginning_of(complained) })
+    }
+}
+
+/// What takes jobs to a process, until it takes no more; its input ends with the last of them.
+fn jobs_to(mut input: ChildStdin) -> Sender<Vec<u8>> {
+    let (to_there, jobs) = channel::<Vec<u8>>();
+    thread::spawn(move || jobs.iter().all(|job| input.write_all(&job).is_ok()));
+    to_there
 }
 
 /// As much of a text as a person reads.
@@ -113,7 +205,7 @@ fn beginning(text: &str) -> String {
     text.chars().take(MAX_WORDS).collect()
 }
 
-/// The lines of an answer, of which few wait to be taken.
+/// The lines of answers, of which few wait to be taken; with its progress an answer has at most [`MAX_ANSWER`] bytes.
 fn lines_of(said: ChildStdout) -> Receiver<io::Result<String>> {
     let (to_here, lines) = sync_channel(MAX_WAITING);
     thread::spawn(move || {
@@ -127,6 +219,10 @@ fn lines_of(said: ChildStdout) -> Receiver<io::Result<String>> {
                 Ok(0) => break,
                 read => read.map(|_| line),
             };
+            // Behind an answer comes that to the next job.
+            if line.as_ref().is_ok_and(|line| !line.starts_with(r#"{"progress""#)) {
+                reader.get_mut().set_limit(MAX_ANSWER);
+            }
             let is_last = line.is_err();
             if to_here.send(line).is_err() || is_last {
                 break;
@@ -149,28 +245,10 @@ fn beginning_of(mut complained: ChildStderr) -> Receiver<String> {
     text
 }
 
-/// A process at work, the lines of its answer, and what it complains of.
+/// A process, what takes it jobs, the lines of its answers, and what it complains of.
 struct Started {
     process: Process,
+    jobs: Sender<Vec<u8>>,
     lines: Receiver<io::Result<String>>,
     complaint: Receiver<String>,
-}
-
-impl OpenMvg {
-    /// Starts the process and gives it the job.
-    fn start(&self, job: &PoseJob) -> Result<Started, SolverError> {
-        let mut command = Command::new(&self.program);
-        command.env("RAYON_NUM_THREADS", rayon::current_num_threads().to_string());
-        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        let process = Process::start(&mut command);
-        let process = process.map_err(|cause| SolverError::not_started(self.name(), &self.program, &cause))?;
-        let (Some(mut input), Some(said), Some(complained)) = process.pipes() else {
-            let problem = "has no input or output".to_owned();
-            return Err(SolverError::Broken(self.program.clone(), problem));
-        };
-        let text = serde_json::to_vec(job).unwrap_or_default();
-        // A process that does not take it, or has ended already, is noticed by its missing answer.
-        thread::spawn(move || input.write_all(&text));
-        Ok(Started { process, lines: lines_of(said), complaint: beginning_of(complained) })
-    }
 }

@@ -255,4 +255,7 @@ pub trait Solver: Sync {
     /// # Errors
     /// [`SolverError`].
     fn solve(&self, job: &PoseJob, progress: &dyn Progress) -> Result<Solution, SolverError>;
+
+    /// There is no job for a while: what is there for the next one is given back.
+    fn rest(&self) {}
 }

@@ -83,7 +83,7 @@ fn opened(solvers: Option<Solvers>) -> Result<Vec<Box<dyn Solver>>, Failure> {
     let solver = |(name, program): (String, Option<PathBuf>)| -> Result<Box<dyn Solver>, Failure> {
         let program = |usual: &str| program.unwrap_or_else(|| usual.into());
         match name.as_str() {
-            "openmvg" => Ok(Box::new(OpenMvg { program: program("viewfuse-openmvg") })),
+            "openmvg" => Ok(Box::new(OpenMvg::new(program("viewfuse-openmvg")))),
             "colmap" => Ok(Box::new(Colmap { program: program("colmap") })),
             "pycolmap" => Ok(Box::new(PyColmap { python: program("python3") })),
             _ => Err(Failure::Input(format!("solvers: '{name}' is none of openmvg, colmap and pycolmap"))),

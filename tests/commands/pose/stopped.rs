@@ -13,12 +13,12 @@ viewfuse_tests::trials![;
     no_scripts().or_else(no_program), REQUIRE => a_killed_run_goes_on, an_interrupted_run_keeps_what_it_has,
 ];
 
-/// Photographs of the room and a program that counts how often it is asked, in a file of the run's own: what a killed
-/// run has started may still count.
+/// Photographs of the room and a program that keeps what it is asked, a line each, in a file of the run's own: what a
+/// killed run has started may still be asked.
 fn counted() -> Folder {
     let folder = bare(0..4);
     let real = fs::canonicalize(program().expect("a program")).expect("a path");
-    folder.script("openmvg", &format!("echo asked >> \"$ASKED\"\nexec '{}' \"$@\"\n", real.display()));
+    folder.script("openmvg", &format!("tee -a \"$ASKED\" | '{}' \"$@\"\n", real.display()));
     folder
 }
 

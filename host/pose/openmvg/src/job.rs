@@ -20,7 +20,7 @@ pub(crate) struct PoseJob {
 }
 
 /// A kind of features.
-#[derive(Clone, Copy, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Features {
     /// Extrema of an analytic Laplacian, described as SIFT's.

@@ -3,14 +3,19 @@
 use crate::answer::{Camera, Line, Pair, Photograph, Point, Solution};
 use crate::apart::Apart;
 use crate::job::{Features, JobPhotograph, PoseJob};
+use crate::remembered::{Once, Remembered};
 use crate::say;
 use openmvg_core::camera::{RadialDistortion, TangentialDistortion};
-use openmvg_sfm::model::{ImageMeta, IntrinsicPrior, PairGeometry};
+use openmvg_sfm::model::{ImageMeta, IntrinsicPrior};
 use openmvg_sfm::progress::{SfmProgressSink, SfmProgressStage};
-use openmvg_sfm::reports::ViewVerdictStatus;
+use openmvg_sfm::reports::{RunReport, ViewVerdictStatus};
+use openmvg_sfm::unstable::SfmWorkspace;
+use openmvg_sfm::unstable::adapters::features::{AlpFeatureExtractor, SiftFrontendPreset};
+use openmvg_sfm::unstable::adapters::matching::{MatchAcceptance, MatcherType, PairMatcherAdapter};
+use openmvg_sfm::unstable::backends::{FeatureExtractor, PairMatcher};
+use openmvg_sfm::unstable::types::GeometricModel;
 use openmvg_sfm::{
-    Camera as Model, Dataset, ExtractionMethod, Frontend, Incremental, IntrinsicId, Reconstruction, Result, SfmError,
-    SfmOutput, ViewGraph, ViewId,
+    Camera as Model, Frontend, Incremental, IntrinsicId, Reconstruction, Result, SfmEngine, SfmError, ViewId, ViewPair,
 };
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -22,15 +27,23 @@ pub(crate) const SOLVER: &str = "openmvg-sfm 0.1.0";
 /// Pixels between the library's image coordinates, whose pixel centres are integers, and ours.
 const CENTRE: f64 = 0.5;
 
-/// Poses for a job's photographs.
-pub(crate) fn solve(job: &PoseJob) -> Result<Solution> {
+/// The library's recommended kind of features, as [`Frontend::default`] takes it.
+const PRESET: SiftFrontendPreset = SiftFrontendPreset::Quality;
+
+/// Poses for a job's photographs. Of its front end, features and matches are those that are remembered.
+pub(crate) fn solve(job: &PoseJob, remembered: &mut Remembered) -> Result<Solution> {
     let told = Told::default();
-    let frontend =
-        Frontend::default().with_max_dimension(Some(job.max_side)).with_extraction_method(match job.features {
-            Features::Alp => ExtractionMethod::Alp,
-            Features::Sift => ExtractionMethod::Sift,
-        });
-    let (graph, _) = frontend.build_with_report(&dataset(job)?, &told)?;
+    let found = remembered.of(job);
+    let frontend = Frontend::default().with_max_dimension(Some(job.max_side));
+    let extractor: &dyn FeatureExtractor = match job.features {
+        Features::Alp => &AlpFeatureExtractor::new(PRESET).with_max_dimension(job.max_side),
+        Features::Sift => &frontend.sift().extractor(),
+    };
+    let matcher = PairMatcherAdapter::new(MatcherType::hnsw_default(), PRESET.ratio(), MatchAcceptance::Reciprocal);
+    let mut workspace = workspace(job)?;
+    let (extractor, matcher) = (Once { found, by: extractor }, Once { found, by: &matcher as &dyn PairMatcher });
+    frontend.stage_with(&mut workspace, Some(&extractor), Some(&matcher), &told)?;
+    let (cameras, pairs) = (workspace.camera_models().iter().map(camera).collect(), pairs(&workspace));
     // The library takes a photograph for misplaced whose rotation differs from the median over its pairs by 20 degrees.
     // Of few photographs far apart more than half of the pairs may be matched by chance: it refused true poses. Where
     // focal lengths are guesses it stays.
@@ -38,17 +51,17 @@ pub(crate) fn solve(job: &PoseJob) -> Result<Solution> {
     if job.cameras.iter().all(|camera| !camera.is_guess) {
         config = config.with_registration_max_rotation_edge_error(None);
     }
-    let output = match Incremental::new(config).runner().progress(&told).run_prepared(&graph) {
-        Ok(output) => output,
-        Err(error) => return Ok(unposed(job, &graph, &error)),
+    let (workspace, report) = match Incremental::new(config).runner().progress(&told).run_workspace(workspace) {
+        Ok(ended) => ended,
+        Err(error) => return Ok(unposed(job, cameras, pairs, &error)),
     };
-    let found = output.reconstruction();
+    let found = &Reconstruction::from_workspace(workspace, SfmEngine::Incremental, false);
     Ok(Solution {
         solver: SOLVER,
         cameras: found.camera_models().iter().map(camera).collect(),
-        photographs: photographs(&output),
+        photographs: photographs(found, &report),
         points: points(found),
-        pairs: pairs(&graph),
+        pairs,
         apart: apart(job, found),
     })
 }
@@ -60,20 +73,14 @@ fn apart(job: &PoseJob, found: &Reconstruction) -> Option<Apart> {
 }
 
 /// What is known without a pose: which photographs match.
-fn unposed(job: &PoseJob, graph: &ViewGraph, error: &SfmError) -> Solution {
+fn unposed(job: &PoseJob, cameras: Vec<Camera>, pairs: Vec<Pair>, error: &SfmError) -> Solution {
     let photograph = |_| Photograph { camera_from_world: None, reason: Some(error.to_string()) };
-    Solution {
-        solver: SOLVER,
-        cameras: graph.camera_models().iter().map(camera).collect(),
-        photographs: job.photographs.iter().map(photograph).collect(),
-        points: Vec::new(),
-        pairs: pairs(graph),
-        apart: None,
-    }
+    let photographs = job.photographs.iter().map(photograph).collect();
+    Solution { solver: SOLVER, cameras, photographs, points: Vec::new(), pairs, apart: None }
 }
 
-/// The photographs with one camera for each group, its principal point in the middle.
-fn dataset(job: &PoseJob) -> Result<Dataset> {
+/// The photographs with one camera for each group, its principal point in the middle; each is matched with each.
+fn workspace(job: &PoseJob) -> Result<SfmWorkspace> {
     let mut models = Vec::new();
     for (index, guess) in job.cameras.iter().enumerate() {
         let size = job
@@ -87,13 +94,14 @@ fn dataset(job: &PoseJob) -> Result<Dataset> {
     }
     let meta = |photograph: &JobPhotograph| ImageMeta::path(&photograph.path, photograph.size[0], photograph.size[1]);
     let prior = |is_guess: bool| if is_guess { IntrinsicPrior::Guess } else { IntrinsicPrior::Trusted };
-    Dataset::builder()
+    SfmWorkspace::builder()
         .root_seed(job.seed)
         .image_meta(job.photographs.iter().map(meta))
         .camera_models(models)
         .intrinsic_priors(job.cameras.iter().map(|guess| prior(guess.is_guess)))
         .view_intrinsics(job.photographs.iter().map(|photograph| IntrinsicId::new(photograph.camera)))
         .one_pose_per_view()
+        .exhaustive_pairs()
         .build()
 }
 
@@ -109,8 +117,7 @@ pub(crate) fn camera(model: &Model) -> Camera {
     }
 }
 
-fn photographs(output: &SfmOutput) -> Vec<Photograph> {
-    let found = output.reconstruction();
+fn photographs(found: &Reconstruction, report: &RunReport) -> Vec<Photograph> {
     let mut all = Vec::new();
     for index in 0..found.view_count() {
         let view = ViewId::new(index);
@@ -118,7 +125,7 @@ fn photographs(output: &SfmOutput) -> Vec<Photograph> {
             let (rotation, translation) = (record.pose.rotation_matrix(), record.pose.translation());
             [0, 1, 2].map(|row| [rotation[(row, 0)], rotation[(row, 1)], rotation[(row, 2)], translation[row]])
         });
-        let verdict = output.report().view_verdicts().get(index).map(|verdict| verdict.status());
+        let verdict = report.view_verdicts().get(index).map(|verdict| verdict.status());
         let reason = match verdict {
             Some(ViewVerdictStatus::Unregistered { reason }) => Some(reason.to_string()),
             _ => None,
@@ -141,14 +148,14 @@ fn points(found: &Reconstruction) -> Vec<Point> {
     found.landmarks().iter_active().filter_map(&mut of).collect()
 }
 
-fn pairs(graph: &ViewGraph) -> Vec<Pair> {
-    let pair = |pair: openmvg_sfm::model::GraphPair<'_>| {
-        let (geometry, is_inlier) = pair.verified()?;
-        let is_general = matches!(geometry, PairGeometry::Essential { .. } | PairGeometry::Fundamental { .. });
-        let inliers = is_inlier.iter().filter(|is_inlier| **is_inlier).count();
-        Some(Pair { photographs: [pair.views().first().index(), pair.views().second().index()], inliers, is_general })
+fn pairs(workspace: &SfmWorkspace) -> Vec<Pair> {
+    let pair = |(index, pair): (usize, &ViewPair)| {
+        let model = workspace.geometric_model_store().get(index)?;
+        let is_general = matches!(model, GeometricModel::Essential { .. } | GeometricModel::Fundamental { .. });
+        let photographs = [pair.first().index(), pair.second().index()];
+        Some(Pair { photographs, inliers: model.evidence().inlier_count, is_general })
     };
-    graph.pairs().filter_map(pair).collect()
+    workspace.pair_graph().pairs().iter().enumerate().filter_map(pair).collect()
 }
 
 /// Says how far the work is; stops it when nobody reads that any more.

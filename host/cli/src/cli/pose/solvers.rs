@@ -25,7 +25,7 @@ pub(super) fn solvers(from: &[From]) -> Vec<Box<dyn Solver>> {
     }
     let opened = |solver: From| -> Box<dyn Solver> {
         match solver {
-            From::Openmvg => Box::new(OpenMvg { program: openmvg() }),
+            From::Openmvg => Box::new(OpenMvg::new(openmvg())),
             From::Colmap => Box::new(Colmap { program: colmap() }),
             From::Pycolmap => Box::new(PyColmap { python: python() }),
         }
