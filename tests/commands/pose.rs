@@ -11,10 +11,12 @@ mod stopped;
 
 use super::{BINARY, assert_refused, assert_wrong_arguments, command, done_with_warnings, list_of, read_json, run};
 use image::{DynamicImage, ImageFormat, RgbImage, imageops};
+use serde_json::{Value, json};
 use std::fs;
-use std::io::Cursor;
+use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
+use std::slice;
 use viewfuse::core::pose::Pose;
 use viewfuse::scene::Scene;
 use viewfuse_tests::command::{Outcome, assert_command_refused, files_below, interrupt, spawn};
@@ -54,6 +56,7 @@ viewfuse_tests::trials![
         what_does_not_belong_is_excluded_by_name,
         sizes_and_orientations_may_differ,
         zooms_are_told_apart,
+        one_process_answers_as_many_do,
         a_step_leaves_few_enough,
         photographs_of_nothing_in_common,
         ctrl_c_leaves_nothing,
@@ -221,6 +224,36 @@ fn zooms_are_told_apart() {
         let focal = view.camera.pinhole.focal()[0];
         assert!((focal / (294.4 * zoom) - 1.0).abs() < 0.1, "{}: {focal}\n{said}", view.name);
     }
+}
+
+/// What the program keeps of a job's photographs serves jobs with these alone.
+fn one_process_answers_as_many_do() {
+    let folder = bare(0..6);
+    let job = |first: usize, features: &str, focal: f64| {
+        let path = |view: usize| folder.join(format!("bare/{view:03}.jpg"));
+        let photograph = |view: usize| json!({ "path": path(view), "size": [320, 240], "camera": 0 });
+        let photographs: Vec<Value> = (first..first + 4).map(photograph).collect();
+        let cameras = [json!({ "focal": focal, "is_guess": true })];
+        let job = json!({ "seed": 1, "features": features, "max_side": 320, "cameras": cameras,
+            "photographs": photographs });
+        job.to_string() + "\n"
+    };
+    let answers = |jobs: &[String]| -> Vec<String> {
+        let mut command = Command::new(program().expect("a program"));
+        let mut process = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it starts");
+        let mut input = process.stdin.take().expect("its input");
+        input.write_all(jobs.concat().as_bytes()).expect("it reads");
+        drop(input);
+        let said = process.wait_with_output().expect("its end").stdout;
+        let lines = String::from_utf8(said).expect("text");
+        lines.lines().filter(|line| !line.starts_with(r#"{"progress""#)).map(str::to_owned).collect()
+    };
+    let jobs = [(0, "alp", 290.0), (0, "sift", 290.0), (0, "alp", 400.0), (2, "alp", 290.0), (0, "sift", 400.0)]
+        .map(|(first, features, focal)| job(first, features, focal));
+    let together = answers(&jobs);
+    let alone: Vec<String> = jobs.iter().flat_map(|job| answers(slice::from_ref(job))).collect();
+    assert!(alone.iter().all(|answer| answer.starts_with(r#"{"solution""#)), "{alone:?}");
+    assert!(together == alone, "{together:?}\n{alone:?}");
 }
 
 fn a_step_leaves_few_enough() {

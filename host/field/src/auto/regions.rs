@@ -341,6 +341,28 @@ mod tests {
     }
 
     #[test]
+    fn sums_are_of_all_terms() {
+        let example = example(4);
+        let (terms, changes) =
+            (example.terms.chunks_exact(4), example.parts[0].colours.iter().zip(&example.parts[1].colours));
+        let sums = Sums::of(&example);
+        // Grey pictures: each pixel counts three times.
+        let pixels = terms.zip(changes).zip(example.truth.pixels());
+        let (mut square, mut expected) = (0.0, [0.0; 3]);
+        for ((terms, (first, second)), truth) in pixels {
+            let (first, second) = (f64::from(first[0]), f64::from(second[0]));
+            square += (f64::from(truth.0[0]) / 255.0 - (first + second) / 2.0).powi(2);
+            for (sum, term) in expected.iter_mut().zip(terms) {
+                *sum += ((second - first) * f64::from(*term)).powi(2);
+            }
+        }
+        for (term, expected) in expected.into_iter().enumerate() {
+            let (found, expected) = (sums.matrix[term * 4 + term], 3.0 * SOURCE_WEIGHT * expected / square);
+            assert!((found / expected - 1.0).abs() < 1.0e-9, "term {term}: {found} instead of {expected}");
+        }
+    }
+
+    #[test]
     fn equal_pictures_are_mixed_evenly() {
         let mut same = example(5);
         same.parts[1] = same.parts[0].clone();
