@@ -30,9 +30,12 @@ pub fn camera_map(scene: &Scene, inspection: &Inspection) -> RgbImage {
     let centre_of = |camera: &Camera| flat(camera.pose.centre_world());
     let points: Vec<([f32; 2], Colour)> =
         scene.points.iter().map(|point| (flat(point.position_world), point.colour)).collect();
+    // Of both axes: cameras in a row have no width across it, where what they pass is.
+    let places = scene.views.iter().flat_map(|view| centre_of(&view.camera));
+    let reach = places.fold(0.0_f32, |reach, place| reach.max(place.abs()));
     let shown = [0, 1].map(|axis| {
         let cameras = scene.views.iter().map(|view| centre_of(&view.camera)[axis]);
-        shown_of(cameras, points.iter().map(|(place, _)| place[axis]))
+        shown_of(cameras, points.iter().map(|(place, _)| place[axis]), MAX_REACH * reach)
     });
     let extent = shown.iter().map(|[low, high]| high - low).fold(f32::MIN_POSITIVE, f32::max);
     let scale = (MAP_SIDE - 2 * MAP_MARGIN) as f32 / extent;
@@ -95,15 +98,14 @@ pub fn camera_map(scene: &Scene, inspection: &Inspection) -> RgbImage {
     canvas.into_image()
 }
 
-/// What is on the map along an axis: the focus, at 0, all cameras, and of the points as many as
-/// [`SHOWN_POINTS`] and [`MAX_REACH`] let on it.
-fn shown_of(cameras: impl Iterator<Item = f32>, points: impl Iterator<Item = f32>) -> [f32; 2] {
+/// What is on the map along an axis: the focus, at 0, all cameras, and of the points as many as [`SHOWN_POINTS`] lets
+/// on it, as far as `most`.
+fn shown_of(cameras: impl Iterator<Item = f32>, points: impl Iterator<Item = f32>, most: f32) -> [f32; 2] {
     let [low, high] = cameras.fold([0.0_f32; 2], |[low, high], place| [low.min(place), high.max(place)]);
     let mut points: Vec<f32> = points.collect();
     points.sort_by(f32::total_cmp);
     let beyond = (0.5 * (1.0 - SHOWN_POINTS) * points.len() as f32) as usize;
     let (Some(first), Some(last)) = (points.get(beyond), points.iter().rev().nth(beyond)) else { return [low, high] };
-    let most = MAX_REACH * high.max(-low);
     [low.min(first.max(-most)), high.max(last.min(most))]
 }
 
@@ -163,10 +165,12 @@ mod tests {
     /// A row of cameras beside what they look at fills the map; points far away do not make it small.
     #[test]
     fn the_map_shows_what_there_is() {
-        assert_eq!(shown_of([-2.0, -4.0].into_iter(), [].into_iter()), [-4.0, 0.0]);
+        assert_eq!(shown_of([-2.0, -4.0].into_iter(), [].into_iter(), 8.0), [-4.0, 0.0]);
         let points = (0..100).map(|index| if index < 2 { 1.0e3 } else { index as f32 / 50.0 });
-        let [low, high] = shown_of([-4.0, -3.0].into_iter(), points);
+        let [low, high] = shown_of([-4.0, -3.0].into_iter(), points, 8.0);
         assert!(low == -4.0 && (1.8..2.0).contains(&high), "{low} {high}");
-        assert_eq!(shown_of([-1.0, 1.0].into_iter(), [50.0; 10].into_iter()), [-1.0, 2.0]);
+        assert_eq!(shown_of([-1.0, 1.0].into_iter(), [50.0; 10].into_iter(), 2.0), [-1.0, 2.0]);
+        // Beside cameras in a row.
+        assert_eq!(shown_of([0.0; 3].into_iter(), [-7.0, 7.0].into_iter(), 10.0), [-7.0, 7.0]);
     }
 }

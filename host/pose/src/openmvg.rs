@@ -61,7 +61,8 @@ impl Solver for OpenMvg {
 
     fn solve(&self, job: &PoseJob, progress: &dyn Progress) -> Result<Solution, SolverError> {
         let idle = self.idle().take();
-        if let Some(idle) = idle {
+        // One that says more than it was asked is not asked again.
+        if let Some(idle) = idle.filter(|idle| idle.lines.try_recv().is_err()) {
             match self.answer(&idle, job, progress) {
                 // It ended behind its last answer.
                 Ok(Answered::Not { has_spoken: false }) => {}
@@ -159,6 +160,9 @@ impl OpenMvg {
                 Ok(Line::Solution(solution)) if solution.fits(job) => return Ok(Answered::Solution(solution)),
                 Ok(Line::Solution(_)) => return Err(broken("its answer does not fit the photographs".to_owned())),
                 Ok(Line::Failed { reason }) => return Ok(Answered::Nothing(beginning(&reason))),
+                Err(_) if line.starts_with("viewfuse-openmvg ") => {
+                    return Err(broken("is of an earlier version than this command: build it again".to_owned()));
+                }
                 Err(error) => return Err(unread(&error)),
             }
         }
@@ -182,6 +186,8 @@ impl OpenMvg {
     /// Starts the process.
     fn start(&self) -> Result<Started, SolverError> {
         let mut command = Command::new(&self.program);
+        // An earlier program than this crate's says its version.
+        command.args(["--version", "jobs"]);
         command.env("RAYON_NUM_THREADS", rayon::current_num_threads().to_string());
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let process = Process::start(&mut command);

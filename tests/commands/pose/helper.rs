@@ -42,6 +42,10 @@ fn assert_ended(script: &str, part: &str) {
 fn one_that_stays_is_ended() {
     assert_ended("exec >&-\nsleep 100", "openmvg: closed its output without an answer, and stayed");
     assert_ended("echo oh >&2; exec >&- 2>&-\nsleep 100", "and stayed: oh");
+    // One of before, which reads a job to the end of its input, said its version where it was asked for that.
+    let earlier =
+        "[ \"$1\" != --version ] || exec echo 'viewfuse-openmvg 0.1.0, openmvg-sfm 0.1.0'\nexec cat > /dev/null";
+    assert_ended(earlier, "openmvg: is of an earlier version than this command: build it again");
     // What it started holds its output.
     assert_ended("sleep 100 &\nexit 3", "openmvg: ended without an answer (exit status: 3)");
     let out_of_reach = Command::new("setsid").arg("true").status().is_ok_and(|status| status.success());

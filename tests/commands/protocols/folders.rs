@@ -130,7 +130,7 @@ fn other_settings_are_refused() {
     refused(&first.replace("random", "random:sources=4"), &["protocol: random:sources=4 here, random:sources=3 there"]);
     refused(&format!("{first} --seed 3"), &["seed: 3 here, 0 there"]);
     refused(&format!("{first} --weights frobenius"), &["schemes: "]);
-    refused(&first.replace(" toy ", " toy again "), &["scenes: toy, again here, toy there"]);
+    refused(&first.replace(" toy ", " toy again "), &["with other settings (scenes: toy, again here, toy there)"]);
     refused(&format!("{first} --exact"), &["exact: true here, false there"]);
     // Threads, pictures and shards change no number.
     done(&folder, &format!("{first} --threads 1 --pictures 0 --shard 0/2 -o out"));

@@ -122,7 +122,11 @@ impl Settings {
                 format!("{}...", text.chars().take(57).collect::<String>())
             }
         };
-        let told = told.into_iter().map(|key| match key.strip_prefix(OF_SCENE) {
+        // Which scenes only one has is told by their names.
+        let are_same_scenes = here.get("scenes") == there.get("scenes");
+        let is_of_both = |key: &str| here.contains_key(key) && there.contains_key(key);
+        let told = told.into_iter().filter(|key| !key.starts_with(OF_SCENE) || are_same_scenes || is_of_both(key));
+        let told = told.map(|key| match key.strip_prefix(OF_SCENE) {
             Some(scene) => format!("cameras, photographs, masks or sizes of {scene}"),
             None => format!("{key}: {} here, {} there", words(&here, key), words(&there, key)),
         });

@@ -25,7 +25,9 @@ use std::io::{BufRead, Write};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    if std::env::args().nth(1).as_deref() == Some("--version") {
+    // `viewfuse pose` says `--version jobs`. An earlier program, which reads one job up to the end of its input, says its
+    // version then and ends: that end would not come.
+    if std::env::args().skip(1).eq(["--version"]) {
         println!("{} {}, {}", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"), solve::SOLVER);
         return ExitCode::SUCCESS;
     }

@@ -36,10 +36,13 @@ pub(crate) fn shows_object(scene: &Scene) -> Result<bool, SceneError> {
     for (index, view) in scene.views.iter().enumerate() {
         if view.image.as_deref().is_some_and(has_alpha) && !scene.has_object_mask(view) {
             let photograph = scene.photograph(index)?;
+            if photograph.has_alpha && scene.mask_choice == MaskChoice::Object {
+                return Ok(true);
+            }
             shares.extend(photograph.has_alpha.then(|| border_share(&photograph)));
         }
     }
-    Ok(!shares.is_empty() && (scene.mask_choice == MaskChoice::Object || !is_of_ignored(shares)))
+    Ok(!shares.is_empty() && !is_of_ignored(shares))
 }
 
 impl Scene {
@@ -65,7 +68,12 @@ impl Scene {
     /// # Errors
     /// [`SceneError`] if a photograph with an alpha channel cannot be read.
     pub fn with_silhouettes(&self) -> Result<Scene, SceneError> {
-        let mask_choice = if shows_object(self)? { MaskChoice::Object } else { self.mask_choice };
+        let mask_choice = match self.mask_choice {
+            _ if shows_object(self)? => MaskChoice::Object,
+            // Nor does a single one say it that is transparent at most of its border.
+            MaskChoice::Auto => MaskChoice::Ignore,
+            given => given,
+        };
         Ok(Scene { mask_choice, ..self.clone() })
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::cli::metrics_options::MetricOptions;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::path::Path;
 use viewfuse_device::choice::AnyDevice;
 use viewfuse_evaluate::gallery::Gallery;
@@ -12,7 +13,7 @@ use viewfuse_field::AnyField;
 use viewfuse_field::render::{RenderOptions, open_album};
 use viewfuse_job::progress::{Part, Progress};
 use viewfuse_output::record::view_names;
-use viewfuse_scene::Scene;
+use viewfuse_scene::{Scene, SceneError};
 use viewfuse_weighting::OpenedChoice;
 
 /// The jobs of a shard that are not finished.
@@ -33,6 +34,14 @@ pub(super) struct Jobs<'a> {
     pub(super) progress: &'a dyn Progress,
 }
 
+/// A scene under a protocol.
+struct Shown {
+    /// What fields may see of it.
+    scene: Scene,
+    /// That by whose masks pictures are scored, if they are.
+    masked: Option<Scene>,
+}
+
 impl Jobs<'_> {
     /// Returns all finished jobs by number, those of other shards included, and how many were done here.
     pub(super) fn run(
@@ -50,35 +59,31 @@ impl Jobs<'_> {
         for (number, done) in &finished {
             self.check(*number, done)?;
         }
-        // What fields may see of the scenes.
-        let shown: Vec<Scene> = match self.protocol.hides_masks() {
-            true => scenes.iter().map(Scene::without_silhouettes).collect::<Result<_, _>>()?,
-            false => scenes.to_vec(),
-        };
-        let masked: Vec<Scene> = match self.protocol.is_masked() {
-            true => scenes.iter().map(Scene::with_silhouettes).collect::<Result<_, _>>()?,
-            false => Vec::new(),
-        };
+        // From when they are first needed: photographs are read for them.
+        let mut shown: BTreeMap<usize, Shown> = BTreeMap::new();
         let (renderer, scorer) = (renderer.as_ref(), scorer.as_ref());
         let is_open = |number: &usize| shard.does(*number) && !finished.contains_key(number);
         let open: Vec<usize> = (0..plan.jobs.len()).filter(is_open).collect();
         for (index, &number) in open.iter().enumerate() {
             let job = &plan.jobs[number];
             progress.check()?;
-            let (scene, options) = (&shown[job.scene], &self.options[job.scene]);
-            let name = format!("job {} of {}, {}", index + 1, open.len(), scene.name());
+            let options = &self.options[job.scene];
+            let name = format!("job {} of {}, {}", index + 1, open.len(), scenes[job.scene].name());
             let progress = &Part::begin(progress, name, index..index + 1, open.len());
+            if let Entry::Vacant(place) = shown.entry(job.scene) {
+                place.insert(self.shown(&scenes[job.scene])?);
+            }
+            let Shown { scene, masked } = &shown[&job.scene];
             let sources = view_names(scene, &job.sources);
             let views = job.sources.iter().chain(&job.targets).copied();
             progress.stage("reading photographs", 0..1, 10);
             let album = open_album(scene, views, renderer, options, progress)?;
             let progress = &Part::begin(progress, "", 1..10, 10);
             let evaluator = Evaluator { weightings, renderer, options, scorer, progress };
-            let masked = masked.get(job.scene);
             let mut gallery = Gallery::default();
             let first = job.targets.first().map_or("", |&target| &scene.views[target].name);
             let scores = evaluator.score(
-                Subject { scene, album: &album, masked },
+                Subject { scene, album: &album, masked: masked.as_ref() },
                 &job.sources,
                 &job.targets,
                 |scheme, frame, values, images| {
@@ -106,6 +111,12 @@ impl Jobs<'_> {
         }
         // Other shards may have added some.
         Ok((folder.map_or(Ok(finished), |folder| folder.finished())?, open.len()))
+    }
+
+    fn shown(&self, scene: &Scene) -> Result<Shown, SceneError> {
+        let masked = self.protocol.is_masked().then(|| scene.with_silhouettes()).transpose()?;
+        let scene = if self.protocol.hides_masks() { scene.without_silhouettes()? } else { scene.clone() };
+        Ok(Shown { scene, masked })
     }
 
     /// A finished job must be the one that would be done now.
