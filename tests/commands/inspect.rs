@@ -8,6 +8,7 @@ use viewfuse_tests::scenes::Folder;
 viewfuse_tests::trials![
     a_good_scene,
     draws_the_cameras,
+    the_map_has_what_cameras_in_a_row_pass,
     bad_poses_are_told,
     a_scene_in_a_map,
     a_background_of_many_colours_is_a_fault_only_of_an_object,
@@ -100,6 +101,28 @@ fn draws_the_cameras() {
     // With --json, standard output is JSON and nothing else.
     let json = done(&scene, "inspect toy --json -o maps/cameras.png");
     assert!(serde_json::from_str::<Value>(&json).is_ok(), "{json}");
+}
+
+/// Cameras in a row have no width across it; what is beside them is on the map.
+fn the_map_has_what_cameras_in_a_row_pass() {
+    let folder = Folder::new();
+    let (mut images, mut points) = (String::new(), String::new());
+    for view in 0..4 {
+        image::RgbImage::new(16, 12).save(folder.file(&format!("row/images/{view}.png"))).expect("a photograph");
+        images += &format!("{} 1 0 0 0 0 0 {} 1 {view}.png\n\n", view + 1, -view);
+    }
+    for point in 0..400 {
+        let aside = f64::from(6 + point % 4) * if point % 2 == 0 { 1.0 } else { -1.0 };
+        points += &format!("{} {aside} 0 {} 255 0 0 0.5\n", point + 1, f64::from(point) / 20.0);
+    }
+    folder.write("row/sparse/0/cameras.txt", "1 PINHOLE 16 12 15 15 8 6\n");
+    folder.write("row/sparse/0/images.txt", images).write("row/sparse/0/points3D.txt", points);
+    run(&folder, "inspect row -o row.png");
+    let map = image::open(folder.join("row.png")).expect("a map").to_rgb8();
+    let red: Vec<u32> =
+        map.enumerate_pixels().filter(|(.., pixel)| pixel[0] > 150 && pixel[1] < 60).map(|(x, ..)| x).collect();
+    assert!(red.len() > 200, "{} pixels of points", red.len());
+    assert!(red.iter().any(|x| *x < map.width() / 3) && red.iter().any(|x| *x > map.width() / 3 * 2));
 }
 
 /// A change of pose number so many, a row-major matrix.

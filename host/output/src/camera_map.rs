@@ -144,33 +144,3 @@ fn short_name(name: &str) -> String {
         (_, number) => number.to_owned(),
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_name_covers_no_other() {
-        let middle = (280, 100);
-        let place = |at, taken: &[[i32; 4]]| place_of_name(at, middle, 3, 200, taken);
-        let outwards = place((300, 100), &[]).expect("room");
-        assert_eq!((outwards[0], outwards[2] - outwards[0]), (308, 18));
-        let other = place((300, 100), &[outwards]).expect("room on another side");
-        assert!(other[2] <= 300, "{other:?}");
-        // At the page's end it is on the other side, and nowhere if all sides are taken.
-        assert!(place((550, 100), &[]).expect("room")[2] <= 550);
-        assert_eq!(place((300, 100), &[[250, 50, 350, 150]]), None);
-    }
-
-    /// A row of cameras beside what they look at fills the map; points far away do not make it small.
-    #[test]
-    fn the_map_shows_what_there_is() {
-        assert_eq!(shown_of([-2.0, -4.0].into_iter(), [].into_iter(), 8.0), [-4.0, 0.0]);
-        let points = (0..100).map(|index| if index < 2 { 1.0e3 } else { index as f32 / 50.0 });
-        let [low, high] = shown_of([-4.0, -3.0].into_iter(), points, 8.0);
-        assert!(low == -4.0 && (1.8..2.0).contains(&high), "{low} {high}");
-        assert_eq!(shown_of([-1.0, 1.0].into_iter(), [50.0; 10].into_iter(), 2.0), [-1.0, 2.0]);
-        // Beside cameras in a row.
-        assert_eq!(shown_of([0.0; 3].into_iter(), [-7.0, 7.0].into_iter(), 10.0), [-7.0, 7.0]);
-    }
-}

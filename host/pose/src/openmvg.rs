@@ -27,6 +27,9 @@ const MAX_COMPLAINT: u64 = 1 << 16;
 /// Most characters of a stage's name and of a reason.
 const MAX_WORDS: usize = 200;
 
+/// What an earlier program is asked for that reads one job, up to the end of its input: this one gets more of them.
+const ASKED: &str = "version";
+
 /// Stages that a process goes through; some several times.
 const STAGE_COUNT: usize = 8;
 
@@ -187,7 +190,7 @@ impl OpenMvg {
     fn start(&self) -> Result<Started, SolverError> {
         let mut command = Command::new(&self.program);
         // An earlier program than this crate's says its version.
-        command.args(["--version", "jobs"]);
+        command.arg(format!("--{ASKED}")).arg("jobs");
         command.env("RAYON_NUM_THREADS", rayon::current_num_threads().to_string());
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let process = Process::start(&mut command);
