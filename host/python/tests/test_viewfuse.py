@@ -566,7 +566,7 @@ class Poses(unittest.TestCase):
         self.assertEqual(self.names(), ["bare", "other", "posed"])
 
     def test_nothing_that_can_be_trusted(self):
-        nothing = self.program("cat > /dev/null; echo '{\"failed\":{\"reason\":\"nothing matches\"}}'")
+        nothing = self.program("read -r job; echo '{\"failed\":{\"reason\":\"nothing matches\"}}'")
         with self.assertRaisesRegex(ValueError, r"bare: no poses that can be trusted \(.*nothing matches"):
             viewfuse.pose(self.photographs, self.folder / "posed", solvers=nothing)
         self.assertEqual(self.names(), ["bare", "openmvg"])
