@@ -25,7 +25,7 @@ function share(seen) {
     : `The photographs show ${percent} % of this.`;
 }
 
-// What photographs that were left out say of the picture, where that is bad. The share is one of cameras alone: it says
+// What photographs that were held out say of the picture, where that is bad. The share is one of cameras alone: it says
 // nothing of depths that are wrong.
 function doubt(frame) {
   const { expected, beyond } = frame ?? {};

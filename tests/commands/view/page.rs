@@ -290,7 +290,7 @@ fn where_nothing_was_photographed_it_is_said() {
     }
 }
 
-/// The share that was photographed is one of cameras alone: what left-out photographs say of a picture is said as well.
+/// The share that was photographed is one of cameras alone: what held-out photographs say of a picture is said as well.
 fn a_picture_that_is_poor_is_said_to_be_so() {
     let browser = &Browser::needed();
     let program = room(SMALL);

@@ -16,7 +16,7 @@ use crate::mixture::{Mixture, term_count, terms};
 use crate::render::RenderError;
 use crate::{AnyOptions, Rendered, Variant};
 use image::RgbImage;
-use viewfuse_device::parallel::{for_each_part, map};
+use viewfuse_device::parallel::{for_each, map};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::{GroundTruth, to_rgb8};
 use viewfuse_weighting::Weighting;
@@ -177,7 +177,7 @@ fn picture(rendered: &Rendered) -> RgbImage {
 
 /// The mixture of the examples' pictures.
 fn fitted(held_out: &HeldOutSources<'_>, examples: &mut [Example], label: &str, parts: &[AnyOptions]) -> Mixed {
-    for_each_part(examples, 1, &|_, example| example[0].terms = terms(&example[0].parts));
+    for_each(examples, 1, |_, example| example.terms = terms(&example.parts));
     let sums = map(examples.len(), 1, |index| Sums::of(&examples[index]));
     let count = parts.len();
     let without = |index: usize| {
