@@ -128,8 +128,9 @@ fn score(made: &Optimised) -> f64 {
     let splatter = splatter(&Cpu, made);
     let score = |index: usize| {
         let camera = images.images[index].camera.block(0);
-        let rendered =
-            splatter.rendered(&made.gaussians, made.gaussians.len(), &[camera], 0.5).expect("a picture").remove(0);
+        let begun = splatter.begin(&made.gaussians, made.gaussians.len(), &[camera]).expect("memory");
+        let pictures = splatter.rendered(&made.gaussians, made.gaussians.len(), begun, 0.5).expect("memory");
+        let rendered = pictures().expect("a picture").remove(0);
         let picture = to_rgb8(&rendered.colours, [rendered.width, rendered.height]);
         psnr(picture.as_raw(), images.picture(index).as_raw())
     };

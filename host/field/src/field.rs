@@ -70,6 +70,16 @@ pub trait Prepared {
     /// [`FieldError`].
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError>;
 
+    /// Goes on towards a picture as far as the host need not wait for the device, and asks for what it will wait for.
+    /// Returns whether there is nothing more to do before it is drawn; otherwise this is called again. What pictures of
+    /// several prepared sources asked for is waited for together.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    fn advance(&mut self, _request: &Request<'_>, _progress: &dyn Progress) -> Result<bool, FieldError> {
+        Ok(true)
+    }
+
     /// As [`Prepared::render`], begun: several pictures can be waited for together.
     ///
     /// # Errors
@@ -216,6 +226,14 @@ pub trait Geometry {
     /// What is known before views are encoded; nothing by default.
     fn surfaces(&self) -> Surfaces {
         Surfaces::default()
+    }
+
+    /// Asks the device for what [`Geometry::source_depths`] has to wait for; returns whether that is there.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    fn ask_for_depths(&self) -> Result<bool, FieldError> {
+        Ok(true)
     }
 
     /// The depth map of each source view that is encoded, under the current weighting. For point clouds.

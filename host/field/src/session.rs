@@ -145,7 +145,7 @@ impl<'a> Session<'a> {
                 progress.step();
             }
         }
-        Ok(self.renderer.finish()?)
+        self.encoded_all()
     }
 
     /// Encodes the views that a target with these weights needs and no earlier target needed, so that the time of
@@ -159,10 +159,15 @@ impl<'a> Session<'a> {
         for view in self.views(weights) {
             is_new |= self.encode_view(view, progress)?;
         }
-        if is_new {
-            self.renderer.finish()?;
+        if is_new { self.encoded_all() } else { Ok(()) }
+    }
+
+    /// Waits until views are encoded, so that this time is measured; of trials nobody measures it.
+    fn encoded_all(&self) -> Result<(), FieldError> {
+        match self.purpose {
+            Some(Purpose::Trial) => Ok(()),
+            _ => Ok(self.renderer.finish()?),
         }
-        Ok(())
     }
 
     /// Renders a target with the sources' weights for it. `early_termination` is the transmittance below which samples
@@ -178,6 +183,19 @@ impl<'a> Session<'a> {
         let rendered = self.render_encoded(camera, weights, early_termination, progress)?;
         self.tell_faults(progress);
         Ok(rendered)
+    }
+
+    /// Goes on towards a picture without a mixture ([`Prepared::advance`]); returns whether it can be drawn.
+    pub(crate) fn advance(
+        &mut self,
+        camera: &Camera,
+        weights: &SourceWeights,
+        early_termination: f32,
+        progress: &dyn Progress,
+    ) -> Result<bool, FieldError> {
+        self.encode(weights, progress)?;
+        let views = &self.views(weights);
+        self.prepared.advance(&Request { camera, weights, views, early_termination }, progress)
     }
 
     /// As [`Session::render`] without a mixture, begun.

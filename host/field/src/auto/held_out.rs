@@ -9,7 +9,7 @@ use crate::held_out::{HeldOut, HoldOut, Photographs};
 use crate::render::{RenderError, RenderOptions, SceneSources, Stage};
 use crate::renderer::Renderer;
 use crate::standing::{Measure, Standing};
-use crate::{AnyOptions, Check, Drawing, Purpose, Rendered};
+use crate::{AnyOptions, Check, Purpose, Rendered};
 use bytemuck::{bytes_of, cast_slice};
 use image::{Rgb, RgbImage};
 use std::ops::Range;
@@ -184,14 +184,33 @@ impl<'a> HeldOutSources<'a> {
         options: &AnyOptions,
         progress: &dyn Progress,
     ) -> Result<Vec<Rendered>, RenderError> {
-        // All of them are begun before the first one is waited for.
+        let quiet = &Quiet(progress);
+        let is_kept = |index: usize| self.kept.picture(&Kept::name(index, weighting, options)).is_some();
+        let mut missing: Vec<usize> = which.clone().filter(|index| !is_kept(*index)).collect();
+        for &index in &missing {
+            progress.check().map_err(stopped)?;
+            self.sources[index].set(&self.weighting, options, progress)?;
+        }
+        // All of them go as far as they can before the first one is waited for.
+        while !missing.is_empty() {
+            let mut waiting = Vec::with_capacity(missing.len());
+            for index in missing {
+                progress.check().map_err(stopped)?;
+                let Source { held_out, target, .. } = &mut self.sources[index];
+                if !held_out.stage.advance(weighting, target, quiet)? {
+                    waiting.push(index);
+                }
+            }
+            missing = waiting;
+        }
         let mut begun = Vec::with_capacity(which.len());
         for (index, source) in self.sources.iter_mut().enumerate().take(which.end).skip(which.start) {
             progress.check().map_err(stopped)?;
             let name = Kept::name(index, weighting, options);
+            let Source { held_out, target, .. } = source;
             let drawing = match self.kept.picture(&name) {
                 Some(_) => None,
-                None => Some(source.draw(&self.weighting, weighting, options, progress)?),
+                None => Some(held_out.stage.draw(weighting, target, quiet)?),
             };
             begun.push((name, drawing));
         }
@@ -234,22 +253,15 @@ impl<'a> HeldOutSources<'a> {
 }
 
 impl Source<'_> {
-    /// Begins its picture from the others, which are encoded under the `first` weighting.
-    fn draw(
-        &mut self,
-        first: &Weighting,
-        weighting: &Weighting,
-        options: &AnyOptions,
-        progress: &dyn Progress,
-    ) -> Result<Drawing<'_>, RenderError> {
+    /// Sets the options of its next picture from the others, which are encoded under the `first` weighting.
+    fn set(&mut self, first: &Weighting, options: &AnyOptions, progress: &dyn Progress) -> Result<(), RenderError> {
         let (stage, quiet) = (&mut self.held_out.stage, &Quiet(progress));
         if !self.is_encoded {
             stage.weigh(first, quiet)?;
             stage.encode_all(quiet)?;
             self.is_encoded = true;
         }
-        stage.vary(Some(options), None, progress)?;
-        stage.draw(weighting, &self.target, quiet)
+        stage.vary(Some(options), None, progress)
     }
 }
 

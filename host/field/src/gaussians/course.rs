@@ -58,6 +58,11 @@ pub(super) trait Steps {
     /// Makes the next iteration. A device may still be at work on it.
     fn iterate(&mut self, course: &mut Course) -> Result<(), FieldError>;
 
+    /// Asks the device for what the next iteration, or the end, needs of the Gaussians, if it has its own.
+    fn ask(&mut self, _course: &Course) -> Result<(), FieldError> {
+        Ok(())
+    }
+
     /// Forgets the Gaussians, if it has any of its own: the course goes on from others.
     fn forget(&mut self) {}
 
@@ -147,6 +152,25 @@ impl<'d> Optimisation<'d> {
             progress.step();
         }
         Ok(())
+    }
+
+    /// The iterations up to the next that begins with other Gaussians, or to the last one, and asks for those so far.
+    /// Returns whether all were done before: the next call, or [`Optimisation::optimised`], waits for what this one
+    /// asked for.
+    ///
+    /// # Errors
+    /// As [`Optimisation::run_to`].
+    pub fn advance(&mut self, progress: &dyn Progress) -> Result<bool, FieldError> {
+        if self.course.is_done() {
+            return Ok(true);
+        }
+        loop {
+            progress.check()?;
+            self.steps.iterate(&mut self.course)?;
+            if self.course.is_done() || self.course.changes() {
+                break self.steps.ask(&self.course).map(|()| false);
+            }
+        }
     }
 
     /// Waits until the device is done with all iterations so far, so that their time can be measured.
@@ -310,6 +334,11 @@ impl Course {
         let finest = if level == 0 { self.recipe.iterations[LEVELS - 1] } else { 0 };
         let growth = growth_at((share * finest as f32).round() as u32, finest.max(1));
         growth.filter(|_| self.recipe.grows)
+    }
+
+    /// Whether all iterations of the recipe are done.
+    pub(super) fn is_done(&self) -> bool {
+        self.iteration >= self.iteration_count()
     }
 
     /// Whether the next iteration is the first one of a level.

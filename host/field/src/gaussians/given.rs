@@ -149,7 +149,8 @@ impl<D: Device> Prepare<'_, D> {
 
     fn picture(&mut self, camera: &CameraBlock) -> Result<Rendered, FieldError> {
         let (Uploaded { gaussians, count, .. }, splatter) = self.uploaded()?;
-        Ok(splatter.rendered(gaussians, *count, &[*camera], MIN_OPACITY)?.remove(0))
+        let begun = splatter.begin(gaussians, *count, &[*camera])?;
+        Ok(splatter.rendered(gaussians, *count, begun, MIN_OPACITY)?()?.remove(0))
     }
 }
 

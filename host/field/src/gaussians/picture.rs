@@ -68,6 +68,15 @@ struct Listed<'d, D: Device> {
     status: Later<'d, u32>,
 }
 
+/// Pictures that are begun.
+pub struct Begun<'d, D: Device> {
+    cameras: Vec<CameraBlock>,
+    /// Whether the device makes their lists...
+    is_listed: bool,
+    /// ... those of the first ones, as many as have room.
+    listed: Vec<Listed<'d, D>>,
+}
+
 /// A picture on the device, alone.
 #[derive(Debug)]
 pub struct Drawn<D: Device> {
@@ -192,31 +201,48 @@ impl<'d, D: Device> Splatter<'d, D> {
         Ok(Drawn { colours, depths })
     }
 
-    /// Pictures alone, their lists made where that is faster; on the device the host waits once for all their lists.
-    fn drawn_usually(
+    /// Begins pictures from these cameras: their lists are made where that is faster, and on the device the host asks
+    /// how many entries those have.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn begin(
         &self,
         gaussians: &D::Buffer<GaussianBlock>,
         gaussian_count: usize,
         cameras: &[CameraBlock],
-    ) -> Result<Vec<Drawn<D>>, DeviceError> {
+    ) -> Result<Begun<'d, D>, DeviceError> {
         let is_listed = |camera: &CameraBlock| can_be_listed(self.device, camera, gaussian_count);
-        if self.device.is_software() || !cameras.iter().all(is_listed) {
+        let is_listed = !self.device.is_software() && cameras.iter().all(is_listed);
+        let largest = cameras.iter().map(|camera| mask_count(camera, gaussian_count)).max().unwrap_or(1);
+        let count = if is_listed { (MAX_MASKS / largest.max(1)).max(1) as usize } else { 0 };
+        let listed = cameras.iter().take(count).map(|camera| self.listed(gaussians, gaussian_count, camera));
+        Ok(Begun { cameras: cameras.to_vec(), is_listed, listed: listed.collect::<Result<_, _>>()? })
+    }
+
+    /// Pictures that were begun; the lists of as many as have room are waited for at once.
+    fn drawn_usually(
+        &self,
+        gaussians: &D::Buffer<GaussianBlock>,
+        gaussian_count: usize,
+        begun: Begun<'d, D>,
+    ) -> Result<Vec<Drawn<D>>, DeviceError> {
+        let Begun { cameras, is_listed, listed } = begun;
+        if !is_listed {
             return cameras.iter().map(|camera| self.drawn(gaussians, gaussian_count, camera, false)).collect();
         }
-        let mut drawn = Vec::with_capacity(cameras.len());
-        let largest = cameras.iter().map(|camera| mask_count(camera, gaussian_count)).max().unwrap_or(1);
-        for cameras in cameras.chunks((MAX_MASKS / largest.max(1)).max(1) as usize) {
-            let listed = cameras.iter().map(|camera| self.listed(gaussians, gaussian_count, camera));
-            let listed = listed.collect::<Result<Vec<_>, _>>()?;
+        let (mut drawn, mut listed) = (Vec::with_capacity(cameras.len()), listed);
+        while !listed.is_empty() {
             for listed in listed {
                 drawn.push(self.blended(listed)?);
             }
+            listed = self.begin(gaussians, gaussian_count, &cameras[drawn.len()..])?.listed;
         }
         Ok(drawn)
     }
 
-    /// Pictures as a field gives them, waited for together: depths where the opacity is at least `least_opacity`, 0
-    /// elsewhere; confidences are the opacities.
+    /// Pictures as a field gives them, to be waited for together: depths where the opacity is at least
+    /// `least_opacity`, 0 elsewhere; confidences are the opacities.
     ///
     /// # Errors
     /// [`DeviceError`].
@@ -224,15 +250,16 @@ impl<'d, D: Device> Splatter<'d, D> {
         &self,
         gaussians: &D::Buffer<GaussianBlock>,
         gaussian_count: usize,
-        cameras: &[CameraBlock],
+        begun: Begun<'d, D>,
         least_opacity: f32,
-    ) -> Result<Vec<Rendered>, DeviceError> {
-        let drawn = self.drawn_usually(gaussians, gaussian_count, cameras)?;
+    ) -> Result<impl FnOnce() -> Result<Vec<Rendered>, DeviceError> + use<'d, D>, DeviceError> {
+        let (cameras, device) = (begun.cameras.clone(), self.device);
+        let drawn = self.drawn_usually(gaussians, gaussian_count, begun)?;
         let later = |Drawn { colours, depths }: &Drawn<D>| {
-            Ok((self.device.download_later(colours)?, self.device.download_later(depths)?))
+            Ok((device.download_later(colours)?, device.download_later(depths)?))
         };
         let later = drawn.iter().map(later).collect::<Result<Vec<_>, DeviceError>>()?;
-        let rendered = |((colours, depths), camera): ((Later<'_, [f32; 4]>, Later<'_, f32>), &CameraBlock)| {
+        let rendered = move |((colours, depths), camera): ((Later<'_, [f32; 4]>, Later<'_, f32>), CameraBlock)| {
             let (mut colours, mut depths) = (colours.get()?, depths.get()?);
             let confidences: Vec<f32> = colours.iter().map(|colour| colour[3]).collect();
             for (depth, opacity) in depths.iter_mut().zip(&confidences) {
@@ -241,10 +268,10 @@ impl<'d, D: Device> Splatter<'d, D> {
             for colour in &mut colours {
                 (0..3).for_each(|channel| colour[channel] = colour[channel].clamp(0.0, 1.0));
             }
-            let CameraBlock { width, height, .. } = *camera;
+            let CameraBlock { width, height, .. } = camera;
             Ok(Rendered { colours, depths, confidences, width, height })
         };
-        later.into_iter().zip(cameras).map(rendered).collect()
+        Ok(move || later.into_iter().zip(cameras).map(rendered).collect())
     }
 
     /// The same, rounded on the device.
@@ -259,7 +286,8 @@ impl<'d, D: Device> Splatter<'d, D> {
         least_opacity: f32,
     ) -> Result<Rounded, DeviceError> {
         let device = self.device;
-        let Drawn { colours, depths } = self.drawn_usually(gaussians, gaussian_count, &[*camera])?.remove(0);
+        let begun = self.begin(gaussians, gaussian_count, &[*camera])?;
+        let Drawn { colours, depths } = self.drawn_usually(gaussians, gaussian_count, begun)?.remove(0);
         let CameraBlock { width, height, .. } = *camera;
         let pixel_count = width * height;
         let (mut shown, mut surfaces) = (device.zeros(pixel_count as usize)?, device.zeros(pixel_count as usize)?);

@@ -12,10 +12,10 @@ mod arrays;
 
 use super::course::{Course, Plan, Steps};
 use crate::FieldError;
-use arrays::{Entries, Level, Needed, Particles, Stepped, list_block, stepped};
+use arrays::{Brought, Entries, Level, Needed, Particles, Stepped, list_block, stepped};
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::gaussian::REST_COUNTS;
-use viewfuse_device::{Device, DeviceError};
+use viewfuse_device::{Device, DeviceError, Later};
 use viewfuse_kernels::gaussians::blend_gradient::SplatGradient;
 use viewfuse_kernels::gaussians::lists::ListStatus;
 use viewfuse_kernels::rows::{
@@ -44,12 +44,24 @@ pub(super) struct Resident<'d, D: Device> {
     status: Option<Stepped<D::Buffer<u32>>>,
     /// Iterations that are dispatched, of which it is not yet known whether the lists had room.
     pending: Vec<Plan>,
+    /// What was asked for after the last of them.
+    asked: Option<Asked<'d>>,
 }
+
+/// What is on its way to the host.
+struct Asked<'d> {
+    needed: Needed,
+    particles: Option<Coming<'d>>,
+    status: Option<Later<'d, u32>>,
+}
+
+/// Gaussians on their way.
+type Coming<'d> = Box<dyn FnOnce() -> Result<Brought, DeviceError> + 'd>;
 
 impl<'d, D: Device> Resident<'d, D> {
     pub(super) fn new(device: &'d D, first_capacity: Option<usize>) -> Resident<'d, D> {
         let (level, particles, entries, status, pending) = (None, None, None, None, Vec::new());
-        Resident { device, first_capacity, level, particles, rest_count: 0, entries, status, pending }
+        Resident { device, first_capacity, level, particles, rest_count: 0, entries, status, pending, asked: None }
     }
 
     /// Takes what an iteration needs to the device, as far as it is not there.
@@ -150,12 +162,15 @@ impl<'d, D: Device> Resident<'d, D> {
     }
 
     /// Sees to it that all iterations so far are done: those from the first one on whose lists had no room are
-    /// dispatched again, with longer lists. Returns whether there were some.
-    fn settle(&mut self, course: &Course) -> Result<bool, DeviceError> {
+    /// dispatched again, with longer lists. Returns whether there were some. `asked` is the status, if it was asked for.
+    fn settle(&mut self, course: &Course, mut asked: Option<Later<'d, u32>>) -> Result<bool, DeviceError> {
         let mut changes = false;
         while !self.pending.is_empty() {
             let Some(status) = &mut self.status else { break };
-            let numbers = self.device.download(&status.now)?;
+            let numbers = match asked.take() {
+                Some(asked) => asked.get()?,
+                None => self.device.download(&status.now)?,
+            };
             let [is_over, done, most] = [0, 1, 2].map(|number| numbers.get(number).copied().unwrap_or(0));
             status.now = self.device.zeros(STATUS_NUMBERS as usize)?;
             let status = ListStatus::of([is_over, done, most]);
@@ -175,48 +190,76 @@ impl<'d, D: Device> Resident<'d, D> {
         Ok(changes)
     }
 
+    /// Asks for what is needed of the Gaussians, with the status, if that is not on its way.
+    fn ask_for(&mut self, needed: Needed) -> Result<Asked<'d>, DeviceError> {
+        if let Some(asked) = self.asked.take().filter(|asked| asked.needed == needed) {
+            return Ok(asked);
+        }
+        let device = self.device;
+        let particles = match &self.particles {
+            Some(particles) => Some(Box::new(particles.later(device, needed)?) as Coming<'d>),
+            None => None,
+        };
+        let status = match &self.status {
+            Some(status) if !self.pending.is_empty() => Some(device.download_later(&status.now)?),
+            _ => None,
+        };
+        Ok(Asked { needed, particles, status })
+    }
+
     /// Gives the course what is needed of the Gaussians, and the gains. They stay on the device, too.
     fn give(&mut self, course: &mut Course, needed: Needed) -> Result<(), DeviceError> {
         // They come with the status, and a second time where that says that they are not there yet.
-        let device = self.device;
-        let later =
-            |particles: &Option<Particles<D>>| particles.as_ref().map(|now| now.later(device, needed)).transpose();
-        let mut coming = later(&self.particles)?;
-        if self.settle(course)? {
-            coming = later(&self.particles)?;
+        let Asked { mut particles, status, .. } = self.ask_for(needed)?;
+        if self.settle(course, status)? {
+            particles = self.ask_for(needed)?.particles;
         }
-        if let Some(arrived) = coming {
+        if let Some(arrived) = particles {
             (course.particles, course.gains) = arrived()?;
         }
         Ok(())
+    }
+
+    /// What the host needs of the Gaussians before the next iteration, or at the end.
+    fn needed(&self, course: &Course) -> Needed {
+        match course.is_done() {
+            true => Needed::Scene(self.rest_count),
+            // What grows goes on with its states; a level begins without any.
+            false if course.begins_level() => Needed::Blocks,
+            false => Needed::All,
+        }
     }
 }
 
 impl<D: Device> Steps for Resident<'_, D> {
     fn iterate(&mut self, course: &mut Course) -> Result<(), FieldError> {
         if course.changes() {
-            // What grows goes on with its states; a level begins without any.
-            let needed = if course.begins_level() { Needed::Blocks } else { Needed::All };
-            self.give(course, needed)?;
+            self.give(course, self.needed(course))?;
             self.particles = None;
         }
         let plan = course.plan();
         self.load(course, &plan)?;
         self.rest_count = self.rest_count.max(REST_COUNTS[plan.step.degree as usize]);
         self.pending.push(plan);
+        self.asked = None;
         self.dispatch(course, &plan)?;
         if self.pending.len() >= ROUND {
-            self.settle(course)?;
+            self.settle(course, None)?;
         }
         Ok(())
     }
 
+    fn ask(&mut self, course: &Course) -> Result<(), FieldError> {
+        self.asked = Some(self.ask_for(self.needed(course))?);
+        Ok(())
+    }
+
     fn forget(&mut self) {
-        (self.particles, self.status, self.pending) = (None, None, Vec::new());
+        (self.particles, self.status, self.pending, self.asked) = (None, None, Vec::new(), None);
     }
 
     fn finish(&mut self, course: &Course) -> Result<(), FieldError> {
-        self.settle(course)?;
+        self.settle(course, None)?;
         Ok(self.device.finish()?)
     }
 

@@ -136,15 +136,15 @@ struct Alone<'a, D: Device> {
     options: Gaussians,
     /// The Gaussians of the current weighting and recipe by their last iteration, once they are needed; none where the
     /// sources have too few surfaces.
-    splats: BTreeMap<u32, Option<Splats<D>>>,
+    splats: BTreeMap<u32, Option<Splats<'a, D>>>,
     /// The optimisation for the current weighting, as far as it went, where a dearer effort may go on from there.
     optimisation: Option<Optimisation<'a>>,
 }
 
-impl<D: Device> Alone<'_, D> {
+impl<'a, D: Device> Alone<'a, D> {
     /// The Gaussians of the current options, optimised if they are not there yet; `None` where the sources have too few
     /// surfaces.
-    fn splats(&mut self, progress: &dyn Progress) -> Result<Option<&mut Splats<D>>, FieldError> {
+    fn splats(&mut self, progress: &dyn Progress) -> Result<Option<&mut Splats<'a, D>>, FieldError> {
         let Gaussians { recipe, end, .. } = self.options;
         if !self.splats.contains_key(&end) {
             let begun = match self.optimisation.take().filter(|optimisation| optimisation.done() <= end) {
@@ -186,9 +186,9 @@ impl<D: Device> Prepared for Alone<'_, D> {
 
     /// Of sources with too few surfaces, the picture of the sweep or the hull.
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
-        let (device, images) = (self.depths.device, self.depths.images.clone());
+        let images = self.depths.images.clone();
         match self.splats(progress)? {
-            Some(splats) => splats.picture(device, &images, request),
+            Some(splats) => splats.picture(images, request)?(),
             None => self.depths.views.render(request, progress),
         }
     }

@@ -7,7 +7,7 @@
 use super::TrainingFree;
 use super::hull::Hull;
 use super::splats::{SourceDepths, Splats};
-use crate::gaussians::Recipe;
+use crate::gaussians::{Optimisation, Recipe};
 use crate::variant::erased;
 use crate::{
     AnyOptions, Drawing, Encoding, FieldError, Geometry, Prepared, Purpose, Record, Rendered, Request, Setting, Variant,
@@ -56,7 +56,9 @@ pub(super) struct Mixed<'a, D: Device> {
     shown: Shown,
     /// The Gaussians of the current weighting by each recipe, once they are needed; none where the sources have too few
     /// surfaces.
-    splats: Vec<(Recipe, Option<Splats<D>>)>,
+    splats: Vec<(Recipe, Option<Splats<'a, D>>)>,
+    /// Gaussians that are being optimised.
+    optimisation: Option<(Recipe, Optimisation<'a>)>,
     /// The hull's last picture under the current weighting and options, with what was asked for: it is filled, and
     /// carved, by the Gaussians of each recipe.
     last: Option<(Asked, Rendered)>,
@@ -68,24 +70,45 @@ type Asked = (CameraBlock, Vec<f32>, f32);
 impl<'a, D: Device> Mixed<'a, D> {
     pub(super) fn new(depths: SourceDepths<'a, D>, options: &TrainingFree) -> Mixed<'a, D> {
         let TrainingFree { hull, recipe, shown, .. } = *options;
-        Mixed { depths, hull, recipe, shown, splats: Vec::new(), last: None }
+        Mixed { depths, hull, recipe, shown, splats: Vec::new(), optimisation: None, last: None }
     }
 
-    /// The Gaussians, optimised if they are not there yet; `None` where the sources have too few surfaces.
-    fn splats(&mut self, progress: &dyn Progress) -> Result<Option<&mut Splats<D>>, FieldError> {
+    /// Goes on towards the Gaussians ([`Prepared::advance`]); returns whether they are there, or cannot be.
+    fn advance_splats(&mut self, progress: &dyn Progress) -> Result<bool, FieldError> {
         let recipe = self.recipe;
-        let is_there = |splats: &(Recipe, Option<Splats<D>>)| splats.0 == recipe;
-        if !self.splats.iter().any(is_there) {
-            let splats = match self.depths.optimisation(recipe, progress)? {
-                Some(mut optimisation) => {
-                    optimisation.run_to(u32::MAX, &Quiet(progress))?;
-                    Some(Splats::upload(self.depths.device, optimisation.optimised()?, &recipe)?)
-                }
-                None => None,
-            };
-            self.splats.push((recipe, splats));
+        if self.splats.iter().any(|(of, _)| *of == recipe) {
+            return Ok(true);
         }
-        Ok(self.splats.iter_mut().find(|splats| splats.0 == recipe).and_then(|splats| splats.1.as_mut()))
+        let begun = match self.optimisation.take().filter(|(of, _)| *of == recipe) {
+            Some((_, optimisation)) => Some(optimisation),
+            None if !self.depths.advance(progress)? => return Ok(false),
+            None => self.depths.optimisation(recipe, progress)?,
+        };
+        let splats = match begun {
+            Some(mut optimisation) => {
+                if !optimisation.advance(&Quiet(progress))? {
+                    self.optimisation = Some((recipe, optimisation));
+                    return Ok(false);
+                }
+                Some(Splats::upload(self.depths.device, optimisation.optimised()?, &recipe)?)
+            }
+            None => None,
+        };
+        self.splats.push((recipe, splats));
+        Ok(true)
+    }
+
+    /// The Gaussians, optimised if they are not there yet, and the sources' depths; no Gaussians where the sources have
+    /// too few surfaces.
+    #[expect(clippy::type_complexity, reason = "two parts of this, which are borrowed apart")]
+    fn splats(
+        &mut self,
+        progress: &dyn Progress,
+    ) -> Result<(Option<&mut Splats<'a, D>>, &mut SourceDepths<'a, D>), FieldError> {
+        while !self.advance_splats(progress)? {}
+        let (splats, recipe) = (&mut self.splats, self.recipe);
+        let splats = splats.iter_mut().find(|(of, _)| *of == recipe).and_then(|(_, splats)| splats.as_mut());
+        Ok((splats, &mut self.depths))
     }
 
     /// The picture of the sweep or the hull; the hull's is rendered once for all that is mixed with it.
@@ -104,9 +127,8 @@ impl<'a, D: Device> Mixed<'a, D> {
 
     /// The Gaussians' picture of a target; `None` if there are none.
     fn splatted(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Option<Rendered>, FieldError> {
-        let (device, images) = (self.depths.device, self.depths.images.clone());
-        let splats = self.splats(progress)?;
-        splats.map(|splats| splats.picture(device, &images, request)).transpose()
+        let (splats, depths) = self.splats(progress)?;
+        splats.map(|splats| splats.picture(depths.images.clone(), request)?()).transpose()
     }
 }
 
@@ -162,12 +184,31 @@ impl<D: Device> Prepared for Mixed<'_, D> {
         }
     }
 
-    fn draw<'p>(&'p mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Drawing<'p>, FieldError> {
-        if self.shown == Shown::Depths && !self.depths.images.has_silhouettes {
-            return self.depths.views.draw(request, progress);
+    fn advance(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<bool, FieldError> {
+        if self.shown == Shown::Depths {
+            return self.depths.views.advance(request, progress);
         }
-        let rendered = self.render(request, progress)?;
-        Ok(Box::new(move || Ok(rendered)))
+        if !self.advance_splats(progress)? {
+            return Ok(false);
+        }
+        match self.splats(progress)? {
+            (Some(splats), depths) => splats.begin(&depths.images, request),
+            (None, depths) => depths.views.advance(request, progress),
+        }
+    }
+
+    fn draw<'p>(&'p mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Drawing<'p>, FieldError> {
+        match self.shown {
+            Shown::Depths if !self.depths.images.has_silhouettes => self.depths.views.draw(request, progress),
+            Shown::Gaussians => match self.splats(progress)? {
+                (Some(splats), depths) => Ok(Box::new(splats.picture(depths.images.clone(), request)?)),
+                (None, depths) => depths.views.draw(request, progress),
+            },
+            _ => {
+                let rendered = self.render(request, progress)?;
+                Ok(Box::new(move || Ok(rendered)))
+            }
+        }
     }
 
     fn record(&self) -> Record {
@@ -179,7 +220,7 @@ impl<D: Device> Prepared for Mixed<'_, D> {
     }
 
     fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
-        (self.splats, self.last) = (Vec::new(), None);
+        (self.splats, self.optimisation, self.last) = (Vec::new(), None, None);
         self.depths.weigh(relevance)
     }
 

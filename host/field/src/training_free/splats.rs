@@ -2,7 +2,7 @@
 
 use super::hull::Hull;
 use super::sweep::{Cache, Sweep};
-use crate::gaussians::{Optimisation, Optimised, Recipe, Residuals, Splatter, optimisation};
+use crate::gaussians::{Begun, Optimisation, Optimised, Recipe, Residuals, Splatter, optimisation};
 use crate::point_cloud::cloud_of;
 use crate::{AnyOptions, DepthMap, FieldError, Geometry, Prepared, Rendered, Request, Surfaces};
 use std::sync::Arc;
@@ -66,19 +66,30 @@ impl<'a, D: Device> SourceDepths<'a, D> {
         self.views.set(&options)
     }
 
+    /// Goes on towards the sources' surfaces ([`Prepared::advance`]): encodes all views, and asks for their depths.
+    pub(super) fn advance(&mut self, progress: &dyn Progress) -> Result<bool, FieldError> {
+        self.encode_all(progress)?;
+        self.views.geometry().map_or(Ok(true), Geometry::ask_for_depths)
+    }
+
+    fn encode_all(&mut self, progress: &dyn Progress) -> Result<(), FieldError> {
+        let quiet = &Quiet(progress);
+        for view in 0..self.encoded.len() {
+            progress.check()?;
+            self.encode(view, quiet)?;
+        }
+        Ok(())
+    }
+
     /// The optimisation at its beginning, from the sources' surfaces; `None` where there are too few.
     pub(super) fn optimisation(
         &mut self,
         recipe: Recipe,
         progress: &dyn Progress,
     ) -> Result<Option<Optimisation<'a>>, FieldError> {
-        let quiet = &Quiet(progress);
-        for view in 0..self.encoded.len() {
-            progress.check()?;
-            self.encode(view, quiet)?;
-        }
+        self.encode_all(progress)?;
         let cloud = Recipe::cloud(self.images.images.len());
-        let points = cloud_of(&self.source_depths()?, &self.images, &self.relevance, cloud, quiet)?;
+        let points = cloud_of(&self.source_depths()?, &self.images, &self.relevance, cloud, &Quiet(progress))?;
         optimisation(self.device, &self.images, &points, recipe)
     }
 }
@@ -94,7 +105,8 @@ impl<D: Device> Geometry for SourceDepths<'_, D> {
 }
 
 /// Gaussians on a device.
-pub(super) struct Splats<D: Device> {
+pub(super) struct Splats<'a, D: Device> {
+    device: &'a D,
     gaussians: D::Buffer<GaussianBlock>,
     count: usize,
     near: f32,
@@ -103,42 +115,83 @@ pub(super) struct Splats<D: Device> {
     /// How much brighter each source is than they are: red, green, blue.
     gains: Vec<[f32; 3]>,
     residuals: Residuals,
+    /// Their pictures of a target and of the sources whose residuals it needs, which are begun.
+    begun: Option<(Pictures, Begun<'a, D>)>,
 }
 
-impl<D: Device> Splats<D> {
+/// Which pictures a target needs.
+#[derive(Clone, PartialEq)]
+struct Pictures {
+    target: CameraBlock,
+    /// The views that have a weight, and no residual yet.
+    missing: Vec<usize>,
+}
+
+impl<'a, D: Device> Splats<'a, D> {
     /// Those of a recipe.
-    pub(super) fn upload(device: &D, optimised: Optimised, recipe: &Recipe) -> Result<Splats<D>, FieldError> {
+    pub(super) fn upload(device: &'a D, optimised: Optimised, recipe: &Recipe) -> Result<Splats<'a, D>, FieldError> {
         let Optimised { gaussians, near, background, gains, is_antialiased, .. } = optimised;
         let (count, residuals) = (gaussians.len(), Residuals::new(gains.len(), recipe.residual_share));
-        Ok(Splats { gaussians: device.upload(&gaussians)?, count, near, background, is_antialiased, gains, residuals })
+        let gaussians = device.upload(&gaussians)?;
+        Ok(Splats { device, gaussians, count, near, background, is_antialiased, gains, residuals, begun: None })
     }
 
-    /// Their picture of a target, as bright as the sources that count for it, as the other pictures are.
-    pub(super) fn picture(
-        &mut self,
-        device: &D,
-        images: &SourceImages,
+    fn splatter(&self) -> Splatter<'a, D> {
+        let Splats { device, near, background, is_antialiased, .. } = *self;
+        Splatter { device, near, background, is_antialiased, harmonics: None }
+    }
+
+    /// The pictures of a target.
+    fn pictures(&self, request: &Request<'_>) -> Pictures {
+        let weights = request.views.iter().copied().zip(request.view_weights());
+        let used = weights.filter(|(_, weight)| *weight > 0.0).map(|(view, _)| view);
+        let missing = used.filter(|view| self.residuals.is_missing(*view)).collect();
+        Pictures { target: request.camera.block(0), missing }
+    }
+
+    /// Begins the pictures of a target; returns whether they were begun before.
+    pub(super) fn begin(&mut self, images: &SourceImages, request: &Request<'_>) -> Result<bool, FieldError> {
+        let pictures = self.pictures(request);
+        let are_begun = self.begun.as_ref().is_some_and(|(begun, _)| *begun == pictures);
+        self.begun = Some(self.begun(images, pictures)?);
+        Ok(are_begun)
+    }
+
+    /// Those that were begun, if they are these.
+    fn begun(&mut self, images: &SourceImages, pictures: Pictures) -> Result<(Pictures, Begun<'a, D>), FieldError> {
+        if let Some(begun) = self.begun.take().filter(|(begun, _)| *begun == pictures) {
+            return Ok(begun);
+        }
+        let sources = pictures.missing.iter().map(|view| images.images[*view].camera.block(0));
+        let cameras: Vec<CameraBlock> = [pictures.target].into_iter().chain(sources).collect();
+        let begun = self.splatter().begin(&self.gaussians, self.count, &cameras)?;
+        Ok((pictures, begun))
+    }
+
+    /// Their picture of a target, as bright as the sources that count for it, as the other pictures are; to be waited
+    /// for.
+    pub(super) fn picture<'p>(
+        &'p mut self,
+        images: Arc<SourceImages>,
         request: &Request<'_>,
-    ) -> Result<Rendered, FieldError> {
-        let Splats { gaussians, count, near, background, is_antialiased, gains, residuals } = self;
-        let splatter =
-            Splatter { device, near: *near, background: *background, is_antialiased: *is_antialiased, harmonics: None };
+    ) -> Result<impl FnOnce() -> Result<Rendered, FieldError> + use<'p, 'a, D>, FieldError> {
+        let (Pictures { target, missing }, begun) = self.begun(&images, self.pictures(request))?;
+        let later = self.splatter().rendered(&self.gaussians, self.count, begun, MIN_OPACITY)?;
         let weights: Vec<(usize, f32)> = request.views.iter().copied().zip(request.view_weights()).collect();
-        let used = weights.iter().filter(|(_, weight)| *weight > 0.0).map(|(view, _)| *view);
-        let missing: Vec<usize> = used.filter(|view| residuals.is_missing(*view)).collect();
-        let sources = missing.iter().map(|view| images.images[*view].camera.block(0));
-        let cameras: Vec<CameraBlock> = [request.camera.block(0)].into_iter().chain(sources).collect();
-        let mut pictures = splatter.rendered(gaussians, *count, &cameras, MIN_OPACITY)?;
-        let mut picture = pictures.remove(0);
-        let gain = common_gain(gains, &weights);
-        for colour in &mut picture.colours {
-            (0..3).for_each(|channel| colour[channel] = (colour[channel] * gain[channel]).clamp(0.0, 1.0));
-        }
-        for (view, picture) in missing.iter().zip(pictures) {
-            residuals.add_source(*view, picture, images, gains[*view]);
-        }
-        residuals.add(&request.camera.block(0), &weights, &mut picture);
-        Ok(picture)
+        let Splats { gains, residuals, .. } = self;
+        Ok(move || {
+            let mut pictures = later()?;
+            let mut picture = pictures.remove(0);
+            let gain = common_gain(gains, &weights);
+            for colour in &mut picture.colours {
+                (0..3).for_each(|channel| colour[channel] = (colour[channel] * gain[channel]).clamp(0.0, 1.0));
+            }
+            for (view, picture) in missing.iter().zip(pictures) {
+                residuals.add_source(*view, picture, &images, gains[*view]);
+            }
+            residuals.add(&target, &weights, &mut picture);
+            Ok(picture)
+        })
     }
 }
 

@@ -65,6 +65,23 @@ impl Stage<'_> {
         })
     }
 
+    /// Goes on towards the picture of [`Stage::draw`]; returns whether it can be drawn without waiting for the device.
+    pub(crate) fn advance(
+        &mut self,
+        weighting: &Weighting,
+        target: &Target,
+        progress: &dyn Progress,
+    ) -> Result<bool, RenderError> {
+        if self.controller.is_some() {
+            return Ok(true);
+        }
+        let camera = self.at_working_size(&target.camera)?;
+        let (_, [omission, _]) = self.weighed(weighting, target);
+        let early_termination = self.options.early_termination;
+        let advanced = self.session.advance(&camera, &omission.weights, early_termination, progress);
+        advanced.map_err(|error| self.error(error))
+    }
+
     /// The weights of the sources for a target, what the options omit of them, and what may be omitted by any.
     fn weighed(&self, weighting: &Weighting, target: &Target) -> (SourceWeights, [Omission<MAX_SOURCES>; 2]) {
         let pose = self.unit.pose(&target.camera.pose);

@@ -6,10 +6,10 @@ use super::matching::swept;
 use super::views::{Matched, Views};
 use super::{DEFAULT, Sweep};
 use crate::FieldError;
-use std::cell::OnceCell;
+use std::cell::{Cell, OnceCell};
 use std::ops::Range;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_device::Device;
+use viewfuse_device::{Device, Later};
 use viewfuse_job::progress::Progress;
 use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
 use viewfuse_kernels::plane_sweep::{MAX_MATCHED, Planes};
@@ -18,16 +18,57 @@ use viewfuse_weighting::sources::SourceWeights;
 /// Most bytes of the means that are kept: those of eight sources of 256x256 pixels and 64 planes.
 const MAX_BYTES: usize = 128 << 20;
 
+/// `[view][row][column]` of the matched ones: disparity and confidence.
+struct Disparities<'d, D: Device> {
+    on_device: D::Buffer<[f32; 2]>,
+    /// The same on their way to the host...
+    coming: Cell<Option<Later<'d, [f32; 2]>>>,
+    /// ... and there, from when it first needs them.
+    on_host: OnceCell<Vec<[f32; 2]>>,
+}
+
+impl<'d, D: Device> Disparities<'d, D> {
+    /// So many, of which none is found.
+    fn none(device: &D, len: usize) -> Result<Disparities<'d, D>, FieldError> {
+        Ok(Disparities { on_device: device.zeros(len)?, coming: Cell::default(), on_host: OnceCell::new() })
+    }
+
+    /// Those of the device, to be found anew: the host's are out of date.
+    fn changed(&mut self) -> &mut D::Buffer<[f32; 2]> {
+        (self.coming, self.on_host) = (Cell::default(), OnceCell::new());
+        &mut self.on_device
+    }
+
+    /// Asks the device for them. Returns whether they were asked for before.
+    fn ask(&self, device: &'d D) -> Result<bool, FieldError> {
+        if self.on_host.get().is_some() {
+            return Ok(true);
+        }
+        let coming = self.coming.take();
+        let is_coming = coming.is_some();
+        self.coming.set(coming.map_or_else(|| device.download_later(&self.on_device), Ok).map(Some)?);
+        Ok(is_coming)
+    }
+
+    fn on_host(&self, device: &D) -> Result<&[[f32; 2]], FieldError> {
+        if let Some(known) = self.on_host.get() {
+            return Ok(known);
+        }
+        let found = match self.coming.take() {
+            Some(coming) => coming.get()?,
+            None => device.download(&self.on_device)?,
+        };
+        Ok(self.on_host.get_or_init(|| found))
+    }
+}
+
 /// What is found of the sources under a weighting.
-pub(super) struct SourceMaps<D: Device> {
+pub(super) struct SourceMaps<'d, D: Device> {
     /// `[view]`: the weights of all sources for source `view` as a target.
     pub(super) relevance: Vec<SourceWeights>,
-    /// `[view][row][column]` of the matched ones: disparity and confidence.
-    disparities: D::Buffer<[f32; 2]>,
-    /// The same on the host, from when it first needs them.
-    on_host: OnceCell<Vec<[f32; 2]>>,
+    disparities: Disparities<'d, D>,
     /// Those found the second time.
-    settled: Option<Settled<D>>,
+    settled: Option<Settled<'d, D>>,
     /// From a plane's disparity to the next one's, of each view; 0 if it is not encoded.
     pub(super) steps: Vec<f32>,
     /// Disparities that were kept, and are not on the device yet...
@@ -39,26 +80,24 @@ pub(super) struct SourceMaps<D: Device> {
 }
 
 /// Disparities and confidences of some views, found the second time.
-struct Settled<D: Device> {
+struct Settled<'d, D: Device> {
     /// The settings under which they were found.
     settings: Sweep,
     /// Of each view, by which others and with which weights; none where it was not found.
     voters: Vec<Option<Vec<(usize, f32)>>>,
-    maps: D::Buffer<[f32; 2]>,
-    on_host: OnceCell<Vec<[f32; 2]>>,
+    disparities: Disparities<'d, D>,
 }
 
-impl<D: Device> SourceMaps<D> {
+impl<'d, D: Device> SourceMaps<'d, D> {
     /// Nothing is found.
     pub(super) fn new(
         device: &D,
         matched: &Matched<D>,
         relevance: Vec<SourceWeights>,
-    ) -> Result<SourceMaps<D>, FieldError> {
+    ) -> Result<SourceMaps<'d, D>, FieldError> {
         Ok(SourceMaps {
             relevance,
-            disparities: device.zeros(matched.texels.len())?,
-            on_host: OnceCell::new(),
+            disparities: Disparities::none(device, matched.texels.len())?,
             settled: None,
             steps: vec![0.0; matched.images.cameras.len()],
             found: Vec::new(),
@@ -85,18 +124,20 @@ impl<D: Device> SourceMeans<D> {
     }
 }
 
-impl<D: Device> Views<'_, D> {
+impl<'a, D: Device> Views<'a, D> {
     /// The sources' disparities and confidences, each from the costs of its planes alone.
     pub(super) fn found(&self) -> Result<&[[f32; 2]], FieldError> {
-        let is_settled = self.settings.second_share > 0.0;
-        let settled = self.maps.settled.as_ref().filter(|_| is_settled);
-        let first = (&self.maps.disparities, &self.maps.on_host);
-        let (maps, on_host) = settled.map_or(first, |settled| (&settled.maps, &settled.on_host));
-        if let Some(known) = on_host.get() {
-            return Ok(known);
-        }
-        let found = self.scene.device.download(maps)?;
-        Ok(on_host.get_or_init(|| found))
+        self.current().on_host(self.scene.device)
+    }
+
+    /// Asks the device for what [`Views::found`] gives; returns whether it was asked for before.
+    pub(super) fn ask_for_found(&self) -> Result<bool, FieldError> {
+        self.current().ask(self.scene.device)
+    }
+
+    fn current(&self) -> &Disparities<'a, D> {
+        let settled = self.maps.settled.as_ref().filter(|_| self.settings.second_share > 0.0);
+        settled.map_or(&self.maps.disparities, |settled| &settled.disparities)
     }
 
     /// Finds the disparities of these views the second time, if the settings ask for it, where others say something of
@@ -110,12 +151,12 @@ impl<D: Device> Views<'_, D> {
         let Sweep { dissent_share, temperature, .. } = DEFAULT;
         let settings = Sweep { front_share: self.settings.second_share, dissent_share, temperature, ..self.settings };
         let known = self.maps.settled.take().filter(|known| known.settings == settings);
-        let Settled { mut voters, mut maps, mut on_host, .. } = match known {
+        let Settled { mut voters, mut disparities, .. } = match known {
             Some(known) => known,
             None => {
                 let voters = vec![None; self.maps.steps.len()];
-                let maps = self.scene.device.zeros(self.matched.texels.len())?;
-                Settled { settings, voters, maps, on_host: OnceCell::new() }
+                let disparities = Disparities::none(self.scene.device, self.matched.texels.len())?;
+                Settled { settings, voters, disparities }
             }
         };
         for &view in views {
@@ -127,13 +168,12 @@ impl<D: Device> Views<'_, D> {
                 let voting = swept(cameras, cameras, &others, Some(&self.maps.steps), None);
                 let (frustum, swept) = self.source_frustum(view, settings);
                 let costs = self.source_costs(frustum, swept, &voting, settings, progress)?;
-                self.scene.device.pick_disparity(&frustum, &costs, &mut maps)?;
-                on_host = OnceCell::new();
+                self.scene.device.pick_disparity(&frustum, &costs, disparities.changed())?;
                 voters[view] = Some(others);
                 self.target = None;
             }
         }
-        self.maps.settled = Some(Settled { settings, voters, maps, on_host });
+        self.maps.settled = Some(Settled { settings, voters, disparities });
         Ok(())
     }
 
@@ -169,6 +209,7 @@ impl<D: Device> Views<'_, D> {
     ) -> Result<D::Buffer<Planes>, FieldError> {
         let matching = settings.matching(self.scene.device, self.scene.has_silhouettes);
         let SourceMaps { disparities, means: kept, .. } = &mut self.maps;
+        let disparities = &disparities.on_device;
         let scratch = &mut self.scratch;
         let is_same = |known: &SourceMeans<D>| {
             known.frustum == frustum && known.views == views && known.near_cost == settings.near_cost
@@ -195,7 +236,7 @@ impl<D: Device> Views<'_, D> {
         if self.maps.found.is_empty() && self.maps.unkept.is_empty() {
             return Ok(());
         }
-        let mut maps = self.scene.device.download(&self.maps.disparities)?;
+        let mut maps = self.maps.disparities.on_host(self.scene.device)?.to_vec();
         self.add_kept(&mut maps);
         for (view, key) in &self.maps.unkept {
             kept.write(key, &maps[self.place(*view)], progress);
@@ -203,8 +244,8 @@ impl<D: Device> Views<'_, D> {
         self.maps.unkept.clear();
         if !self.maps.found.is_empty() {
             self.maps.found.clear();
-            self.maps.disparities = self.scene.device.upload(&maps)?;
-            self.maps.on_host = maps.into();
+            *self.maps.disparities.changed() = self.scene.device.upload(&maps)?;
+            self.maps.disparities.on_host = maps.into();
         }
         Ok(())
     }
@@ -236,8 +277,7 @@ impl<D: Device> Views<'_, D> {
             return Ok(());
         }
         let costs = self.source_costs(frustum, swept, &[], settings, progress)?;
-        self.scene.device.pick_disparity(&frustum, &costs, &mut self.maps.disparities)?;
-        self.maps.on_host = OnceCell::new();
+        self.scene.device.pick_disparity(&frustum, &costs, self.maps.disparities.changed())?;
         self.maps.unkept.extend(key.map(|key| (view, key)));
         Ok(())
     }

@@ -56,9 +56,8 @@ impl<D: Device> Views<'_, D> {
     ) -> Result<TargetViews<D>, FieldError> {
         self.exchange(progress)?;
         self.settle(views, progress)?;
-        let by_second = self.settings.second_share > 0.0;
-        let known = self.target.take().filter(|target| target.views == views && target.by_second == by_second);
-        if let Some(known) = known {
+        let (known, by_second) = (self.knows(views), self.settings.second_share > 0.0);
+        if let Some(known) = self.target.take_if(|_| known) {
             return Ok(known);
         }
         let on_host = self.confirmed(views, self.found()?);
@@ -68,6 +67,12 @@ impl<D: Device> Views<'_, D> {
         let gains = exposure::gains(&self.matched.images.cameras, &self.matched.texels, &on_host, &used);
         let (views, maps) = (views.to_vec(), self.scene.device.upload(&on_host)?);
         Ok(TargetViews { views, by_second, gains, maps, maps_on_host: on_host, compared: None })
+    }
+
+    /// Whether that is known.
+    pub(super) fn knows(&self, views: &[usize]) -> bool {
+        let by_second = self.settings.second_share > 0.0;
+        self.target.as_ref().is_some_and(|target| target.views == views && target.by_second == by_second)
     }
 
     /// The costs of a target's planes, and what its pixels are blended from.

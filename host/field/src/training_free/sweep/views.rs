@@ -33,7 +33,7 @@ pub(super) struct Views<'a, D: Device> {
     /// For an effort.
     pub(super) matched: Matched<D>,
     /// For an effort and a weighting.
-    pub(super) maps: SourceMaps<D>,
+    pub(super) maps: SourceMaps<'a, D>,
     /// For the views of the last target, as long as their maps stay.
     pub(super) target: Option<TargetViews<D>>,
     pub(super) scratch: Scratch<D>,
@@ -135,6 +135,13 @@ impl<D: Device> Prepared for Views<'_, D> {
         self.draw(request, progress)?()
     }
 
+    /// Finds the disparities, and asks for them.
+    fn advance(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<bool, FieldError> {
+        self.exchange(progress)?;
+        self.settle(request.views, progress)?;
+        Ok(self.knows(request.views) || self.ask_for_found()?)
+    }
+
     fn draw<'p>(&'p mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Drawing<'p>, FieldError> {
         let mut target = self.target_views(request.views, progress)?;
         let Volume { block, views: blended, costs } = self.volume(&mut target, request, progress)?;
@@ -222,6 +229,10 @@ impl<D: Device> Prepared for Views<'_, D> {
 impl<D: Device> Geometry for Views<'_, D> {
     fn surfaces(&self) -> Surfaces {
         self.scene.space.surfaces()
+    }
+
+    fn ask_for_depths(&self) -> Result<bool, FieldError> {
+        self.ask_for_found()
     }
 
     fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError> {
