@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::{Device, Memory};
 use viewfuse::field::gaussians::{
-    Drawn, Optimised, Recipe, Splatter, Tiles, optimisation_by_host, optimisation_on_device, optimised,
+    Drawn, Optimised, Recipe, Room, Splatted, Splatter, Tiles, optimisation_by_host, optimisation_on_device, optimised,
 };
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::photographs::to_rgb8;
@@ -125,12 +125,11 @@ fn derivatives_of_a_scene_are_the_cpus(candidate: &Candidate) -> Result<(), Fail
 /// The PSNR of the Gaussians at the sources, decibels.
 fn score(made: &Optimised) -> f64 {
     let images = &toy_cloud().0;
-    let splatter = splatter(&Cpu, made);
+    let (splatter, room) = (splatter(&Cpu, made), Room::default());
     let score = |index: usize| {
         let camera = images.images[index].camera.block(0);
-        let begun = splatter.begin(&made.gaussians, made.gaussians.len(), &[camera]).expect("memory");
-        let pictures = splatter.rendered(&made.gaussians, made.gaussians.len(), begun, 0.5).expect("memory");
-        let rendered = pictures().expect("a picture").remove(0);
+        let begun = splatter.begin(&made.gaussians, made.gaussians.len(), &camera, &room).expect("memory");
+        let rendered = splatter.rendered(&made.gaussians, made.gaussians.len(), begun, &room, 0.5).expect("a picture");
         let picture = to_rgb8(&rendered.colours, [rendered.width, rendered.height]);
         psnr(picture.as_raw(), images.picture(index).as_raw())
     };
@@ -277,27 +276,27 @@ fn a_devices_scene_depends_on_no_capacity_and_no_run(candidate: &Candidate) -> R
     Ok(())
 }
 
-/// At one level: 12 bytes are read after 64 iterations.
+/// At one level: 12 bytes are read after 128 iterations.
 fn an_iteration_needs_no_transfer(candidate: &Candidate) -> Result<(), Failed> {
     let device = candidate.vulkan(&GpuOptions::default())?;
     let (images, points) = toy_cloud();
     for degree in [0, 1] {
-        let recipe = Recipe { iterations: [0, 0, 0, 200], grows: false, degree, ..small_recipe() };
+        let recipe = Recipe { iterations: [0, 0, 0, 300], grows: false, degree, ..small_recipe() };
         let optimisation = optimisation_on_device(&device, images, points, recipe, None)?;
         let mut optimisation = optimisation.expect("enough points");
         // From here on there are harmonics, if there are any at all.
-        optimisation.run_to(64, &Silent)?;
+        optimisation.run_to(128, &Silent)?;
         let dispatches = |device: &viewfuse::device::vulkan::Vulkan| {
             device.kernel_times().iter().map(|time| time.dispatches).sum::<u64>()
         };
         let (before, dispatched) = (device.transfers(), dispatches(&device));
-        optimisation.run_to(64 + 63, &Silent)?;
-        assert_eq!(device.transfers(), before, "no transfer in 63 iterations");
-        optimisation.run_to(64 + 64, &Silent)?;
+        optimisation.run_to(128 + 127, &Silent)?;
+        assert_eq!(device.transfers(), before, "no transfer in 127 iterations");
+        optimisation.run_to(128 + 128, &Silent)?;
         let after = device.transfers();
         assert_eq!(after.uploads, before.uploads);
         assert_eq!((after.downloads - before.downloads, after.downloaded_bytes - before.downloaded_bytes), (1, 12));
-        let a_piece = (dispatches(&device) - dispatched) as f64 / 64.0;
+        let a_piece = (dispatches(&device) - dispatched) as f64 / 128.0;
         assert_eq!(a_piece, 15.0 + f64::from(degree), "dispatches an iteration");
     }
     Ok(())
@@ -308,16 +307,23 @@ fn a_picture_has_the_same_bits_with_lists_of_the_device(candidate: &Candidate) -
     let made = cpus_scene();
     let uploaded = device.upload(&made.gaussians)?;
     let splatter = splatter(&device, made);
-    let before = device.transfers();
-    let [ours, hosts] = [true, false].map(|are_lists_on_device| {
-        let drawn = splatter.drawn(&uploaded, made.gaussians.len(), &camera(), are_lists_on_device);
-        let Drawn { colours, depths } = drawn.expect("a picture");
-        let transfers = device.transfers();
-        (device.download(&colours).expect("colours"), device.download(&depths).expect("depths"), transfers)
-    });
-    assert!(ours.0 == hosts.0 && ours.1 == hosts.1);
-    assert!(ours.0.iter().any(|colour| colour[3] > 0.5), "something is seen");
-    let downloaded = ours.2.downloaded_bytes - before.downloaded_bytes;
-    assert!(downloaded == 12 && ours.2.uploads == before.uploads, "{downloaded} bytes");
+    let Splatted { lists, colours, depths, .. } = splatter.picture(&uploaded, made.gaussians.len(), &camera())?;
+    let (colours, depths) = (device.download(&colours)?, device.download(&depths)?);
+    assert!(colours.iter().any(|colour| colour[3] > 0.5), "something is seen");
+    let needed = lists.entries.len();
+    for (capacity, has_room) in [(needed, true), (2 * needed, true), (needed - 1, false)] {
+        let before = device.transfers();
+        let Drawn { colours: ours, depths: our_depths, status } =
+            splatter.drawn(&uploaded, made.gaussians.len(), &camera(), capacity)?;
+        let numbers = status.expect("lists of the device").get()?;
+        let after = device.transfers();
+        assert!(after.uploads == before.uploads && after.downloaded_bytes == before.downloaded_bytes + 12);
+        assert_eq!(numbers, [u32::from(!has_room), u32::from(has_room), needed as u32], "room for {capacity}");
+        let (ours, our_depths) = (device.download(&ours)?, device.download(&our_depths)?);
+        match has_room {
+            true => assert!(ours == colours && our_depths == depths, "room for {capacity}"),
+            false => assert!(ours.iter().all(|colour| colour[3] == 0.0), "an empty picture"),
+        }
+    }
     Ok(())
 }

@@ -39,15 +39,15 @@ pub trait Field {
         device: &'a D,
         sources: &SourceImages,
         progress: &dyn Progress,
-    ) -> Result<Box<dyn Prepared + 'a>, FieldError>;
+    ) -> Result<Box<dyn Prepared<'a> + 'a>, FieldError>;
 }
 
 /// A picture that is begun; it is waited for when it is called.
-pub type Drawing<'p> = Box<dyn FnOnce() -> Result<Rendered, FieldError> + 'p>;
+pub type Drawing<'a> = Box<dyn FnOnce() -> Result<Rendered, FieldError> + 'a>;
 
 /// Source views on a device, with their encodings so far. What not every field can do is a capability: a value that is
 /// there or not.
-pub trait Prepared {
+pub trait Prepared<'a> {
     /// Which views are encoded.
     fn encoding(&self) -> Encoding {
         Encoding::Used
@@ -84,7 +84,7 @@ pub trait Prepared {
     ///
     /// # Errors
     /// [`FieldError`].
-    fn draw<'p>(&'p mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Drawing<'p>, FieldError> {
+    fn draw(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Drawing<'a>, FieldError> {
         let rendered = self.render(request, progress)?;
         Ok(Box::new(move || Ok(rendered)))
     }

@@ -48,7 +48,7 @@ mod tiles;
 pub use course::{Optimisation, Optimised};
 pub use given::{GIVEN, GivenGaussians, behind, scene_of};
 pub use optimise::{optimisation, optimisation_by_host, optimisation_on_device, optimised};
-pub use picture::{Begun, Drawn, Splatted, Splatter};
+pub use picture::{Begun, Drawn, Room, Splatted, Splatter};
 pub use quality::{Quality, RecipeOptions};
 pub use recipe::{MAX_COUNT, MAX_ITERATIONS, Recipe};
 pub use residuals::Residuals;

@@ -157,7 +157,7 @@ impl Field for Genvs {
         device: &'a D,
         sources: &SourceImages,
         progress: &dyn Progress,
-    ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
+    ) -> Result<Box<dyn Prepared<'a> + 'a>, FieldError> {
         self.architecture.assumptions(&self.checkpoint).iter().for_each(|assumption| progress.warn(assumption));
         if self.options.rays.near_far.is_none() {
             Distance::of(sources).warn_of_guess(progress);

@@ -197,7 +197,7 @@ impl Field for PixelNerf {
         device: &'a D,
         sources: &SourceImages,
         progress: &dyn Progress,
-    ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
+    ) -> Result<Box<dyn Prepared<'a> + 'a>, FieldError> {
         let views = self.views(device, sources)?;
         self.assumption.iter().for_each(|assumption| progress.warn(assumption));
         warn_of_unit(views.unit, views.distance, progress);
@@ -367,7 +367,7 @@ impl<D: Device> Views<'_, D> {
     }
 }
 
-impl<D: Device> Prepared for Views<'_, D> {
+impl<'a, D: Device> Prepared<'a> for Views<'a, D> {
     fn encoding(&self) -> Encoding {
         if self.options.omissions.unused_views { Encoding::Used } else { Encoding::All }
     }

@@ -30,7 +30,7 @@ pub trait Renderer: Sync {
         &'a self,
         sources: &SourceImages,
         progress: &dyn Progress,
-    ) -> Result<Box<dyn Prepared + 'a>, FieldError>;
+    ) -> Result<Box<dyn Prepared<'a> + 'a>, FieldError>;
 
     /// Waits until all dispatched work is done, so that its time can be measured.
     ///
@@ -75,7 +75,7 @@ impl<D: Device + Sync, F: Field + Sync> Renderer for On<'_, D, F> {
         &'a self,
         sources: &SourceImages,
         progress: &dyn Progress,
-    ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
+    ) -> Result<Box<dyn Prepared<'a> + 'a>, FieldError> {
         self.field.prepare(self.device, sources, progress)
     }
 

@@ -16,7 +16,7 @@ use viewfuse_weighting::sources::{MAX_SOURCES, SourceWeights};
 /// on it).
 pub(crate) struct Session<'a> {
     renderer: &'a dyn Renderer,
-    pub(crate) prepared: Box<dyn Prepared + 'a>,
+    pub(crate) prepared: Box<dyn Prepared<'a> + 'a>,
     /// `[view]`.
     encoded: Vec<bool>,
     /// The weights of the weighting that began, if encodings depend on it.
@@ -205,7 +205,7 @@ impl<'a> Session<'a> {
         weights: &SourceWeights,
         early_termination: f32,
         progress: &dyn Progress,
-    ) -> Result<Drawing<'_>, FieldError> {
+    ) -> Result<Drawing<'a>, FieldError> {
         self.encode(weights, progress)?;
         self.tell_faults(progress);
         let views = &self.views(weights);
@@ -244,12 +244,14 @@ impl<'a> Session<'a> {
         let request = Request { camera, weights, views, early_termination };
         self.shares.clear();
         let Some(mixture) = self.mixture.clone() else { return self.prepared.render(&request, progress) };
-        let mut parts = Vec::with_capacity(mixture.parts.len());
+        // All of them are begun before the first one is waited for.
+        let mut begun = Vec::with_capacity(mixture.parts.len());
         for options in &mixture.parts {
             self.go_on_with(options, weights, progress)?;
-            parts.push(self.prepared.render(&request, progress)?);
+            begun.push(self.prepared.draw(&request, progress)?);
         }
         self.go_on_with(&self.options.clone(), weights, progress)?;
+        let parts = begun.into_iter().map(|part| part()).collect::<Result<Vec<_>, _>>()?;
         let (mixed, part_shares) = mixture.mixed(&parts);
         let share = mixture.share_at(&camera.pose);
         self.shares = part_shares.into_iter().map(|part| share * part).collect();

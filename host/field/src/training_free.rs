@@ -185,7 +185,7 @@ impl Field for TrainingFree {
         device: &'a D,
         sources: &SourceImages,
         progress: &dyn Progress,
-    ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
+    ) -> Result<Box<dyn Prepared<'a> + 'a>, FieldError> {
         let (fields, cache) = ((&self.hull, &self.sweep), self.cache.as_ref());
         let depths = SourceDepths::prepare(device, fields, cache, sources, progress)?;
         Ok(Box::new(Mixed::new(depths, self)))

@@ -36,13 +36,13 @@ impl Field for Plane {
         device: &'a D,
         sources: &SourceImages,
         _progress: &dyn Progress,
-    ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
+    ) -> Result<Box<dyn Prepared<'a> + 'a>, FieldError> {
         let SourceImages { images, background, .. } = sources;
         Ok(Box::new(Photographs { plane: self, device, images: images.clone(), background: *background }))
     }
 }
 
-impl<D: Device> Prepared for Photographs<'_, D> {
+impl<'a, D: Device> Prepared<'a> for Photographs<'a, D> {
     fn encode(&mut self, _view: usize, _progress: &dyn Progress) -> Result<(), FieldError> {
         Ok(())
     }

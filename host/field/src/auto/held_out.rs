@@ -9,7 +9,7 @@ use crate::held_out::{HeldOut, HoldOut, Photographs};
 use crate::render::{RenderError, RenderOptions, SceneSources, Stage};
 use crate::renderer::Renderer;
 use crate::standing::{Measure, Standing};
-use crate::{AnyOptions, Check, Purpose, Rendered};
+use crate::{AnyOptions, Check, Drawing, Purpose, Rendered};
 use bytemuck::{bytes_of, cast_slice};
 use image::{Rgb, RgbImage};
 use std::ops::Range;
@@ -81,7 +81,7 @@ impl<'a> HeldOutSources<'a> {
     /// with the field's own options. Empty if there are too few sources. A source without which the field finds no
     /// object is skipped.
     pub(super) fn prepare(
-        stage: &Stage<'a>,
+        stage: &'a Stage<'_>,
         weighting: &Weighting,
         renderer: &'a dyn Renderer,
         options: &'a RenderOptions,
@@ -168,7 +168,7 @@ impl<'a> HeldOutSources<'a> {
         options: &AnyOptions,
         progress: &dyn Progress,
     ) -> Result<Vec<Outcome>, RenderError> {
-        let frames = self.frames(which.clone(), weighting, options, progress)?;
+        let frames = self.frames(which.clone(), weighting, std::slice::from_ref(options), progress)?.remove(0);
         let outcome = |(index, frame): (usize, &Rendered)| {
             let picture = to_rgb8(&frame.colours, [frame.width, frame.height]);
             self.outcome(index, &picture, &frame.confidences)
@@ -176,53 +176,69 @@ impl<'a> HeldOutSources<'a> {
         Ok(which.zip(&frames).map(outcome).collect())
     }
 
-    /// The pictures of these of the held-out sources: those that were kept, or rendered.
+    /// The pictures of these of the held-out sources under each of some options, `[options][source]`: those that were
+    /// kept, or rendered. All of them are begun before the first one is waited for.
     pub(super) fn frames(
+        &mut self,
+        which: Range<usize>,
+        weighting: &Weighting,
+        options: &[AnyOptions],
+        progress: &dyn Progress,
+    ) -> Result<Vec<Vec<Rendered>>, RenderError> {
+        let begun = options.iter().map(|options| self.begin(which.clone(), weighting, options, progress));
+        let begun = begun.collect::<Result<Vec<_>, _>>()?;
+        let mut all = Vec::with_capacity(begun.len());
+        for begun in begun {
+            let mut frames = Vec::with_capacity(begun.len());
+            for (name, drawing) in begun {
+                if let Some(drawing) = drawing {
+                    self.kept.add(name.clone(), drawing().map_err(RenderError::Field)?);
+                }
+                frames.extend(self.kept.picture(&name).cloned());
+                progress.step();
+            }
+            all.push(frames);
+        }
+        Ok(all)
+    }
+
+    /// Begins the pictures that are not kept; with the names of all.
+    fn begin(
         &mut self,
         which: Range<usize>,
         weighting: &Weighting,
         options: &AnyOptions,
         progress: &dyn Progress,
-    ) -> Result<Vec<Rendered>, RenderError> {
+    ) -> Result<Vec<(String, Option<Drawing<'a>>)>, RenderError> {
         let quiet = &Quiet(progress);
         let is_kept = |index: usize| self.kept.picture(&Kept::name(index, weighting, options)).is_some();
-        let mut missing: Vec<usize> = which.clone().filter(|index| !is_kept(*index)).collect();
+        let missing: Vec<usize> = which.clone().filter(|index| !is_kept(*index)).collect();
         for &index in &missing {
             progress.check().map_err(stopped)?;
             self.sources[index].set(&self.weighting, options, progress)?;
         }
-        // All of them go as far as they can before the first one is waited for.
-        while !missing.is_empty() {
-            let mut waiting = Vec::with_capacity(missing.len());
-            for index in missing {
+        // All of them go as far as they can before one waits for the device.
+        let mut waiting = missing.clone();
+        while !waiting.is_empty() {
+            let mut still = Vec::with_capacity(waiting.len());
+            for index in waiting {
                 progress.check().map_err(stopped)?;
                 let Source { held_out, target, .. } = &mut self.sources[index];
                 if !held_out.stage.advance(weighting, target, quiet)? {
-                    waiting.push(index);
+                    still.push(index);
                 }
             }
-            missing = waiting;
+            waiting = still;
         }
         let mut begun = Vec::with_capacity(which.len());
-        for (index, source) in self.sources.iter_mut().enumerate().take(which.end).skip(which.start) {
+        for index in which {
             progress.check().map_err(stopped)?;
-            let name = Kept::name(index, weighting, options);
-            let Source { held_out, target, .. } = source;
-            let drawing = match self.kept.picture(&name) {
-                Some(_) => None,
-                None => Some(held_out.stage.draw(weighting, target, quiet)?),
-            };
-            begun.push((name, drawing));
+            let Source { held_out, target, .. } = &mut self.sources[index];
+            let is_missing = missing.contains(&index);
+            let drawing = is_missing.then(|| held_out.stage.draw(weighting, target, quiet)).transpose()?;
+            begun.push((Kept::name(index, weighting, options), drawing));
         }
-        let mut frames = Vec::with_capacity(which.len());
-        for (name, drawing) in begun {
-            if let Some(drawing) = drawing {
-                self.kept.add(name.clone(), drawing().map_err(RenderError::Field)?);
-            }
-            frames.extend(self.kept.picture(&name).cloned());
-            progress.step();
-        }
-        Ok(frames)
+        Ok(begun)
     }
 
     /// Keeps the pictures for the next run, if there is a folder for them.

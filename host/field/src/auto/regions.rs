@@ -108,9 +108,7 @@ fn further(
     let mut scores = Vec::with_capacity(mixtures.len());
     for Variant { options: parts, .. } in &mixtures {
         let mut example: Vec<Example> = held_out.truths().skip(nearest).take(1).map(Example::of).collect();
-        for options in parts {
-            add(&mut example, held_out.frames(nearest..nearest + 1, weighting, options, progress)?);
-        }
+        add(&mut example, held_out.frames(nearest..nearest + 1, weighting, parts, progress)?);
         let (rendered, _) = by_its_own(&mut example[0], parts);
         scores.push(held_out.outcome(nearest, &picture(&rendered), &rendered.confidences).psnr);
     }
@@ -137,11 +135,12 @@ fn one(
     progress.expect(examples.len() * parts.len());
     let count = examples.len();
     let cheap = if parts.len() < 3 { parts.len() } else { parts.len() - 1 };
-    for options in &parts[..cheap] {
-        add(&mut examples, held_out.frames(0..count, weighting, options, progress)?);
-    }
+    add(&mut examples, held_out.frames(0..count, weighting, &parts[..cheap], progress)?);
     let without_last = fitted(held_out, &mut examples, &label, &parts[..cheap]);
-    let Some(last) = parts.get(cheap) else { return Ok(without_last) };
+    let last = &parts[cheap..];
+    if last.is_empty() {
+        return Ok(without_last);
+    }
     // The last picture is the dearest one: a source says whether it has a share at all.
     add(&mut examples, held_out.frames(0..1, weighting, last, progress)?);
     let (_, first_shares) = by_its_own(&mut examples[0], &parts);
@@ -156,10 +155,12 @@ fn one(
     Ok(if is_worth_it { all } else { without_last })
 }
 
-/// Adds another picture of each example.
-fn add(examples: &mut [Example], frames: Vec<Rendered>) {
-    for (example, frame) in examples.iter_mut().zip(frames) {
-        example.parts.push(frame);
+/// Adds more pictures of each example.
+fn add(examples: &mut [Example], frames: Vec<Vec<Rendered>>) {
+    for frames in frames {
+        for (example, frame) in examples.iter_mut().zip(frames) {
+            example.parts.push(frame);
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::covers;
 use super::harmonics::terms_of;
-use super::picture::Splatter;
+use super::picture::{Room, Splatter};
 use crate::{About, AnyField, Encoding, Field, FieldError, Prepared, Rendered, Request, Rounded};
 use std::path::Path;
 use viewfuse_core::Vec3;
@@ -59,6 +59,7 @@ struct Uploaded<D: Device> {
     count: usize,
     /// As of [`Splatter::harmonics`].
     harmonics: Option<(D::Buffer<HarmonicTerm>, u32)>,
+    room: Room,
 }
 
 /// Those of a picture, in the order of their first use: the first one of colours that are the same from everywhere, the
@@ -94,7 +95,7 @@ impl Field for GivenGaussians {
         device: &'a D,
         sources: &SourceImages,
         progress: &dyn Progress,
-    ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
+    ) -> Result<Box<dyn Prepared<'a> + 'a>, FieldError> {
         let (usual, nearest) = (NEAR * self.unit, self.nearest_depth(sources));
         let near = if nearest >= MIN_FAR * usual { usual } else { NEAR_SHARE * nearest };
         let background = behind(sources);
@@ -148,13 +149,13 @@ impl<D: Device> Prepare<'_, D> {
     }
 
     fn picture(&mut self, camera: &CameraBlock) -> Result<Rendered, FieldError> {
-        let (Uploaded { gaussians, count, .. }, splatter) = self.uploaded()?;
-        let begun = splatter.begin(gaussians, *count, &[*camera])?;
-        Ok(splatter.rendered(gaussians, *count, begun, MIN_OPACITY)?()?.remove(0))
+        let (Uploaded { gaussians, count, room, .. }, splatter) = self.uploaded()?;
+        let begun = splatter.begin(gaussians, *count, camera, room)?;
+        Ok(splatter.rendered(gaussians, *count, begun, room, MIN_OPACITY)?)
     }
 }
 
-impl<D: Device> Prepared for Prepare<'_, D> {
+impl<'a, D: Device> Prepared<'a> for Prepare<'a, D> {
     fn encoding(&self) -> Encoding {
         Encoding::Used
     }
@@ -178,8 +179,8 @@ impl<D: Device> Prepared for Prepare<'_, D> {
         progress: &dyn Progress,
     ) -> Result<Option<Rounded>, FieldError> {
         progress.check()?;
-        let (Uploaded { gaussians, count, .. }, splatter) = self.uploaded()?;
-        Ok(Some(splatter.rounded(gaussians, *count, &request.camera.block(0), MIN_OPACITY)?))
+        let (Uploaded { gaussians, count, room, .. }, splatter) = self.uploaded()?;
+        Ok(Some(splatter.rounded(gaussians, *count, &request.camera.block(0), room, MIN_OPACITY)?))
     }
 }
 
@@ -195,7 +196,7 @@ impl<D: Device> Uploaded<D> {
             0 => None,
             _ => Some((device.upload_owned(terms_of(&scene.f_rest, term_count as usize))?, term_count)),
         };
-        Ok(Uploaded { gaussians: device.upload_owned(blocks)?, count: count.max(1), harmonics })
+        Ok(Uploaded { gaussians: device.upload_owned(blocks)?, count: count.max(1), harmonics, room: Room::default() })
     }
 }
 

@@ -2,8 +2,10 @@
 
 use super::tiles::Tiles;
 use crate::{Rendered, Rounded};
+use std::cell::Cell;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::{Device, DeviceError, Later};
+use viewfuse_kernels::gaussians::lists::ListStatus;
 use viewfuse_kernels::gaussians::shown::bytes_of_pixel;
 use viewfuse_kernels::gaussians::{SplatBlock, TileBlock};
 use viewfuse_kernels::rows::{
@@ -57,33 +59,48 @@ pub struct Splatted<D: Device> {
     pub depths: D::Buffer<f32>,
 }
 
-/// What the lists of a picture are made from.
-struct Listed<'d, D: Device> {
-    block: ListBlock,
-    splats: D::Buffer<ProjectedGaussian>,
-    masks: D::Buffer<u32>,
-    before: D::Buffer<u32>,
-    starts: D::Buffer<u32>,
-    /// The last number is how many entries they have.
-    status: Later<'d, u32>,
-}
+/// How many entries the lists of a scene's pictures needed so far: the device does not tell before they are made.
+#[derive(Debug, Default)]
+pub struct Room(Cell<usize>);
 
-/// Pictures that are begun.
-pub struct Begun<'d, D: Device> {
-    cameras: Vec<CameraBlock>,
-    /// Whether the device makes their lists...
-    is_listed: bool,
-    /// ... those of the first ones, as many as have room.
-    listed: Vec<Listed<'d, D>>,
+/// Entries that lists have room for at first: so many for each Gaussian, at least these, and of pictures at most those.
+pub(super) const ENTRIES_A_GAUSSIAN: usize = 8;
+pub(super) const MIN_ENTRIES: usize = 4096;
+const MAX_ENTRIES: usize = 1 << 24;
+
+impl Room {
+    /// The entries that the next picture of so many Gaussians gets room for.
+    fn next(&self, gaussian_count: usize, most: usize) -> usize {
+        let first = (gaussian_count * ENTRIES_A_GAUSSIAN).clamp(MIN_ENTRIES, MAX_ENTRIES);
+        first.min(most).max(self.0.get())
+    }
+
+    /// Whether lists had room for their entries; the next ones will have. `None` is of lists that the host made.
+    fn sufficed(&self, status: Option<Later<'_, u32>>) -> Result<bool, DeviceError> {
+        let Some(status) = status else { return Ok(true) };
+        let numbers = status.get()?;
+        let status = ListStatus::of([0, 1, 2].map(|number| numbers.get(number).copied().unwrap_or(0)));
+        self.0.set(self.0.get().max(status.most as usize));
+        Ok(!status.is_over)
+    }
 }
 
 /// A picture on the device, alone.
-#[derive(Debug)]
-pub struct Drawn<D: Device> {
+pub struct Drawn<'d, D: Device> {
     /// `[row][column]`: red, green, blue over the background, opacity.
     pub colours: D::Buffer<[f32; 4]>,
     /// `[row][column]`: weighted sums of depths; over the opacity, the depth along the principal axis.
     pub depths: D::Buffer<f32>,
+    /// The numbers of [`ListStatus`] of lists that the device made: the picture is empty where these had no room.
+    pub status: Option<Later<'d, u32>>,
+}
+
+/// A picture on its way to the host.
+pub struct Begun<'d> {
+    camera: CameraBlock,
+    colours: Later<'d, [f32; 4]>,
+    depths: Later<'d, f32>,
+    status: Option<Later<'d, u32>>,
 }
 
 impl<'d, D: Device> Splatter<'d, D> {
@@ -138,8 +155,7 @@ impl<'d, D: Device> Splatter<'d, D> {
         Ok(Splatted { block, tiles, lists, starts, entries, splats, colours, depths })
     }
 
-    /// The picture alone. On the device, its lists are made there, and the host
-    /// hears how many entries they have; otherwise the host makes them. Both are the same lists.
+    /// The picture alone, with lists made on the device that have room for so many entries, at least one.
     ///
     /// # Errors
     /// [`DeviceError`].
@@ -148,61 +164,51 @@ impl<'d, D: Device> Splatter<'d, D> {
         gaussians: &D::Buffer<GaussianBlock>,
         gaussian_count: usize,
         camera: &CameraBlock,
-        are_lists_on_device: bool,
-    ) -> Result<Drawn<D>, DeviceError> {
-        if !are_lists_on_device {
-            let Splatted { colours, depths, .. } = self.picture(gaussians, gaussian_count, camera)?;
-            return Ok(Drawn { colours, depths });
-        }
-        self.blended(self.listed(gaussians, gaussian_count, camera)?)
-    }
-
-    /// Counts the entries of a picture's lists on the device.
-    fn listed(
-        &self,
-        gaussians: &D::Buffer<GaussianBlock>,
-        gaussian_count: usize,
-        camera: &CameraBlock,
-    ) -> Result<Listed<'d, D>, DeviceError> {
+        capacity: usize,
+    ) -> Result<Drawn<'d, D>, DeviceError> {
         let device = self.device;
         let camera = CameraBlock { first_texel: 0, ..*camera };
         let CameraBlock { width, height, .. } = camera;
         let gaussian_count = gaussian_count as u32;
         let splats = self.splats(gaussians, gaussian_count, camera)?;
-        let block = ListBlock { width, height, splat_count: gaussian_count, capacity: u32::MAX };
+        let block = ListBlock { width, height, splat_count: gaussian_count, capacity: capacity as u32 };
         let zeros = |count: u32| device.zeros(count.max(1) as usize);
         let mut masks = zeros(block.bin_count() * block.mask_count())?;
         let (mut counts, mut before) = (zeros(block.most_counts())?, zeros(block.most_counts())?);
         let (mut sums, mut starts) = (zeros(block.run_count() * TILE_RUN)?, zeros(block.tile_count() + 1)?);
         let (earlier, mut status) = (zeros(STATUS_NUMBERS)?, zeros(STATUS_NUMBERS)?);
+        let (mut keys, mut entries) = (device.zeros(capacity)?, device.zeros(capacity)?);
         device.mark_bins(&block, &splats, &mut masks)?;
         device.count_entries(&block, &splats, &masks, &mut counts)?;
         device.sum_entries(&block, &counts, &mut before, &mut sums)?;
         device.start_tiles(&block, &sums, &earlier, &mut starts, &mut status)?;
-        let status = device.download_later(&status)?;
-        Ok(Listed { block, splats, masks, before, starts, status })
-    }
-
-    /// Makes the lists, and the picture.
-    fn blended(&self, listed: Listed<'d, D>) -> Result<Drawn<D>, DeviceError> {
-        let Listed { block, splats, masks, before, starts, status } = listed;
-        let device = self.device;
-        let entry_count = status.get()?.last().copied().unwrap_or(0);
-        let block = ListBlock { capacity: entry_count, ..block };
-        let entry_len = entry_count.max(1) as usize;
-        let (mut keys, mut entries) = (device.zeros(entry_len)?, device.zeros(entry_len)?);
         device.list_entries(&block, &splats, &masks, &starts, &before, &mut keys)?;
         device.sort_entries(&block, &starts, &keys, &mut entries)?;
 
-        let pixel_count = (block.width * block.height) as usize;
+        let pixel_count = (width * height) as usize;
         let (mut colours, mut depths) = (device.zeros(pixel_count)?, device.zeros(pixel_count)?);
         let tiles = block.tiles(self.background);
         device.blend_splats(&tiles, &starts, &entries, &splats, &mut colours, &mut depths)?;
-        Ok(Drawn { colours, depths })
+        Ok(Drawn { colours, depths, status: Some(device.download_later(&status)?) })
     }
 
-    /// Begins pictures from these cameras: their lists are made where that is faster, and on the device the host asks
-    /// how many entries those have.
+    /// The picture alone, its lists made where that is faster: both are the same lists.
+    fn drawn_usually(
+        &self,
+        gaussians: &D::Buffer<GaussianBlock>,
+        gaussian_count: usize,
+        camera: &CameraBlock,
+        room: &Room,
+    ) -> Result<Drawn<'d, D>, DeviceError> {
+        if self.device.is_software() || !can_be_listed(self.device, camera, gaussian_count) {
+            let Splatted { colours, depths, .. } = self.picture(gaussians, gaussian_count, camera)?;
+            return Ok(Drawn { colours, depths, status: None });
+        }
+        let capacity = room.next(gaussian_count, self.device.most_elements::<[u32; 2]>());
+        self.drawn(gaussians, gaussian_count, camera, capacity)
+    }
+
+    /// Begins the picture from a camera: [`Splatter::rendered`] waits for it.
     ///
     /// # Errors
     /// [`DeviceError`].
@@ -210,39 +216,16 @@ impl<'d, D: Device> Splatter<'d, D> {
         &self,
         gaussians: &D::Buffer<GaussianBlock>,
         gaussian_count: usize,
-        cameras: &[CameraBlock],
-    ) -> Result<Begun<'d, D>, DeviceError> {
-        let is_listed = |camera: &CameraBlock| can_be_listed(self.device, camera, gaussian_count);
-        let is_listed = !self.device.is_software() && cameras.iter().all(is_listed);
-        let largest = cameras.iter().map(|camera| mask_count(camera, gaussian_count)).max().unwrap_or(1);
-        let count = if is_listed { (MAX_MASKS / largest.max(1)).max(1) as usize } else { 0 };
-        let listed = cameras.iter().take(count).map(|camera| self.listed(gaussians, gaussian_count, camera));
-        Ok(Begun { cameras: cameras.to_vec(), is_listed, listed: listed.collect::<Result<_, _>>()? })
+        camera: &CameraBlock,
+        room: &Room,
+    ) -> Result<Begun<'d>, DeviceError> {
+        let Drawn { colours, depths, status } = self.drawn_usually(gaussians, gaussian_count, camera, room)?;
+        let (colours, depths) = (self.device.download_later(&colours)?, self.device.download_later(&depths)?);
+        Ok(Begun { camera: *camera, colours, depths, status })
     }
 
-    /// Pictures that were begun; the lists of as many as have room are waited for at once.
-    fn drawn_usually(
-        &self,
-        gaussians: &D::Buffer<GaussianBlock>,
-        gaussian_count: usize,
-        begun: Begun<'d, D>,
-    ) -> Result<Vec<Drawn<D>>, DeviceError> {
-        let Begun { cameras, is_listed, listed } = begun;
-        if !is_listed {
-            return cameras.iter().map(|camera| self.drawn(gaussians, gaussian_count, camera, false)).collect();
-        }
-        let (mut drawn, mut listed) = (Vec::with_capacity(cameras.len()), listed);
-        while !listed.is_empty() {
-            for listed in listed {
-                drawn.push(self.blended(listed)?);
-            }
-            listed = self.begin(gaussians, gaussian_count, &cameras[drawn.len()..])?.listed;
-        }
-        Ok(drawn)
-    }
-
-    /// Pictures as a field gives them, to be waited for together: depths where the opacity is at least
-    /// `least_opacity`, 0 elsewhere; confidences are the opacities.
+    /// A picture as a field gives it: depths where the opacity is at least `least_opacity`, 0 elsewhere; confidences are
+    /// the opacities.
     ///
     /// # Errors
     /// [`DeviceError`].
@@ -250,31 +233,26 @@ impl<'d, D: Device> Splatter<'d, D> {
         &self,
         gaussians: &D::Buffer<GaussianBlock>,
         gaussian_count: usize,
-        begun: Begun<'d, D>,
+        mut begun: Begun<'d>,
+        room: &Room,
         least_opacity: f32,
-    ) -> Result<impl FnOnce() -> Result<Vec<Rendered>, DeviceError> + use<'d, D>, DeviceError> {
-        let (cameras, device) = (begun.cameras.clone(), self.device);
-        let drawn = self.drawn_usually(gaussians, gaussian_count, begun)?;
-        let later = |Drawn { colours, depths }: &Drawn<D>| {
-            Ok((device.download_later(colours)?, device.download_later(depths)?))
-        };
-        let later = drawn.iter().map(later).collect::<Result<Vec<_>, DeviceError>>()?;
-        let rendered = move |((colours, depths), camera): ((Later<'_, [f32; 4]>, Later<'_, f32>), CameraBlock)| {
-            let (mut colours, mut depths) = (colours.get()?, depths.get()?);
-            let confidences: Vec<f32> = colours.iter().map(|colour| colour[3]).collect();
-            for (depth, opacity) in depths.iter_mut().zip(&confidences) {
-                *depth = if *opacity >= least_opacity { *depth / opacity } else { 0.0 };
-            }
-            for colour in &mut colours {
-                (0..3).for_each(|channel| colour[channel] = colour[channel].clamp(0.0, 1.0));
-            }
-            let CameraBlock { width, height, .. } = camera;
-            Ok(Rendered { colours, depths, confidences, width, height })
-        };
-        Ok(move || later.into_iter().zip(cameras).map(rendered).collect())
+    ) -> Result<Rendered, DeviceError> {
+        while !room.sufficed(begun.status.take())? {
+            begun = self.begin(gaussians, gaussian_count, &begun.camera, room)?;
+        }
+        let Begun { camera: CameraBlock { width, height, .. }, colours, depths, .. } = begun;
+        let (mut colours, mut depths) = (colours.get()?, depths.get()?);
+        let confidences: Vec<f32> = colours.iter().map(|colour| colour[3]).collect();
+        for (depth, opacity) in depths.iter_mut().zip(&confidences) {
+            *depth = if *opacity >= least_opacity { *depth / opacity } else { 0.0 };
+        }
+        for colour in &mut colours {
+            (0..3).for_each(|channel| colour[channel] = colour[channel].clamp(0.0, 1.0));
+        }
+        Ok(Rendered { colours, depths, confidences, width, height })
     }
 
-    /// The same, rounded on the device.
+    /// The same from a camera, rounded on the device.
     ///
     /// # Errors
     /// [`DeviceError`].
@@ -283,18 +261,22 @@ impl<'d, D: Device> Splatter<'d, D> {
         gaussians: &D::Buffer<GaussianBlock>,
         gaussian_count: usize,
         camera: &CameraBlock,
+        room: &Room,
         least_opacity: f32,
     ) -> Result<Rounded, DeviceError> {
         let device = self.device;
-        let begun = self.begin(gaussians, gaussian_count, &[*camera])?;
-        let Drawn { colours, depths } = self.drawn_usually(gaussians, gaussian_count, begun)?.remove(0);
         let CameraBlock { width, height, .. } = *camera;
         let pixel_count = width * height;
         let (mut shown, mut surfaces) = (device.zeros(pixel_count as usize)?, device.zeros(pixel_count as usize)?);
-        device.show_pixels(&least_opacity, pixel_count, &colours, &depths, &mut shown, &mut surfaces)?;
-        let (shown, surfaces) = (device.download_later(&shown)?, device.download_later(&surfaces)?);
-        let pixels = shown.get()?.into_iter().map(bytes_of_pixel).collect();
-        Ok(Rounded { pixels, depths: surfaces.get()?, width, height })
+        loop {
+            let Drawn { colours, depths, status } = self.drawn_usually(gaussians, gaussian_count, camera, room)?;
+            device.show_pixels(&least_opacity, pixel_count, &colours, &depths, &mut shown, &mut surfaces)?;
+            let (shown, surfaces) = (device.download_later(&shown)?, device.download_later(&surfaces)?);
+            if room.sufficed(status)? {
+                let pixels = shown.get()?.into_iter().map(bytes_of_pixel).collect();
+                return Ok(Rounded { pixels, depths: surfaces.get()?, width, height });
+            }
+        }
     }
 
     /// Derivatives of a loss by the Gaussians' parameters, in the places of these, from those by the picture's pixels,

@@ -11,6 +11,7 @@
 mod arrays;
 
 use super::course::{Course, Plan, Steps};
+use super::picture::{ENTRIES_A_GAUSSIAN, MIN_ENTRIES};
 use crate::FieldError;
 use arrays::{Brought, Entries, Level, Needed, Particles, Stepped, list_block, stepped};
 use viewfuse_core::camera::CameraBlock;
@@ -26,10 +27,7 @@ pub(super) use arrays::fits;
 
 /// Iterations after which the host sees whether the lists had room: with more of them it waits less often, and more are
 /// dispatched in vain where they had none.
-const ROUND: usize = 64;
-/// Entries that there is room for at first: so many for each Gaussian, and at least these.
-pub(super) const ENTRIES_A_GAUSSIAN: usize = 8;
-const MIN_ENTRIES: usize = 4096;
+const ROUND: usize = 128;
 
 /// What an optimisation has on a device.
 pub(super) struct Resident<'d, D: Device> {

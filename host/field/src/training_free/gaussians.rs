@@ -15,6 +15,7 @@ use crate::{
     Request, Variant,
 };
 use std::collections::BTreeMap;
+use std::rc::Rc;
 use viewfuse_device::Device;
 use viewfuse_job::progress::{Progress, Quiet};
 use viewfuse_scene::photographs::{SourceImages, longest_side};
@@ -124,7 +125,7 @@ impl Field for Gaussians {
         device: &'a D,
         sources: &SourceImages,
         progress: &dyn Progress,
-    ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
+    ) -> Result<Box<dyn Prepared<'a> + 'a>, FieldError> {
         let depths = SourceDepths::prepare(device, (&self.hull, &self.sweep), None, sources, progress)?;
         Ok(Box::new(Alone { depths, options: *self, splats: BTreeMap::new(), optimisation: None }))
     }
@@ -136,7 +137,7 @@ struct Alone<'a, D: Device> {
     options: Gaussians,
     /// The Gaussians of the current weighting and recipe by their last iteration, once they are needed; none where the
     /// sources have too few surfaces.
-    splats: BTreeMap<u32, Option<Splats<'a, D>>>,
+    splats: BTreeMap<u32, Option<Rc<Splats<'a, D>>>>,
     /// The optimisation for the current weighting, as far as it went, where a dearer effort may go on from there.
     optimisation: Option<Optimisation<'a>>,
 }
@@ -144,7 +145,7 @@ struct Alone<'a, D: Device> {
 impl<'a, D: Device> Alone<'a, D> {
     /// The Gaussians of the current options, optimised if they are not there yet; `None` where the sources have too few
     /// surfaces.
-    fn splats(&mut self, progress: &dyn Progress) -> Result<Option<&mut Splats<'a, D>>, FieldError> {
+    fn splats(&mut self, progress: &dyn Progress) -> Result<Option<Rc<Splats<'a, D>>>, FieldError> {
         let Gaussians { recipe, end, .. } = self.options;
         if !self.splats.contains_key(&end) {
             let begun = match self.optimisation.take().filter(|optimisation| optimisation.done() <= end) {
@@ -159,13 +160,13 @@ impl<'a, D: Device> Alone<'a, D> {
                         self.optimisation = Some(optimisation);
                     }
                     ran?;
-                    Some(Splats::upload(self.depths.device, optimised, &recipe)?)
+                    Some(Rc::new(Splats::upload(self.depths.device, optimised, &recipe)?))
                 }
                 None => None,
             };
             self.splats.insert(end, splats);
         }
-        Ok(self.splats.get_mut(&end).and_then(Option::as_mut))
+        Ok(self.splats.get(&end).cloned().flatten())
     }
 
     /// Drops the Gaussians, finished and unfinished.
@@ -175,7 +176,7 @@ impl<'a, D: Device> Alone<'a, D> {
     }
 }
 
-impl<D: Device> Prepared for Alone<'_, D> {
+impl<'a, D: Device> Prepared<'a> for Alone<'a, D> {
     fn encoding(&self) -> Encoding {
         Encoding::All
     }
@@ -186,9 +187,8 @@ impl<D: Device> Prepared for Alone<'_, D> {
 
     /// Of sources with too few surfaces, the picture of the sweep or the hull.
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
-        let images = self.depths.images.clone();
         match self.splats(progress)? {
-            Some(splats) => splats.picture(images, request)?(),
+            Some(splats) => splats.draw(&self.depths.images, request)?(),
             None => self.depths.views.render(request, progress),
         }
     }

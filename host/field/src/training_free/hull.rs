@@ -179,7 +179,7 @@ impl<D: Device> Views<'_, D> {
     }
 }
 
-impl<D: Device> Prepared for Views<'_, D> {
+impl<'a, D: Device> Prepared<'a> for Views<'a, D> {
     fn encoding(&self) -> Encoding {
         Encoding::All
     }

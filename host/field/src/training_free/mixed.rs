@@ -12,6 +12,7 @@ use crate::variant::erased;
 use crate::{
     AnyOptions, Drawing, Encoding, FieldError, Geometry, Prepared, Purpose, Record, Rendered, Request, Setting, Variant,
 };
+use std::rc::Rc;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::Device;
 use viewfuse_job::progress::{Progress, Quiet};
@@ -56,7 +57,7 @@ pub(super) struct Mixed<'a, D: Device> {
     shown: Shown,
     /// The Gaussians of the current weighting by each recipe, once they are needed; none where the sources have too few
     /// surfaces.
-    splats: Vec<(Recipe, Option<Splats<'a, D>>)>,
+    splats: Vec<(Recipe, Option<Rc<Splats<'a, D>>>)>,
     /// Gaussians that are being optimised.
     optimisation: Option<(Recipe, Optimisation<'a>)>,
     /// The hull's last picture under the current weighting and options, with what was asked for: it is filled, and
@@ -90,7 +91,7 @@ impl<'a, D: Device> Mixed<'a, D> {
                     self.optimisation = Some((recipe, optimisation));
                     return Ok(false);
                 }
-                Some(Splats::upload(self.depths.device, optimisation.optimised()?, &recipe)?)
+                Some(Rc::new(Splats::upload(self.depths.device, optimisation.optimised()?, &recipe)?))
             }
             None => None,
         };
@@ -98,17 +99,10 @@ impl<'a, D: Device> Mixed<'a, D> {
         Ok(true)
     }
 
-    /// The Gaussians, optimised if they are not there yet, and the sources' depths; no Gaussians where the sources have
-    /// too few surfaces.
-    #[expect(clippy::type_complexity, reason = "two parts of this, which are borrowed apart")]
-    fn splats(
-        &mut self,
-        progress: &dyn Progress,
-    ) -> Result<(Option<&mut Splats<'a, D>>, &mut SourceDepths<'a, D>), FieldError> {
+    /// The Gaussians, optimised if they are not there yet; `None` where the sources have too few surfaces.
+    fn splats(&mut self, progress: &dyn Progress) -> Result<Option<Rc<Splats<'a, D>>>, FieldError> {
         while !self.advance_splats(progress)? {}
-        let (splats, recipe) = (&mut self.splats, self.recipe);
-        let splats = splats.iter_mut().find(|(of, _)| *of == recipe).and_then(|(_, splats)| splats.as_mut());
-        Ok((splats, &mut self.depths))
+        Ok(self.splats.iter().find(|(of, _)| *of == self.recipe).and_then(|(_, splats)| splats.clone()))
     }
 
     /// The picture of the sweep or the hull; the hull's is rendered once for all that is mixed with it.
@@ -127,8 +121,8 @@ impl<'a, D: Device> Mixed<'a, D> {
 
     /// The Gaussians' picture of a target; `None` if there are none.
     fn splatted(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Option<Rendered>, FieldError> {
-        let (splats, depths) = self.splats(progress)?;
-        splats.map(|splats| splats.picture(depths.images.clone(), request)?()).transpose()
+        let splats = self.splats(progress)?;
+        splats.map(|splats| splats.draw(&self.depths.images, request)?()).transpose()
     }
 }
 
@@ -158,7 +152,7 @@ fn carve(picture: &mut Rendered, by: &Rendered, background: [f32; 3]) {
     }
 }
 
-impl<D: Device> Prepared for Mixed<'_, D> {
+impl<'a, D: Device> Prepared<'a> for Mixed<'a, D> {
     fn encoding(&self) -> Encoding {
         self.depths.views.encoding()
     }
@@ -185,30 +179,24 @@ impl<D: Device> Prepared for Mixed<'_, D> {
     }
 
     fn advance(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<bool, FieldError> {
-        if self.shown == Shown::Depths {
-            return self.depths.views.advance(request, progress);
-        }
-        if !self.advance_splats(progress)? {
+        if self.shown != Shown::Depths && !self.advance_splats(progress)? {
             return Ok(false);
         }
-        match self.splats(progress)? {
-            (Some(splats), depths) => splats.begin(&depths.images, request),
-            (None, depths) => depths.views.advance(request, progress),
-        }
+        let has_splats = self.shown == Shown::Gaussians && self.splats(progress)?.is_some();
+        if has_splats { Ok(true) } else { self.depths.views.advance(request, progress) }
     }
 
-    fn draw<'p>(&'p mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Drawing<'p>, FieldError> {
-        match self.shown {
-            Shown::Depths if !self.depths.images.has_silhouettes => self.depths.views.draw(request, progress),
-            Shown::Gaussians => match self.splats(progress)? {
-                (Some(splats), depths) => Ok(Box::new(splats.picture(depths.images.clone(), request)?)),
-                (None, depths) => depths.views.draw(request, progress),
-            },
-            _ => {
-                let rendered = self.render(request, progress)?;
-                Ok(Box::new(move || Ok(rendered)))
-            }
+    fn draw(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Drawing<'a>, FieldError> {
+        if self.shown == Shown::Gaussians
+            && let Some(splats) = self.splats(progress)?
+        {
+            return Ok(Box::new(splats.draw(&self.depths.images, request)?));
         }
+        if self.shown == Shown::Depths && !self.depths.images.has_silhouettes {
+            return self.depths.views.draw(request, progress);
+        }
+        let rendered = self.render(request, progress)?;
+        Ok(Box::new(move || Ok(rendered)))
     }
 
     fn record(&self) -> Record {

@@ -2,9 +2,11 @@
 
 use super::hull::Hull;
 use super::sweep::{Cache, Sweep};
-use crate::gaussians::{Begun, Optimisation, Optimised, Recipe, Residuals, Splatter, optimisation};
+use crate::gaussians::{Optimisation, Optimised, Recipe, Residuals, Room, Splatter, optimisation};
 use crate::point_cloud::cloud_of;
 use crate::{AnyOptions, DepthMap, FieldError, Geometry, Prepared, Rendered, Request, Surfaces};
+use std::cell::RefCell;
+use std::rc::Rc;
 use std::sync::Arc;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::Device;
@@ -19,7 +21,7 @@ const MIN_OPACITY: f32 = 0.5;
 /// The sources as the hull or the sweep prepared them: Gaussians begin with their depths.
 pub(super) struct SourceDepths<'a, D: Device> {
     pub(super) device: &'a D,
-    pub(super) views: Box<dyn Prepared + 'a>,
+    pub(super) views: Box<dyn Prepared<'a> + 'a>,
     pub(super) images: Arc<SourceImages>,
     encoded: Vec<bool>,
     relevance: Vec<SourceWeights>,
@@ -35,7 +37,7 @@ impl<'a, D: Device> SourceDepths<'a, D> {
         sources: &SourceImages,
         progress: &dyn Progress,
     ) -> Result<SourceDepths<'a, D>, FieldError> {
-        let views: Box<dyn Prepared + 'a> = match sources.has_silhouettes {
+        let views: Box<dyn Prepared<'a> + 'a> = match sources.has_silhouettes {
             true => Box::new(hull.views(device, sources, progress)?),
             false => sweep.prepare_kept(device, sources, cache, progress)?,
         };
@@ -114,78 +116,45 @@ pub(super) struct Splats<'a, D: Device> {
     is_antialiased: bool,
     /// How much brighter each source is than they are: red, green, blue.
     gains: Vec<[f32; 3]>,
-    residuals: Residuals,
-    /// Their pictures of a target and of the sources whose residuals it needs, which are begun.
-    begun: Option<(Pictures, Begun<'a, D>)>,
-}
-
-/// Which pictures a target needs.
-#[derive(Clone, PartialEq)]
-struct Pictures {
-    target: CameraBlock,
-    /// The views that have a weight, and no residual yet.
-    missing: Vec<usize>,
+    residuals: RefCell<Residuals>,
+    room: Room,
 }
 
 impl<'a, D: Device> Splats<'a, D> {
     /// Those of a recipe.
     pub(super) fn upload(device: &'a D, optimised: Optimised, recipe: &Recipe) -> Result<Splats<'a, D>, FieldError> {
         let Optimised { gaussians, near, background, gains, is_antialiased, .. } = optimised;
-        let (count, residuals) = (gaussians.len(), Residuals::new(gains.len(), recipe.residual_share));
-        let gaussians = device.upload(&gaussians)?;
-        Ok(Splats { device, gaussians, count, near, background, is_antialiased, gains, residuals, begun: None })
+        let residuals = RefCell::new(Residuals::new(gains.len(), recipe.residual_share));
+        let (count, gaussians, room) = (gaussians.len(), device.upload(&gaussians)?, Room::default());
+        Ok(Splats { device, gaussians, count, near, background, is_antialiased, gains, residuals, room })
     }
 
-    fn splatter(&self) -> Splatter<'a, D> {
-        let Splats { device, near, background, is_antialiased, .. } = *self;
-        Splatter { device, near, background, is_antialiased, harmonics: None }
-    }
-
-    /// The pictures of a target.
-    fn pictures(&self, request: &Request<'_>) -> Pictures {
-        let weights = request.views.iter().copied().zip(request.view_weights());
-        let used = weights.filter(|(_, weight)| *weight > 0.0).map(|(view, _)| view);
-        let missing = used.filter(|view| self.residuals.is_missing(*view)).collect();
-        Pictures { target: request.camera.block(0), missing }
-    }
-
-    /// Begins the pictures of a target; returns whether they were begun before.
-    pub(super) fn begin(&mut self, images: &SourceImages, request: &Request<'_>) -> Result<bool, FieldError> {
-        let pictures = self.pictures(request);
-        let are_begun = self.begun.as_ref().is_some_and(|(begun, _)| *begun == pictures);
-        self.begun = Some(self.begun(images, pictures)?);
-        Ok(are_begun)
-    }
-
-    /// Those that were begun, if they are these.
-    fn begun(&mut self, images: &SourceImages, pictures: Pictures) -> Result<(Pictures, Begun<'a, D>), FieldError> {
-        if let Some(begun) = self.begun.take().filter(|(begun, _)| *begun == pictures) {
-            return Ok(begun);
-        }
-        let sources = pictures.missing.iter().map(|view| images.images[*view].camera.block(0));
-        let cameras: Vec<CameraBlock> = [pictures.target].into_iter().chain(sources).collect();
-        let begun = self.splatter().begin(&self.gaussians, self.count, &cameras)?;
-        Ok((pictures, begun))
-    }
-
-    /// Their picture of a target, as bright as the sources that count for it, as the other pictures are; to be waited
-    /// for.
-    pub(super) fn picture<'p>(
-        &'p mut self,
-        images: Arc<SourceImages>,
+    /// Begins their picture of a target, as bright as the sources that count for it, as the other pictures are.
+    pub(super) fn draw(
+        self: &Rc<Self>,
+        images: &Arc<SourceImages>,
         request: &Request<'_>,
-    ) -> Result<impl FnOnce() -> Result<Rendered, FieldError> + use<'p, 'a, D>, FieldError> {
-        let (Pictures { target, missing }, begun) = self.begun(&images, self.pictures(request))?;
-        let later = self.splatter().rendered(&self.gaussians, self.count, begun, MIN_OPACITY)?;
+    ) -> Result<impl FnOnce() -> Result<Rendered, FieldError> + use<'a, D>, FieldError> {
+        let Splats { device, near, background, is_antialiased, .. } = **self;
+        let splatter = Splatter { device, near, background, is_antialiased, harmonics: None };
         let weights: Vec<(usize, f32)> = request.views.iter().copied().zip(request.view_weights()).collect();
-        let Splats { gains, residuals, .. } = self;
+        let used = weights.iter().filter(|(_, weight)| *weight > 0.0).map(|(view, _)| *view);
+        let missing: Vec<usize> = used.filter(|view| self.residuals.borrow().is_missing(*view)).collect();
+        let target = request.camera.block(0);
+        let sources = missing.iter().map(|view| images.images[*view].camera.block(0));
+        let begin = |camera: CameraBlock| splatter.begin(&self.gaussians, self.count, &camera, &self.room);
+        let begun = [target].into_iter().chain(sources).map(begin).collect::<Result<Vec<_>, _>>()?;
+        let (splats, images) = (self.clone(), images.clone());
         Ok(move || {
-            let mut pictures = later()?;
+            let Splats { gaussians, count, gains, residuals, room, .. } = &*splats;
+            let finish = |begun| splatter.rendered(gaussians, *count, begun, room, MIN_OPACITY);
+            let mut pictures = begun.into_iter().map(finish).collect::<Result<Vec<_>, _>>()?;
             let mut picture = pictures.remove(0);
             let gain = common_gain(gains, &weights);
             for colour in &mut picture.colours {
                 (0..3).for_each(|channel| colour[channel] = (colour[channel] * gain[channel]).clamp(0.0, 1.0));
             }
+            let mut residuals = residuals.borrow_mut();
             for (view, picture) in missing.iter().zip(pictures) {
                 residuals.add_source(*view, picture, &images, gains[*view]);
             }

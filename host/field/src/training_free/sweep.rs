@@ -118,7 +118,7 @@ impl Field for Sweep {
         device: &'a D,
         sources: &SourceImages,
         progress: &dyn Progress,
-    ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
+    ) -> Result<Box<dyn Prepared<'a> + 'a>, FieldError> {
         self.prepare_kept(device, sources, None, progress)
     }
 }
@@ -131,7 +131,7 @@ impl Sweep {
         sources: &SourceImages,
         cache: Option<&Cache>,
         progress: &dyn Progress,
-    ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
+    ) -> Result<Box<dyn Prepared<'a> + 'a>, FieldError> {
         if !sources.has_silhouettes {
             let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
             viewfuse_scene::rig::gap_warning(&cameras).iter().for_each(|warning| progress.warn(warning));

@@ -18,7 +18,7 @@ use viewfuse_scene::photographs::to_rgb8;
 use viewfuse_weighting::Weighting;
 use viewfuse_weighting::sources::{MAX_SOURCES, SourceWeights};
 
-impl Stage<'_> {
+impl<'a> Stage<'a> {
     /// Weighs the sources for a target, leaves out those of least weight, renders, and compares with the ground truth.
     ///
     /// # Errors
@@ -46,7 +46,7 @@ impl Stage<'_> {
         weighting: &Weighting,
         target: &Target,
         progress: &dyn Progress,
-    ) -> Result<Drawing<'_>, RenderError> {
+    ) -> Result<Drawing<'a>, RenderError> {
         let camera = self.at_working_size(&target.camera)?;
         if self.controller.is_some() {
             let frame = self.frame_at(weighting, target, &camera, progress)?;
@@ -56,13 +56,8 @@ impl Stage<'_> {
         }
         let (_, [omission, _]) = self.weighed(weighting, target);
         let early_termination = self.options.early_termination;
-        // An error of the scene is told with its name.
-        let scene = self.scene.as_ref().map(|of| of.scene);
         let drawn = self.session.draw(&camera, &omission.weights, early_termination, progress);
-        drawn.map_err(|error| match scene {
-            Some(scene) => RenderError::of(error, scene),
-            None => RenderError::Field(error),
-        })
+        drawn.map_err(|error| self.error(error))
     }
 
     /// Goes on towards the picture of [`Stage::draw`]; returns whether it can be drawn without waiting for the device.

@@ -122,7 +122,7 @@ impl<'a, D: Device> Views<'a, D> {
     }
 }
 
-impl<D: Device> Prepared for Views<'_, D> {
+impl<'a, D: Device> Prepared<'a> for Views<'a, D> {
     fn encoding(&self) -> Encoding {
         Encoding::Greatest(MAX_VIEWS)
     }
@@ -142,7 +142,7 @@ impl<D: Device> Prepared for Views<'_, D> {
         Ok(self.knows(request.views) || self.ask_for_found()?)
     }
 
-    fn draw<'p>(&'p mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Drawing<'p>, FieldError> {
+    fn draw(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Drawing<'a>, FieldError> {
         let mut target = self.target_views(request.views, progress)?;
         let Volume { block, views: blended, costs } = self.volume(&mut target, request, progress)?;
         let device = self.scene.device;
