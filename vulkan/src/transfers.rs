@@ -29,6 +29,33 @@ impl Gpu {
         Ok(buffer)
     }
 
+    /// A short array with these values in memory that host and device share: the device reads them where they are
+    /// written. `None` for one of more than 64 KiB, and for an empty one.
+    ///
+    /// # Errors
+    /// As [`Gpu::upload`].
+    pub fn table<T: Pod>(&self, values: &[T]) -> Result<Option<Buffer<T>>, VulkanError> {
+        let bytes: &[u8] = bytemuck::cast_slice(values);
+        if !(1..=INLINE).contains(&bytes.len()) {
+            return Ok(None);
+        }
+        let mut memory = self.host_memory(bytes.len() as u64, MemoryLocation::CpuToGpu)?;
+        memory.mapped().ok_or_else(|| self.hidden())?[..bytes.len()].copy_from_slice(bytes);
+        Ok(Some(Buffer::new(Array::new(vec![memory], values.len(), values.len(), size_of::<T>()))))
+    }
+
+    /// Memory that the host sees. What was released while submissions in flight used it is free when they are done.
+    fn host_memory(&self, bytes: u64, location: MemoryLocation) -> Result<Memory, VulkanError> {
+        let bytes = bytes.next_multiple_of(4).max(4);
+        match self.handle.memory(bytes, location) {
+            Err(VulkanError::OutOfMemory { .. }) => {
+                self.wait()?;
+                self.handle.memory(bytes, location)
+            }
+            memory => memory,
+        }
+    }
+
     /// Writes all bytes of an array. Without the type of its elements, so that it is compiled once.
     fn write(&self, array: &Arc<Array>, bytes: &[u8]) -> Result<(), VulkanError> {
         let is_one_piece = array.chunks.len() == 1;
@@ -139,17 +166,8 @@ impl Gpu {
         if len * stride > self.staging_bytes() {
             return Ok(None);
         }
-        let bytes = ((len * stride) as u64).next_multiple_of(4).max(4);
-        let chunk = match self.handle.memory(bytes, MemoryLocation::GpuToCpu) {
-            // As in `array_of`.
-            Err(VulkanError::OutOfMemory { .. }) => {
-                self.wait()?;
-                self.handle.memory(bytes, MemoryLocation::GpuToCpu)?
-            }
-            chunk => chunk?,
-        };
-        let chunks = vec![chunk];
-        let to = Arc::new(Array::new(chunks, len.max(1), len, stride));
+        let chunk = self.host_memory((len * stride) as u64, MemoryLocation::GpuToCpu)?;
+        let to = Arc::new(Array::new(vec![chunk], len.max(1), len, stride));
         let mut submission = 0;
         self.with_state(|gpu, state| {
             for_each_stretch(from, len, usize::MAX, |memory, offset, range| {

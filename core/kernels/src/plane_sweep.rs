@@ -11,6 +11,7 @@
 //! front       the first opaque plane of each ray, by the sources' surfaces  FrontBlock, plane_opacity, Front
 //! path        semi-global regularisation along four directions     Line, joined_cost
 //! disparity   a source's disparity and its confidence              pick_disparity
+//! consistency ... by what other sources say of it                  ConfirmBlock, confirmed
 //! blend       a target's pixel: softmax over planes                blend
 //! ```
 //!
@@ -24,6 +25,7 @@
 
 pub mod blend;
 pub mod census;
+pub mod consistency;
 pub mod disparity;
 pub mod evidence;
 pub mod front;

@@ -80,6 +80,7 @@ pub use crate::pixelnerf::{EmbedBlock, GatherBlock};
 pub use crate::plane_sweep::Planes;
 pub use crate::plane_sweep::blend::BlendBlock;
 pub use crate::plane_sweep::evidence::ViewPair;
+pub use crate::plane_sweep::consistency::ConfirmBlock;
 pub use crate::plane_sweep::front::FrontBlock;
 pub use crate::plane_sweep::frustum::{FrustumBlock, SweptView};
 pub use crate::plane_sweep::path::CostBlock;

@@ -4,6 +4,7 @@ mod blend_planes;
 mod census_cost;
 mod compare_views;
 mod composite;
+mod confirm_disparities;
 mod convolutions;
 mod depths;
 mod depthwise;

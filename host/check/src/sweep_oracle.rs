@@ -4,6 +4,7 @@
 //! `None` means undecided: a value lies so near to a threshold that `f32` may fall on either side of it.
 
 mod blended;
+mod consistency;
 mod costs;
 mod evidence;
 mod front;
@@ -11,6 +12,7 @@ mod paths;
 mod picked;
 
 pub use blended::{Pixel, blend};
+pub use consistency::confirmed;
 pub use costs::{census_cost, row_sums, window_cost};
 pub use evidence::{Found, evidence};
 pub use front::{front_cost, plane_opacity};

@@ -139,6 +139,16 @@ pub trait Memory {
         self.upload(&values)
     }
 
+    /// A short buffer that kernels only read, as parameters of theirs are: a GPU reads it where the host wrote it, and
+    /// nothing is transferred. As [`Memory::upload`] for more than some ten thousand bytes, and where memory is the
+    /// host's.
+    ///
+    /// # Errors
+    /// If the device has no memory left.
+    fn table<T: Element>(&self, values: &[T]) -> Result<Self::Buffer<T>, DeviceError> {
+        self.upload(values)
+    }
+
     /// A buffer of `count` elements whose bytes are 0.
     ///
     /// # Errors

@@ -152,6 +152,13 @@ impl Memory for Vulkan {
         Ok(buffer)
     }
 
+    fn table<T: Element>(&self, values: &[T]) -> Result<Buffer<T>, DeviceError> {
+        match self.gpu.table(values)? {
+            Some(table) => Ok(table),
+            None => self.upload(values),
+        }
+    }
+
     fn zeros<T: Element>(&self, count: usize) -> Result<Buffer<T>, DeviceError> {
         Ok(self.gpu.zeros(count)?)
     }

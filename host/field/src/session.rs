@@ -244,7 +244,11 @@ impl<'a> Session<'a> {
         let request = Request { camera, weights, views, early_termination };
         self.shares.clear();
         let Some(mixture) = self.mixture.clone() else { return self.prepared.render(&request, progress) };
-        // All of them are begun before the first one is waited for.
+        // All of them go as far as they can, and are begun, before the first one is waited for.
+        for options in &mixture.parts {
+            self.go_on_with(options, weights, progress)?;
+            self.prepared.advance(&request, progress)?;
+        }
         let mut begun = Vec::with_capacity(mixture.parts.len());
         for options in &mixture.parts {
             self.go_on_with(options, weights, progress)?;

@@ -32,6 +32,10 @@ impl Memory for CpuAsGpu {
         Cpu.upload(values)
     }
 
+    fn table<T: Element>(&self, values: &[T]) -> Result<Vec<T>, DeviceError> {
+        Cpu.upload(values)
+    }
+
     fn zeros<T: Element>(&self, count: usize) -> Result<Vec<T>, DeviceError> {
         Cpu.zeros(count)
     }

@@ -10,7 +10,7 @@ use crate::gaussians::steps::{
     GainStepBlock, HarmonicTerm, ParticleBlock, ParticleState, StepBlock, TermState, by_colour, colour_along,
     corrections, direction, step_gain, step_particle, step_term,
 };
-use crate::gaussians::windows::{GainBlock, LossBlock, SHARE_RUN, pixel_gradient, structure};
+use crate::gaussians::windows::{GainBlock, LossBlock, SHARE_RUN, moments, pixel_gradient, structure};
 use crate::gaussians::{SPLAT_TILE, SplatBlock};
 use crate::store::Store;
 use viewfuse_core::fetch::Fetch;
@@ -172,6 +172,20 @@ pub fn sort_entries(
         let (start, end) = (starts[tile], starts[tile + 1]);
         entries.store((start + rank(keys, start, end, entry)) as usize, keys.fetch(entry as usize)[1]);
     }
+}
+
+/// Mean and variance of a photograph's window around a pixel.
+#[inline(always)]
+pub fn measure_windows(
+    block: &LossBlock,
+    photographs: &(impl Fetch<[f32; 4]> + ?Sized),
+    means: &mut (impl Store<[f32; 4]> + ?Sized),
+    variances: &mut (impl Store<[f32; 4]> + ?Sized),
+    pixel: u32,
+) {
+    let ([red, green, blue], [of_red, of_green, of_blue]) = moments(block, photographs, pixel);
+    means.store((block.first + pixel) as usize, [red, green, blue, 0.0]);
+    variances.store((block.first + pixel) as usize, [of_red, of_green, of_blue, 0.0]);
 }
 
 /// The derivatives of `1 - SSIM` by the means of a pixel's window.

@@ -6,6 +6,7 @@ use crate::plane_sweep::blend::{self, BlendBlock};
 use crate::plane_sweep::census;
 use crate::plane_sweep::disparity;
 use crate::plane_sweep::evidence::{self, ViewPair};
+use crate::plane_sweep::consistency::{self, ConfirmBlock};
 use crate::plane_sweep::front::{self, Front, FrontBlock};
 use crate::plane_sweep::frustum::{FrustumBlock, SweptView};
 use crate::plane_sweep::path::{self, CostBlock, LINES_TOGETHER, Line};
@@ -166,6 +167,19 @@ pub fn pick_disparity(
 ) {
     let picked = disparity::pick_disparity(block, costs, pixel);
     disparities.store((block.camera.first_texel + pixel) as usize, picked);
+}
+
+/// Disparity and confidence of a pixel of a view, by what other views say of it.
+#[inline(always)]
+pub fn confirm_disparities(
+    block: &ConfirmBlock,
+    others: &(impl Fetch<SweptView> + ?Sized),
+    disparities: &(impl Fetch<[f32; 2]> + ?Sized),
+    confirmed: &mut (impl Store<[f32; 2]> + ?Sized),
+    pixel: u32,
+) {
+    let found = consistency::confirmed(block, others, disparities, pixel);
+    confirmed.store((block.camera.first_texel + pixel) as usize, found);
 }
 
 /// A pixel of the target, blended from the planes.

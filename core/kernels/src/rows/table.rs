@@ -413,6 +413,14 @@ macro_rules! for_each_kernel {
                 read costs: Planes,
                 write disparities[block.camera.first_texel + pixel]: [f32; 2],
             }
+            /// Disparity and confidence of a view's pixels by what other views say of them: the view's part of
+            /// `confirmed[view][row][column]`. An element is a pixel.
+            ConfirmDisparities confirm_disparities(block: ConfirmBlock)
+            for pixel in [0..block.camera.width * block.camera.height; 256 a core] {
+                read others: SweptView as vectors,
+                read disparities: [f32; 2] as vectors,
+                write confirmed[block.camera.first_texel + pixel]: [f32; 2],
+            }
             /// Pixels blended from planes, for some rows of a target: `colours[row][column]` (red, green, blue,
             /// opacity), `pixel_depths[row][column]` and `confidences[row][column]`. An element is a pixel of the
             /// target.
@@ -528,6 +536,14 @@ macro_rules! for_each_kernel {
                 read starts: u32,
                 read keys: [u32; 2],
                 write entries: u32,
+            }
+            /// Means and variances of a photograph's windows: its part of `means[row][column]` and
+            /// `variances[row][column]` of several photographs (red, green, blue, 0). An element is a pixel.
+            MeasureWindows measure_windows(block: LossBlock)
+            for pixel in [0..block.width * block.height; 16 a core] {
+                read photographs: [f32; 4] as vectors,
+                write means[block.first + pixel]: [f32; 4] as vectors,
+                write variances[block.first + pixel]: [f32; 4] as vectors,
             }
             /// Derivatives of `1 - SSIM` of a picture and a photograph by the means of windows:
             /// `by_windows[row][column]` (by those of x, x x and x y; red, green, blue). `photographs`, `means` and

@@ -1,4 +1,4 @@
-//! [`Kernel::CompareWindows`], [`Kernel::ComparePixels`] and [`Kernel::SumShares`]: pictures against the second of two
+//! [`Kernel::MeasureWindows`], [`Kernel::CompareWindows`], [`Kernel::ComparePixels`] and [`Kernel::SumShares`]: pictures against the second of two
 //! photographs, with holes and with silhouettes; windows end at all edges, and small pictures are smaller than one.
 
 use super::*;
@@ -80,6 +80,38 @@ fn mean(block: &LossBlock, pixel: usize, at: impl Fn(usize) -> Bounded) -> Bound
     }
     // A product is rounded with each of two weights, which are off by some roundings, and in nine sums at most.
     Bounded { value, error: brought + magnitudes * roundings(32) }
+}
+
+impl Case for MeasureWindows {
+    const LIMITS: Limits = Limits { tolerance: 1.0e-5, least: 1.0e-2 };
+    const REASON: &'static str = "a mean over 81 numbers up to 1, and its square less that of their squares";
+    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
+        ("photographs", |case| increase(case.photographs.as_flattened_mut().iter_mut().step_by(2))),
+        ("parameters", |case| case.block.first -= 1),
+    ];
+
+    fn inputs(seed: u64, size: u32) -> Vec<MeasureWindows> {
+        let Compared { block, photographs, .. } = Compared::new(&mut Numbers::new(seed), size, false);
+        let [means, variances] = [0; 2].map(|_| Output::Zeros(photographs.len()));
+        vec![MeasureWindows { block, photographs, means, variances }]
+    }
+
+    fn expected(&self) -> Vec<Option<Bounded>> {
+        let MeasureWindows { block, photographs, .. } = self;
+        let pixel = |pixel: usize| {
+            let at = |pixel: usize, channel: usize| Bounded::from(photographs[block.first as usize + pixel][channel]);
+            let means = [0, 1, 2].map(|channel| mean(block, pixel, |pixel| at(pixel, channel)));
+            let variance = |channel: usize| {
+                mean(block, pixel, |pixel| at(pixel, channel).squared()) - means[channel].squared()
+            };
+            (means, [0, 1, 2].map(variance))
+        };
+        let (means, variances): (Vec<_>, Vec<_>) = map(self.element_count(), 16, pixel).into_iter().unzip();
+        let before = || vec![[Bounded::ZERO; 4]; block.first as usize].into_iter();
+        let with_rest = |[red, green, blue]: [Bounded; 3]| [red, green, blue, Bounded::ZERO];
+        let all = |channels: Vec<[Bounded; 3]>| before().chain(channels.into_iter().map(with_rest)).flatten();
+        all(means).chain(all(variances)).map(Some).collect()
+    }
 }
 
 impl Case for CompareWindows {

@@ -1,8 +1,9 @@
 //! The source views at the sizes of the pyramid.
 
 use super::loss::Structure;
+use std::sync::OnceLock;
 use viewfuse_core::camera::{CameraBlock, PinholeError};
-use viewfuse_device::parallel::try_map;
+use viewfuse_device::parallel::{map, try_map};
 use viewfuse_scene::photographs::{SourceImage, SourceImages};
 
 /// A source view at a level.
@@ -11,8 +12,8 @@ pub(super) struct LevelView {
     pub(super) camera: CameraBlock,
     /// Red, green and blue over the background, and opacity: `[channel][row][column]`.
     pub(super) channels: [Vec<f32>; 4],
-    /// What the photograph is compared by, once for all iterations.
-    pub(super) structure: [Structure; 3],
+    /// What the host compares the photograph by, once for all iterations, from when it does.
+    structure: OnceLock<Vec<Structure>>,
     /// `[row][column]`: 0 where the lens saw nothing or pixels do not count, 1 elsewhere; empty if all count.
     pub(super) seen: Vec<f32>,
     /// Whether the opacity is a silhouette.
@@ -28,7 +29,6 @@ pub(super) fn level(images: &SourceImages, finest_side: u32, level: u32) -> Resu
 impl LevelView {
     fn of(image: &SourceImage, images: &SourceImages) -> LevelView {
         let camera = image.camera.block(0);
-        let (width, height) = (camera.width as usize, camera.height as usize);
         let behind = images.background;
         let channel = |channel: usize| -> Vec<f32> {
             let over = |texel: &[f32; 4]| match (channel, images.has_silhouettes) {
@@ -44,7 +44,13 @@ impl LevelView {
             true => channels[3].iter().map(|alpha| if *alpha < 0.999 { 0.0 } else { 1.0 }).collect(),
             false => Vec::new(),
         };
-        let structure = [0, 1, 2].map(|channel| Structure::of(&channels[channel], width, height));
-        LevelView { camera, channels, structure, seen, has_silhouette: images.has_silhouettes }
+        LevelView { camera, channels, structure: OnceLock::new(), seen, has_silhouette: images.has_silhouettes }
+    }
+
+    /// The photograph's windows: red, green, blue.
+    pub(super) fn structure(&self) -> &[Structure] {
+        let (width, height) = (self.camera.width as usize, self.camera.height as usize);
+        let of = |channel: usize| Structure::of(&self.channels[channel], width, height);
+        self.structure.get_or_init(|| map(3, 1, of))
     }
 }

@@ -118,9 +118,10 @@ impl<D: Device> Steps for ByHost<'_, D> {
 fn by_pixels(colours: &[[f32; 4]], view: &LevelView, gain: [f32; 3], loss: &LossBlock) -> (Vec<[f32; 4]>, [f32; 3]) {
     let (width, height) = (view.camera.width as usize, view.camera.height as usize);
     let factor = loss.factor;
+    let structures = view.structure();
     let channels = map(3, 1, |channel| {
         let mut picture: Vec<f32> = colours.iter().map(|colour| colour[channel] * gain[channel]).collect();
-        let (photograph, structure, seen) = (&view.channels[channel], &view.structure[channel], &view.seen[..]);
+        let (photograph, structure, seen) = (&view.channels[channel], &structures[channel], &view.seen[..]);
         // What the photograph does not show is the same in both: windows that hold some of it compare the rest.
         let pixels = picture.iter_mut().zip(photograph).zip(seen);
         pixels.filter(|(_, seen)| **seen == 0.0).for_each(|((x, y), _)| *x = *y);

@@ -13,14 +13,15 @@ mod arrays;
 use super::course::{Course, Plan, Steps};
 use super::picture::{ENTRIES_A_GAUSSIAN, MIN_ENTRIES};
 use crate::FieldError;
-use arrays::{Brought, Entries, Level, Needed, Particles, Stepped, list_block, stepped};
+use super::particles::Particle;
+use arrays::{Entries, Level, Needed, Particles, Photographs, Stepped, list_block, stepped};
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::gaussian::REST_COUNTS;
 use viewfuse_device::{Device, DeviceError, Later};
 use viewfuse_kernels::gaussians::blend_gradient::SplatGradient;
 use viewfuse_kernels::gaussians::lists::ListStatus;
 use viewfuse_kernels::rows::{
-    GainStepBlock, LossBlock, ParticleBlock, SHARE_RUN, STATUS_NUMBERS, SplatBlock, StepBlock,
+    GainBlock, GainStepBlock, LossBlock, ParticleBlock, SHARE_RUN, STATUS_NUMBERS, SplatBlock, StepBlock,
 };
 
 pub(super) use arrays::fits;
@@ -34,7 +35,9 @@ pub(super) struct Resident<'d, D: Device> {
     device: &'d D,
     /// What the lists have room for at first.
     first_capacity: Option<usize>,
+    photographs: Option<Photographs<D>>,
     level: Option<Level<D>>,
+    gains: Option<Stepped<D::Buffer<GainBlock>>>,
     particles: Option<Particles<D>>,
     /// The most coefficients of a channel beyond degree 0 that a Gaussian has.
     rest_count: u32,
@@ -50,21 +53,39 @@ pub(super) struct Resident<'d, D: Device> {
 struct Asked<'d> {
     needed: Needed,
     particles: Option<Coming<'d>>,
+    gains: Option<Later<'d, GainBlock>>,
     status: Option<Later<'d, u32>>,
 }
 
 /// Gaussians on their way.
-type Coming<'d> = Box<dyn FnOnce() -> Result<Brought, DeviceError> + 'd>;
+type Coming<'d> = Box<dyn FnOnce() -> Result<Vec<Particle>, DeviceError> + 'd>;
 
 impl<'d, D: Device> Resident<'d, D> {
     pub(super) fn new(device: &'d D, first_capacity: Option<usize>) -> Resident<'d, D> {
-        let (level, particles, entries, status, pending) = (None, None, None, None, Vec::new());
-        Resident { device, first_capacity, level, particles, rest_count: 0, entries, status, pending, asked: None }
+        Resident {
+            device,
+            first_capacity,
+            photographs: None,
+            level: None,
+            gains: None,
+            particles: None,
+            rest_count: 0,
+            entries: None,
+            status: None,
+            pending: Vec::new(),
+            asked: None,
+        }
     }
 
     /// Takes what an iteration needs to the device, as far as it is not there.
     fn load(&mut self, course: &Course, plan: &Plan) -> Result<(), DeviceError> {
         let device = self.device;
+        if self.photographs.is_none() {
+            self.photographs = Some(Photographs::new(device, course)?);
+        }
+        if self.gains.is_none() {
+            self.gains = Some(stepped(device, course.gains.iter().copied())?);
+        }
         let level = match self.level.take().filter(|level| level.number == plan.level) {
             Some(level) => level,
             None => Level::new(device, plan.level, &course.levels[plan.level])?,
@@ -95,8 +116,8 @@ impl<'d, D: Device> Resident<'d, D> {
         let is_antialiased = u32::from(course.recipe.is_antialiased);
         let (Some(level), Some(particles)) = (&mut self.level, &mut self.particles) else { return Ok(()) };
         let (Some(entries), Some(status)) = (&mut self.entries, &mut self.status) else { return Ok(()) };
-        let Particles { count: gaussian_count, term_count, gaussians, states, terms, term_states, gains, .. } =
-            particles;
+        let (Some(photographs), Some(gains)) = (&self.photographs, &mut self.gains) else { return Ok(()) };
+        let Particles { count: gaussian_count, term_count, gaussians, states, terms, term_states, .. } = particles;
         let (gaussian_count, term_count) = (*gaussian_count, *term_count);
         let (splats, gradients, masks) = (&mut particles.splats, &mut particles.gradients, &mut particles.masks);
         let camera = CameraBlock { first_texel: 0, ..plan.step.camera };
@@ -115,14 +136,13 @@ impl<'d, D: Device> Resident<'d, D> {
 
         let tiles = lists.tiles(background);
         device.blend_splats(&tiles, starts, &entries.sorted, splats, &mut level.colours, &mut level.depths)?;
-        let loss = LossBlock { first: level.firsts[plan.source], ..plan.loss };
-        let (colours, photographs) = (&level.colours, &level.photographs);
+        let loss = LossBlock { first: photographs.firsts[plan.level][plan.source], ..plan.loss };
+        let (colours, Photographs { pixels, means, variances, .. }) = (&level.colours, photographs);
         if loss.structure_share > 0.0 {
-            let (means, variances) = (&level.means, &level.variances);
-            device.compare_windows(&loss, colours, photographs, means, variances, &gains.now, &mut level.by_windows)?;
+            device.compare_windows(&loss, colours, pixels, means, variances, &gains.now, &mut level.by_windows)?;
         }
         let (by_pixels, shares) = (&mut level.by_pixels, &mut level.shares);
-        device.compare_pixels(&loss, colours, photographs, &level.by_windows, &gains.now, by_pixels, shares)?;
+        device.compare_pixels(&loss, colours, pixels, &level.by_windows, &gains.now, by_pixels, shares)?;
 
         device.blend_gradient(&tiles, starts, &entries.sorted, splats, colours, by_pixels, &mut entries.sums)?;
         let projected = SplatBlock { camera, near, gaussian_count, is_antialiased, padding: 0 };
@@ -202,18 +222,26 @@ impl<'d, D: Device> Resident<'d, D> {
             Some(status) if !self.pending.is_empty() => Some(device.download_later(&status.now)?),
             _ => None,
         };
-        Ok(Asked { needed, particles, status })
+        // Nothing on the host depends on the gains before the end.
+        let gains = match (&self.gains, needed) {
+            (Some(gains), Needed::Scene(_)) => Some(device.download_later(&gains.now)?),
+            _ => None,
+        };
+        Ok(Asked { needed, particles, gains, status })
     }
 
-    /// Gives the course what is needed of the Gaussians, and the gains. They stay on the device, too.
+    /// Gives the course what is needed of the Gaussians, and at the end the gains. They stay on the device, too.
     fn give(&mut self, course: &mut Course, needed: Needed) -> Result<(), DeviceError> {
         // They come with the status, and a second time where that says that they are not there yet.
-        let Asked { mut particles, status, .. } = self.ask_for(needed)?;
-        if self.settle(course, status)? {
-            particles = self.ask_for(needed)?.particles;
+        let mut asked = self.ask_for(needed)?;
+        if self.settle(course, asked.status.take())? {
+            asked = self.ask_for(needed)?;
         }
-        if let Some(arrived) = particles {
-            (course.particles, course.gains) = arrived()?;
+        if let Some(arrived) = asked.particles {
+            course.particles = arrived()?;
+        }
+        if let Some(gains) = asked.gains {
+            course.gains = gains.get()?;
         }
         Ok(())
     }
@@ -253,7 +281,7 @@ impl<D: Device> Steps for Resident<'_, D> {
     }
 
     fn forget(&mut self) {
-        (self.particles, self.status, self.pending, self.asked) = (None, None, Vec::new(), None);
+        (self.particles, self.gains, self.status, self.pending, self.asked) = (None, None, None, Vec::new(), None);
     }
 
     fn finish(&mut self, course: &Course) -> Result<(), FieldError> {

@@ -11,7 +11,7 @@ use viewfuse_device::parallel::for_each;
 use viewfuse_device::{Device, DeviceError, Element, Later};
 use viewfuse_kernels::gaussians::blend_gradient::SplatGradient;
 use viewfuse_kernels::rows::{
-    GainBlock, GaussianBlock, HarmonicTerm, ListBlock, ParticleState, ProjectedGaussian, SHARE_RUN, TILE_RUN, TermState,
+    GaussianBlock, HarmonicTerm, ListBlock, LossBlock, ParticleState, ProjectedGaussian, SHARE_RUN, TILE_RUN, TermState,
 };
 
 /// Pixels that are enough work for a thread.
@@ -24,21 +24,18 @@ pub(in crate::gaussians) fn fits<D: Device>(device: &D, course: &Course) -> bool
     let count = course.recipe.max_count.max(course.particles.len());
     let terms = count * REST_COUNTS[course.recipe.degree.min(3) as usize] as usize;
     let pixels = |views: &Vec<LevelView>| views.iter().map(pixel_count).sum::<usize>();
-    let most_pixels = course.levels.iter().map(pixels).max().unwrap_or(0);
+    let all_pixels = course.levels.iter().map(pixels).sum::<usize>();
     let cameras = course.levels.iter().flatten().map(|view| &view.camera);
     count < MAX_GAUSSIANS.min(device.most_elements::<ParticleState>())
         && cameras.into_iter().all(|camera| can_be_listed(device, camera, count))
         && terms <= device.most_elements::<TermState>()
-        && most_pixels <= device.most_elements::<[f32; 4]>()
+        && all_pixels <= device.most_elements::<[f32; 4]>()
         && count * ENTRIES_A_GAUSSIAN <= device.most_elements::<SplatGradient>()
 }
 
 fn pixel_count(view: &LevelView) -> usize {
     (view.camera.width * view.camera.height) as usize
 }
-
-/// Gaussians and gains on the host.
-pub(super) type Brought = (Vec<Particle>, Vec<GainBlock>);
 
 /// What the host needs of the Gaussians.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,14 +73,42 @@ pub(super) fn stepped<D: Device, T: Element + PartialEq>(
     Ok(Stepped { now, next: device.zeros(count)? })
 }
 
-/// The photographs of a level, and arrays for a picture of the largest of them.
-pub(super) struct Level<D: Device> {
-    pub(super) number: usize,
-    /// `[source]`: where its pixels begin.
-    pub(super) firsts: Vec<u32>,
-    pub(super) photographs: D::Buffer<[f32; 4]>,
+/// The photographs at all levels.
+pub(super) struct Photographs<D: Device> {
+    /// `[level][source]`: where its pixels begin.
+    pub(super) firsts: Vec<Vec<u32>>,
+    /// `[level][source][row][column]`: red, green, blue, opacity.
+    pub(super) pixels: D::Buffer<[f32; 4]>,
+    /// The same of their windows, for the structural similarity.
     pub(super) means: D::Buffer<[f32; 4]>,
     pub(super) variances: D::Buffer<[f32; 4]>,
+}
+
+impl<D: Device> Photographs<D> {
+    pub(super) fn new(device: &D, course: &Course) -> Result<Photographs<D>, DeviceError> {
+        let views: Vec<&LevelView> = course.levels.iter().flatten().collect();
+        let count = views.iter().map(|view| pixel_count(view)).sum();
+        let pixels = device.upload_owned(joined(&views, count))?;
+        let (mut means, mut variances) = (device.zeros(count)?, device.zeros(count)?);
+        let (mut firsts, mut first) = (Vec::with_capacity(course.levels.len()), 0);
+        for level in &course.levels {
+            let mut of_level = Vec::with_capacity(level.len());
+            for view in level {
+                let CameraBlock { width, height, .. } = view.camera;
+                let photograph = LossBlock { width, height, first, ..LossBlock::default() };
+                device.measure_windows(&photograph, &pixels, &mut means, &mut variances)?;
+                of_level.push(first);
+                first += width * height;
+            }
+            firsts.push(of_level);
+        }
+        Ok(Photographs { firsts, pixels, means, variances })
+    }
+}
+
+/// Arrays for a picture of the largest photograph of a level.
+pub(super) struct Level<D: Device> {
+    pub(super) number: usize,
     pub(super) counts: D::Buffer<u32>,
     pub(super) before: D::Buffer<u32>,
     pub(super) sums: D::Buffer<u32>,
@@ -99,18 +124,6 @@ pub(super) struct Level<D: Device> {
 
 impl<D: Device> Level<D> {
     pub(super) fn new(device: &D, number: usize, views: &[LevelView]) -> Result<Level<D>, DeviceError> {
-        let firsts = views.iter().scan(0, |next, view| {
-            let first = *next;
-            *next += pixel_count(view) as u32;
-            Some(first)
-        });
-        let means = joined(views, |LevelView { structure: [red, green, blue], .. }| {
-            [&red.means[..], &green.means, &blue.means, &[]]
-        });
-        let variances = joined(views, |LevelView { structure: [red, green, blue], .. }| {
-            [&red.variances[..], &green.variances, &blue.variances, &[]]
-        });
-        let photographs = joined(views, |view| view.channels.each_ref().map(|channel| &channel[..]));
         let most = |of: fn(&ListBlock) -> u32| {
             let blocks = views.iter().map(|view| list_block(&view.camera, 0, 0));
             blocks.map(|block| of(&block)).max().unwrap_or(0).max(1) as usize
@@ -120,10 +133,6 @@ impl<D: Device> Level<D> {
         let pixels = views.iter().map(pixel_count).max().unwrap_or(0).max(1);
         Ok(Level {
             number,
-            firsts: firsts.collect(),
-            photographs: device.upload_owned(photographs)?,
-            means: device.upload_owned(means)?,
-            variances: device.upload_owned(variances)?,
             counts: device.zeros(count_count)?,
             before: device.zeros(count_count)?,
             sums: device.zeros(run_count * TILE_RUN as usize)?,
@@ -139,16 +148,13 @@ impl<D: Device> Level<D> {
     }
 }
 
-/// `[source][row][column]`: four channels of each, 0 where one is not there.
-fn joined(views: &[LevelView], channels: impl Fn(&LevelView) -> [&[f32]; 4]) -> Vec<[f32; 4]> {
-    let mut pixels = vec![[0.0; 4]; views.iter().map(pixel_count).sum()];
+/// `[view][row][column]`: the channels of all views.
+fn joined(views: &[&LevelView], count: usize) -> Vec<[f32; 4]> {
+    let mut pixels = vec![[0.0; 4]; count];
     let mut rest = &mut pixels[..];
     for view in views {
         let (of_view, others) = rest.split_at_mut(pixel_count(view));
-        let channels = channels(view);
-        for_each(of_view, MIN_PIXELS, |pixel, numbers| {
-            *numbers = channels.map(|channel| channel.get(pixel).copied().unwrap_or(0.0));
-        });
+        for_each(of_view, MIN_PIXELS, |pixel, numbers| *numbers = [0, 1, 2, 3].map(|of| view.channels[of][pixel]));
         rest = others;
     }
     pixels
@@ -184,7 +190,6 @@ pub(super) struct Particles<D: Device> {
     pub(super) states: Stepped<D::Buffer<ParticleState>>,
     pub(super) terms: Stepped<D::Buffer<HarmonicTerm>>,
     pub(super) term_states: Stepped<D::Buffer<TermState>>,
-    pub(super) gains: Stepped<D::Buffer<GainBlock>>,
     pub(super) splats: D::Buffer<ProjectedGaussian>,
     pub(super) gradients: D::Buffer<GaussianBlock>,
     pub(super) masks: D::Buffer<u32>,
@@ -209,27 +214,25 @@ impl<D: Device> Particles<D> {
             states: stepped(device, all.iter().map(|particle| particle.state))?,
             terms: stepped(device, terms)?,
             term_states: stepped(device, term_states)?,
-            gains: stepped(device, course.gains.iter().copied())?,
             splats: device.zeros(all.len().max(1))?,
             gradients: device.zeros(all.len().max(1))?,
             masks: device.zeros((bin_count * mask_count).max(1) as usize)?,
         })
     }
 
-    /// What the host needs of them as they are now, with the gains, to be waited for later. What it does not need is as
-    /// at the beginning of an optimisation.
+    /// What the host needs of them as they are now, to be waited for later. What it does not need is as at the beginning
+    /// of an optimisation.
     pub(super) fn later<'d>(
         &self,
         device: &'d D,
         needed: Needed,
-    ) -> Result<impl FnOnce() -> Result<Brought, DeviceError> + use<'d, D>, DeviceError> {
+    ) -> Result<impl FnOnce() -> Result<Vec<Particle>, DeviceError> + use<'d, D>, DeviceError> {
         let (term_count, count) = (self.term_count as usize, self.count as usize);
         let gaussians = device.download_later(&self.gaussians.now)?;
         let has_terms = term_count > 0 && !matches!(needed, Needed::Blocks | Needed::Scene(0));
         let terms = later_if(device, &self.terms.now, has_terms)?;
         let states = later_if(device, &self.states.now, needed == Needed::All)?;
         let term_states = later_if(device, &self.term_states.now, term_count > 0 && needed == Needed::All)?;
-        let gains = device.download_later(&self.gains.now)?;
         Ok(move || {
             let (gaussians, terms) = (gaussians.get()?, arrived(terms)?);
             let (states, term_states) = (arrived(states)?, arrived(term_states)?);
@@ -248,7 +251,7 @@ impl<D: Device> Particles<D> {
                 }
                 Particle { gaussian, harmonics, state }
             };
-            Ok((gaussians.into_iter().take(count).enumerate().map(particle).collect(), gains.get()?))
+            Ok(gaussians.into_iter().take(count).enumerate().map(particle).collect())
         })
     }
 }

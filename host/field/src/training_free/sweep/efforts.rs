@@ -66,7 +66,7 @@ impl<D: Device> Views<'_, D> {
             return Ok(());
         }
         let (device, relevance) = (self.scene.device, std::mem::take(&mut self.maps.relevance));
-        self.target = None;
+        self.targets = [None, None];
         if before.match_side != settings.match_side {
             let images = self.scene.small.iter().map(|image| image.reduced(settings.match_side));
             let images: Vec<SourceImage> = images.collect::<Result<_, _>>().map_err(FieldError::unsuitable)?;

@@ -127,7 +127,7 @@ impl<D: Device> Matching<'_, D> {
         let FrustumBlock { camera: CameraBlock { width, height, .. }, group_count, .. } = *whole;
         let matched = &swept[..whole.view_count as usize];
         let row_len = (width * group_count) as usize;
-        let (views, pairs) = (scratch.views.of(device, matched)?, scratch.pairs.of(device, &pairs(swept))?);
+        let (views, pairs) = (&device.table(matched)?, &device.table(&pairs(swept))?);
         let band_rows = self.band_rows(row_len * matched.len().max(4)).min(height);
         let rows = (band_rows + REACH).min(height) as usize;
         let grey = scratch.grey.of_len(device, rows * row_len * matched.len())?;
@@ -206,7 +206,7 @@ impl<D: Device> Matching<'_, D> {
         if self.front_share > 0.0 && voters.iter().any(|view| view.disparity_step > 0.0) {
             let opacities = scratch.opacities.of_len(device, volume)?;
             let frustum = FrustumBlock { view_count: voters.len() as u32, ..whole };
-            device.plane_opacity(&frustum, scratch.views.of(device, voters)?, maps, opacities)?;
+            device.plane_opacity(&frustum, &device.table(voters)?, maps, opacities)?;
             let block = FrontBlock { width, height, group_count, front_share: self.front_share };
             let costs = scratch.costs.of_len(device, volume)?;
             device.front_cost(&block, opacities, means, costs)?;

@@ -2,10 +2,8 @@
 //! time.
 
 use crate::FieldError;
-use viewfuse_device::{Device, Element};
+use viewfuse_device::Device;
 use viewfuse_kernels::plane_sweep::Planes;
-use viewfuse_kernels::plane_sweep::evidence::ViewPair;
-use viewfuse_kernels::plane_sweep::frustum::SweptView;
 
 /// What is needed while the costs of a frustum are found.
 pub(super) struct Scratch<D: Device> {
@@ -16,15 +14,12 @@ pub(super) struct Scratch<D: Device> {
     pub(super) opacities: Slot<D>,
     pub(super) costs: Slot<D>,
     pub(super) paths: Slot<D>,
-    pub(super) views: Known<D, SweptView>,
-    pub(super) pairs: Known<D, ViewPair>,
 }
 
 impl<D: Device> Default for Scratch<D> {
     fn default() -> Scratch<D> {
         let [compared, grey, evidence, sums, opacities, costs, paths] = std::array::from_fn(|_| Slot::default());
-        let (views, pairs) = (Known(Vec::new()), Known(Vec::new()));
-        Scratch { compared, grey, evidence, sums, opacities, costs, paths, views, pairs }
+        Scratch { compared, grey, evidence, sums, opacities, costs, paths }
     }
 }
 
@@ -46,29 +41,5 @@ impl<D: Device> Slot<D> {
             None => (len, device.zeros(len)?),
         };
         Ok(&mut self.0.insert(slot).1)
-    }
-}
-
-/// Most short arrays that stay on the device.
-const MAX_KNOWN: usize = 64;
-
-/// Short arrays that are on the device: trials of settings ask for the same ones again and again.
-pub(super) struct Known<D: Device, T: Element>(Vec<(Vec<T>, D::Buffer<T>)>);
-
-impl<D: Device, T: Element + PartialEq> Known<D, T> {
-    /// A buffer of these values, uploaded if it is not there.
-    pub(super) fn of(&mut self, device: &D, values: &[T]) -> Result<&D::Buffer<T>, FieldError> {
-        let place = match self.0.iter().position(|(known, _)| known == values) {
-            Some(place) => place,
-            None => {
-                let buffer = device.upload(values)?;
-                if self.0.len() == MAX_KNOWN {
-                    self.0.remove(0);
-                }
-                self.0.push((values.to_vec(), buffer));
-                self.0.len() - 1
-            }
-        };
-        Ok(&self.0[place].1)
     }
 }

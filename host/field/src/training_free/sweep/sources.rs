@@ -130,6 +130,11 @@ impl<'a, D: Device> Views<'a, D> {
         self.current().on_host(self.scene.device)
     }
 
+    /// The same on the device.
+    pub(super) fn found_on_device(&self) -> &D::Buffer<[f32; 2]> {
+        &self.current().on_device
+    }
+
     /// Asks the device for what [`Views::found`] gives; returns whether it was asked for before.
     pub(super) fn ask_for_found(&self) -> Result<bool, FieldError> {
         self.current().ask(self.scene.device)
@@ -170,7 +175,7 @@ impl<'a, D: Device> Views<'a, D> {
                 let costs = self.source_costs(frustum, swept, &voting, settings, progress)?;
                 self.scene.device.pick_disparity(&frustum, &costs, disparities.changed())?;
                 voters[view] = Some(others);
-                self.target = None;
+                self.targets[1] = None;
             }
         }
         self.maps.settled = Some(Settled { settings, voters, disparities });
@@ -264,7 +269,7 @@ impl<'a, D: Device> Views<'a, D> {
     /// Finds a source's disparities, or takes those that were kept.
     pub(super) fn find(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
         self.maps.settled = None;
-        self.target = None;
+        self.targets = [None, None];
         let settings = Sweep { dissent_share: DEFAULT.dissent_share, ..self.settings };
         let (frustum, swept) = self.source_frustum(view, settings);
         self.maps.steps[view] = frustum.disparity_step;

@@ -6,7 +6,7 @@ use super::views::Views;
 use crate::training_free::exposure;
 use crate::{FieldError, Request};
 use viewfuse_core::camera::Camera;
-use viewfuse_device::Device;
+use viewfuse_device::{Device, Later};
 use viewfuse_job::progress::Progress;
 use viewfuse_kernels::plane_sweep::Planes;
 use viewfuse_kernels::plane_sweep::blend::BlendBlock;
@@ -14,16 +14,16 @@ use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
 use viewfuse_scene::photographs::reduced_size;
 
 /// What is found of the views of a target from the maps of all of them.
-pub(super) struct TargetViews<D: Device> {
+pub(super) struct TargetViews<'d, D: Device> {
     views: Vec<usize>,
-    /// Whether from the second disparities.
-    by_second: bool,
-    /// Gain of each view: red, green, blue, 1.
-    gains: Vec<[f32; 4]>,
     /// `[view][row][column]`: disparity and confidence.
     pub(super) maps: D::Buffer<[f32; 2]>,
+    /// The same on their way to the host, until they are there.
+    coming: Option<Later<'d, [f32; 2]>>,
     /// The same on the host.
     pub(super) maps_on_host: Vec<[f32; 2]>,
+    /// Gain of each view: red, green, blue, 1; from when the maps are on the host.
+    gains: Vec<[f32; 4]>,
     /// Of the last picture, for another one of the same target under other settings.
     compared: Option<Compared<D>>,
 }
@@ -46,39 +46,66 @@ pub(super) struct Volume<D: Device> {
     pub(super) costs: D::Buffer<Planes>,
 }
 
-impl<D: Device> Views<'_, D> {
-    /// Takes what is known of these views, or finds it from these views alone: a picture does not depend on sources
-    /// without a weight.
+impl<'a, D: Device> Views<'a, D> {
+    /// Which of the targets the settings ask for.
+    fn slot(&self) -> usize {
+        usize::from(self.settings.second_share > 0.0)
+    }
+
+    /// Takes what is known of these views, or begins to find it from these views alone: a picture does not depend on
+    /// sources without a weight. Returns whether it was begun before.
+    fn begun(
+        &mut self,
+        views: &[usize],
+        progress: &dyn Progress,
+    ) -> Result<(TargetViews<'a, D>, bool), FieldError> {
+        self.exchange(progress)?;
+        self.settle(views, progress)?;
+        let slot = self.slot();
+        if let Some(known) = self.targets[slot].take().filter(|target| target.views == views) {
+            return Ok((known, true));
+        }
+        let device = self.scene.device;
+        let maps = self.confirmed(device, views, self.found_on_device())?;
+        let coming = Some(device.download_later(&maps)?);
+        let (maps_on_host, gains) = (Vec::new(), Vec::new());
+        Ok((TargetViews { views: views.to_vec(), maps, coming, maps_on_host, gains, compared: None }, false))
+    }
+
+    /// Goes on towards what is found of these views; returns whether it was begun before.
+    pub(super) fn advance_target(&mut self, views: &[usize], progress: &dyn Progress) -> Result<bool, FieldError> {
+        let (target, is_begun) = self.begun(views, progress)?;
+        self.keep(target);
+        Ok(is_begun)
+    }
+
+    /// What is found of these views.
     pub(super) fn target_views(
         &mut self,
         views: &[usize],
         progress: &dyn Progress,
-    ) -> Result<TargetViews<D>, FieldError> {
-        self.exchange(progress)?;
-        self.settle(views, progress)?;
-        let (known, by_second) = (self.knows(views), self.settings.second_share > 0.0);
-        if let Some(known) = self.target.take_if(|_| known) {
-            return Ok(known);
+    ) -> Result<TargetViews<'a, D>, FieldError> {
+        let (mut target, _) = self.begun(views, progress)?;
+        if let Some(coming) = target.coming.take() {
+            target.maps_on_host = coming.get()?;
+            let steps = self.maps.steps.iter().enumerate();
+            let used: Vec<f32> = steps.map(|(view, step)| if views.contains(&view) { *step } else { 0.0 }).collect();
+            let (cameras, texels) = (&self.matched.images.cameras, &self.matched.texels);
+            target.gains = exposure::gains(cameras, texels, &target.maps_on_host, &used);
         }
-        let on_host = self.confirmed(views, self.found()?);
-        let steps = &self.maps.steps;
-        let used: Vec<f32> =
-            steps.iter().enumerate().map(|(view, step)| if views.contains(&view) { *step } else { 0.0 }).collect();
-        let gains = exposure::gains(&self.matched.images.cameras, &self.matched.texels, &on_host, &used);
-        let (views, maps) = (views.to_vec(), self.scene.device.upload(&on_host)?);
-        Ok(TargetViews { views, by_second, gains, maps, maps_on_host: on_host, compared: None })
+        Ok(target)
     }
 
-    /// Whether that is known.
-    pub(super) fn knows(&self, views: &[usize]) -> bool {
-        let by_second = self.settings.second_share > 0.0;
-        self.target.as_ref().is_some_and(|target| target.views == views && target.by_second == by_second)
+    /// Keeps what is found of a target's views for its next picture.
+    pub(super) fn keep(&mut self, target: TargetViews<'a, D>) {
+        let slot = self.slot();
+        self.targets[slot] = Some(target);
     }
 
     /// The costs of a target's planes, and what its pixels are blended from.
     pub(super) fn volume(
         &mut self,
-        target: &mut TargetViews<D>,
+        target: &mut TargetViews<'a, D>,
         request: &Request<'_>,
         progress: &dyn Progress,
     ) -> Result<Volume<D>, FieldError> {

@@ -16,6 +16,7 @@ use crate::{
 use std::borrow::Cow;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::Device;
+use viewfuse_device::cpu::Cpu;
 use viewfuse_device::parallel::map;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::{SourceImage, SourceImages, longest_side};
@@ -34,8 +35,8 @@ pub(super) struct Views<'a, D: Device> {
     pub(super) matched: Matched<D>,
     /// For an effort and a weighting.
     pub(super) maps: SourceMaps<'a, D>,
-    /// For the views of the last target, as long as their maps stay.
-    pub(super) target: Option<TargetViews<D>>,
+    /// For the views of the last target, as long as their maps stay: by the first disparities, and by the second ones.
+    pub(super) targets: [Option<TargetViews<'a, D>>; 2],
     pub(super) scratch: Scratch<D>,
 }
 
@@ -100,7 +101,7 @@ impl<'a, D: Device> Views<'a, D> {
         let maps = SourceMaps::new(device, &matched, Vec::new())?;
         let (background, pictures) = (sources.background, Images::upload(device, &pictures)?);
         let scene = SceneViews { device, has_silhouettes, background, pictures, small, space, kept };
-        Ok(Views { scene, settings, matched, maps, target: None, scratch: Scratch::default() })
+        Ok(Views { scene, settings, matched, maps, targets: [None, None], scratch: Scratch::default() })
     }
 
     /// Planes for a camera.
@@ -135,11 +136,8 @@ impl<'a, D: Device> Prepared<'a> for Views<'a, D> {
         self.draw(request, progress)?()
     }
 
-    /// Finds the disparities, and asks for them.
     fn advance(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<bool, FieldError> {
-        self.exchange(progress)?;
-        self.settle(request.views, progress)?;
-        Ok(self.knows(request.views) || self.ask_for_found()?)
+        self.advance_target(request.views, progress)
     }
 
     fn draw(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Drawing<'a>, FieldError> {
@@ -154,7 +152,7 @@ impl<'a, D: Device> Prepared<'a> for Views<'a, D> {
             &block,
             0,
             height,
-            self.scratch.views.of(device, &blended)?,
+            &device.table(&blended)?,
             &self.scene.pictures.texels,
             &target.maps,
             &costs,
@@ -167,7 +165,7 @@ impl<'a, D: Device> Prepared<'a> for Views<'a, D> {
         let (background, has_silhouettes) = (self.scene.background, self.scene.has_silhouettes);
         let used = if has_silhouettes { &[] } else { request.views };
         let used: Vec<DepthMap> = used.iter().map(|view| self.depth_map(*view, &target.maps_on_host)).collect();
-        self.target = Some(target);
+        self.keep(target);
         Ok(Box::new(move || {
             let mut colours = colours.get()?;
             for colour in &mut colours {
@@ -188,7 +186,7 @@ impl<'a, D: Device> Prepared<'a> for Views<'a, D> {
     }
 
     fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
-        self.target = None;
+        self.targets = [None, None];
         self.maps = SourceMaps::new(self.scene.device, &self.matched, relevance.to_vec())?;
         Ok(())
     }
@@ -240,7 +238,7 @@ impl<D: Device> Geometry for Views<'_, D> {
         self.add_kept(&mut maps);
         let view_count = self.maps.steps.len();
         let encoded: Vec<usize> = (0..view_count).filter(|view| self.maps.steps[*view] > 0.0).collect();
-        let maps = self.confirmed(&encoded, &maps);
+        let maps = self.confirmed(&Cpu, &encoded, &maps)?;
         Ok((0..view_count).map(|view| self.depth_map(view, &maps)).collect())
     }
 }
