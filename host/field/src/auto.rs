@@ -44,6 +44,7 @@ use gain::{fewest_to_lose, is_better, is_better_near, is_lost, is_worth_mixing, 
 use held_out::{HeldOutSources, Outcome, coarse, coarse_side};
 use regions::Mixed;
 use serde::Serialize;
+use std::ops::Range;
 use viewfuse_core::pose::Pose;
 use viewfuse_core::weighting::{Formula, Scheme};
 use viewfuse_job::progress::Progress;
@@ -297,8 +298,8 @@ fn choose_of(
             if others.is_empty() {
                 break;
             }
-            for options in others {
-                let outcomes = search.outcomes(&chosen.weighting, &options, &before)?;
+            let all = search.outcomes_of(&chosen.weighting, &others, &before)?;
+            for (options, outcomes) in others.into_iter().zip(all) {
                 if is_better(&outcomes, &best, &before) {
                     (best, chosen.options) = (outcomes, options);
                 }
@@ -347,28 +348,49 @@ struct Search<'s, 'a> {
 }
 
 impl Search<'_, '_> {
-    /// The results of a candidate on the held-out sources, up to the one that decides that it is not better
-    /// than what it would replace: see [`is_lost`].
+    /// The results of a candidate on the held-out sources: [`Search::outcomes_of`].
     fn outcomes(
         &mut self,
         weighting: &Weighting,
         options: &AnyOptions,
         replaced: &[Outcome],
     ) -> Result<Vec<Outcome>, RenderError> {
+        Ok(self.outcomes_of(weighting, std::slice::from_ref(options), replaced)?.remove(0))
+    }
+
+    /// The results of candidates on the held-out sources, of each up to the one that decides that it is not better than
+    /// what all of them would replace: see [`is_lost`].
+    fn outcomes_of(
+        &mut self,
+        weighting: &Weighting,
+        options: &[AnyOptions],
+        replaced: &[Outcome],
+    ) -> Result<Vec<Vec<Outcome>>, RenderError> {
         let count = self.held_out.len();
-        let mut outcomes = Vec::new();
-        while outcomes.len() < count && !is_lost(&outcomes, replaced) {
-            // The fewest that can decide against it are waited for together.
-            let more = if replaced.is_empty() { count } else { fewest_to_lose(&outcomes, replaced) };
-            let next = outcomes.len()..count.min(outcomes.len() + more);
-            outcomes.extend(self.held_out.outcomes(next, weighting, options, self.progress)?);
+        let mut all = vec![Vec::new(); options.len()];
+        loop {
+            // The fewest that can decide against each of them; all are waited for together.
+            let next = |(number, outcomes): (usize, &Vec<Outcome>)| {
+                let is_decided = outcomes.len() == count || is_lost(outcomes, replaced);
+                let more = if replaced.is_empty() { count } else { fewest_to_lose(outcomes, replaced) };
+                (!is_decided).then(|| (number, outcomes.len()..count.min(outcomes.len() + more)))
+            };
+            let next: Vec<(usize, Range<usize>)> = all.iter().enumerate().filter_map(next).collect();
+            if next.is_empty() {
+                break;
+            }
+            let asked: Vec<_> = next.iter().map(|(number, which)| (which.clone(), &options[*number])).collect();
+            let outcomes = self.held_out.outcomes(weighting, &asked, self.progress)?;
+            next.iter().zip(outcomes).for_each(|((number, _), more)| all[*number].extend(more));
         }
-        (outcomes.len()..count).for_each(|_| self.progress.step());
-        let scores: Vec<f64> = outcomes.iter().map(|outcome| outcome.psnr).collect();
-        let psnr = (outcomes.len() == self.held_out.len()).then(|| mean_score(&outcomes));
-        let (weighting, options) = (weighting.to_string(), options.clone());
-        self.candidates.push(Candidate { weighting, options, mixture: None, psnr, scores });
-        Ok(outcomes)
+        for (options, outcomes) in options.iter().zip(&all) {
+            (outcomes.len()..count).for_each(|_| self.progress.step());
+            let scores: Vec<f64> = outcomes.iter().map(|outcome| outcome.psnr).collect();
+            let psnr = (outcomes.len() == count).then(|| mean_score(outcomes));
+            let (weighting, options) = (weighting.to_string(), options.clone());
+            self.candidates.push(Candidate { weighting, options, mixture: None, psnr, scores });
+        }
+        Ok(all)
     }
 
     /// The scheme that is better than the first one, with its results, if one is.

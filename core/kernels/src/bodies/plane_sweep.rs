@@ -4,9 +4,9 @@
 use crate::plane_sweep::Planes;
 use crate::plane_sweep::blend::{self, BlendBlock};
 use crate::plane_sweep::census;
+use crate::plane_sweep::consistency::{self, ConfirmBlock};
 use crate::plane_sweep::disparity;
 use crate::plane_sweep::evidence::{self, ViewPair};
-use crate::plane_sweep::consistency::{self, ConfirmBlock};
 use crate::plane_sweep::front::{self, Front, FrontBlock};
 use crate::plane_sweep::frustum::{FrustumBlock, SweptView};
 use crate::plane_sweep::path::{self, CostBlock, LINES_TOGETHER, Line};

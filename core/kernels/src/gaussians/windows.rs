@@ -158,11 +158,7 @@ fn mean(block: &LossBlock, pixel: u32, at: impl Fn(u32) -> [Channels; 3] + Copy)
 
 /// Mean and variance of a photograph in a pixel's window: red, green and blue each.
 #[inline(always)]
-pub fn moments(
-    block: &LossBlock,
-    photographs: &(impl Fetch<[f32; 4]> + ?Sized),
-    pixel: u32,
-) -> (Channels, Channels) {
+pub fn moments(block: &LossBlock, photographs: &(impl Fetch<[f32; 4]> + ?Sized), pixel: u32) -> (Channels, Channels) {
     let squared = |pixel: u32| {
         let [red, green, blue, _] = photographs.fetch((block.first + pixel) as usize);
         [[red, green, blue], [red * red, green * green, blue * blue], [0.0; 3]]

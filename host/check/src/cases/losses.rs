@@ -101,9 +101,8 @@ impl Case for MeasureWindows {
         let pixel = |pixel: usize| {
             let at = |pixel: usize, channel: usize| Bounded::from(photographs[block.first as usize + pixel][channel]);
             let means = [0, 1, 2].map(|channel| mean(block, pixel, |pixel| at(pixel, channel)));
-            let variance = |channel: usize| {
-                mean(block, pixel, |pixel| at(pixel, channel).squared()) - means[channel].squared()
-            };
+            let variance =
+                |channel: usize| mean(block, pixel, |pixel| at(pixel, channel).squared()) - means[channel].squared();
             (means, [0, 1, 2].map(variance))
         };
         let (means, variances): (Vec<_>, Vec<_>) = map(self.element_count(), 16, pixel).into_iter().unzip();

@@ -160,32 +160,31 @@ impl<'a> HeldOutSources<'a> {
         self.sources.iter().map(|source| source.target.name.as_str())
     }
 
-    /// Renders these of the held-out sources with this weighting and these options.
+    /// The results of [`HeldOutSources::frames`].
     pub(super) fn outcomes(
         &mut self,
-        which: Range<usize>,
         weighting: &Weighting,
-        options: &AnyOptions,
+        asked: &[(Range<usize>, &AnyOptions)],
         progress: &dyn Progress,
-    ) -> Result<Vec<Outcome>, RenderError> {
-        let frames = self.frames(which.clone(), weighting, std::slice::from_ref(options), progress)?.remove(0);
+    ) -> Result<Vec<Vec<Outcome>>, RenderError> {
+        let frames = self.frames(weighting, asked, progress)?;
         let outcome = |(index, frame): (usize, &Rendered)| {
             let picture = to_rgb8(&frame.colours, [frame.width, frame.height]);
             self.outcome(index, &picture, &frame.confidences)
         };
-        Ok(which.zip(&frames).map(outcome).collect())
+        let all = asked.iter().zip(&frames);
+        Ok(all.map(|((which, _), frames)| which.clone().zip(frames).map(outcome).collect()).collect())
     }
 
-    /// The pictures of these of the held-out sources under each of some options, `[options][source]`: those that were
-    /// kept, or rendered. All of them are begun before the first one is waited for.
+    /// Pictures with a weighting, for each of the options those of some held-out sources: kept ones, or rendered. All of
+    /// them are begun before the first one is waited for.
     pub(super) fn frames(
         &mut self,
-        which: Range<usize>,
         weighting: &Weighting,
-        options: &[AnyOptions],
+        asked: &[(Range<usize>, &AnyOptions)],
         progress: &dyn Progress,
     ) -> Result<Vec<Vec<Rendered>>, RenderError> {
-        let begun = options.iter().map(|options| self.begin(which.clone(), weighting, options, progress));
+        let begun = asked.iter().map(|(which, options)| self.begin(which.clone(), weighting, options, progress));
         let begun = begun.collect::<Result<Vec<_>, _>>()?;
         let mut all = Vec::with_capacity(begun.len());
         for begun in begun {

@@ -16,6 +16,7 @@ use crate::mixture::{Mixture, term_count, terms};
 use crate::render::RenderError;
 use crate::{AnyOptions, Rendered, Variant};
 use image::RgbImage;
+use std::ops::Range;
 use viewfuse_device::parallel::{for_each, map};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::{GroundTruth, to_rgb8};
@@ -108,7 +109,7 @@ fn further(
     let mut scores = Vec::with_capacity(mixtures.len());
     for Variant { options: parts, .. } in &mixtures {
         let mut example: Vec<Example> = held_out.truths().skip(nearest).take(1).map(Example::of).collect();
-        add(&mut example, held_out.frames(nearest..nearest + 1, weighting, parts, progress)?);
+        add(&mut example, held_out.frames(weighting, &under(nearest..nearest + 1, parts), progress)?);
         let (rendered, _) = by_its_own(&mut example[0], parts);
         scores.push(held_out.outcome(nearest, &picture(&rendered), &rendered.confidences).psnr);
     }
@@ -135,24 +136,29 @@ fn one(
     progress.expect(examples.len() * parts.len());
     let count = examples.len();
     let cheap = if parts.len() < 3 { parts.len() } else { parts.len() - 1 };
-    add(&mut examples, held_out.frames(0..count, weighting, &parts[..cheap], progress)?);
+    add(&mut examples, held_out.frames(weighting, &under(0..count, &parts[..cheap]), progress)?);
     let without_last = fitted(held_out, &mut examples, &label, &parts[..cheap]);
     let last = &parts[cheap..];
     if last.is_empty() {
         return Ok(without_last);
     }
     // The last picture is the dearest one: a source says whether it has a share at all.
-    add(&mut examples, held_out.frames(0..1, weighting, last, progress)?);
+    add(&mut examples, held_out.frames(weighting, &under(0..1, last), progress)?);
     let (_, first_shares) = by_its_own(&mut examples[0], &parts);
     if first_shares.last().is_none_or(|share| *share < MIN_FIRST_SHARE) {
         (1..count).for_each(|_| progress.step());
         return Ok(without_last);
     }
-    add(&mut examples[1..], held_out.frames(1..count, weighting, last, progress)?);
+    add(&mut examples[1..], held_out.frames(weighting, &under(1..count, last), progress)?);
     let all = fitted(held_out, &mut examples, &label, &parts);
     let is_worth_it =
         mean_score(&all.outcomes) > mean_score(&without_last.outcomes) - MAX_LOSS && all.last_share >= MIN_LAST_SHARE;
     Ok(if is_worth_it { all } else { without_last })
+}
+
+/// The same sources under each of some options.
+fn under(which: Range<usize>, options: &[AnyOptions]) -> Vec<(Range<usize>, &AnyOptions)> {
+    options.iter().map(|options| (which.clone(), options)).collect()
 }
 
 /// Adds more pictures of each example.

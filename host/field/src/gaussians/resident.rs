@@ -11,9 +11,9 @@
 mod arrays;
 
 use super::course::{Course, Plan, Steps};
+use super::particles::Particle;
 use super::picture::{ENTRIES_A_GAUSSIAN, MIN_ENTRIES};
 use crate::FieldError;
-use super::particles::Particle;
 use arrays::{Entries, Level, Needed, Particles, Photographs, Stepped, list_block, stepped};
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::gaussian::REST_COUNTS;

@@ -54,11 +54,7 @@ impl<'a, D: Device> Views<'a, D> {
 
     /// Takes what is known of these views, or begins to find it from these views alone: a picture does not depend on
     /// sources without a weight. Returns whether it was begun before.
-    fn begun(
-        &mut self,
-        views: &[usize],
-        progress: &dyn Progress,
-    ) -> Result<(TargetViews<'a, D>, bool), FieldError> {
+    fn begun(&mut self, views: &[usize], progress: &dyn Progress) -> Result<(TargetViews<'a, D>, bool), FieldError> {
         self.exchange(progress)?;
         self.settle(views, progress)?;
         let slot = self.slot();
@@ -94,6 +90,12 @@ impl<'a, D: Device> Views<'a, D> {
             target.gains = exposure::gains(cameras, texels, &target.maps_on_host, &used);
         }
         Ok(target)
+    }
+
+    /// The maps of these views that a target's picture needed, if one did.
+    pub(super) fn known(&self, views: &[usize]) -> Option<&[[f32; 2]]> {
+        let known = self.targets[self.slot()].as_ref().filter(|target| target.views == views);
+        known.filter(|target| target.coming.is_none()).map(|target| &target.maps_on_host[..])
     }
 
     /// Keeps what is found of a target's views for its next picture.

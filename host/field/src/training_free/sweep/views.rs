@@ -109,6 +109,11 @@ impl<'a, D: Device> Views<'a, D> {
         Range::new(self.scene.space.disparities(camera), self.settings.plane_count)
     }
 
+    /// The views that are encoded.
+    fn encoded(&self) -> Vec<usize> {
+        (0..self.maps.steps.len()).filter(|view| self.maps.steps[*view] > 0.0).collect()
+    }
+
     /// A view's depths, of the disparities of all views.
     fn depth_map(&self, view: usize, maps: &[[f32; 2]]) -> DepthMap {
         let (camera, step) = (self.matched.images.cameras[view], self.maps.steps[view]);
@@ -230,15 +235,17 @@ impl<D: Device> Geometry for Views<'_, D> {
     }
 
     fn ask_for_depths(&self) -> Result<bool, FieldError> {
-        self.ask_for_found()
+        if self.known(&self.encoded()).is_some() { Ok(true) } else { self.ask_for_found() }
     }
 
     fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError> {
+        let of = |maps: &[[f32; 2]]| (0..self.maps.steps.len()).map(|view| self.depth_map(view, maps)).collect();
+        let encoded = self.encoded();
+        if let Some(known) = self.known(&encoded) {
+            return Ok(of(known));
+        }
         let mut maps = self.found()?.to_vec();
         self.add_kept(&mut maps);
-        let view_count = self.maps.steps.len();
-        let encoded: Vec<usize> = (0..view_count).filter(|view| self.maps.steps[*view] > 0.0).collect();
-        let maps = self.confirmed(&Cpu, &encoded, &maps)?;
-        Ok((0..view_count).map(|view| self.depth_map(view, &maps)).collect())
+        Ok(of(&self.confirmed(&Cpu, &encoded, &maps)?))
     }
 }
