@@ -127,7 +127,7 @@ fn open(given: &Given) -> Result<AnyField, OpenError> {
 
 /// Those of the sweep, of the hull, and of Gaussians, each in the order of their first use: which of them a scene needs
 /// is known when its photographs are read.
-const KERNELS: [Kernel; 33] = [
+const KERNELS: [Kernel; 35] = [
     Kernel::CompareViews,
     Kernel::CensusCost,
     Kernel::RowSums,
@@ -135,6 +135,7 @@ const KERNELS: [Kernel; 33] = [
     Kernel::FollowPaths,
     Kernel::JoinPaths,
     Kernel::PickDisparity,
+    Kernel::ConfirmDisparities,
     Kernel::PlaneOpacity,
     Kernel::FrontCost,
     Kernel::BlendPlanes,
@@ -152,6 +153,7 @@ const KERNELS: [Kernel; 33] = [
     Kernel::SortEntries,
     Kernel::StartTiles,
     Kernel::BlendSplats,
+    Kernel::MeasureWindows,
     Kernel::CompareWindows,
     Kernel::ComparePixels,
     Kernel::BlendGradient,
