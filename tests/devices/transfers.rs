@@ -1,15 +1,20 @@
 //! Arrays there and back.
 
 use crate::candidate::{Candidate, tests};
-use bytemuck::Pod;
+use bytemuck::{Pod, bytes_of};
 use libtest_mimic::Failed;
 use std::fmt::Debug;
-use viewfuse_vulkan::{Gpu, GpuOptions, Limits, VulkanError};
+use viewfuse_core::sampler::Mix;
+use viewfuse_vulkan::kernel::Kernel;
+use viewfuse_vulkan::{Buffer, Gpu, GpuOptions, Limits, VulkanError};
 
 tests!(
     arrays_of_any_length_come_back, arrays_larger_than_a_transfer_come_back, arrays_in_pieces_come_back,
-    uploads_do_not_wait_for_one_another,
+    tables_are_read_where_they_are_written, uploads_do_not_wait_for_one_another,
 );
+
+/// The sum of two arrays.
+const SUM: Mix = Mix { state: 1.0, results: [1.0, 0.0, 0.0, 0.0] };
 
 /// Numbers without a pattern that a shifted or repeated stretch would share.
 fn number(index: usize) -> u64 {
@@ -61,6 +66,34 @@ fn arrays_in_pieces_come_back(candidate: &Candidate) -> Result<(), Failed> {
         of_every_width(&gpu, 1)?;
         of_every_width(&gpu, 10_001)?;
     }
+    Ok(())
+}
+
+/// A kernel reads two tables while later ones are written; nothing is submitted for a table alone.
+fn tables_are_read_where_they_are_written(candidate: &Candidate) -> Result<(), Failed> {
+    let gpu = candidate.gpu(&GpuOptions::default())?;
+    for length in [1, 3, 1000, 16_384] {
+        let values = |table: usize| -> Vec<f32> { (0..length).map(|at| (at + 7 * table) as f32 / 64.0).collect() };
+        let before = gpu.submission_count();
+        let tables = (0..20).map(|table| gpu.table(&values(table))).collect::<Result<Vec<_>, _>>()?;
+        let tables: Vec<Buffer<f32>> = tables.into_iter().map(|table| table.expect("a short one")).collect();
+        assert_eq!(gpu.submission_count(), before);
+        let sums = (1..tables.len())
+            .map(|table| {
+                let sums = gpu.zeros::<f32>(length)?;
+                let [a, b] = [table - 1, table].map(|table| tables[table].bind());
+                gpu.dispatch(Kernel::MixPictures, bytes_of(&SUM), 0..length as u32, &[a, b, a, a, a, sums.bind()])?;
+                Ok(sums)
+            })
+            .collect::<Result<Vec<_>, VulkanError>>()?;
+        drop(tables);
+        for (table, sums) in (1..).zip(&sums) {
+            let expected: Vec<f32> = values(table - 1).iter().zip(values(table)).map(|(a, b)| a + b).collect();
+            assert!(gpu.download(sums)? == expected, "tables of {length}");
+        }
+    }
+    assert!(gpu.table(&[0_u8; (64 << 10) + 1])?.is_none() && gpu.table::<u8>(&[])?.is_none());
+    assert!(gpu.table(&[1_u8, 2, 3])?.is_some_and(|table| gpu.download(&table).is_ok_and(|read| read == [1, 2, 3])));
     Ok(())
 }
 

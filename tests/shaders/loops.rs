@@ -30,9 +30,9 @@ const LEFT_BY_THEIR_BODY: [(&str, usize); 10] = [
 /// does, these arrays are memory and not registers.
 const INDEXED_BY_A_COUNTER: &str = "add_noise blend_gradient blend_planes blend_splats census_cost coarse_depths \
     compare_pixels compare_views compare_windows composite count_entries embed_points follow_paths front_cost \
-    gather_gradients hull_entry join_paths list_entries look_up_texels march_rays match_cost pick_depth pick_disparity \
-    plane_opacity project_gradients project_particles random_draws row_sums step_gains step_harmonics step_particles \
-    window_cost";
+    gather_gradients hull_entry join_paths list_entries look_up_texels march_rays match_cost measure_windows pick_depth \
+    pick_disparity plane_opacity project_gradients project_particles random_draws row_sums step_gains step_harmonics \
+    step_particles window_cost";
 
 fn compiled() -> [Module; 4] {
     let modules = Modules::read(&repository()).expect("the compiled kernels");

@@ -98,9 +98,10 @@ impl<'a, D: Device> Views<'a, D> {
         known.filter(|target| target.coming.is_none()).map(|target| &target.maps_on_host[..])
     }
 
-    /// Keeps what is found of a target's views for its next picture.
+    /// Keeps what is found of a target's views for its next picture; volumes of the last picture alone.
     pub(super) fn keep(&mut self, target: TargetViews<'a, D>) {
         let slot = self.slot();
+        self.targets[1 - slot].iter_mut().for_each(|other| other.compared = None);
         self.targets[slot] = Some(target);
     }
 
