@@ -276,6 +276,14 @@ impl Gpu {
         usize::try_from(most).unwrap_or(usize::MAX) / bytes.max(1)
     }
 
+    /// Submits what is recorded: the device begins with it, and nobody waits.
+    ///
+    /// # Errors
+    /// If the device fails, or failed before.
+    pub fn submit(&self) -> Result<(), VulkanError> {
+        self.with_state(|_, state| state.submissions.flush())
+    }
+
     /// Waits until all work is done.
     ///
     /// # Errors

@@ -167,6 +167,15 @@ pub trait Memory {
         true
     }
 
+    /// Lets a device begin with all dispatched work, which it would otherwise do when somebody waits or there is enough
+    /// of it: the host has other things to do before it waits.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    fn submit(&self) -> Result<(), DeviceError> {
+        Ok(())
+    }
+
     /// Waits until all dispatched work is done, so that its time can be measured.
     ///
     /// # Errors

@@ -179,6 +179,11 @@ impl Memory for Vulkan {
         self.is_software
     }
 
+    /// The cores of a software driver have the host's work to do.
+    fn submit(&self) -> Result<(), DeviceError> {
+        if self.is_software { Ok(()) } else { Ok(self.gpu.submit()?) }
+    }
+
     fn finish(&self) -> Result<(), DeviceError> {
         Ok(self.gpu.wait()?)
     }

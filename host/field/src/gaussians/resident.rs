@@ -277,7 +277,7 @@ impl<D: Device> Steps for Resident<'_, D> {
 
     fn ask(&mut self, course: &Course) -> Result<(), FieldError> {
         self.asked = Some(self.ask_for(self.needed(course))?);
-        Ok(())
+        Ok(self.device.submit()?)
     }
 
     fn forget(&mut self) {

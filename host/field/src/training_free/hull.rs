@@ -1,7 +1,9 @@
 //! Sources that show a silhouette: a visual hull from silhouettes, depths by plane sweep, colours by weighted
 //! fusion; the mathematics is in [`viewfuse_kernels::visual_hull`].
 
-use crate::{AnyOptions, DepthMap, Encoding, FieldError, Geometry, Options, Prepared, Rendered, Request, Variant};
+use crate::{
+    AnyOptions, DepthMap, Drawing, Encoding, FieldError, Geometry, Options, Prepared, Rendered, Request, Variant,
+};
 use std::ops::Range;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_device::{Device, HullScene, Pixels};
@@ -213,6 +215,10 @@ impl<'a, D: Device> Prepared<'a> for Views<'a, D> {
     }
 
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
+        self.draw(request, progress)?()
+    }
+
+    fn draw(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Drawing<'a>, FieldError> {
         let Views { device, whole, reduced, background, depths, .. } = self;
         let scene = &reduced.as_ref().unwrap_or(whole).scene;
         let depths = depths.as_mut().ok_or_else(|| FieldError::unsuitable(NotWeighed))?;
@@ -220,7 +226,7 @@ impl<'a, D: Device> Prepared<'a> for Views<'a, D> {
         let &Request { camera: target, early_termination, .. } = request;
         let (width, height) = (target.pinhole.width(), target.pinhole.height());
         let count = (width * height) as usize;
-        let weights = device.upload(&request.view_weights())?;
+        let weights = device.table(&request.view_weights())?;
         let target = MarchBlock { target: target.block(0), background: *background, termination: early_termination };
         let mut pixels: Pixels<D> = Pixels { colours: device.zeros(count)?, depths: device.zeros(count)? };
         let band_rows = BAND_ROWS.max(u32::try_from(device.busy_elements() / width as usize).unwrap_or(u32::MAX));
@@ -236,8 +242,11 @@ impl<'a, D: Device> Prepared<'a> for Views<'a, D> {
             )?;
             progress.step();
         }
-        let (colours, depths) = (device.download(&pixels.colours)?, device.download(&pixels.depths)?);
-        Ok(Rendered { colours, depths, confidences: Vec::new(), width, height })
+        let (colours, depths) = (device.download_later(&pixels.colours)?, device.download_later(&pixels.depths)?);
+        Ok(Box::new(move || {
+            let (colours, depths) = (colours.get()?, depths.get()?);
+            Ok(Rendered { colours, depths, confidences: Vec::new(), width, height })
+        }))
     }
 
     fn is_weighted(&self) -> bool {

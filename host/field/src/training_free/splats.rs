@@ -144,6 +144,7 @@ impl<'a, D: Device> Splats<'a, D> {
         let sources = missing.iter().map(|view| images.images[*view].camera.block(0));
         let begin = |camera: CameraBlock| splatter.begin(&self.gaussians, self.count, &camera, &self.room);
         let begun = [target].into_iter().chain(sources).map(begin).collect::<Result<Vec<_>, _>>()?;
+        device.submit()?;
         let (splats, images) = (self.clone(), images.clone());
         Ok(move || {
             let Splats { gaussians, count, gains, residuals, room, .. } = &*splats;

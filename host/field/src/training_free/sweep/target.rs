@@ -64,6 +64,7 @@ impl<'a, D: Device> Views<'a, D> {
         let device = self.scene.device;
         let maps = self.confirmed(device, views, self.found_on_device())?;
         let coming = Some(device.download_later(&maps)?);
+        device.submit()?;
         let (maps_on_host, gains) = (Vec::new(), Vec::new());
         Ok((TargetViews { views: views.to_vec(), maps, coming, maps_on_host, gains, compared: None }, false))
     }

@@ -167,6 +167,7 @@ impl<'a, D: Device> Prepared<'a> for Views<'a, D> {
         )?;
         let colours = device.download_later(&colours)?;
         let (depths, confidences) = (device.download_later(&depths)?, device.download_later(&confidences)?);
+        device.submit()?;
         let (background, has_silhouettes) = (self.scene.background, self.scene.has_silhouettes);
         let used = if has_silhouettes { &[] } else { request.views };
         let used: Vec<DepthMap> = used.iter().map(|view| self.depth_map(*view, &target.maps_on_host)).collect();
