@@ -83,6 +83,9 @@ impl<'a, D: Device> Views<'a, D> {
         progress: &dyn Progress,
     ) -> Result<TargetViews<'a, D>, FieldError> {
         let (mut target, _) = self.begun(views, progress)?;
+        // There is memory for one picture's volume.
+        let other = 1 - self.slot();
+        self.targets[other].iter_mut().for_each(|other| other.compared = None);
         if let Some(coming) = target.coming.take() {
             target.maps_on_host = coming.get()?;
             let steps = self.maps.steps.iter().enumerate();
@@ -99,10 +102,9 @@ impl<'a, D: Device> Views<'a, D> {
         known.filter(|target| target.coming.is_none()).map(|target| &target.maps_on_host[..])
     }
 
-    /// Keeps what is found of a target's views for its next picture; volumes of the last picture alone.
+    /// Keeps what is found of a target's views for its next picture.
     pub(super) fn keep(&mut self, target: TargetViews<'a, D>) {
         let slot = self.slot();
-        self.targets[1 - slot].iter_mut().for_each(|other| other.compared = None);
         self.targets[slot] = Some(target);
     }
 
