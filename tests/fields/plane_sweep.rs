@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::render::{RenderError, RenderOptions, RenderRun, Stage, render, render_all};
 use viewfuse::field::training_free::{Cache, Sweep, TrainingFree};
-use viewfuse::field::{DepthMap, On, Rendered};
+use viewfuse::field::{AnyOptions, DepthMap, On, Rendered};
 use viewfuse::job::digest::{SEAL, sealed, sha256};
 use viewfuse::job::progress::{Progress, Silent};
 use viewfuse::scene::few_shot::{FewShot, Target};
@@ -388,6 +388,43 @@ fn second_disparities_are_the_same_bits_whether_the_first_comparison_is_kept_or_
         [(); 2].map(|()| stage.picture(&target, &weights, 0.0, &Silent).expect("a picture"))
     });
     assert_eq!(twice, [expected.clone(), expected]);
+}
+
+/// One stage under several settings, as trials and mixtures have it, gives what a fresh one gives under each, whichever
+/// sources a picture uses.
+#[test]
+fn what_other_settings_found_changes_no_bit() {
+    let mut sources = wall([0.8, 1.0, 1.25]);
+    sources.images.push(photograph(camera(Vec3::new(0.2, 0.2, 0.0), 72, 54), 0.9));
+    let target = camera(Vec3::ZERO, 72, 54);
+    let first = Sweep::default();
+    let second = Sweep { front_share: 0.2, second_share: 0.03, ..first };
+    let settings =
+        [first, second, Sweep { near_cost: 0.05, ..second }, Sweep { near_cost: 0.05, ..first }, second, first];
+    let field = |sweep: Sweep| TrainingFree { sweep, ..TrainingFree::default() };
+    let drawn = |stage: &mut Stage<'_>, number: usize| {
+        let weights = without(4, if number % 2 == 0 { 3 } else { 4 }, 4);
+        let picture = stage.picture(&target, &weights, 0.0, &Silent).expect("a picture");
+        (picture, stage.source_depths().expect("depths"))
+    };
+    let shared = on_stage(&field(first), &sources, &Silent, |stage| {
+        // The depths of some are known when the others are encoded.
+        let few = drawn(stage, 0).1;
+        assert!(few[3].depths.iter().all(|depth| *depth == 0.0) && few[0].depths.iter().any(|depth| *depth > 0.0));
+        stage.encode_all(&Silent).expect("encoded sources");
+        let of = |number: usize| {
+            stage.vary(Some(&AnyOptions::new(field(settings[number]))), None, &Silent).expect("settings");
+            drawn(stage, number)
+        };
+        [0, 1, 2, 3, 4, 5].map(of)
+    });
+    for (number, (sweep, shared)) in settings.into_iter().zip(shared).enumerate() {
+        let fresh = on_stage(&field(sweep), &sources, &Silent, |stage| {
+            stage.encode_all(&Silent).expect("encoded sources");
+            drawn(stage, number)
+        });
+        assert!(shared == fresh, "settings {number}");
+    }
 }
 
 /// A target of another shape than the size keeps its own, and that is said.
