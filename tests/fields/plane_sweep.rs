@@ -399,17 +399,25 @@ fn what_other_settings_found_changes_no_bit() {
     let target = camera(Vec3::ZERO, 72, 54);
     let first = Sweep::default();
     let second = Sweep { front_share: 0.2, second_share: 0.03, ..first };
-    let settings =
-        [first, second, Sweep { near_cost: 0.05, ..second }, Sweep { near_cost: 0.05, ..first }, second, first];
+    let settings = [
+        first,
+        second,
+        Sweep { second_share: 0.06, ..second },
+        Sweep { near_cost: 0.05, ..second },
+        Sweep { consistency_share: 0.1, ..first },
+        first,
+    ];
     let field = |sweep: Sweep| TrainingFree { sweep, ..TrainingFree::default() };
     let drawn = |stage: &mut Stage<'_>, number: usize| {
-        let weights = without(4, if number % 2 == 0 { 3 } else { 4 }, 4);
+        let weights = without(4, if number % 3 == 0 { 3 } else { 4 }, 4);
         let picture = stage.picture(&target, &weights, 0.0, &Silent).expect("a picture");
         (picture, stage.source_depths().expect("depths"))
     };
     let shared = on_stage(&field(first), &sources, &Silent, |stage| {
-        // The depths of some are known when the others are encoded.
-        let few = drawn(stage, 0).1;
+        // The depths of some are known when the others are encoded; those of two are a target's.
+        drawn(stage, 0);
+        stage.picture(&target, &without(4, 2, 4), 0.0, &Silent).expect("a picture");
+        let few = stage.source_depths().expect("depths");
         assert!(few[3].depths.iter().all(|depth| *depth == 0.0) && few[0].depths.iter().any(|depth| *depth > 0.0));
         stage.encode_all(&Silent).expect("encoded sources");
         let of = |number: usize| {

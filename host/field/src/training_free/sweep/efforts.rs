@@ -62,6 +62,9 @@ impl<D: Device> Views<'_, D> {
     /// Goes on with other settings. What is found of the sources is dropped where it has another size.
     pub(super) fn go_on_with(&mut self, settings: Sweep) -> Result<(), FieldError> {
         let before = std::mem::replace(&mut self.settings, settings);
+        if before.consistency_share != settings.consistency_share {
+            self.targets = [None, None];
+        }
         if before.finds_of() == settings.finds_of() {
             return Ok(());
         }
