@@ -146,6 +146,13 @@ fn labels_name_schemes() {
     // One that means another scheme would be read as that.
     let taken = "weights toy --target 20 --weights mean=error:alpha=1";
     assert_wrong_arguments(&folder, taken, &["'mean' is a weighting itself"]);
+    // In JSON one of two schemes under one name would be missing.
+    for form in ["", "--json", "--csv", "--npy weights.npy"] {
+        let two = format!("weights toy --target 20 --weights a=mean --weights a=l1 {form}");
+        assert_wrong_arguments(&folder, &two, &["two schemes would be called 'a'"]);
+    }
+    let once = done(&folder, "weights toy --target 20 --weights mean --csv");
+    assert_eq!(done(&folder, "weights toy --target 20 --weights mean --weights mean --csv"), once);
 }
 
 fn nothing_counts_twice_in_a_table() {

@@ -6,6 +6,7 @@ use super::path::PathOptions;
 use super::printing::{complain, say, warn_of};
 use super::table::table;
 use super::weighting::{many_help, open_all, or_every_scheme};
+use super::wrong::wrong;
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
@@ -48,7 +49,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    let weightings = open_all(&or_every_scheme(&arguments.weights)?)?;
+    let weightings = open_all(&each_once(or_every_scheme(&arguments.weights)?)?)?;
     let scene = Scene::open(&arguments.scene)?;
     warn_of(&scene);
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), arguments.path.choice());
@@ -90,6 +91,23 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Each scheme once. Two under one name are refused: JSON has one entry a name, so one of them would be missing, and in
+/// tables nobody could tell them apart.
+fn each_once(given: Vec<WeightingSpec>) -> anyhow::Result<Vec<WeightingSpec>> {
+    let mut schemes: Vec<WeightingSpec> = Vec::new();
+    for scheme in given {
+        if schemes.contains(&scheme) {
+            continue;
+        }
+        let name = scheme.to_string();
+        if schemes.iter().any(|other| other.to_string() == name) {
+            return Err(wrong(format_args!("--weights: two schemes would be called '{name}'; give them other labels")));
+        }
+        schemes.push(scheme);
+    }
+    Ok(schemes)
 }
 
 /// Whether an array is one of weights, as another one: its header without the sizes.
