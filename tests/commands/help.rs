@@ -102,4 +102,11 @@ fn shells_complete_and_pages_tell() {
         "{page}"
     );
     assert!(done(&folder, "completions man").contains(".TH viewfuse"));
+    // What an earlier version wrote is replaced, what somebody else wrote stays.
+    done(&folder, "completions bash -o scripts/bash");
+    done(&folder, "completions man -o pages");
+    folder.write("profile", "source <(viewfuse completions bash)\n").write("other/viewfuse-render.1", "notes\n");
+    for others in ["bash -o profile", "zsh -o scripts/bash", "fish -o other/viewfuse-render.1", "man -o other"] {
+        assert_wrong_arguments(&folder, &format!("completions {others}"), &["would be replaced"]);
+    }
 }

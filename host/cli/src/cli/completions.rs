@@ -1,5 +1,6 @@
 //! `viewfuse completions`: what a shell completes, and manual pages, from the command line itself.
 
+use super::outputs::{keep_others, keep_unlike};
 use super::printing::{data_out, say};
 use clap::{Args, Command, ValueEnum};
 use clap_complete::{Shell, generate};
@@ -61,12 +62,21 @@ pub(crate) fn run(arguments: &Arguments, mut command: Command) -> anyhow::Result
     generate(shell, &mut command, NAME, &mut script);
     match output {
         Some(path) => {
+            keep_others(path)?;
+            keep_unlike(path, &script, is_script)?;
             write_whole(path, &script)?;
             say(path.display())?;
         }
         None => put(&script)?,
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Whether a file is a script for the same shell as another one, by its first line: what a shell reads at its start may
+/// name this command, too.
+fn is_script(there: &[u8], new: &[u8]) -> bool {
+    let first = |text: &[u8]| text.split(|byte| *byte == b'\n').find(|line| !line.is_empty()).map(<[u8]>::to_vec);
+    first(there) == first(new)
 }
 
 /// A page for the command and each of its commands in a folder, or the first on standard output.
@@ -79,9 +89,15 @@ fn write_pages(mut command: Command, folder: Option<&Path>) -> anyhow::Result<()
     };
     let Some(folder) = folder else { return Ok(put(&page(&command)?)?) };
     let commands = command.get_subcommands().filter(|within| within.get_name() != "help");
+    let mut pages = Vec::new();
     for page_of in [&command].into_iter().chain(commands) {
         let path = folder.join(format!("{}.1", page_of.get_display_name().unwrap_or(page_of.get_name())));
-        write_whole(&path, &page(page_of)?)?;
+        // Before the first is written, all are asked.
+        keep_others(&path)?;
+        pages.push((path, page(page_of)?));
+    }
+    for (path, page) in pages {
+        write_whole(&path, &page)?;
         say(path.display())?;
     }
     Ok(())
