@@ -1,6 +1,8 @@
 //! Videos and animated pictures of paths: their content by other readers, and runs that are killed and continued.
 
-use super::{assert_refused, command, done, killed_when, list_of, number_of, numbers, read_json};
+use super::{
+    assert_refused, assert_wrong_arguments, command, done, killed_when, list_of, number_of, numbers, read_json,
+};
 use image::codecs::webp::WebPDecoder;
 use image::{AnimationDecoder, Rgb, RgbImage};
 use serde_json::{Value, json};
@@ -85,6 +87,9 @@ fn a_path_as_animated_webp_and_as_y4m() {
     assert!(run.status.success() && said.is_empty(), "{said}");
     assert!(run.stdout == fs::read(out.join("video.y4m")).expect("a file"), "another video on standard output");
     assert_eq!(files_below(&scene), before);
+    for files in ["--video webp", "--depth npy", "--alpha"] {
+        assert_wrong_arguments(&scene, &format!("{PATH} {files} -o -"), &["standard output", "no files are written"]);
+    }
 }
 
 /// The frames of a GIF are these pictures, up to its 256 colours, at 12 a second.

@@ -56,6 +56,18 @@ impl OutputOptions {
         }
     }
 
+    /// Refuses what is asked for and standard output, which takes the pictures alone, does not get.
+    pub(crate) fn check_stream(&self) -> anyhow::Result<()> {
+        let asked = [(!self.video.is_empty(), "--video"), (self.depth.is_some(), "--depth"), (self.alpha, "--alpha")];
+        match asked.into_iter().find(|(is_asked, _)| *is_asked) {
+            Some((_, option)) => Err(wrong(format_args!(
+                "{option}: with --output - the pictures go to standard output as y4m, which has no alpha, and no files \
+                 are written; leave it out, or give a folder"
+            ))),
+            None => Ok(()),
+        }
+    }
+
     pub(crate) fn outputs(&self) -> Outputs {
         let depths = match &self.depth {
             _ if self.pictures_only => Vec::new(),

@@ -70,8 +70,9 @@ impl Prepared {
     /// `values` are all options and their values.
     pub(super) fn open(arguments: &Arguments, values: &BTreeMap<String, String>) -> anyhow::Result<Prepared> {
         let start = Instant::now();
-        if !arguments.is_stream() {
-            refuse_file(&arguments.output)?;
+        match arguments.is_stream() {
+            true => arguments.outputs.check_stream()?,
+            false => refuse_file(&arguments.output)?,
         }
         let weighting = arguments.weighting()?;
         // Finding poses takes minutes: what can be refused without them is.
