@@ -249,7 +249,7 @@ fn an_ffmpeg_gets_the_video_or_there_is_y4m() {
     for no_video_or_another in ["", "--video mp4"] {
         let run = with_programs(&folder, &programs, &format!("{PATH} {no_video_or_another} -o out"));
         assert_eq!(run.code, Some(1));
-        assert!(run.stderr.contains("1 files of an earlier run, video.y4m for one"), "{}", run.stderr);
+        assert!(run.stderr.contains("has 1 file of an earlier run, video.y4m for one"), "{}", run.stderr);
         assert!(fs::read(folder.join("out/video.y4m")).expect("a video") == video);
     }
     let run = with_programs(&folder, &programs, &format!("{PATH} --video mp4 --replace -o out"));

@@ -27,8 +27,8 @@ pub enum OutputError {
     NotWritten(PathBuf),
     /// An earlier run wrote other pictures, or a video, there.
     #[error(
-        "{}: has {count} files of an earlier run, {example} for one, which this run does not write, and cannot be \
-         added to: {reason}", folder.display()
+        "{}: has {count} file{} of an earlier run, {example} for one, which this run does not write, and cannot be \
+         added to: {reason}", folder.display(), if *count == 1 { "" } else { "s" }
     )]
     OtherRun {
         /// The folder.
