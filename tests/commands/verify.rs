@@ -1,6 +1,6 @@
 //! `viewfuse verify` on reference values computed here in `f64`, right and wrong.
 
-use super::{done, number_of, run};
+use super::{assert_refused, done, number_of, run};
 use serde_json::{Value, json};
 use viewfuse_tests::command::safetensors;
 use viewfuse_tests::scenes::Folder;
@@ -77,6 +77,11 @@ fn a_file_without_weights_is_no_reference() {
         let outcome = run(&folder, "verify weighting.json");
         assert_eq!((outcome.code, outcome.stdout.as_str()), (Some(1), ""));
         assert!(outcome.stderr.contains("holds no reference values"), "{outcome:?}");
+    }
+    for other in [json!({ "frames": [] }), json!([{ "name": "by hand" }]), json!(3)] {
+        folder.write("other.json", other.to_string());
+        let line = "other.json: holds no reference values that this version knows";
+        assert_refused(&folder, "verify other.json", &[line]);
     }
 }
 

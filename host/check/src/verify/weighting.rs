@@ -34,6 +34,10 @@ pub(super) fn verify(path: &Path, json: &Value) -> Result<Report, VerifyError> {
         place: place.to_owned(),
         message,
     };
+    // Other JSON, as that of a scene, is no damaged file of weights.
+    if json.get("cases").is_none() {
+        return Err(VerifyError::Unknown { path: path.to_path_buf() });
+    }
     let file = File::deserialize(json).map_err(|error| content("top level", error.to_string()))?;
     if file.cases.is_empty() {
         return Err(content("cases", "holds no reference values".to_owned()));
