@@ -8,7 +8,8 @@
 //!
 //! Bytes count each number once that is read or written; a cache may serve several reads. Of products, convolutions,
 //! compositing and the census the operations are counted by hand, those of a convolution's definition: a processor,
-//! which convolves large images by fewer (Winograd), may have a share above 1, as arrays may that stay in its caches.
+//! which convolves large images by fewer (Winograd) and adds the census in whole numbers of 16 bits, may have a share
+//! above 1, as arrays may that stay in its caches.
 //! An operation that no device may fuse with another takes the place of two. Where views are compared on planes it is
 //! look-ups. Other kernels are compared with the copy only.
 //!

@@ -15,9 +15,9 @@ use viewfuse_vulkan::GpuOptions;
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  viewfuse bench\n  viewfuse bench --device vulkan --json > bench.json\n\n\
-    A share is the time that the device's own limits allow over the time that a kernel took; it is above 100 % where a\n\
-    convolution takes fewer operations than its definition, and where arrays stay in a processor's caches.\n\
-    Exit code 1 if a device fails.")]
+    A share is the time that the device's own limits allow over the time that a kernel took; it is above 100 % where a \
+    convolution takes fewer operations than its definition, where a processor adds the census in whole numbers of 16 \
+    bits, and where arrays stay in its caches.\n\nExit code 1 if a device fails.")]
 pub(crate) struct Arguments {
     /// Measure this device: cpu, vulkan, vulkan:NUMBER or vulkan:NAME; may be given several times [default: all]
     #[arg(long, value_name = "DEVICE")]
