@@ -121,6 +121,10 @@ fn the_few_sources_of_a_target() {
     assert_wrong_arguments(&folder, "select toy -k 2 --orbit 3 --index", &["--index needs targets"]);
     let table = done(&folder, "select toy -k 2 --targets 20");
     assert!(table.contains(greatest[0]) && table.contains("for all together: "), "{table}");
+    // A share is one of the sources' weight, however many photographs the scene has besides.
+    assert!(table.starts_with("toy, error:alpha=1: 2 of 23 sources\n"), "{table}");
+    let of_few = done(&folder, "select toy -k 9 --targets 20 --views 4");
+    assert!(of_few.starts_with("toy, error:alpha=1: 4 of 4 sources\n"), "{of_few}");
 }
 
 fn the_few_sources_of_a_path() {

@@ -77,7 +77,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
             || wrong("--index needs targets that are photographs of the scene, of which it holds the indices");
         format!("{}\n", selected.index().ok_or_else(no_index)?)
     } else {
-        readable(&selected)
+        readable(&selected, job.sources.len())
     };
     match &arguments.output {
         Some(path) => {
@@ -122,8 +122,8 @@ fn is_selection(there: &[u8], new: &[u8]) -> bool {
     }
 }
 
-/// For a person.
-fn readable(selected: &SelectedSources) -> String {
+/// For a person. `source_count` sources were there to choose from: a share is one of their weight.
+fn readable(selected: &SelectedSources, source_count: usize) -> String {
     let mut rows = table(["target", "share", "sources and their weights"].map(str::to_owned));
     for target in selected.targets.iter().take(PRINTED) {
         let named = |(name, weight): (&String, &f32)| format!("{name} {weight:.3}");
@@ -135,12 +135,11 @@ fn readable(selected: &SelectedSources) -> String {
     let together = &selected.together;
     let [mean, least] = together.share;
     format!(
-        "{}, {}: {} of {} views\n{rows}\n{more}for all together: {} (share of the weight: mean {mean:.3}, least \
+        "{}, {}: {} of {source_count} sources\n{rows}\n{more}for all together: {} (share of the weight: mean {mean:.3}, least \
             {least:.3})\n",
         selected.scene,
         selected.weighting,
         together.indices.len(),
-        selected.views.len(),
         together.sources.join(", ")
     )
 }

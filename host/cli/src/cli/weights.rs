@@ -3,7 +3,7 @@
 use super::options::SourceOptions;
 use super::outputs::{keep_file_apart, keep_unlike};
 use super::path::PathOptions;
-use super::printing::{complain, say, warn_of};
+use super::printing::{complain, counted, say, warn_of};
 use super::table::table;
 use super::weighting::{many_help, open_all, or_every_scheme};
 use super::wrong::wrong;
@@ -157,6 +157,7 @@ fn print_table(
         let weight = |scheme| format!("{:.4}", weights.weights(scheme, index)[row]);
         rows.add_row(lead.into_iter().chain((0..weights.schemes.len()).map(weight)));
     }
-    say(format_args!("{}: target {}, {} sources", scene.path.display(), target.name, job.sources.len()))?;
+    let sources = counted(job.sources.len(), "source");
+    say(format_args!("{}: target {}, {sources}", scene.path.display(), target.name))?;
     say(format_args!("{rows}"))
 }
