@@ -67,7 +67,7 @@ use std::process::ExitCode;
 #[command(
     name = "viewfuse",
     version,
-    about = "Renders novel views of an object from a few posed photographs.",
+    about = "Renders novel views of a scene from a few photographs.",
     long_about = long_about(),
     after_help = "Exit code: 0 done, 1 the job failed, 2 wrong arguments, 130 interrupted.",
     max_term_width = 110
