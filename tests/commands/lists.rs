@@ -94,7 +94,7 @@ fn the_few_sources_of_a_target() {
     );
     // Another selection and other weights take the place of the first ones; a file that holds something else stays.
     for form in ["--lines", "--json", "--index", ""] {
-        for more in ["--count 3 --targets 20", "--count 2 --targets 20,21"] {
+        for more in ["--count 3 --targets 20", "--count 2 --targets 20,21", "--count 2 --targets 20 --weights mean"] {
             done(&folder, &format!("select toy {more} {form} -o again{form}"));
         }
     }

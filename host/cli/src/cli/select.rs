@@ -91,8 +91,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Whether a file is a selection in the form of another one: by the keys of JSON, the lines of a list, the first line of a
-/// table without its numbers.
+/// Whether a file is a selection in the form of another one: by the keys of JSON, the lines of a list, the header of a
+/// table and its first line without scene, scheme and numbers.
 fn is_selection(there: &[u8], new: &[u8]) -> bool {
     let keys = |text: &[u8]| -> Option<Vec<String>> {
         let whole: serde_json::Map<String, serde_json::Value> = serde_json::from_slice(text).ok()?;
@@ -103,10 +103,12 @@ fn is_selection(there: &[u8], new: &[u8]) -> bool {
     if let Some(new) = keys(new) {
         return keys(there) == Some(new);
     }
-    let first = |text: &[u8]| -> String {
-        let line = text.split(|byte| *byte == b'\n').next().unwrap_or_default();
-        let letters = |byte: &u8| !byte.is_ascii_digit() && !byte.is_ascii_whitespace();
-        String::from_utf8_lossy(line).bytes().filter(letters).map(char::from).collect()
+    let form = |text: &[u8]| -> Option<(String, String)> {
+        let text = String::from_utf8_lossy(text);
+        let mut lines = text.lines();
+        let counts = lines.next()?.rsplit(':').next()?.replace(|letter: char| letter.is_ascii_digit(), "");
+        let header: String = lines.nth(1)?.split_whitespace().collect();
+        Some((counts, header))
     };
     let is_list = |text: &[u8]| {
         let text = String::from_utf8_lossy(text);
@@ -118,7 +120,7 @@ fn is_selection(there: &[u8], new: &[u8]) -> bool {
     };
     match is_list(new) {
         true => is_list(there),
-        false => first(there) == first(new),
+        false => form(there) == form(new),
     }
 }
 
@@ -135,8 +137,8 @@ fn readable(selected: &SelectedSources, source_count: usize) -> String {
     let together = &selected.together;
     let [mean, least] = together.share;
     format!(
-        "{}, {}: {} of {source_count} sources\n{rows}\n{more}for all together: {} (share of the weight: mean {mean:.3}, least \
-            {least:.3})\n",
+        "{}, {}: {} of {source_count} sources\n{rows}\n{more}for all together: {} (share of the weight: mean \
+            {mean:.3}, least {least:.3})\n",
         selected.scene,
         selected.weighting,
         together.indices.len(),

@@ -13,7 +13,8 @@ use viewfuse_device::choice::{AnyDevice, Chosen};
 use viewfuse_job::progress::{Part, Progress};
 
 #[derive(Args)]
-#[command(after_help = "Example:\n  viewfuse verify tests/data/weighting.json tests/data/metrics/reference.safetensors\n\n\
+#[command(after_help = "Example:\n  \
+    viewfuse verify tests/data/weighting.json tests/data/metrics/reference.safetensors\n\n\
     Exit code 1 if a tolerance is exceeded.")]
 pub(crate) struct Arguments {
     /// Files of reference values: of weighting schemes and attention, metrics, PixelNeRF or GeNVS; the repository has
