@@ -78,6 +78,8 @@ fn tables_are_read_where_they_are_written(candidate: &Candidate) -> Result<(), F
         let tables = (0..20).map(|table| gpu.table(&values(table))).collect::<Result<Vec<_>, _>>()?;
         let tables: Vec<Buffer<f32>> = tables.into_iter().map(|table| table.expect("a short one")).collect();
         assert_eq!(gpu.submission_count(), before);
+        gpu.submit()?;
+        assert_eq!(gpu.submission_count(), before, "nothing is recorded");
         let sums = (1..tables.len())
             .map(|table| {
                 let sums = gpu.zeros::<f32>(length)?;
@@ -87,6 +89,8 @@ fn tables_are_read_where_they_are_written(candidate: &Candidate) -> Result<(), F
             })
             .collect::<Result<Vec<_>, VulkanError>>()?;
         drop(tables);
+        gpu.submit()?;
+        assert_eq!(gpu.submission_count(), before + 1, "the device begins");
         for (table, sums) in (1..).zip(&sums) {
             let expected: Vec<f32> = values(table - 1).iter().zip(values(table)).map(|(a, b)| a + b).collect();
             assert!(gpu.download(sums)? == expected, "tables of {length}");

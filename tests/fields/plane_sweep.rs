@@ -409,7 +409,7 @@ fn what_other_settings_found_changes_no_bit() {
     ];
     let field = |sweep: Sweep| TrainingFree { sweep, ..TrainingFree::default() };
     let drawn = |stage: &mut Stage<'_>, number: usize| {
-        let weights = without(4, if number % 3 == 0 { 3 } else { 4 }, 4);
+        let weights = without(4, if number.is_multiple_of(3) { 3 } else { 4 }, 4);
         let picture = stage.picture(&target, &weights, 0.0, &Silent).expect("a picture");
         (picture, stage.source_depths().expect("depths"))
     };

@@ -39,6 +39,10 @@ impl Gpu {
         if !(1..=INLINE).contains(&bytes.len()) {
             return Ok(None);
         }
+        self.with_state(|_, state| {
+            state.submissions.note(false);
+            Ok(())
+        })?;
         let mut memory = self.host_memory(bytes.len() as u64, MemoryLocation::CpuToGpu)?;
         memory.mapped().ok_or_else(|| self.hidden())?[..bytes.len()].copy_from_slice(bytes);
         Ok(Some(Buffer::new(Array::new(vec![memory], values.len(), values.len(), size_of::<T>()))))

@@ -70,9 +70,9 @@ pub trait Prepared<'a> {
     /// [`FieldError`].
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError>;
 
-    /// Goes on towards a picture as far as the host need not wait for the device, and asks for what it will wait for.
-    /// Returns whether there is nothing more to do before it is drawn; otherwise this is called again. What pictures of
-    /// several prepared sources asked for is waited for together.
+    /// Goes on towards a picture: waits for what the last call asked for, if it did, and asks the device for what it will
+    /// wait for next. Returns whether there is nothing more to ask for before it is drawn; otherwise this is called
+    /// again. What pictures of several prepared sources asked for is waited for together.
     ///
     /// # Errors
     /// [`FieldError`].

@@ -244,10 +244,13 @@ impl<'a> Session<'a> {
         let request = Request { camera, weights, views, early_termination };
         self.shares.clear();
         let Some(mixture) = self.mixture.clone() else { return self.prepared.render(&request, progress) };
-        // All of them go as far as they can, and are begun, before the first one is waited for.
-        for options in &mixture.parts {
-            self.go_on_with(options, weights, progress)?;
-            self.prepared.advance(&request, progress)?;
+        // All of them go as far as they can, and are begun, before the first one is waited for. The last one may need
+        // views that the others do not use, and find what these need otherwise: it goes on when they are begun.
+        if mixture.parts.iter().all(|part| part.encodes_alike(&self.current)) {
+            for options in mixture.parts.split_last().map_or(&[][..], |(_, others)| others) {
+                self.go_on_with(options, weights, progress)?;
+                self.prepared.advance(&request, progress)?;
+            }
         }
         let mut begun = Vec::with_capacity(mixture.parts.len());
         for options in &mixture.parts {

@@ -1,5 +1,6 @@
-//! [`Kernel::MeasureWindows`], [`Kernel::CompareWindows`], [`Kernel::ComparePixels`] and [`Kernel::SumShares`]: pictures against the second of two
-//! photographs, with holes and with silhouettes; windows end at all edges, and small pictures are smaller than one.
+//! [`Kernel::MeasureWindows`], [`Kernel::CompareWindows`], [`Kernel::ComparePixels`] and [`Kernel::SumShares`]: pictures
+//! against the second of two photographs, with holes and with silhouettes; windows end at all edges, and small pictures
+//! are smaller than one.
 
 use super::*;
 use crate::bounded::roundings;

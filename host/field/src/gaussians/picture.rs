@@ -59,7 +59,7 @@ pub struct Splatted<D: Device> {
     pub depths: D::Buffer<f32>,
 }
 
-/// How many entries the lists of a scene's pictures needed so far: the device does not tell before they are made.
+/// How many entries the lists of a scene's last picture needed: the device does not tell before they are made.
 #[derive(Debug, Default)]
 pub struct Room(Cell<usize>);
 
@@ -69,19 +69,23 @@ pub(super) const MIN_ENTRIES: usize = 4096;
 const MAX_ENTRIES: usize = 1 << 24;
 
 impl Room {
-    /// The entries that the next picture of so many Gaussians gets room for.
+    /// The entries that the next picture of so many Gaussians gets room for, at most those of a device.
     fn next(&self, gaussian_count: usize, most: usize) -> usize {
         let first = (gaussian_count * ENTRIES_A_GAUSSIAN).clamp(MIN_ENTRIES, MAX_ENTRIES);
-        first.min(most).max(self.0.get())
+        let last = self.0.get();
+        first.max(last + last / 4).min(most)
     }
 
-    /// Whether lists had room for their entries; the next ones will have. `None` is of lists that the host made.
-    fn sufficed(&self, status: Option<Later<'_, u32>>) -> Result<bool, DeviceError> {
-        let Some(status) = status else { return Ok(true) };
+    /// How many entries lists need that had no room for them; `None` where they had, and of lists that the host made.
+    fn missing(&self, status: Option<Later<'_, u32>>) -> Result<Option<usize>, DeviceError> {
+        let Some(status) = status else { return Ok(None) };
         let numbers = status.get()?;
         let status = ListStatus::of([0, 1, 2].map(|number| numbers.get(number).copied().unwrap_or(0)));
-        self.0.set(self.0.get().max(status.most as usize));
-        Ok(!status.is_over)
+        if status.is_over {
+            return Ok(Some(status.most as usize));
+        }
+        self.0.set(status.most as usize);
+        Ok(None)
     }
 }
 
@@ -192,20 +196,22 @@ impl<'d, D: Device> Splatter<'d, D> {
         Ok(Drawn { colours, depths, status: Some(device.download_later(&status)?) })
     }
 
-    /// The picture alone, its lists made where that is faster: both are the same lists.
+    /// The picture alone, its lists made where that is faster: both are the same lists. On the device they have room for
+    /// `needed` entries at the least, or it has not.
     fn drawn_usually(
         &self,
         gaussians: &D::Buffer<GaussianBlock>,
         gaussian_count: usize,
         camera: &CameraBlock,
         room: &Room,
+        needed: usize,
     ) -> Result<Drawn<'d, D>, DeviceError> {
         if self.device.is_software() || !can_be_listed(self.device, camera, gaussian_count) {
             let Splatted { colours, depths, .. } = self.picture(gaussians, gaussian_count, camera)?;
             return Ok(Drawn { colours, depths, status: None });
         }
         let capacity = room.next(gaussian_count, self.device.most_elements::<[u32; 2]>());
-        self.drawn(gaussians, gaussian_count, camera, capacity)
+        self.drawn(gaussians, gaussian_count, camera, capacity.max(needed))
     }
 
     /// Begins the picture from a camera: [`Splatter::rendered`] waits for it.
@@ -219,7 +225,19 @@ impl<'d, D: Device> Splatter<'d, D> {
         camera: &CameraBlock,
         room: &Room,
     ) -> Result<Begun<'d>, DeviceError> {
-        let Drawn { colours, depths, status } = self.drawn_usually(gaussians, gaussian_count, camera, room)?;
+        self.begin_within(gaussians, gaussian_count, camera, room, 0)
+    }
+
+    /// As [`Splatter::begin`], where so many entries are needed.
+    fn begin_within(
+        &self,
+        gaussians: &D::Buffer<GaussianBlock>,
+        gaussian_count: usize,
+        camera: &CameraBlock,
+        room: &Room,
+        needed: usize,
+    ) -> Result<Begun<'d>, DeviceError> {
+        let Drawn { colours, depths, status } = self.drawn_usually(gaussians, gaussian_count, camera, room, needed)?;
         let (colours, depths) = (self.device.download_later(&colours)?, self.device.download_later(&depths)?);
         Ok(Begun { camera: *camera, colours, depths, status })
     }
@@ -237,8 +255,8 @@ impl<'d, D: Device> Splatter<'d, D> {
         room: &Room,
         least_opacity: f32,
     ) -> Result<Rendered, DeviceError> {
-        while !room.sufficed(begun.status.take())? {
-            begun = self.begin(gaussians, gaussian_count, &begun.camera, room)?;
+        while let Some(needed) = room.missing(begun.status.take())? {
+            begun = self.begin_within(gaussians, gaussian_count, &begun.camera, room, needed)?;
         }
         let Begun { camera: CameraBlock { width, height, .. }, colours, depths, .. } = begun;
         let (mut colours, mut depths) = (colours.get()?, depths.get()?);
@@ -268,14 +286,19 @@ impl<'d, D: Device> Splatter<'d, D> {
         let CameraBlock { width, height, .. } = *camera;
         let pixel_count = width * height;
         let (mut shown, mut surfaces) = (device.zeros(pixel_count as usize)?, device.zeros(pixel_count as usize)?);
+        let mut needed = 0;
         loop {
-            let Drawn { colours, depths, status } = self.drawn_usually(gaussians, gaussian_count, camera, room)?;
+            let drawn = self.drawn_usually(gaussians, gaussian_count, camera, room, needed)?;
+            let Drawn { colours, depths, status } = drawn;
             device.show_pixels(&least_opacity, pixel_count, &colours, &depths, &mut shown, &mut surfaces)?;
             let (shown, surfaces) = (device.download_later(&shown)?, device.download_later(&surfaces)?);
-            if room.sufficed(status)? {
-                let pixels = shown.get()?.into_iter().map(bytes_of_pixel).collect();
-                return Ok(Rounded { pixels, depths: surfaces.get()?, width, height });
-            }
+            needed = match room.missing(status)? {
+                Some(needed) => needed,
+                None => {
+                    let pixels = shown.get()?.into_iter().map(bytes_of_pixel).collect();
+                    return Ok(Rounded { pixels, depths: surfaces.get()?, width, height });
+                }
+            };
         }
     }
 

@@ -80,8 +80,9 @@ impl<'d, D: Device> Resident<'d, D> {
     /// Takes what an iteration needs to the device, as far as it is not there.
     fn load(&mut self, course: &Course, plan: &Plan) -> Result<(), DeviceError> {
         let device = self.device;
-        if self.photographs.is_none() {
-            self.photographs = Some(Photographs::new(device, course)?);
+        if self.photographs.as_ref().is_none_or(|photographs| photographs.firsts[plan.level].is_empty()) {
+            self.photographs = None;
+            self.photographs = Some(Photographs::new(device, course, plan.level)?);
         }
         if self.gains.is_none() {
             self.gains = Some(stepped(device, course.gains.iter().copied())?);
@@ -197,6 +198,7 @@ impl<'d, D: Device> Resident<'d, D> {
                 break;
             }
             changes = true;
+            self.asked = None;
             self.pending.drain(..(status.done as usize).min(self.pending.len()));
             let most = status.most as usize;
             self.entries = None;

@@ -1,9 +1,7 @@
 //! Sources that show a silhouette: a visual hull from silhouettes, depths by plane sweep, colours by weighted
 //! fusion; the mathematics is in [`viewfuse_kernels::visual_hull`].
 
-use crate::{
-    AnyOptions, DepthMap, Drawing, Encoding, FieldError, Geometry, Options, Prepared, Rendered, Request, Variant,
-};
+use crate::{AnyOptions, DepthMap, Encoding, FieldError, Geometry, Options, Prepared, Rendered, Request, Variant};
 use std::ops::Range;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_device::{Device, HullScene, Pixels};
@@ -215,10 +213,6 @@ impl<'a, D: Device> Prepared<'a> for Views<'a, D> {
     }
 
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
-        self.draw(request, progress)?()
-    }
-
-    fn draw(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Drawing<'a>, FieldError> {
         let Views { device, whole, reduced, background, depths, .. } = self;
         let scene = &reduced.as_ref().unwrap_or(whole).scene;
         let depths = depths.as_mut().ok_or_else(|| FieldError::unsuitable(NotWeighed))?;
@@ -243,10 +237,8 @@ impl<'a, D: Device> Prepared<'a> for Views<'a, D> {
             progress.step();
         }
         let (colours, depths) = (device.download_later(&pixels.colours)?, device.download_later(&pixels.depths)?);
-        Ok(Box::new(move || {
-            let (colours, depths) = (colours.get()?, depths.get()?);
-            Ok(Rendered { colours, depths, confidences: Vec::new(), width, height })
-        }))
+        let (colours, depths) = (colours.get()?, depths.get()?);
+        Ok(Rendered { colours, depths, confidences: Vec::new(), width, height })
     }
 
     fn is_weighted(&self) -> bool {

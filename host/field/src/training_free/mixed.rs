@@ -215,6 +215,7 @@ impl<'a, D: Device> Prepared<'a> for Mixed<'a, D> {
     fn set(&mut self, options: &AnyOptions) -> Result<(), FieldError> {
         let Some(TrainingFree { hull, sweep, recipe, shown, .. }) = options.of() else { return Ok(()) };
         (self.recipe, self.shown) = (*recipe, *shown);
+        self.optimisation.take_if(|(of, _)| of != recipe);
         if *hull != self.hull {
             (self.hull, self.last) = (*hull, None);
         }

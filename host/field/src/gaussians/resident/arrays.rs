@@ -24,12 +24,12 @@ pub(in crate::gaussians) fn fits<D: Device>(device: &D, course: &Course) -> bool
     let count = course.recipe.max_count.max(course.particles.len());
     let terms = count * REST_COUNTS[course.recipe.degree.min(3) as usize] as usize;
     let pixels = |views: &Vec<LevelView>| views.iter().map(pixel_count).sum::<usize>();
-    let all_pixels = course.levels.iter().map(pixels).sum::<usize>();
+    let most_pixels = course.levels.iter().map(pixels).max().unwrap_or(0);
     let cameras = course.levels.iter().flatten().map(|view| &view.camera);
     count < MAX_GAUSSIANS.min(device.most_elements::<ParticleState>())
         && cameras.into_iter().all(|camera| can_be_listed(device, camera, count))
         && terms <= device.most_elements::<TermState>()
-        && all_pixels <= device.most_elements::<[f32; 4]>()
+        && most_pixels <= device.most_elements::<[f32; 4]>()
         && count * ENTRIES_A_GAUSSIAN <= device.most_elements::<SplatGradient>()
 }
 
@@ -73,9 +73,9 @@ pub(super) fn stepped<D: Device, T: Element + PartialEq>(
     Ok(Stepped { now, next: device.zeros(count)? })
 }
 
-/// The photographs at all levels.
+/// The photographs at all levels that have iterations, or at one where there is no room for all.
 pub(super) struct Photographs<D: Device> {
-    /// `[level][source]`: where its pixels begin.
+    /// `[level][source]`: where its pixels begin; nothing of a level that is not there.
     pub(super) firsts: Vec<Vec<u32>>,
     /// `[level][source][row][column]`: red, green, blue, opacity.
     pub(super) pixels: D::Buffer<[f32; 4]>,
@@ -85,22 +85,31 @@ pub(super) struct Photographs<D: Device> {
 }
 
 impl<D: Device> Photographs<D> {
-    pub(super) fn new(device: &D, course: &Course) -> Result<Photographs<D>, DeviceError> {
-        let views: Vec<&LevelView> = course.levels.iter().flatten().collect();
-        let count = views.iter().map(|view| pixel_count(view)).sum();
+    /// Those of a level, and of the others if there is room.
+    pub(super) fn new(device: &D, course: &Course, needed: usize) -> Result<Photographs<D>, DeviceError> {
+        let iterations = course.recipe.iterations.iter().rev();
+        let mut levels: Vec<usize> = iterations
+            .enumerate()
+            .filter(|(level, count)| *level == needed || **count > 0)
+            .map(|(level, _)| level)
+            .collect();
+        let count_of = |levels: &[usize]| levels.iter().flat_map(|level| &course.levels[*level]).map(pixel_count).sum();
+        if count_of(&levels) > device.most_elements::<[f32; 4]>() {
+            levels = vec![needed];
+        }
+        let count = count_of(&levels);
+        let views: Vec<&LevelView> = levels.iter().flat_map(|level| &course.levels[*level]).collect();
         let pixels = device.upload_owned(joined(&views, count))?;
         let (mut means, mut variances) = (device.zeros(count)?, device.zeros(count)?);
-        let (mut firsts, mut first) = (Vec::with_capacity(course.levels.len()), 0);
-        for level in &course.levels {
-            let mut of_level = Vec::with_capacity(level.len());
-            for view in level {
+        let (mut firsts, mut first) = (vec![Vec::new(); course.levels.len()], 0);
+        for level in levels {
+            for view in &course.levels[level] {
                 let CameraBlock { width, height, .. } = view.camera;
                 let photograph = LossBlock { width, height, first, ..LossBlock::default() };
                 device.measure_windows(&photograph, &pixels, &mut means, &mut variances)?;
-                of_level.push(first);
+                firsts[level].push(first);
                 first += width * height;
             }
-            firsts.push(of_level);
         }
         Ok(Photographs { firsts, pixels, means, variances })
     }

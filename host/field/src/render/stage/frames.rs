@@ -60,7 +60,7 @@ impl<'a> Stage<'a> {
         drawn.map_err(|error| self.error(error))
     }
 
-    /// Goes on towards the picture of [`Stage::draw`]; returns whether it can be drawn without waiting for the device.
+    /// Goes on towards the picture of [`Stage::draw`]; returns whether there is nothing more to ask for.
     pub(crate) fn advance(
         &mut self,
         weighting: &Weighting,
