@@ -3,9 +3,10 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use viewfuse::device::cpu::Cpu;
+use viewfuse::field::gaussians::Recipe;
 use viewfuse::field::render::{RenderError, RenderOptions, RenderRun, Stage, render, render_all};
-use viewfuse::field::training_free::{Cache, Sweep, TrainingFree};
-use viewfuse::field::{AnyOptions, DepthMap, On, Rendered};
+use viewfuse::field::training_free::{Cache, Shown, Sweep, TrainingFree};
+use viewfuse::field::{AnyOptions, DepthMap, Mixture, On, Rendered};
 use viewfuse::job::digest::{SEAL, sealed, sha256};
 use viewfuse::job::progress::{Progress, Silent};
 use viewfuse::scene::few_shot::{FewShot, Target};
@@ -433,6 +434,31 @@ fn what_other_settings_found_changes_no_bit() {
         });
         assert!(shared == fresh, "settings {number}");
     }
+}
+
+/// Gaussians begin with the depths of all sources, also where a mixture's other picture found those of some again.
+#[test]
+fn gaussians_of_a_mixture_begin_with_all_sources() {
+    let mut sources = wall([1.0; 3]);
+    sources.images.push(photograph(camera(Vec3::new(0.2, 0.2, 0.0), 72, 54), 1.0));
+    let (target, weights) = (camera(Vec3::ZERO, 72, 54), without(4, 3, 4));
+    let sweep = Sweep { front_share: 0.2, second_share: 0.03, ..Sweep::default() };
+    let recipe = Recipe { iterations: [0, 4, 4, 4], ..Recipe::default() };
+    let field = TrainingFree { sweep, recipe, ..TrainingFree::default() };
+    let gaussians = TrainingFree { shown: Shown::Gaussians, ..field.clone() };
+    let [sweeps, gaussians] = [field.clone(), gaussians].map(AnyOptions::new);
+    let mixture = Mixture::mean(vec![sweeps.clone(), gaussians.clone()]);
+    // Its Gaussians are those of the picture after it.
+    let [mixed, apart] = [Some(&mixture), None].map(|mixture| {
+        on_stage(&field, &sources, &Silent, |stage| {
+            for (options, mixture) in [(&sweeps, mixture), (&gaussians, None)] {
+                stage.vary(Some(options), mixture, &Silent).expect("settings");
+                stage.picture(&target, &weights, 0.0, &Silent).expect("a picture");
+            }
+            stage.picture(&target, &weights, 0.0, &Silent).expect("a picture")
+        })
+    });
+    assert!(mixed == apart);
 }
 
 /// A target of another shape than the size keeps its own, and that is said.
