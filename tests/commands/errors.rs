@@ -251,7 +251,7 @@ fn references_that_are_none() {
     refused("none.json", &["none.json: cannot be read: No such file"]);
     refused("toy/rgb/000000.png", &["toy/rgb/000000.png: neither JSON", "nor safetensors"]);
     let cases: [(&str, &[&str]); 5] = [
-        ("{}", &["cases"]),
+        ("{}", &["holds no reference values"]),
         (r#"{"cases": []}"#, &["holds no reference values"]),
         (r#"{"cases": [{"name": "c", "src": [[1, 2]], "tgt": [], "official": {}}]}"#, &["case 'c', src", "16 numbers"]),
         (r#"{"cases": [{"name": "c", "src": [], "tgt": [], "official": {}}]}"#, &["case 'c', tgt", "16 numbers"]),
